@@ -1,0 +1,42 @@
+# make run | make test | make build | make bench; everything is set up in .venv and install/.
+PYTHON ?= python3
+SHELL := /bin/bash
+
+VENV := .venv
+SOURCES := $(shell find cpg_ros config launch resource -type f -not -name '*.pyc') package.xml setup.py setup.cfg
+# A domain of our own, seen by this machine only; both can be overridden from outside.
+export ROS_DOMAIN_ID ?= 42
+export ROS_AUTOMATIC_DISCOVERY_RANGE ?= LOCALHOST
+# Where the build has put the package, for every command that uses it.
+ENTER := set -e; source install/setup.bash; \
+	export AMENT_PREFIX_PATH=$(CURDIR)/install/cpg_ros:$(CURDIR)/$(VENV)
+
+.PHONY: build run test bench clean
+
+build: install/.built
+
+run: install/.built
+	@$(ENTER); exec install/cpg_ros/lib/cpg_ros/generator $(ARGS)
+
+test: install/.built
+	@$(VENV)/bin/ruff check .
+	@$(VENV)/bin/mypy
+	@$(ENTER); exec $(VENV)/bin/python -m pytest test $(ARGS)
+
+bench: install/.built
+	@$(ENTER); for file in benchmarks/bench_*.py; do $(VENV)/bin/python $$file; done
+
+$(VENV)/.installed: requirements.txt
+	@test -d $(VENV) || $(PYTHON) -m venv $(VENV) || \
+		{ echo 'a virtual environment could not be made: install python3-venv' >&2; exit 1; }
+	@echo 'installing the dependencies into $(VENV) (the first time takes a few minutes)'
+	@$(VENV)/bin/python -m pip install --quiet --disable-pip-version-check -r requirements.txt
+	@touch $@
+
+install/.built: $(VENV)/.installed $(SOURCES)
+	@source $(VENV)/bin/activate; \
+		colcon --log-base log build --base-paths . --packages-select cpg_ros --event-handlers console_direct- 
+	@touch $@
+
+clean:
+	rm -rf build install log out $(VENV)

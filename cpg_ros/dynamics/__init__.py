@@ -1,0 +1,1 @@
+"""Time stepping, simulation, orbits, Hopf points and the moving pattern: no ROS in here."""

@@ -1,0 +1,67 @@
+"""Trigonometric collocation on one period: n odd, nodes theta_m = m / n, theta in cycles."""
+
+from functools import lru_cache
+
+import numpy as np
+
+
+@lru_cache(maxsize=16)
+def _tables(n: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Wave numbers 1..(n-1)/2, the circulant index table, and the derivative matrix."""
+    waves = np.arange(1, (n - 1) // 2 + 1)
+    index = (np.arange(n)[:, None] - np.arange(n)[None, :]) % n
+    return waves, index, _kernel(n, waves, 0.0)[1][index]
+
+
+def _kernel(n: int, waves: np.ndarray, shift: float) -> tuple[np.ndarray, np.ndarray]:
+    """Dirichlet kernel and its derivative at theta_m + shift, each of shape (n,)."""
+    angle = 2.0 * np.pi * np.outer(np.arange(n) / n + shift, waves)
+    return ((1.0 + 2.0 * np.cos(angle).sum(axis=1)) / n,
+            -4.0 * np.pi / n * (np.sin(angle) @ waves))
+
+
+def derivative_matrix(n: int) -> np.ndarray:
+    """Matrix of d/dtheta on nodal values, shape (n, n)."""
+    return _tables(n)[2]
+
+
+def shift_matrices(n: int, shift: float) -> tuple[np.ndarray, np.ndarray]:
+    """Matrices that take nodal values of u to those of u(theta + shift) and u'(theta + shift)."""
+    waves, index, _ = _tables(n)
+    value, slope = _kernel(n, waves, shift)
+    return value[index], slope[index]
+
+
+def evaluate(values: np.ndarray, theta: np.ndarray, order: int = 0,
+             shifts: np.ndarray | None = None) -> np.ndarray:
+    """Evaluate the interpolant, or its derivative of the given order in theta.
+
+    Args:
+        values: nodal values, shape (n,).
+        theta: where, in cycles, any shape.
+        order: 0 for the value, 1 and 2 for derivatives.
+        shifts: phases to add in turn, in cycles, shape (m,), or none.
+
+    Returns:
+        An array of shape theta.shape, or theta.shape + (m,) with shifts.
+
+    """
+    coefficients = np.fft.rfft(values) / values.size
+    coefficients[1:] *= 2.0
+    factor = 2j * np.pi * np.arange(coefficients.size)
+    coefficients *= factor**order
+    if shifts is not None:
+        coefficients = coefficients[:, None] * np.exp(np.outer(factor, shifts))
+    waves = np.exp(np.multiply.outer(np.asarray(theta, dtype=float), factor))
+    return (waves @ coefficients).real
+
+
+def tail(values: np.ndarray) -> float:
+    """Largest of the last six harmonics relative to the largest of all: how well it is resolved."""
+    size = np.abs(np.fft.rfft(values))
+    return float(size[-6:].max() / size.max())
+
+
+def resample(values: np.ndarray, n: int) -> np.ndarray:
+    """Nodal values on n nodes of the same interpolant."""
+    return evaluate(values, np.arange(n) / n)

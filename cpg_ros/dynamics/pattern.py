@@ -1,0 +1,316 @@
+"""The moving pattern: from programs to joint positions and velocities, tick by tick.
+
+A gait switch cross-fades two networks whose legs share one phase; a ramp scales the whole
+pattern between the stand (every joint at its offset) and the gait; a watchdog compares the
+network with its orbit. All three run on the pattern's own clock, which is slowed while they
+move whenever a joint would exceed the speed that the gaits themselves reach.
+"""
+
+import math
+from collections import deque
+
+import numpy as np
+
+from cpg_ros.dynamics.program import Program
+from cpg_ros.dynamics.readout import confine, observe
+
+#: Cross-fades and ramps are worked out at least this often (s), whatever the tick.
+SUBSTEP = 1e-3
+#: Most gaits fading into one another at once; a further one waits for a place.
+MOST_TRACKS = 4
+#: Off the orbit: a cell further away than this share of the peak, or the phase behind or ahead
+#: of the clock by this share of a cycle, for longer than this many strides.
+FAR, ASTRAY, PATIENCE = 0.3, 0.15, 0.5
+#: Strides the network gets to find its new gait by itself after a transition of 0 s.
+SETTLING = 40.0
+#: Such a transition starts with at least this share of the new gait in the state.
+KICK = 0.05
+#: Jumps of the network's output are absorbed over this time (s).
+ABSORB = 0.3
+
+
+def ease(s: float) -> tuple[float, float]:
+    """Smooth step from 0 to 1 and its derivative: 3 s^2 - 2 s^3."""
+    return s * s * (3.0 - 2.0 * s), 6.0 * s * (1.0 - s)
+
+
+class Track:
+    """A network running one program."""
+
+    def __init__(self, program: Program, transition: float) -> None:
+        self.transition = transition
+        self.progress = 0.0
+        self.angle = np.zeros(len(program.robot.joints))
+        self.rise = np.zeros_like(self.angle)
+        self.legs = np.zeros(len(program.robot.legs))
+        self.stepper = program.seed.copy()
+        self.settling = 0.0
+        self.follow(program)
+
+    def follow(self, program: Program) -> None:
+        """Read joints and judge health by this program from now on."""
+        self.program = program
+        orbit, robot = program.orbit, program.robot
+        self._view = (orbit.peak, orbit.period, robot.cells, program.weights, orbit.phases,
+                      robot.leg_cells, program.wave, program.lead, self.angle, self.rise,
+                      self.legs)
+        self._astray = 0.0
+        self._look()
+        self.phase = float(self.legs[0])
+
+    def align(self, phase: float) -> None:
+        """Bring the first leg to this phase, from the orbit's start."""
+        self.stepper.advance(phase % 1.0 * self.program.orbit.period)
+        self._look()
+        self.phase = float(self.legs[0])
+        self._astray = 0.0
+
+    def _look(self) -> float:
+        return observe(self.stepper.now, *self._view)
+
+    def advance(self, strides: float) -> bool:
+        """Advance by some strides; tell whether the network is still on its orbit."""
+        self.stepper.advance(strides * self.program.orbit.period)
+        distance = self._look()
+        error = (self.legs[0] - self.phase - strides + 0.5) % 1.0 - 0.5
+        # The clock follows the network's own phase within two strides.
+        self.phase = (self.phase + strides + min(1.0, 0.5 * strides) * error) % 1.0
+        if not math.isfinite(distance):
+            return False
+        if self.settling > 0.0:
+            self.settling -= strides
+            if distance < FAR / 3:
+                self.settling = 0.0
+            self.phase = float(self.legs[0])
+        elif distance > FAR or abs(error) > ASTRAY:
+            self._astray += strides
+        else:
+            self._astray = 0.0
+        return self._astray <= PATIENCE
+
+    def reseed(self) -> None:
+        """Put the network back on its orbit, at the phase the clock has."""
+        phase = self.phase if math.isfinite(self.phase) else 0.0
+        self.stepper = self.program.seed.copy()
+        self.settling = 0.0
+        self.align(phase)
+
+    def drift_to(self, program: Program) -> None:
+        """Take a program's parameters and leave the change to the network's own dynamics.
+
+        A gait in whose class the state has nothing, as between any two gaits on their exact
+        orbits, gets a small start; the lock would otherwise hold the network at rest.
+        """
+        orbit = program.orbit
+        self.stepper.set(orbit.network, program.gain, orbit.mode)
+        state, target = self.stepper.newest(), orbit(np.array(self.phase * orbit.period))
+        basis = orbit.mode.basis
+        if np.linalg.norm(basis @ state) < KICK * np.linalg.norm(basis @ target):
+            self.stepper.disturb(KICK * target)
+        self.stepper.advance(0.0)
+        self.follow(program)
+        self.settling = SETTLING
+
+
+class Pattern:
+    """Joint positions and velocities of a robot in its gait.
+
+    ``advance`` belongs to one thread; ``apply`` and ``enable`` may be called from another.
+
+    Attributes:
+        position, velocity: of each joint, rad and rad/s, leg by leg; overwritten by advance.
+        faults: times the watchdog had to put the network back on its orbit.
+        held: ticks in which a limit held a joint back.
+
+    """
+
+    def __init__(self, program: Program, ramp: float = 1.0, enabled: bool = True) -> None:
+        """Stand, then ramp into the program if enabled."""
+        robot = program.robot
+        self.robot = robot
+        self.faults = 0
+        self.held = 0
+        self._offset, self._lower = robot.column('offset'), robot.column('lower')
+        self._upper, self._limit = robot.column('upper'), robot.column('velocity')
+        self._requests: deque = deque()
+        self._tracks = [Track(program, 0.0)]
+        self._ramp = (0.0, 0.0, 0.0, 0.0)
+        self.restart(ramp, enabled)
+
+    def restart(self, ramp: float, enabled: bool = True) -> None:
+        """Begin anew from the stand at phase 0, with the newest program."""
+        newest = self._tracks[-1]
+        newest.phase = 0.0
+        newest.reseed()
+        self._tracks = [newest]
+        self.position, self.velocity = self._offset.copy(), np.zeros_like(self._offset)
+        self._wanted, self._rate = self.position.copy(), self.velocity.copy()
+        self._jump: tuple[np.ndarray, np.ndarray] | None = None
+        self._absorbed = ABSORB
+        self._slowing = 1.0
+        self._last_rate = self.velocity.copy()
+        # Level, its rate at the start, the level it goes to, and the time gone by.
+        self._level, self._level_rate = 0.0, 0.0
+        self._ramp = (0.0, 0.0, float(enabled), max(ramp, SUBSTEP))
+        self._ramped = 0.0
+        self.enabled = enabled
+
+    # -- asked from other threads ---------------------------------------------------------
+
+    def apply(self, program: Program, transition: float) -> None:
+        """Change to a program over a transition in s; 0 leaves it to the network's dynamics."""
+        prepared = Track(program, transition) if transition > 0.0 else None
+        self._requests.append((program, prepared))
+
+    def enable(self, enabled: bool, ramp: float) -> None:
+        """Ramp into the gait, or down to the stand, over a time in s."""
+        self._requests.append((enabled, max(ramp, SUBSTEP)))
+
+    @property
+    def program(self) -> Program:
+        """The newest program in force."""
+        return self._tracks[-1].program
+
+    @property
+    def phases(self) -> np.ndarray:
+        """Phase of each leg in cycles, shape (legs,); 0 is where its cell peaks."""
+        return self._tracks[-1].legs
+
+    @property
+    def level(self) -> float:
+        """0 at the stand, 1 in the full gait."""
+        return self._level
+
+    @property
+    def standing(self) -> bool:
+        """Tell whether it is disabled and the ramp has ended."""
+        return not self.enabled and self._level == 0.0 and not self._requests
+
+    @property
+    def in_transition(self) -> bool:
+        """Tell whether gaits are still fading into one another, or settling."""
+        return len(self._tracks) > 1 or self._tracks[-1].settling > 0.0
+
+    @property
+    def recovering(self) -> bool:
+        """Tell whether a jump after a fault is still being absorbed."""
+        return self._jump is not None
+
+    # -- the tick --------------------------------------------------------------------------
+
+    def advance(self, dt: float) -> None:
+        """Advance by dt in s and fill position, velocity and phases."""
+        if self._requests:
+            self._take_requests()
+        if len(self._tracks) == 1 and self._ramped >= self._ramp[3] and self._jump is None:
+            self._slowing = 1.0
+            self._step(dt)
+        else:
+            parts = max(1, math.ceil(dt / SUBSTEP - 1e-9))
+            for _ in range(parts):
+                self._step(dt / parts)
+        self.held += confine(self._wanted, self._rate, self._lower, self._upper, self._limit,
+                             dt, self.position, self.velocity) > 0
+
+    def _take_requests(self) -> None:
+        waiting = []
+        while self._requests:
+            what, how = self._requests.popleft()
+            if isinstance(what, bool):
+                self.enabled = what
+                self._ramp = (self._level, self._level_rate, float(what), how)
+                self._ramped = 0.0
+            elif how is None:
+                del self._tracks[:-1]
+                self._tracks[0].drift_to(what)
+                self._absorb()
+            elif len(self._tracks) < MOST_TRACKS:
+                how.align(self._tracks[-1].phase)
+                self._tracks.append(how)
+            else:
+                # Of those that wait, only the last one matters.
+                waiting = [(what, how)]
+        self._requests.extend(waiting)
+
+    def _absorb(self) -> None:
+        """Take note that the network's output jumps here; ``_step`` smooths it."""
+        self._jump, self._absorbed = None, 0.0
+
+    def _step(self, dt: float) -> None:
+        clock = dt * self._slowing
+        tracks = self._tracks
+        first = tracks[0]
+        frequency, moving = first.program.frequency, len(tracks) > 1
+        fades = []
+        if moving:
+            for track in tracks[1:]:
+                track.progress = min(1.0, track.progress + clock / track.transition)
+                share, rate = ease(track.progress)
+                fades.append((share, rate / track.transition))
+                frequency += share * (track.program.frequency - frequency)
+        for track in tracks:
+            if not track.advance(frequency * clock):
+                self.faults += 1
+                track.reseed()
+                self._absorb()
+
+        wanted, rate = first.angle, first.rise * frequency
+        for track, (share, share_rate) in zip(tracks[1:], fades, strict=True):
+            rate = (rate + share * (track.rise * frequency - rate)
+                    + share_rate * (track.angle - wanted))
+            wanted = wanted + share * (track.angle - wanted)
+        while len(tracks) > 1 and tracks[1].progress >= 1.0:
+            del tracks[0]
+
+        if self._ramped < self._ramp[3]:
+            moving = True
+            self._advance_ramp(clock)
+        if self._level != 1.0 or self._level_rate:
+            rate = self._level * rate + self._level_rate * wanted
+            wanted = self._level * wanted
+        if moving:
+            # The pattern slows where it would outrun the gaits, now or at the next substep.
+            bound = np.minimum(np.max([t.program.speed for t in tracks], axis=0), self._limit)
+            fastest = np.maximum(np.abs(rate), np.abs(2.0 * rate - self._last_rate))
+            self._last_rate = rate
+            self._slowing = 1.0 / max(1.0, float(np.max(fastest / np.maximum(bound, 1e-9))))
+            rate = self._slowing * rate
+        else:
+            self._slowing, self._last_rate = 1.0, rate
+
+        if self._absorbed < ABSORB:
+            wanted, rate = self._smooth(wanted + self._offset, rate, dt)
+            self._wanted[:], self._rate[:] = wanted, rate
+        else:
+            self._wanted[:] = wanted
+            self._wanted += self._offset
+            self._rate[:] = rate
+
+    def _advance_ramp(self, clock: float) -> None:
+        """Cubic from the level and rate at which the ramp began to its end, at rest."""
+        start, start_rate, end, time = self._ramp
+        self._ramped += clock
+        s = self._ramped / time
+        if s >= 1.0:
+            self._level, self._level_rate = end, 0.0
+            return
+        share, share_rate = ease(s)
+        level = start + share * (end - start) + s * (1.0 - s) ** 2 * time * start_rate
+        rate = share_rate * (end - start) / time + (1.0 - s) * (1.0 - 3.0 * s) * start_rate
+        self._level = min(1.0, max(0.0, level))
+        self._level_rate = rate if self._level == level else 0.0
+
+    def _smooth(self, wanted: np.ndarray, rate: np.ndarray, dt: float
+                ) -> tuple[np.ndarray, np.ndarray]:
+        """Add a difference that starts where the output was and dies out."""
+        if self._jump is None:
+            self._jump = (self._wanted + dt * self._rate - wanted, self._rate - rate)
+        self._absorbed += dt
+        s = min(1.0, self._absorbed / ABSORB)
+        share, share_rate = ease(s)
+        gap, gap_rate = self._jump
+        wanted = wanted + (1.0 - share) * gap + s * (1.0 - s) ** 2 * ABSORB * gap_rate
+        rate = rate - share_rate / ABSORB * gap + (1.0 - s) * (1.0 - 3.0 * s) * gap_rate
+        if s >= 1.0:
+            self._jump = None
+        return wanted, rate

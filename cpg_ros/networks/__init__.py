@@ -1,0 +1,1 @@
+"""The networks: equations, symmetry, gaits, and which cell drives which leg."""

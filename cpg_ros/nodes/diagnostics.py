@@ -1,0 +1,71 @@
+"""The generator's health, once a second on /diagnostics."""
+
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from rclpy.clock import Clock
+from rclpy.clock_type import ClockType
+from rclpy.node import Node
+
+from cpg_ros.dynamics.pattern import Pattern
+from cpg_ros.nodes.ticker import Ticker
+
+
+class Diagnostics:
+    """Reports ERROR from a fault until the pattern is back, at least once; WARN on lateness."""
+
+    def __init__(self, node: Node, pattern: Pattern, ticker: Ticker) -> None:
+        self._node, self._pattern, self._ticker = node, pattern, ticker
+        self._publisher = node.create_publisher(DiagnosticArray, '/diagnostics', 10)
+        self._before = self._counts()
+        self._seconds = 0
+        # On the steady clock: health is wanted when simulated time stands still, too.
+        self._clock = Clock(clock_type=ClockType.STEADY_TIME)
+        self._timer = node.create_timer(1.0, self.publish, clock=self._clock)
+
+    def _counts(self) -> dict[str, int]:
+        ticker, pattern = self._ticker, self._pattern
+        return {'ticks': ticker.ticks, 'late ticks': ticker.late,
+                'dropped ticks': ticker.dropped, 'watchdog re-seeds': pattern.faults,
+                'ticks held by limits': pattern.held}
+
+    def publish(self) -> None:
+        """Publish one status."""
+        counts, before, pattern = self._counts(), self._before, self._pattern
+        self._before = counts
+        new = {key: counts[key] - before[key] for key in counts}
+        program = pattern.program
+        if new['watchdog re-seeds'] or pattern.recovering:
+            level, text = DiagnosticStatus.ERROR, 'the network left its orbit and was re-seeded'
+            if program.gain == 0.0:
+                text += ' (symmetry_gain is 0: no gait is stable)'
+        elif new['dropped ticks']:
+            level, text = DiagnosticStatus.WARN, f'{new["dropped ticks"]} ticks dropped'
+        elif new['ticks held by limits']:
+            level, text = DiagnosticStatus.WARN, 'a joint limit held the pattern back'
+        elif 100 * new['late ticks'] > new['ticks']:
+            level, text = DiagnosticStatus.WARN, f'{new["late ticks"]} late ticks'
+        else:
+            level, text = DiagnosticStatus.OK, self._state()
+        values = {
+            'gait': program.name, 'state': self._state(), 'network': 'delayed',
+            'frequency [Hz]': f'{program.frequency:.6g}',
+            'period [model time]': f'{program.orbit.period:.8g}',
+            'symmetry gain [1/model time]': f'{program.gain:.4g}',
+            'rate wanted [Hz]': f'{self._ticker.rate:.6g}', 'ticks in the last second':
+            str(new['ticks']), **{key: str(value) for key, value in counts.items()},
+            'worst delay of a tick [ms]': f'{1e3 * self._ticker.worst:.3f}',
+        }
+        status = DiagnosticStatus(
+            level=level, name=f'{self._node.get_fully_qualified_name()}: pattern', message=text,
+            hardware_id=self._pattern.robot.name,
+            values=[KeyValue(key=key, value=value) for key, value in values.items()])
+        message = DiagnosticArray(status=[status])
+        message.header.stamp = self._node.get_clock().now().to_msg()
+        self._publisher.publish(message)
+
+    def _state(self) -> str:
+        pattern = self._pattern
+        if pattern.standing:
+            return 'standing'
+        if pattern.level < 1.0:
+            return 'ramping up' if pattern.enabled else 'ramping down'
+        return 'changing gait' if pattern.in_transition else 'running'

@@ -1,0 +1,283 @@
+"""The generator node: a central pattern generator that publishes joint states in real time."""
+
+import gc
+import signal
+import sys
+import threading
+import time
+import traceback
+from pathlib import Path
+
+import rclpy
+from ament_index_python.packages import PackageNotFoundError, get_package_share_directory
+from rcl_interfaces.msg import SetParametersResult
+from rclpy.exceptions import InvalidParameterTypeException, InvalidParameterValueException
+from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.logging import get_logger
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+from rclpy.qos import DurabilityPolicy, QoSProfile
+from rclpy.qos_overriding_options import QoSOverridingOptions
+from rclpy.signals import SignalHandlerOptions
+from std_msgs.msg import String
+from std_srvs.srv import SetBool
+
+from cpg_ros.dynamics.pattern import Pattern
+from cpg_ros.dynamics.program import Refused
+from cpg_ros.dynamics.warm import warm
+from cpg_ros.networks.delayed import PRESETS
+from cpg_ros.nodes.diagnostics import Diagnostics
+from cpg_ros.nodes.outputs import Outputs
+from cpg_ros.nodes.parameter_services import StrictParameterService
+from cpg_ros.nodes.settings import (COMMANDS, GAIT_NAMES, NETWORKS, SPECS, Planner, Settings, Spec,
+                                    as_doubles, network_specs, with_preset)
+from cpg_ros.nodes.ticker import Ticker
+from cpg_ros.robot import Robot, RobotError, load_robot
+
+NAME = 'cpg_generator'
+#: On SIGINT or SIGTERM the ramp takes this long, and the node ends by the later time, s.
+LAST_RAMP, LAST_DEADLINE = 0.5, 0.8
+
+
+class StartError(RuntimeError):
+    """The node cannot start; the message is one line for the user."""
+
+
+def find_robot(name: str) -> Robot:
+    """Load a robot file, or a shipped one by its bare name.
+
+    Raises:
+        StartError: there is no such file, or it cannot be used.
+
+    """
+    try:
+        if name.endswith(('.yaml', '.yml')) or '/' in name:
+            return load_robot(Path(name).expanduser())
+        config = Path(get_package_share_directory('cpg_ros')) / 'config'
+        path = config / f'{name}.yaml'
+        if not path.is_file():
+            shipped = ', '.join(sorted(file.stem for file in config.glob('*.yaml')))
+            raise StartError(f"robot '{name}' is neither a .yaml file nor one of: {shipped}")
+        return load_robot(path)
+    except (RobotError, PackageNotFoundError) as error:
+        raise StartError(str(error)) from error
+
+
+class Generator(Node):
+    """Parameters, topics and services around one moving pattern."""
+
+    def __init__(self) -> None:
+        """Declare everything, check it, and be ready to start.
+
+        Raises:
+            StartError: a parameter or the robot file cannot be used.
+
+        """
+        super().__init__(NAME, start_parameter_services=False)
+        self._parameter_service = StrictParameterService(self)
+        self._doubles: set[str] = set()
+        self.failure: BaseException | None = None
+        for name, spec in SPECS.items():
+            self._declare(name, spec)
+            if name == 'network':
+                self._one_of(name, NETWORKS)
+        self._one_of('gait', GAIT_NAMES)
+        self._one_of('command', COMMANDS)
+        for name, spec in network_specs(self._value('gait')).items():
+            self._declare(name, spec)
+
+        robot = find_robot(self._value('robot'))
+        if robot.network != self._value('network'):
+            raise StartError(f"robot file '{robot.name}' is for the network '{robot.network}', "
+                             f"not '{self._value('network')}'")
+        self._planner = Planner(robot)
+        try:
+            program = self._planner.plan(Settings.merged(self._values()))
+        except Refused as error:
+            raise StartError(str(error)) from error
+
+        self.pattern = Pattern(program, self._value('ramp'), self._value('autostart'))
+        self._outputs = Outputs(self, robot, self._value('combined_topic'),
+                                self._value('command'))
+        self._gait = self.create_publisher(
+            String, '~/gait',
+            QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL),
+            qos_overriding_options=QoSOverridingOptions.with_default_policies())
+        self.create_service(SetBool, '~/enable', self._enable)
+        self.ticker = Ticker(self, self._value('rate'), self._tick, self._restart, self._fail)
+        self._diagnostics = Diagnostics(self, self.pattern, self.ticker)
+        self.add_pre_set_parameters_callback(self._complete)
+        self.add_on_set_parameters_callback(self._judge)
+        self.add_post_set_parameters_callback(self._apply)
+        self.stop = threading.Event()
+
+    # -- parameters -----------------------------------------------------------------------
+
+    def _declare(self, name: str, spec: Spec) -> None:
+        override = self._parameter_overrides.get(name)
+        if isinstance(spec.default, float):
+            self._doubles.add(name)
+            if override is not None and override.type_ == Parameter.Type.INTEGER:
+                self._parameter_overrides[name] = as_doubles([override], {name})[0]
+        try:
+            self.declare_parameter(name, spec.default, spec.descriptor())
+        except InvalidParameterTypeException as error:
+            kind = type(spec.default).__name__
+            raise StartError(f'parameter {name} must be a {kind}, not '
+                             f'{self._parameter_overrides[name].value!r}') from error
+        except InvalidParameterValueException as error:
+            raise StartError(f'parameter {name}: {error}') from error
+
+    def _value(self, name: str):
+        return self.get_parameter(name).value
+
+    def _one_of(self, name: str, allowed: tuple[str, ...]) -> None:
+        if self._value(name) not in allowed:
+            raise StartError(f"{name} '{self._value(name)}' is not one of {', '.join(allowed)}")
+
+    def _values(self, changes: list[Parameter] | None = None) -> dict:
+        values = {name: self._value(name) for name in Settings.planned_names()}
+        values.update({p.name: p.value for p in changes or [] if p.name in values})
+        return values
+
+    def _complete(self, parameters: list[Parameter]) -> list[Parameter]:
+        return with_preset(as_doubles(parameters, self._doubles))
+
+    def _judge(self, parameters: list[Parameter]) -> SetParametersResult:
+        """Say whether a batch can run as a whole; changes nothing."""
+        if any(p.name in Settings.planned_names() for p in parameters):
+            try:
+                self._planner.plan(Settings.merged(self._values(parameters)))
+            except Refused as error:
+                return SetParametersResult(successful=False, reason=str(error))
+        return SetParametersResult(successful=True)
+
+    def _apply(self, parameters: list[Parameter]) -> None:
+        """Act on a batch that has been accepted and stored."""
+        for parameter in parameters:
+            if parameter.name == 'rate':
+                self.ticker.rate = parameter.value
+        if any(p.name in Settings.planned_names() for p in parameters):
+            program = self._planner.plan(Settings.merged(self._values()))
+            self.pattern.apply(program, self._value('transition'))
+            self._announce()
+
+    def _announce(self) -> None:
+        program = self._planner.plan(Settings.merged(self._values()))
+        self._gait.publish(String(data=program.name))
+        self.get_logger().info(f'{program.name} at {program.frequency:.4g} Hz, period '
+                               f'{program.orbit.period:.6f} model time, symmetry gain '
+                               f'{program.gain:.3g}')
+        if program.gain == 0.0:
+            self.get_logger().warning('symmetry_gain is 0: no gait is stable in the full '
+                                      'network, the watchdog will have to put it back')
+
+    # -- the robot ------------------------------------------------------------------------
+
+    def _enable(self, request: SetBool.Request, response: SetBool.Response) -> SetBool.Response:
+        ramp = self._value('ramp')
+        self.pattern.enable(request.data, ramp)
+        response.success = True
+        response.message = f'ramping {"up" if request.data else "down"} over {ramp:g} s'
+        self.get_logger().info(response.message)
+        return response
+
+    def _tick(self, dt: float, stamp: int) -> None:
+        self.pattern.advance(dt)
+        self._outputs.publish(stamp, dt, self.pattern.position, self.pattern.velocity,
+                              self.pattern.phases)
+
+    def _restart(self) -> None:
+        self.get_logger().warning('simulated time jumped back: starting again from the stand')
+        self.pattern.restart(self._value('ramp'), self.pattern.enabled)
+
+    def _fail(self, error: BaseException) -> None:
+        self.failure = error
+        self.get_logger().fatal('the publishing thread failed:\n'
+                                + ''.join(traceback.format_exception(error)))
+        self.stop.set()
+
+    def begin(self) -> None:
+        """Start publishing."""
+        self._announce()
+        names = len(self.pattern.robot.joints)
+        self.get_logger().info(f"publishing {names} joints of '{self.pattern.robot.name}' at "
+                               f'{self.ticker.rate:g} Hz')
+        self.ticker.start()
+
+    def finish(self) -> None:
+        """Ramp down to the stand, then stop publishing, within LAST_DEADLINE."""
+        began = time.monotonic()
+        if self.failure is None and not self.pattern.standing:
+            self.get_logger().info(f'ramping down over {LAST_RAMP:g} s before the end')
+            self.pattern.enable(False, LAST_RAMP)
+            while not self.pattern.standing and time.monotonic() < began + LAST_DEADLINE:
+                time.sleep(0.005)
+            time.sleep(min(0.05, 1.0 / self.ticker.rate))
+        self.ticker.end()
+        self.ticker.join(timeout=0.2)
+
+
+def compile_kernels() -> None:
+    """Compile or load the numerical kernels, saying so where it takes long."""
+    logger = get_logger(NAME)
+    began = time.monotonic()
+    notice = threading.Timer(1.0, logger.info, ['compiling the numerical kernels; only the very '
+                                                'first start needs this (about 20 s)'])
+    notice.daemon = True
+    notice.start()
+    warm()
+    notice.cancel()
+    if time.monotonic() - began > 1.0:
+        logger.info(f'compiled in {time.monotonic() - began:.1f} s')
+
+
+def _spin(executor: SingleThreadedExecutor, node: Generator) -> None:
+    """Serve parameters, services and timers until the executor is shut down."""
+    while not node.stop.is_set():
+        try:
+            executor.spin_once()
+        except ExternalShutdownException:
+            return
+        except Exception:
+            # One bad request must not end a node that moves a robot.
+            node.get_logger().error('a request failed:\n' + traceback.format_exc())
+
+
+def main(args: list[str] | None = None) -> int:
+    """Run the node until SIGINT or SIGTERM; return the exit code."""
+    def leave(*_: object) -> None:
+        raise SystemExit(0)
+
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, leave)
+    # The publishing thread must not wait long for one that computes in Python.
+    sys.setswitchinterval(2e-4)
+    rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
+    try:
+        compile_kernels()
+        node = Generator()
+    except StartError as error:
+        get_logger(NAME).fatal(str(error))
+        rclpy.shutdown()
+        return 1
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda *_: node.stop.set())
+    executor = SingleThreadedExecutor()
+    executor.add_node(node)
+    serving = threading.Thread(target=_spin, args=(executor, node), name='executor', daemon=True)
+    gc.collect()
+    gc.freeze()
+    node.begin()
+    serving.start()
+    # A bare wait() can miss a signal that another thread received.
+    while not node.stop.wait(0.2):
+        pass
+    node.finish()
+    executor.shutdown(timeout_sec=0.1)
+    rclpy.shutdown()
+    return 0 if node.failure is None else 1
+
+
+if __name__ == '__main__':
+    sys.exit(main())

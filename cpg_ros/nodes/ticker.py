@@ -1,0 +1,117 @@
+"""A thread that ticks on absolute deadlines, on the steady clock or on simulated time."""
+
+import threading
+import time
+from collections.abc import Callable
+
+from rclpy.clock import JumpThreshold
+from rclpy.duration import Duration
+from rclpy.node import Node
+
+#: Behind by more than this (s), as after a suspended process, ticks are dropped, not caught up:
+#: a robot must not be driven through a second of motion in a burst.
+MOST_BEHIND = 1.0
+
+
+class Ticker(threading.Thread):
+    """Calls ``tick(dt, stamp)`` once a period, dt in s and the stamp in ns of ROS time.
+
+    A late tick is made up for at once and the deadlines stay where they were, so the rate has
+    no drift and no period is left out. The stamp is that of the deadline. With simulated time
+    the deadlines are instants of ``/clock``: it pauses with the clock, and a jump back calls
+    ``restart``.
+
+    Attributes:
+        ticks: ticks so far.
+        late: those that began more than a period after their deadline.
+        dropped: periods left out after being behind by more than MOST_BEHIND.
+        worst: longest delay behind a deadline since it was last read, s.
+
+    """
+
+    def __init__(self, node: Node, rate: float, tick: Callable[[float, int], None],
+                 restart: Callable[[], None], failed: Callable[[BaseException], None]) -> None:
+        super().__init__(name='ticker', daemon=True)
+        self.rate = rate
+        self.ticks = self.late = self.dropped = 0
+        self._worst = 0.0
+        self._clock = node.get_clock()
+        self._tick, self._restart, self._failed = tick, restart, failed
+        self._ending = threading.Event()
+        self._moved = threading.Event()
+        threshold = JumpThreshold(min_forward=Duration(nanoseconds=1),
+                                  min_backward=Duration(nanoseconds=-1))
+        self._jumps = self._clock.create_jump_callback(
+            threshold, post_callback=lambda _: self._moved.set())
+
+    @property
+    def worst(self) -> float:
+        """Longest delay behind a deadline since this was last read, s."""
+        worst, self._worst = self._worst, 0.0
+        return worst
+
+    def end(self) -> None:
+        """Stop after the tick under way."""
+        self._ending.set()
+        self._moved.set()
+
+    def run(self) -> None:
+        """Tick until ended; hand any exception to ``failed``."""
+        try:
+            while not self._ending.is_set():
+                if self._clock.ros_time_is_active:
+                    self._run_simulated()
+                else:
+                    self._run_steady()
+        except BaseException as error:
+            self._failed(error)
+
+    def _period(self) -> int:
+        return round(1e9 / self.rate)
+
+    def _run_steady(self) -> None:
+        deadline = time.monotonic_ns()
+        ending, clock = self._ending, self._clock
+        while not ending.is_set() and not clock.ros_time_is_active:
+            period = self._period()
+            deadline += period
+            behind = time.monotonic_ns() - deadline
+            if behind < 0:
+                time.sleep(-behind * 1e-9)
+                behind = time.monotonic_ns() - deadline
+            deadline += self._note(behind, period)
+            self._tick(period * 1e-9, clock.now().nanoseconds - (time.monotonic_ns() - deadline))
+
+    def _run_simulated(self) -> None:
+        deadline = last = 0
+        while not self._ending.is_set() and self._clock.ros_time_is_active:
+            self._moved.wait()
+            self._moved.clear()
+            now = self._clock.now().nanoseconds
+            if now == 0:
+                continue
+            if deadline == 0 or now < last:
+                if deadline:
+                    self._restart()
+                deadline = now
+            last = now
+            while not self._ending.is_set() and deadline + self._period() <= now:
+                period = self._period()
+                deadline += period
+                if now - deadline > MOST_BEHIND * 1e9:
+                    self.dropped += (now - deadline) // period
+                    deadline += (now - deadline) // period * period
+                self.ticks += 1
+                self._tick(period * 1e-9, deadline)
+
+    def _note(self, behind: int, period: int) -> int:
+        """Count a tick and its lateness, ns; return how far the deadline must leap."""
+        self.ticks += 1
+        self._worst = max(self._worst, behind * 1e-9)
+        if behind > period:
+            self.late += 1
+        if behind <= MOST_BEHIND * 1e9:
+            return 0
+        leap = behind // period * period
+        self.dropped += leap // period
+        return leap

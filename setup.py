@@ -1,0 +1,24 @@
+from glob import glob
+
+from setuptools import find_packages, setup
+
+setup(
+    name='cpg_ros',
+    version='0.1.0',
+    packages=find_packages(include=['cpg_ros', 'cpg_ros.*']),
+    data_files=[
+        ('share/ament_index/resource_index/packages', ['resource/cpg_ros']),
+        ('share/cpg_ros', ['package.xml']),
+        ('share/cpg_ros/config', glob('config/*.yaml')),
+        ('share/cpg_ros/launch', glob('launch/*.launch.py')),
+    ],
+    python_requires='>=3.10',
+    install_requires=['setuptools', 'numpy', 'scipy', 'numba', 'matplotlib', 'PyYAML'],
+    extras_require={'test': ['pytest', 'hypothesis', 'jitcdde']},
+    zip_safe=False,
+    maintainer='cpg_ros maintainers',
+    maintainer_email='maintainers@cpg-ros.example',
+    description='Central pattern generators for legged robots on ROS 2',
+    license='Apache-2.0',
+    entry_points={'console_scripts': ['generator = cpg_ros.nodes.generator:main']},
+)
