@@ -18,13 +18,14 @@ COMMAND_TOPICS = {'joint_trajectory': 'joint_trajectory_controller/joint_traject
                   'forward_position': 'forward_position_controller/commands'}
 
 
-def zeros(n: int) -> tuple[array, np.ndarray]:
-    """Return a message field of n doubles and a numpy view of the same memory.
+def view_of(message: object, field: str, n: int) -> np.ndarray:
+    """Give a message's field n zeros and return a numpy view of the memory it publishes from.
 
-    rclpy keeps an array('d') as it is, so what is written to the view is what is published.
+    The view is taken from the field as stored: rclpy copies what is assigned or not, depending
+    on whether it checks fields.
     """
-    field = array('d', bytes(8 * n))
-    return field, np.frombuffer(field, dtype=float)
+    setattr(message, field, array('d', bytes(8 * n)))
+    return np.frombuffer(getattr(message, field), dtype=float)
 
 
 class Outputs:
@@ -35,7 +36,9 @@ class Outputs:
         self._order = np.array([joints.index(name) for name in robot.order])
         self._stamps: list = []
         self._publish: list = []
-        self._copies: list = []
+        # Views of the messages' memory, and which joints go there.
+        self._positions: list[tuple[np.ndarray, slice | np.ndarray]] = []
+        self._velocities: list[tuple[np.ndarray, slice | np.ndarray]] = []
         self._node = node
 
         start = 0
@@ -46,9 +49,8 @@ class Outputs:
         if combined_topic:
             self._joint_state(combined_topic, list(robot.order), self._order)
 
-        field, self._phases = zeros(len(robot.legs))
         phases = Float64MultiArray()
-        phases.data = field
+        self._phases = view_of(phases, 'data', len(robot.legs))
         phases.layout.dim = [MultiArrayDimension(label=','.join(robot.legs), stride=1,
                                                  size=len(robot.legs))]
         self._add(Float64MultiArray, '~/phase', phases)
@@ -56,13 +58,9 @@ class Outputs:
         if command == 'joint_trajectory':
             self._trajectory(robot.order)
         elif command == 'forward_position':
-            field, view = zeros(len(robot.order))
-            self._copies.append((view, self._order, 'position'))
-            positions = Float64MultiArray()
-            positions.data = field
-            self._add(Float64MultiArray, COMMAND_TOPICS[command], positions)
-        self._positions = [(v, k) for v, k, what in self._copies if what == 'position']
-        self._velocities = [(v, k) for v, k, what in self._copies if what == 'velocity']
+            message = Float64MultiArray()
+            self._positions.append((view_of(message, 'data', len(joints)), self._order))
+            self._add(Float64MultiArray, COMMAND_TOPICS[command], message)
 
     def _add(self, kind: type, topic: str, message: object) -> None:
         publisher = self._node.create_publisher(
@@ -71,23 +69,17 @@ class Outputs:
         self._publish.append((publisher.publish, message))
 
     def _joint_state(self, topic: str, names: list[str], part: slice | np.ndarray) -> None:
-        position, position_view = zeros(len(names))
-        velocity, velocity_view = zeros(len(names))
         message = JointState(name=names)
-        # Assigned, because the constructor would copy them.
-        message.position, message.velocity = position, velocity
-        self._copies += [(position_view, part, 'position'), (velocity_view, part, 'velocity')]
+        self._positions.append((view_of(message, 'position', len(names)), part))
+        self._velocities.append((view_of(message, 'velocity', len(names)), part))
         self._stamps.append(message.header.stamp)
         self._add(JointState, topic, message)
 
     def _trajectory(self, names: tuple[str, ...]) -> None:
         """One point a message, reached a period after it: stamp 0 means from now."""
-        position, position_view = zeros(len(names))
-        velocity, velocity_view = zeros(len(names))
-        self._copies += [(position_view, self._order, 'position'),
-                         (velocity_view, self._order, 'velocity')]
         self._point = JointTrajectoryPoint()
-        self._point.positions, self._point.velocities = position, velocity
+        self._positions.append((view_of(self._point, 'positions', len(names)), self._order))
+        self._velocities.append((view_of(self._point, 'velocities', len(names)), self._order))
         message = JointTrajectory(joint_names=list(names))
         message.points = [self._point]
         self._add(JointTrajectory, COMMAND_TOPICS['joint_trajectory'], message)
