@@ -6,7 +6,7 @@ peak, y the derivative of that by phase (in radians), psi = x, y, x^2, x y, x^3,
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Set
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -109,8 +109,8 @@ class _Reader:
     def fail(self, where: str, why: str) -> RobotError:
         return RobotError(f'robot file {self.path}: {where}: {why}')
 
-    def keys(self, tree: Any, where: str, required: set[str], optional: set[str] = frozenset()
-             ) -> Mapping[str, Any]:  # type: ignore[assignment]
+    def keys(self, tree: Any, where: str, required: Set[str], optional: Set[str] = frozenset()
+             ) -> Mapping[str, Any]:
         if not isinstance(tree, Mapping):
             raise self.fail(where, f'must be a mapping, not {_shown(tree)}')
         for key in tree:

@@ -1,10 +1,11 @@
 """Start the generator: ros2 launch cpg_ros generator.launch.py gait:=walk robot:=goat."""
 
-from launch import LaunchDescription
 from launch.actions import DeclareLaunchArgument
 from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
 from launch_ros.parameter_descriptions import ParameterValue
+
+from launch import LaunchDescription
 
 # Argument -> (default, type, what it is); each sets the parameter of the same name.
 ARGUMENTS = {

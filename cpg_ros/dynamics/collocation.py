@@ -57,7 +57,7 @@ def evaluate(values: np.ndarray, theta: np.ndarray, order: int = 0,
 
 
 def tail(values: np.ndarray) -> float:
-    """Largest of the last six harmonics relative to the largest of all: how well it is resolved."""
+    """Largest of the last six harmonics over the largest of all: how well it is resolved."""
     size = np.abs(np.fft.rfft(values))
     return float(size[-6:].max() / size.max())
 

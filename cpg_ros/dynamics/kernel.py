@@ -58,7 +58,10 @@ def field(kind, x, k, weight, driven, p, gain, basis, lanes, work, out):
 
 @jit
 def past_state(x, after, before, head, c, tau, step, first, stride, out):
-    """State at t_head + c step - tau, for tau >= c step: cubic Hermite, every stride-th component."""
+    """State at t_head + c step - tau, for tau >= c step, by the cubic Hermite interpolant.
+
+    Only every stride-th component from first on is filled in.
+    """
     back = tau / step - c
     nodes = max(1, math.ceil(back))
     start = head - nodes

@@ -12,19 +12,13 @@ from collections import deque
 import numpy as np
 
 from cpg_ros.dynamics.program import Program
-from cpg_ros.dynamics.readout import confine, observe
+from cpg_ros.dynamics.readout import confine
+from cpg_ros.dynamics.track import Track
 
 #: Cross-fades and ramps are worked out at least this often (s), whatever the tick.
 SUBSTEP = 1e-3
 #: Most gaits fading into one another at once; a further one waits for a place.
 MOST_TRACKS = 4
-#: Off the orbit: a cell further away than this share of the peak, or the phase behind or ahead
-#: of the clock by this share of a cycle, for longer than this many strides.
-FAR, ASTRAY, PATIENCE = 0.3, 0.15, 0.5
-#: Strides the network gets to find its new gait by itself after a transition of 0 s.
-SETTLING = 40.0
-#: Such a transition starts with at least this share of the new gait in the state.
-KICK = 0.05
 #: Jumps of the network's output are absorbed over this time (s).
 ABSORB = 0.3
 
@@ -32,84 +26,6 @@ ABSORB = 0.3
 def ease(s: float) -> tuple[float, float]:
     """Smooth step from 0 to 1 and its derivative: 3 s^2 - 2 s^3."""
     return s * s * (3.0 - 2.0 * s), 6.0 * s * (1.0 - s)
-
-
-class Track:
-    """A network running one program."""
-
-    def __init__(self, program: Program, transition: float) -> None:
-        self.transition = transition
-        self.progress = 0.0
-        self.angle = np.zeros(len(program.robot.joints))
-        self.rise = np.zeros_like(self.angle)
-        self.legs = np.zeros(len(program.robot.legs))
-        self.stepper = program.seed.copy()
-        self.settling = 0.0
-        self.follow(program)
-
-    def follow(self, program: Program) -> None:
-        """Read joints and judge health by this program from now on."""
-        self.program = program
-        orbit, robot = program.orbit, program.robot
-        self._view = (orbit.peak, orbit.period, robot.cells, program.weights, orbit.phases,
-                      robot.leg_cells, program.wave, program.lead, self.angle, self.rise,
-                      self.legs)
-        self._astray = 0.0
-        self._look()
-        self.phase = float(self.legs[0])
-
-    def align(self, phase: float) -> None:
-        """Bring the first leg to this phase, from the orbit's start."""
-        self.stepper.advance(phase % 1.0 * self.program.orbit.period)
-        self._look()
-        self.phase = float(self.legs[0])
-        self._astray = 0.0
-
-    def _look(self) -> float:
-        return observe(self.stepper.now, *self._view)
-
-    def advance(self, strides: float) -> bool:
-        """Advance by some strides; tell whether the network is still on its orbit."""
-        self.stepper.advance(strides * self.program.orbit.period)
-        distance = self._look()
-        error = (self.legs[0] - self.phase - strides + 0.5) % 1.0 - 0.5
-        # The clock follows the network's own phase within two strides.
-        self.phase = (self.phase + strides + min(1.0, 0.5 * strides) * error) % 1.0
-        if not math.isfinite(distance):
-            return False
-        if self.settling > 0.0:
-            self.settling -= strides
-            if distance < FAR / 3:
-                self.settling = 0.0
-            self.phase = float(self.legs[0])
-        elif distance > FAR or abs(error) > ASTRAY:
-            self._astray += strides
-        else:
-            self._astray = 0.0
-        return self._astray <= PATIENCE
-
-    def reseed(self) -> None:
-        """Put the network back on its orbit, at the phase the clock has."""
-        phase = self.phase if math.isfinite(self.phase) else 0.0
-        self.stepper = self.program.seed.copy()
-        self.settling = 0.0
-        self.align(phase)
-
-    def drift_to(self, program: Program) -> None:
-        """Take a program's parameters and leave the change to the network's own dynamics.
-
-        A gait in whose class the state has nothing, as between any two gaits on their exact
-        orbits, gets a small start; the lock would otherwise hold the network at rest.
-        """
-        orbit = program.orbit
-        self.stepper.set(orbit.network, program.gain, orbit.mode)
-        state, target = self.stepper.newest(), orbit(np.array(self.phase * orbit.period))
-        basis = orbit.mode.basis
-        if np.linalg.norm(basis @ state) < KICK * np.linalg.norm(basis @ target):
-            self.stepper.disturb(KICK * target)
-        self.stepper.advance(0.0)
-        self.follow(program)
-        self.settling = SETTLING
 
 
 class Pattern:
@@ -245,8 +161,8 @@ class Pattern:
         if moving:
             for track in tracks[1:]:
                 track.progress = min(1.0, track.progress + clock / track.transition)
-                share, rate = ease(track.progress)
-                fades.append((share, rate / track.transition))
+                share, share_rate = ease(track.progress)
+                fades.append((share, share_rate / track.transition))
                 frequency += share * (track.program.frequency - frequency)
         for track in tracks:
             if not track.advance(frequency * clock):

@@ -22,7 +22,7 @@ def progress_bar(what: str, total: int, enabled: bool = True) -> Iterator[Callab
     def update(done: int) -> None:
         nonlocal shown
         spent = time.monotonic() - started
-        if not enabled or spent < PATIENCE or done >= total and shown < 0:
+        if not enabled or spent < PATIENCE or (done >= total and shown < 0):
             return
         share = done / total
         mark = int(share * (100 if live else 10))

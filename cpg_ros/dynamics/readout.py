@@ -5,7 +5,7 @@ import math
 import numpy as np
 from numba import njit
 
-from cpg_ros.networks.jit import OPTIONS, sources_digest
+from cpg_ros.networks.jit import OPTIONS, jit, sources_digest
 
 #: Entries of the tables over one cycle.
 TABLE = 512
@@ -13,18 +13,19 @@ TABLE = 512
 TURN = 2.0 * math.pi
 
 
+@jit
+def lookup(table, cycles):
+    """Periodic table with linear interpolation, at a place in cycles."""
+    place = (cycles - math.floor(cycles)) * table.shape[0]
+    low = int(place)
+    rest = place - low
+    low = low if low < table.shape[0] else 0
+    high = low + 1 if low + 1 < table.shape[0] else 0
+    return table[low] + rest * (table[high] - table[low])
+
+
 def _cached(digest):
     """Build the cached entry points; see sources_digest for why they are closures."""
-
-    @njit(cache=True, **OPTIONS)
-    def lookup(table, cycles):
-        """Periodic table with linear interpolation, at a place in cycles."""
-        place = (cycles - math.floor(cycles)) * table.shape[0]
-        low = int(place)
-        rest = place - low
-        low = low if low < table.shape[0] else 0
-        high = low + 1 if low + 1 < table.shape[0] else 0
-        return table[low] + rest * (table[high] - table[low])
 
     @njit(cache=True, **OPTIONS)
     def observe(now, peak, period, cells, weights, phases, leg_cells, wave, lead, angle, rise,
@@ -33,15 +34,16 @@ def _cached(digest):
 
         Args:
             now: x, x', x'' of the cells, shape (3, cells).
-            peak, period: of the gait's orbit.
-            cells, weights: cell and readout weights of each joint, shapes (joints,) and
-                (joints, 6), in rad.
+            peak: largest value of a cell on the gait's orbit.
+            period: of the orbit, model time.
+            cells: the cell behind each joint, shape (joints,).
+            weights: readout weights of each joint in rad, shape (joints, 6).
             phases: phase of each cell in the gait.
             leg_cells: the cell that gives each leg's phase.
             wave: normalised waveform over the cycle.
             lead: phase minus angle, both in cycles, as a function of the angle.
-            angle, rise: filled with the joints' deviation from their offset (rad) and its
-                derivative by phase (rad per cycle).
+            angle: filled with the joints' deviation from their offset, rad.
+            rise: filled with its derivative by phase, rad per cycle.
             leg_phases: filled with the legs' phases in cycles, [0, 1).
 
         Returns:
@@ -106,8 +108,8 @@ def lead_table(x: np.ndarray, y: np.ndarray) -> np.ndarray:
     """Tabulate phase minus angle over the angle, from a closed curve sampled evenly in phase.
 
     Args:
-        x, y: normalised state and its derivative by phase in radians, shape (m,), starting at
-            phase 0 where y = 0 and x > 0. The angle is atan2(-y, x).
+        x: normalised state, shape (m,), from phase 0 where it peaks.
+        y: its derivative by phase in radians, shape (m,). The angle is atan2(-y, x).
 
     Raises:
         ValueError: the curve does not turn steadily about the origin, so that its angle does

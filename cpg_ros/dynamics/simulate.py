@@ -154,22 +154,22 @@ def simulate(network: Delayed | Sequence[Delayed], history: History | Sequence[H
             x[block, :nodes, :, lane] = states
             after[block, :nodes, :, lane] = before[block, :nodes, :, lane] = slopes
     flat = [array.reshape(*array.shape[:2], cells * lanes) for array in (x, after, before)]
-    p = p.reshape(blocks, -1, cells * lanes)
+    flat_p = p.reshape(blocks, -1, cells * lanes)
     gain, basis = (0.0, np.zeros((1, cells))) if lock is None else (lock[0], lock[1].basis)
 
     head = nodes - 1
     for block in range(blocks):
-        kernel.set_slope(kind, p[block], tau[block], gain, basis, step,
+        kernel.set_slope(kind, flat_p[block], tau[block], gain, basis, step,
                          *(array[block] for array in flat), head)
     with progress_bar('simulating', steps, enabled=progress) as bar:
         done = 0
         while done < steps:
             chunk = min(steps - done, max(1, CHUNK // x[:, 0].size))
             if blocks == 1:
-                kernel.integrate(kind, p[0], tau[0], gain, basis, step,
+                kernel.integrate(kind, flat_p[0], tau[0], gain, basis, step,
                                  *(array[0] for array in flat), head, chunk, noise, seed + done)
             else:
-                kernel.integrate_many(kind, p, tau, gain, basis, step, *flat, head, chunk,
+                kernel.integrate_many(kind, flat_p, tau, gain, basis, step, *flat, head, chunk,
                                       noise, seed + done)
             head, done = head + chunk, done + chunk
             bar(done)

@@ -3,13 +3,14 @@
 import hashlib
 import math
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numba import njit
 
 #: No division checks (they keep loops from being vectorised), fused multiply-add allowed,
 #: and the interpreter lock released: the publishing thread must not wait for parameters.
-OPTIONS = {'error_model': 'numpy', 'fastmath': {'contract'}, 'nogil': True}
+OPTIONS: dict[str, Any] = {'error_model': 'numpy', 'fastmath': {'contract'}, 'nogil': True}
 
 jit = njit(**OPTIONS)
 

@@ -25,12 +25,21 @@ from std_srvs.srv import SetBool
 from cpg_ros.dynamics.pattern import Pattern
 from cpg_ros.dynamics.program import Refused
 from cpg_ros.dynamics.warm import warm
-from cpg_ros.networks.delayed import PRESETS
 from cpg_ros.nodes.diagnostics import Diagnostics
 from cpg_ros.nodes.outputs import Outputs
 from cpg_ros.nodes.parameter_services import StrictParameterService
-from cpg_ros.nodes.settings import (COMMANDS, GAIT_NAMES, NETWORKS, SPECS, Planner, Settings, Spec,
-                                    as_doubles, network_specs, with_preset)
+from cpg_ros.nodes.settings import (
+    COMMANDS,
+    GAIT_NAMES,
+    NETWORKS,
+    SPECS,
+    Planner,
+    Settings,
+    Spec,
+    as_doubles,
+    network_specs,
+    with_preset,
+)
 from cpg_ros.nodes.ticker import Ticker
 from cpg_ros.robot import Robot, RobotError, load_robot
 

@@ -3,6 +3,7 @@
 import threading
 import time
 from collections.abc import Callable
+from typing import Any
 
 from rclpy.clock import JumpThreshold
 from rclpy.duration import Duration
@@ -35,7 +36,7 @@ class Ticker(threading.Thread):
         self.rate = rate
         self.ticks = self.late = self.dropped = 0
         self._worst = 0.0
-        self._clock = node.get_clock()
+        self._clock: Any = node.get_clock()
         self._tick, self._restart, self._failed = tick, restart, failed
         self._ending = threading.Event()
         self._moved = threading.Event()
