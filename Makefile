@@ -21,7 +21,7 @@ run: install/.built
 test: install/.built
 	@$(VENV)/bin/ruff check .
 	@$(VENV)/bin/mypy
-	@$(ENTER); exec $(VENV)/bin/python -m pytest test $(ARGS)
+	@$(ENTER); exec $(VENV)/bin/pytest test $(ARGS)
 
 bench: install/.built
 	@$(ENTER); for file in benchmarks/bench_*.py; do $(VENV)/bin/python $$file; done

@@ -84,6 +84,16 @@ class _Scaled:
         return self.factor * self.orbit.derivative(times)
 
 
+def _highest(values: np.ndarray) -> np.ndarray:
+    """Maximum of each row, a periodic function on TABLE points: the parabola through the top."""
+    top = values.argmax(axis=1)
+    rows = np.arange(len(values))
+    before, here, after = (values[rows, (top + k) % values.shape[1]] for k in (-1, 0, 1))
+    bend = 2.0 * here - before - after
+    return here + np.divide((after - before)**2, 8.0 * bend, out=np.zeros_like(here),
+                            where=bend > 0.0)
+
+
 def plan(robot: Robot, name: str, gait: str, network: Delayed, frequency: float = 0.0,
          amplitude: float = 1.0, gain: float = -1.0) -> Program:
     """Work out a gait on a robot and check it against the robot's limits.
@@ -129,8 +139,9 @@ def plan(robot: Robot, name: str, gait: str, network: Delayed, frequency: float 
                               2 * x * y * y + x * x * z])
     angle = weights @ monomials
     strides = frequency if frequency > 0.0 else 1.0 / orbit.period
-    span = np.stack([angle.min(axis=1), angle.max(axis=1)])
-    speed = strides * np.abs(weights @ slopes).max(axis=1)
+    rise = weights @ slopes
+    span = np.stack([-_highest(-angle), _highest(angle)])
+    speed = strides * np.maximum(_highest(rise), _highest(-rise))
     for joint, low, high, fastest in zip(robot.joints, *span, speed, strict=True):
         if joint.offset + low < joint.lower - 1e-9:
             raise Refused(f'amplitude {amplitude:g} takes {joint.name} to '

@@ -135,7 +135,8 @@ class Generator(Node):
             raise StartError(f'parameter {name} must be a {kind}, not '
                              f'{self._parameter_overrides[name].value!r}') from error
         except InvalidParameterValueException as error:
-            raise StartError(f'parameter {name}: {error}') from error
+            raise StartError(f'parameter {name}: {self._parameter_overrides[name].value} is not '
+                             f'from {spec.low:g} to {spec.high:g}') from error
 
     def _value(self, name: str):
         return self.get_parameter(name).value

@@ -1,15 +1,15 @@
 """Parameter services that answer malformed requests instead of dying of them."""
 
 from rcl_interfaces.msg import SetParametersResult
-from rclpy.exceptions import ParameterNotDeclaredException
 from rclpy.parameter import Parameter
 from rclpy.parameter_service import ParameterService
 
 
 class StrictParameterService(ParameterService):
-    """rclpy's service, but a value of no known type is refused with a reason.
+    """rclpy's service, but values of no known type and unknown names are refused with a reason.
 
-    rclpy 7.1 lets the exception out of the executor: one such request would end the node.
+    rclpy 7.1 lets the exception of the first out of the executor, so that one request ends the
+    node, and answers the second without the name.
     """
 
     def _set_parameters_callback(self, request, response):
@@ -28,7 +28,9 @@ class StrictParameterService(ParameterService):
             except (ValueError, TypeError, RuntimeError) as error:
                 return SetParametersResult(successful=False,
                                            reason=f'{message.name}: {error}')
-        try:
-            return self._get_node().set_parameters_atomically(parameters)
-        except ParameterNotDeclaredException as error:
-            return SetParametersResult(successful=False, reason=str(error))
+        node = self._get_node()
+        for parameter in parameters:
+            if not node.has_parameter(parameter.name):
+                return SetParametersResult(
+                    successful=False, reason=f"there is no parameter '{parameter.name}'")
+        return node.set_parameters_atomically(parameters)

@@ -1,0 +1,34 @@
+import pytest
+from graph import Process, Watcher
+
+
+@pytest.fixture
+def start():
+    """Start generators and watchers that are ended with the test."""
+    ending = []
+
+    def start_one(*ros_args: str, watch: bool = True, domain: int | None = None,
+                  node: str = '/cpg_generator'):
+        process = Process(*ros_args, domain=domain)
+        ending.append(process)
+        if not watch:
+            return process
+        process.wait_for('publishing')
+        watcher = Watcher(process.domain, node)
+        ending.append(watcher)
+        return process, watcher
+
+    yield start_one
+    for one in reversed(ending):
+        one.end()
+
+
+@pytest.fixture(scope='module')
+def running():
+    """One generator for all tests of a file that leave it as they found it."""
+    process = Process('-p', 'rate:=200.0', '-p', 'frequency:=2.0', '-p', 'transition:=0.4')
+    process.wait_for('publishing')
+    watcher = Watcher(process.domain)
+    yield process, watcher
+    watcher.end()
+    process.end()

@@ -1,0 +1,191 @@
+"""Real processes on a real ROS graph: a generator of its own domain, and a node that watches it."""
+
+import os
+import re
+import signal
+import subprocess
+import threading
+import time
+from pathlib import Path
+
+import numpy as np
+import rclpy
+from ament_index_python.packages import get_package_prefix
+from diagnostic_msgs.msg import DiagnosticArray
+from rcl_interfaces.msg import Parameter as ParameterMessage
+from rcl_interfaces.srv import GetParameters, SetParameters, SetParametersAtomically
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.parameter import Parameter
+from rclpy.qos import DurabilityPolicy, QoSProfile
+from sensor_msgs.msg import JointState
+from std_msgs.msg import String
+
+EXECUTABLE = Path(get_package_prefix('cpg_ros')) / 'lib' / 'cpg_ros' / 'generator'
+#: Long enough for a loaded machine; nothing waits that long when all is well.
+PATIENCE = 60.0
+_domains = iter(range(100, 230))
+
+
+def free_domain() -> int:
+    """Give every test a ROS domain of its own, apart from other test runs on the machine."""
+    return 100 + (next(_domains) + 7 * os.getpid()) % 130
+
+
+class Process:
+    """The installed generator in a domain of its own, its log kept."""
+
+    def __init__(self, *ros_args: str, domain: int | None = None) -> None:
+        self.domain = free_domain() if domain is None else domain
+        environment = dict(os.environ, ROS_DOMAIN_ID=str(self.domain),
+                           ROS_AUTOMATIC_DISCOVERY_RANGE='LOCALHOST', ROS_PYTHON_CHECK_FIELDS='1',
+                           PYTHONUNBUFFERED='1')
+        command = [str(EXECUTABLE), *(['--ros-args', *ros_args] if ros_args else [])]
+        self._process = subprocess.Popen(command, env=environment, stdout=subprocess.PIPE,
+                                         stderr=subprocess.STDOUT, text=True)
+        self.pid = self._process.pid
+        self.lines: list[str] = []
+        self._reader = threading.Thread(target=self._read, daemon=True)
+        self._reader.start()
+
+    def _read(self) -> None:
+        for line in self._process.stdout:
+            self.lines.append(line.rstrip())
+
+    @property
+    def log(self) -> str:
+        """All it has printed."""
+        return '\n'.join(self.lines)
+
+    @property
+    def alive(self) -> bool:
+        """Tell whether it runs."""
+        return self._process.poll() is None
+
+    def wait_for(self, pattern: str) -> 'Process':
+        """Wait for a line of its log."""
+        until(lambda: re.search(pattern, self.log) or not self.alive,
+              f"'{pattern}' in the log:\n{self.log}")
+        assert re.search(pattern, self.log), f"ended without '{pattern}':\n{self.log}"
+        return self
+
+    def signal(self, number: int) -> None:
+        """Send a signal."""
+        self._process.send_signal(number)
+
+    def wait(self) -> int:
+        """Wait for its end and return the exit code."""
+        code = self._process.wait(PATIENCE)
+        self._reader.join(PATIENCE)
+        return code
+
+    def end(self) -> None:
+        """End it, whatever state it is in."""
+        if self.alive:
+            self.signal(signal.SIGCONT)
+            self.signal(signal.SIGINT)
+            try:
+                self._process.wait(10.0)
+            except subprocess.TimeoutExpired:
+                self._process.kill()
+                self._process.wait()
+
+
+def until(condition, what: str):
+    """Wait until the condition holds, and return what it returned."""
+    end = time.monotonic() + PATIENCE
+    while time.monotonic() < end:
+        result = condition()
+        if result:
+            return result
+        time.sleep(0.01)
+    raise AssertionError(f'waited {PATIENCE} s in vain for {what}')
+
+
+class Watcher:
+    """A node that records joint states and calls the generator's parameter services."""
+
+    def __init__(self, domain: int, generator: str = '/cpg_generator',
+                 topic: str = 'joint_states') -> None:
+        self.context = rclpy.Context()
+        rclpy.init(context=self.context, domain_id=domain)
+        self.node = rclpy.create_node('watcher', context=self.context, enable_rosout=False)
+        self.generator = generator
+        self.names: list[str] = []
+        self.samples: list[tuple[float, list, list]] = []
+        self.diagnostics: list = []
+        self.gaits: list[str] = []
+        prefix = generator.rsplit('/', 1)[0]
+        self.node.create_subscription(JointState, f'{prefix}/{topic}', self._joints,
+                                      QoSProfile(depth=5000))
+        self.node.create_subscription(DiagnosticArray, '/diagnostics', self._health, 10)
+        self.node.create_subscription(
+            String, f'{generator}/gait', lambda m: self.gaits.append(m.data),
+            QoSProfile(depth=10, durability=DurabilityPolicy.TRANSIENT_LOCAL))
+        self._clients: dict = {}
+        self._executor = SingleThreadedExecutor(context=self.context)
+        self._executor.add_node(self.node)
+        self._ending = False
+        self._thread = threading.Thread(target=self._spin, daemon=True)
+        self._thread.start()
+
+    def _spin(self) -> None:
+        while not self._ending:
+            self._executor.spin_once(timeout_sec=0.1)
+
+    def _joints(self, message: JointState) -> None:
+        self.names = list(message.name)
+        stamp = message.header.stamp
+        self.samples.append((stamp.sec + 1e-9 * stamp.nanosec, message.position.tolist(),
+                             message.velocity.tolist()))
+
+    def _health(self, message: DiagnosticArray) -> None:
+        self.diagnostics += [s for s in message.status if s.name.startswith(self.generator + ':')]
+
+    def call(self, kind: type, name: str, request):
+        """Call a service and return its response."""
+        if name not in self._clients:
+            self._clients[name] = self.node.create_client(kind, name)
+        client = self._clients[name]
+        assert client.wait_for_service(PATIENCE), f'no service {name}'
+        future = client.call_async(request)
+        until(future.done, f'an answer of {name}')
+        return future.result()
+
+    def set(self, **values):
+        """Set parameters one by one (``delayed_tau`` for delayed.tau); return the results."""
+        request = SetParameters.Request(parameters=_messages(values))
+        return self.call(SetParameters, f'{self.generator}/set_parameters', request).results
+
+    def set_together(self, **values):
+        """Set parameters atomically; return the result."""
+        request = SetParametersAtomically.Request(parameters=_messages(values))
+        name = f'{self.generator}/set_parameters_atomically'
+        return self.call(SetParametersAtomically, name, request).result
+
+    def get(self, *names: str) -> list:
+        """Read parameters."""
+        response = self.call(GetParameters, f'{self.generator}/get_parameters',
+                             GetParameters.Request(names=list(names)))
+        return [Parameter.from_parameter_msg(ParameterMessage(name=n, value=v)).value
+                for n, v in zip(names, response.values, strict=True)]
+
+    def record(self, seconds: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Record for some time by the stamps; return times, positions, velocities."""
+        first = len(self.samples)
+        until(lambda: len(self.samples) > first and
+              self.samples[-1][0] - self.samples[first][0] >= seconds, 'joint states')
+        times, positions, velocities = zip(*self.samples[first:], strict=True)
+        return np.array(times), np.array(positions), np.array(velocities)
+
+    def end(self) -> None:
+        """Leave the graph."""
+        self._ending = True
+        self._thread.join()
+        self._executor.shutdown()
+        self.node.destroy_node()
+        rclpy.shutdown(context=self.context)
+
+
+def _messages(values: dict) -> list[ParameterMessage]:
+    return [Parameter(name.replace('delayed_', 'delayed.'), value=value).to_parameter_msg()
+            for name, value in values.items()]

@@ -1,0 +1,156 @@
+"""The node as a process: how it starts, ends, and lives beside others."""
+
+import signal
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+from ament_index_python.packages import get_package_share_directory
+from diagnostic_msgs.msg import DiagnosticStatus
+from graph import Watcher, until
+
+CONFIG = Path(get_package_share_directory('cpg_ros')) / 'config'
+
+
+@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_ends_it_at_the_stand_with_code_0(start, number):
+    process, watcher = start('-p', 'rate:=200', '-p', 'frequency:=2')
+    watcher.record(1.5)
+    process.signal(number)
+    assert process.wait() == 0
+    assert 'ramping down' in process.log
+    assert 'Traceback' not in process.log
+    _, position, velocity = watcher.samples[-1]
+    stand = {'hip': 0.0, 'thigh': 0.8, 'calf': -1.5}
+    expected = [stand[name.split('_')[1]] for name in watcher.names]
+    assert position == pytest.approx(expected, abs=1e-9)
+    assert velocity == pytest.approx([0.0] * 12, abs=1e-9)
+    speeds = np.abs(np.diff([sample[1] for sample in watcher.samples], axis=0)) / 0.005
+    assert speeds.max() <= 20.0
+
+
+def test_a_second_generator_in_another_namespace_is_left_alone(start):
+    one, watcher = start('-p', 'rate:=200')
+    two = start('-p', 'rate:=200', '-p', 'gait:=walk', '-r', '__ns:=/other', domain=one.domain,
+                watch=False).wait_for('publishing')
+    other = Watcher(one.domain, '/other/cpg_generator')
+    until(lambda: other.gaits == ['walk'] and watcher.gaits == ['trot'], 'both gaits')
+    other.record(1.5)
+    assert watcher.set(gait='pace')[0].successful
+    one.signal(signal.SIGTERM)
+    assert one.wait() == 0
+    times, positions, _ = other.record(0.5)
+    stamps = np.array([sample[0] for sample in other.samples])
+    gaps = np.diff(stamps)
+    assert np.abs(gaps - 0.005).max() < 1e-3, (len(gaps), np.nonzero(gaps > 0.006), gaps.max())
+    assert np.ptp(positions, axis=0).max() > 0.2
+    assert other.get('gait') == ['walk']
+    assert two.alive
+    other.end()
+
+
+def test_late_ticks_are_made_up_for_and_counted(start):
+    process, watcher = start('-p', 'rate:=200')
+    watcher.record(0.5)
+    process.signal(signal.SIGSTOP)
+    until(lambda: 'T' in Path(f'/proc/{process.pid}/stat').read_text().rsplit(')')[1][:4], 'a stop')
+    count = len(watcher.samples)
+    # Waits for the wall clock: what is being tested is what happens after that much of it.
+    import time
+    time.sleep(0.4)
+    process.signal(signal.SIGCONT)
+    watcher.record(1.0)
+    stamps = np.array([sample[0] for sample in watcher.samples])
+    assert len(stamps) > count + 80
+    assert np.abs(np.diff(stamps) - 0.005).max() < 1e-3, 'no period is left out'
+
+    def late():
+        values = {p.key: p.value for s in watcher.diagnostics[-1:] for p in s.values}
+        return int(values.get('late ticks', 0)) >= 60 and values['dropped ticks'] == '0'
+    until(late, 'late ticks in the diagnostics')
+
+
+def test_a_longer_stop_is_not_run_through_in_a_burst(start):
+    process, watcher = start('-p', 'rate:=200')
+    watcher.record(0.5)
+    process.signal(signal.SIGSTOP)
+    import time
+    time.sleep(1.5)
+    process.signal(signal.SIGCONT)
+    watcher.record(3.0)
+    positions = np.array([sample[1] for sample in watcher.samples])
+    # The pattern goes on where it stood.
+    assert np.abs(np.diff(positions, axis=0)).max() < 0.005 * 20
+    until(lambda: any(s.level == DiagnosticStatus.WARN and 'dropped' in s.message
+                      for s in watcher.diagnostics), 'the warning')
+
+
+def test_the_watchdog_reports_and_puts_the_paper_model_back(start):
+    # symmetry_gain 0 is the published model: rounding errors alone end its walk within some 30
+    # strides.
+    _, watcher = start('-p', 'rate:=200', '-p', 'gait:=walk', '-p', 'symmetry_gain:=0.0',
+                       '-p', 'frequency:=8', '-p', 'amplitude:=0.5')
+    until(lambda: any(s.level == DiagnosticStatus.ERROR for s in watcher.diagnostics), 'ERROR')
+    error = next(s for s in watcher.diagnostics if s.level == DiagnosticStatus.ERROR)
+    assert 're-seeded' in error.message
+    until(lambda: watcher.diagnostics[-1].level != DiagnosticStatus.ERROR, 'the way back')
+    watcher.record(0.5)
+    positions = np.array([sample[1] for sample in watcher.samples])
+    assert np.isfinite(positions).all()
+    assert np.abs(np.diff(positions, axis=0)).max() <= 0.005 * 20 * 1.001
+    assert np.ptp(positions[-60:], axis=0).max() > 0.2
+    assert watcher.set(symmetry_gain=-1.0)[0].successful
+
+
+def broken_goat(tmp_path, change):
+    tree = yaml.safe_load((CONFIG / 'goat.yaml').read_text())
+    change(tree)
+    path = tmp_path / 'broken.yaml'
+    path.write_text(yaml.safe_dump(tree))
+    return path
+
+
+def _joint(tree):
+    return tree['legs']['lf']['joints'][0]
+
+
+@pytest.mark.parametrize('change, key', [
+    (lambda t: _joint(t).update(colour='red'), 'colour'),
+    (lambda t: t['legs']['lf']['joints'].pop(0), 'lf_wrist_joint'),
+    (lambda t: _joint(t).update(name='lh_toe_joint'), 'lh_toe_joint'),
+    (lambda t: _joint(t).update(lower=1.0, upper=-1.0), 'lower'),
+    (lambda t: _joint(t).update(velocity=float('inf')), 'velocity'),
+])
+def test_a_bad_robot_file_is_refused_at_start(start, tmp_path, change, key):
+    path = broken_goat(tmp_path, change)
+    process = start('-p', f'robot:={path}', watch=False)
+    assert process.wait() == 1
+    last = process.lines[-1]
+    assert 'FATAL' in last and str(path) in last and key in last
+    assert 'Traceback' not in process.log
+
+
+@pytest.mark.parametrize('argument, reason', [
+    ('gait:=gallop', "gait 'gallop' is not one of"),
+    ('frequency:=fast', 'frequency must be a float'),
+    ('delayed.tau:=0.1', 'critical delay 0.2852'),
+    ('rate:=0.0', 'rate: 0.0 is not from 1 to 2000'),
+    ('robot:=cow', "robot 'cow' is neither"),
+    ('network:=brain', "network 'brain' is not one of"),
+])
+def test_a_bad_parameter_is_refused_at_start(start, argument, reason):
+    process = start('-p', argument, watch=False)
+    assert process.wait() == 1
+    assert 'FATAL' in process.lines[-1] and reason in process.lines[-1]
+    assert 'Traceback' not in process.log
+
+
+def test_without_autostart_it_stands_until_enabled(start):
+    from std_srvs.srv import SetBool
+    _, watcher = start('-p', 'autostart:=false')
+    _, positions, velocities = watcher.record(0.5)
+    assert np.ptp(positions, axis=0).max() == 0.0 and not velocities.any()
+    watcher.call(SetBool, '/cpg_generator/enable', SetBool.Request(data=True))
+    _, positions, _ = watcher.record(2.5)
+    assert np.ptp(positions, axis=0).max() > 0.4
