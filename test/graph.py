@@ -34,13 +34,14 @@ def free_domain() -> int:
 class Process:
     """The installed generator in a domain of its own, its log kept."""
 
-    def __init__(self, *ros_args: str, domain: int | None = None) -> None:
+    def __init__(self, *ros_args: str, domain: int | None = None, executable: Path = EXECUTABLE,
+                 environment: dict[str, str] | None = None) -> None:
         self.domain = free_domain() if domain is None else domain
-        environment = dict(os.environ, ROS_DOMAIN_ID=str(self.domain),
-                           ROS_AUTOMATIC_DISCOVERY_RANGE='LOCALHOST', ROS_PYTHON_CHECK_FIELDS='1',
-                           PYTHONUNBUFFERED='1')
-        command = [str(EXECUTABLE), *(['--ros-args', *ros_args] if ros_args else [])]
-        self._process = subprocess.Popen(command, env=environment, stdout=subprocess.PIPE,
+        variables = dict(os.environ, ROS_DOMAIN_ID=str(self.domain),
+                         ROS_AUTOMATIC_DISCOVERY_RANGE='LOCALHOST', ROS_PYTHON_CHECK_FIELDS='1',
+                         PYTHONUNBUFFERED='1', **environment or {})
+        command = [str(executable), *(['--ros-args', *ros_args] if ros_args else [])]
+        self._process = subprocess.Popen(command, env=variables, stdout=subprocess.PIPE,
                                          stderr=subprocess.STDOUT, text=True)
         self.pid = self._process.pid
         self.lines: list[str] = []

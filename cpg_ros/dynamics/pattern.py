@@ -63,8 +63,9 @@ class Pattern:
         self._wanted, self._rate = self.position.copy(), self.velocity.copy()
         self._jump: tuple[np.ndarray, np.ndarray] | None = None
         self._absorbed = ABSORB
+        self._recovering = False
         self._slowing = 1.0
-        self._last_rate = self.velocity.copy()
+        self._last_rate: np.ndarray | None = None
         # Level, its rate at the start, the level it goes to, and the time gone by.
         self._level, self._level_rate = 0.0, 0.0
         self._ramp = (0.0, 0.0, float(enabled), max(ramp, SUBSTEP))
@@ -75,8 +76,9 @@ class Pattern:
 
     def apply(self, program: Program, transition: float) -> None:
         """Change to a program over a transition in s; 0 leaves it to the network's dynamics."""
-        prepared = Track(program, transition) if transition > 0.0 else None
-        self._requests.append((program, prepared))
+        # Seeding an orbit takes its time: here, in the caller's thread, not in that of the ticks.
+        prepared = Track(program, max(transition, SUBSTEP))
+        self._requests.append((program, prepared if transition > 0.0 else None))
 
     def enable(self, enabled: bool, ramp: float) -> None:
         """Ramp into the gait, or down to the stand, over a time in s."""
@@ -109,8 +111,8 @@ class Pattern:
 
     @property
     def recovering(self) -> bool:
-        """Tell whether a jump after a fault is still being absorbed."""
-        return self._jump is not None
+        """Tell whether a fault is still being got over."""
+        return self._recovering and self._absorbed < ABSORB
 
     # -- the tick --------------------------------------------------------------------------
 
@@ -118,9 +120,9 @@ class Pattern:
         """Advance by dt in s and fill position, velocity and phases."""
         if self._requests:
             self._take_requests()
-        if len(self._tracks) == 1 and self._ramped >= self._ramp[3] and self._jump is None:
-            self._slowing = 1.0
-            self._step(dt)
+        if (len(self._tracks) == 1 and self._ramped >= self._ramp[3]
+                and self._absorbed >= ABSORB):
+            self._cruise(dt)
         else:
             parts = max(1, math.ceil(dt / SUBSTEP - 1e-9))
             for _ in range(parts):
@@ -152,6 +154,25 @@ class Pattern:
         """Take note that the network's output jumps here; ``_step`` smooths it."""
         self._jump, self._absorbed = None, 0.0
 
+    def _cruise(self, dt: float) -> None:
+        """One gait, at the stand or in full swing: nothing to mix, nothing to allocate."""
+        self._slowing, self._last_rate = 1.0, None
+        track = self._tracks[0]
+        frequency = track.program.frequency
+        if not track.advance(frequency * dt):
+            self._recover(track)
+            self._step(0.0)
+            return
+        np.multiply(track.angle, self._level, out=self._wanted)
+        self._wanted += self._offset
+        np.multiply(track.rise, self._level * frequency, out=self._rate)
+
+    def _recover(self, track: Track) -> None:
+        self.faults += 1
+        self._recovering = True
+        track.reseed()
+        self._absorb()
+
     def _step(self, dt: float) -> None:
         clock = dt * self._slowing
         tracks = self._tracks
@@ -166,9 +187,7 @@ class Pattern:
                 frequency += share * (track.program.frequency - frequency)
         for track in tracks:
             if not track.advance(frequency * clock):
-                self.faults += 1
-                track.reseed()
-                self._absorb()
+                self._recover(track)
 
         wanted, rate = first.angle, first.rise * frequency
         for track, (share, share_rate) in zip(tracks[1:], fades, strict=True):
@@ -187,12 +206,13 @@ class Pattern:
         if moving:
             # The pattern slows where it would outrun the gaits, now or at the next substep.
             bound = np.minimum(np.max([t.program.speed for t in tracks], axis=0), self._limit)
-            fastest = np.maximum(np.abs(rate), np.abs(2.0 * rate - self._last_rate))
+            ahead = rate if self._last_rate is None else 2.0 * rate - self._last_rate
+            fastest = np.maximum(np.abs(rate), np.abs(ahead))
             self._last_rate = rate
             self._slowing = 1.0 / max(1.0, float(np.max(fastest / np.maximum(bound, 1e-9))))
             rate = self._slowing * rate
         else:
-            self._slowing, self._last_rate = 1.0, rate
+            self._slowing, self._last_rate = 1.0, None
 
         if self._absorbed < ABSORB:
             wanted, rate = self._smooth(wanted + self._offset, rate, dt)
@@ -228,5 +248,5 @@ class Pattern:
         wanted = wanted + (1.0 - share) * gap + s * (1.0 - s) ** 2 * ABSORB * gap_rate
         rate = rate - share_rate / ABSORB * gap + (1.0 - s) * (1.0 - 3.0 * s) * gap_rate
         if s >= 1.0:
-            self._jump = None
+            self._jump, self._recovering = None, False
         return wanted, rate

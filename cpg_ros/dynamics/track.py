@@ -54,11 +54,13 @@ class Track:
         """Advance by some strides; tell whether the network is still on its orbit."""
         self.stepper.advance(strides * self.program.orbit.period)
         distance = self._look()
-        error = (self.legs[0] - self.phase - strides + 0.5) % 1.0 - 0.5
-        # The clock follows the network's own phase within two strides.
-        self.phase = (self.phase + strides + min(1.0, 0.5 * strides) * error) % 1.0
+        expected = self.phase + strides
         if not math.isfinite(distance):
+            self.phase = expected % 1.0
             return False
+        error = (self.legs[0] - expected + 0.5) % 1.0 - 0.5
+        # The clock follows the network's own phase within two strides.
+        self.phase = (expected + min(1.0, 0.5 * strides) * error) % 1.0
         if self.settling > 0.0:
             self.settling -= strides
             if distance < FAR / 3:
@@ -72,10 +74,9 @@ class Track:
 
     def reseed(self) -> None:
         """Put the network back on its orbit, at the phase the clock has."""
-        phase = self.phase if math.isfinite(self.phase) else 0.0
         self.stepper = self.program.seed.copy()
         self.settling = 0.0
-        self.align(phase)
+        self.align(self.phase)
 
     def drift_to(self, program: Program) -> None:
         """Take a program's parameters and leave the change to the network's own dynamics.

@@ -119,6 +119,9 @@ class Generator(Node):
         self.add_on_set_parameters_callback(self._judge)
         self.add_post_set_parameters_callback(self._apply)
         self.stop = threading.Event()
+        for name in self._parameter_overrides:
+            if not self.has_parameter(name):
+                self.get_logger().warning(f"there is no parameter '{name}': ignored")
 
     # -- parameters -----------------------------------------------------------------------
 

@@ -1,0 +1,1 @@
+"""Command-line tools: thin, arguments in and tables or figures out."""

@@ -1,0 +1,129 @@
+"""Time: simulated clocks that pause and jump, and system clocks that are set."""
+
+import threading
+import time
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from graph import until
+from rosgraph_msgs.msg import Clock
+
+from cpg_ros.nodes.ticker import Ticker
+
+
+class SimulatedTime:
+    """A /clock that another thread of the test advances."""
+
+    def __init__(self, watcher):
+        self._publisher = watcher.node.create_publisher(Clock, '/clock', 100)
+        until(self._publisher.get_subscription_count, 'a listener to /clock')
+
+    def run(self, start, end, step=0.004):
+        for now in np.arange(start, end, step):
+            message = Clock()
+            message.clock.sec = int(now)
+            message.clock.nanosec = int(now % 1 * 1e9)
+            self._publisher.publish(message)
+            time.sleep(0.001)
+
+
+@pytest.fixture
+def simulated(start):
+    _, watcher = start('-p', 'use_sim_time:=true', '-p', 'rate:=100', '-p', 'frequency:=2')
+    return watcher, SimulatedTime(watcher)
+
+
+def settled(watcher):
+    """Samples once no more of them come."""
+    count = -1
+    while count != len(watcher.samples):
+        count = len(watcher.samples)
+        time.sleep(0.3)
+    return watcher.samples[:]
+
+
+def test_simulated_time_sets_the_pace_and_pauses(simulated):
+    watcher, clock = simulated
+    assert settled(watcher) == [], 'nothing before the first /clock'
+    clock.run(100.0, 103.0)
+    samples = settled(watcher)
+    stamps = np.array([sample[0] for sample in samples])
+    assert np.diff(stamps) == pytest.approx(0.01, abs=1e-6)
+    assert stamps[-1] == pytest.approx(103.0, abs=0.02)
+    assert len(stamps) >= 290
+    # After a pause of wall time the pattern goes on where it stood.
+    clock.run(103.0, 104.0)
+    more = settled(watcher)
+    positions = np.array([sample[1] for sample in more])
+    assert np.diff([sample[0] for sample in more]) == pytest.approx(0.01, abs=1e-6)
+    velocities = np.array([sample[2] for sample in more])
+    assert np.abs(np.diff(positions, axis=0)).max() < 0.0105 * np.abs(velocities).max()
+
+
+def test_a_jump_back_starts_again_from_the_stand(simulated):
+    watcher, clock = simulated
+    clock.run(100.0, 102.5)
+    before = len(settled(watcher))
+    moving = watcher.samples[-1]
+    clock.run(10.0, 12.5)
+    after = settled(watcher)[before:]
+    stamps = np.array([sample[0] for sample in after])
+    assert stamps[0] < 10.1 and np.diff(stamps) == pytest.approx(0.01, abs=1e-6)
+    thigh = watcher.names.index('lh_thigh_joint')
+    # A ramp from the stand, as at the start, not a leap into the gait.
+    assert abs(after[0][1][thigh] - 0.8) < 0.005
+    assert np.ptp([sample[1][thigh] for sample in after[-100:]]) == pytest.approx(0.5, abs=0.01)
+    assert np.any(np.abs(moving[2]) > 0.1)
+
+
+def test_a_long_jump_forward_is_not_run_through(simulated):
+    watcher, clock = simulated
+    clock.run(100.0, 102.0)
+    before = len(settled(watcher))
+    clock.run(500.0, 501.0)
+    after = settled(watcher)
+    assert len(after) - before < 250
+    positions = np.array([sample[1] for sample in after])
+    assert np.abs(np.diff(positions, axis=0)).max() < 0.01 * 6.0
+    assert after[-1][0] == pytest.approx(501.0, abs=0.02)
+
+
+def test_a_set_system_clock_shows_in_the_stamps_alone():
+    # The machine's clock is not ours to set: the ticker runs against one that is.
+    now = SimpleNamespace(nanoseconds=0)
+    offset = [0]
+
+    def read():
+        now.nanoseconds = time.monotonic_ns() + offset[0]
+        return now
+
+    clock = SimpleNamespace(ros_time_is_active=False, now=read,
+                            create_jump_callback=lambda *_, **__: None)
+    ticks: list = []
+    done = threading.Event()
+
+    def tick(dt, stamp):
+        ticks.append((time.monotonic(), dt, stamp - offset[0]))
+        if len(ticks) == 100:
+            offset[0] = -3600 * 10**9
+        if len(ticks) == 200:
+            offset[0] = 86400 * 10**9
+        if len(ticks) == 300:
+            done.set()
+
+    failures: list = []
+    ticker = Ticker(SimpleNamespace(get_clock=lambda: clock), 500.0, tick, None, failures.append)
+    began = time.monotonic()
+    ticker.start()
+    assert done.wait(60.0)
+    ticker.end()
+    ticker.join()
+    assert not failures
+    assert ticker.dropped == 0
+    times, spans, stamps = (np.array(part) for part in zip(*ticks[:300], strict=True))
+    # Every tick spans one period and belongs to its own deadline on the steady clock.
+    assert spans == pytest.approx(0.002)
+    grid = np.round((stamps / 1e9 - began) / 0.002)
+    assert (np.delete(np.diff(grid), [99, 199]) == 1).all()
+    assert times[-1] - began >= 0.6 - 0.01
