@@ -27,8 +27,8 @@ bench: install/.built
 	@$(ENTER); for file in benchmarks/bench_*.py; do $(VENV)/bin/python $$file; done
 
 $(VENV)/.installed: requirements.txt
-	@test -d $(VENV) || $(PYTHON) -m venv $(VENV) || \
-		{ echo 'a virtual environment could not be made: install python3-venv' >&2; exit 1; }
+	@test -x $(VENV)/bin/pip || $(PYTHON) -m venv --clear $(VENV) || \
+		{ echo '$(PYTHON) could not make a virtual environment (on Debian and Ubuntu: apt install python3-venv)' >&2; exit 1; }
 	@echo 'installing the dependencies into $(VENV) (the first time takes a few minutes)'
 	@$(VENV)/bin/python -m pip install --quiet --disable-pip-version-check -r requirements.txt
 	@touch $@
