@@ -10,7 +10,6 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from scipy.linalg import lapack
 from scipy.optimize import brentq
 
 from cpg_ros.dynamics import collocation
@@ -114,12 +113,14 @@ def _newton(network: Delayed, mode: Mode, u: np.ndarray, period: float) -> Orbit
         for _ in range(12):
             residual, jacobian, by_parameter = _equations(network, mode, u, period)
             size = float(np.abs(residual[:-1]).max())
-            factors = lapack.dgetrf(jacobian)
-            if factors[2] != 0:
-                return None
             if size <= TOLERANCE * max(1.0, float(np.abs(u).max()) * abs(network.c)):
                 break
-            step = lapack.dgetrs(*factors[:2], residual)[0]
+            # numpy's solver, unlike scipy's, releases the interpreter lock: a node publishes
+            # while it solves.
+            try:
+                step = np.linalg.solve(jacobian, residual)
+            except np.linalg.LinAlgError:
+                return None
             u, period = u - step[:-1], period - float(step[-1])
             # A period that leaves the range of the delay has run away, and so has a waveform.
             if not (1e-3 * network.tau < period < 1e3 * network.tau and np.abs(u).max() < 1e3):
@@ -133,7 +134,7 @@ def _newton(network: Delayed, mode: Mode, u: np.ndarray, period: float) -> Orbit
         if u.size >= MOST_NODES:
             raise NoOrbit(f'the waveform is too steep for {MOST_NODES} nodes')
         u = collocation.resample(u, 2 * u.size + 1)
-    derivatives = -lapack.dgetrs(*factors[:2], by_parameter)[0]
+    derivatives = -np.linalg.solve(jacobian, by_parameter)
     return Orbit(network, mode, period, u, size, derivatives[-1], derivatives[:-1])
 
 
