@@ -19,6 +19,9 @@ from cpg_ros.networks import delayed
 #: Network -> leg -> cells (numbered from 1), the first of which gives the leg's phase.
 LEGS: dict[str, Mapping[str, tuple[int, ...]]] = {'delayed': delayed.LEGS}
 
+#: No angle (rad) or speed (rad/s) of a joint is larger.
+LARGEST = 1e6
+
 #: How many weights each readout order takes; the bare scale is an order of its own.
 WEIGHTS = (1, 2, 4, 6)
 
@@ -93,6 +96,9 @@ class _UniqueKeys(yaml.SafeLoader):
         seen = set()
         for key_node, _ in node.value:
             key = self.construct_object(key_node, deep=True)
+            if not isinstance(key, str):
+                raise yaml.constructor.ConstructorError(
+                    None, None, f'the key {_shown(key)} is not a name', key_node.start_mark)
             if key in seen:
                 raise yaml.constructor.ConstructorError(
                     None, None, f"the key '{key}' is there twice", key_node.start_mark)
@@ -107,7 +113,7 @@ class _Reader:
         self.path = path
 
     def fail(self, where: str, why: str) -> RobotError:
-        return RobotError(f'robot file {self.path}: {where}: {why}')
+        return RobotError(' '.join(f'robot file {self.path}: {where}: {why}'.split()))
 
     def keys(self, tree: Any, where: str, required: Set[str], optional: Set[str] = frozenset()
              ) -> Mapping[str, Any]:
@@ -124,8 +130,10 @@ class _Reader:
     def number(self, value: Any, where: str) -> float:
         if isinstance(value, bool) or not isinstance(value, int | float):
             raise self.fail(where, f'must be a number, not {_shown(value)}')
-        if not math.isfinite(value):
+        if value != value or value in (math.inf, -math.inf):
             raise self.fail(where, f'must be finite, not {value}')
+        if abs(value) > LARGEST:
+            raise self.fail(where, f'must be at most {LARGEST:g}, not {_shown(value)}')
         return float(value)
 
     def text(self, value: Any, where: str) -> str:
@@ -144,7 +152,7 @@ class _Reader:
         name = self.text(tree['name'], f'{where}.name')
         where = f'{where} ({name})'
         values = {key: self.number(tree[key], f'{where}.{key}') for key in sorted(numbers)}
-        if tree['cell'] not in cells or isinstance(tree['cell'], bool):
+        if type(tree['cell']) is not int or tree['cell'] not in cells:
             raise self.fail(f'{where}.cell', f"leg '{leg}' has the cells "
                             f'{" and ".join(map(str, cells))}, not {_shown(tree["cell"])}')
         if ('amplitude' in tree) == ('weights' in tree):

@@ -179,19 +179,18 @@ def _cached(digest):
 
     @njit(cache=True, **OPTIONS)
     def integrate(kind, p, tau, gain, basis, step, x, after, before, head, steps, noise, seed):
-        """Take steps in one block of lanes; a negative seed goes on with the noise as it is."""
+        """Take steps in one block of lanes."""
         digest  # noqa: B018
-        if seed >= 0:
-            np.random.seed(seed)
+        np.random.seed(seed)
         return run(kind, p, tau, gain, basis, step, x, after, before, head, steps, noise)
 
     @njit(cache=True, parallel=True, **OPTIONS)
     def integrate_many(kind, p, tau, gain, basis, step, x, after, before, head, steps, noise,
-                       seed):
+                       seeds):
         """Take steps in many blocks on all cores; arrays have a leading axis, the block."""
         digest  # noqa: B018
         for m in prange(x.shape[0]):
-            np.random.seed(seed + m)
+            np.random.seed(seeds[m])
             run(kind, p[m], tau[m], gain, basis, step, x[m], after[m], before[m], head, steps,
                 noise)
 

@@ -50,7 +50,7 @@ class Pattern:
         self._upper, self._limit = robot.column('upper'), robot.column('velocity')
         self._requests: deque = deque()
         self._tracks = [Track(program, 0.0)]
-        self._ramp = (0.0, 0.0, 0.0, 0.0)
+        self._ramps: deque[tuple[float, float, float, float]] = deque()
         self.restart(ramp, enabled)
 
     def restart(self, ramp: float, enabled: bool = True) -> None:
@@ -66,10 +66,8 @@ class Pattern:
         self._recovering = False
         self._slowing = 1.0
         self._last_rate: np.ndarray | None = None
-        # Level, its rate at the start, the level it goes to, and the time gone by.
         self._level, self._level_rate = 0.0, 0.0
-        self._ramp = (0.0, 0.0, float(enabled), max(ramp, SUBSTEP))
-        self._ramped = 0.0
+        self._ramp_to(float(enabled), max(ramp, SUBSTEP))
         self.enabled = enabled
 
     # -- asked from other threads ---------------------------------------------------------
@@ -120,8 +118,7 @@ class Pattern:
         """Advance by dt in s and fill position, velocity and phases."""
         if self._requests:
             self._take_requests()
-        if (len(self._tracks) == 1 and self._ramped >= self._ramp[3]
-                and self._absorbed >= ABSORB):
+        if len(self._tracks) == 1 and not self._ramps and self._absorbed >= ABSORB:
             self._cruise(dt)
         else:
             parts = max(1, math.ceil(dt / SUBSTEP - 1e-9))
@@ -136,8 +133,7 @@ class Pattern:
             what, how = self._requests.popleft()
             if isinstance(what, bool):
                 self.enabled = what
-                self._ramp = (self._level, self._level_rate, float(what), how)
-                self._ramped = 0.0
+                self._ramp_to(float(what), how)
             elif how is None:
                 del self._tracks[:-1]
                 self._tracks[0].drift_to(what)
@@ -197,7 +193,7 @@ class Pattern:
         while len(tracks) > 1 and tracks[1].progress >= 1.0:
             del tracks[0]
 
-        if self._ramped < self._ramp[3]:
+        if self._ramps:
             moving = True
             self._advance_ramp(clock)
         if self._level != 1.0 or self._level_rate:
@@ -222,26 +218,45 @@ class Pattern:
             self._wanted += self._offset
             self._rate[:] = rate
 
+    def _ramp_to(self, end: float, time: float) -> None:
+        """Plan the level's way to its end, from its present value and rate, without overshoot.
+
+        Cubics that end at rest, each (start, rate, end, time). One that starts towards its end
+        stays in between if it takes no longer than 3 |end - start| / |rate|.
+        """
+        level, rate = self._level, self._level_rate
+        self._ramps.clear()
+        self._ramped = 0.0
+        if rate * (end - level) < 0.0:
+            # Turned round half way: brake first, within half of the room that is left.
+            turn = level + 0.5 * ((1.0 if rate > 0.0 else 0.0) - level)
+            self._ramps.append((level, rate, turn, 2.0 * (turn - level) / rate))
+            level, rate = turn, 0.0
+        if rate:
+            time = min(time, 3.0 * (end - level) / rate)
+        self._ramps.append((level, rate, end, time))
+
     def _advance_ramp(self, clock: float) -> None:
-        """Cubic from the level and rate at which the ramp began to its end, at rest."""
-        start, start_rate, end, time = self._ramp
+        start, start_rate, end, time = self._ramps[0]
         self._ramped += clock
-        s = self._ramped / time
+        s = self._ramped / time if time > 0.0 else 1.0
         if s >= 1.0:
+            self._ramps.popleft()
+            self._ramped = 0.0
             self._level, self._level_rate = end, 0.0
             return
         share, share_rate = ease(s)
-        level = start + share * (end - start) + s * (1.0 - s) ** 2 * time * start_rate
-        rate = share_rate * (end - start) / time + (1.0 - s) * (1.0 - 3.0 * s) * start_rate
-        self._level = min(1.0, max(0.0, level))
-        self._level_rate = rate if self._level == level else 0.0
+        self._level = start + share * (end - start) + s * (1.0 - s)**2 * time * start_rate
+        self._level_rate = (share_rate * (end - start) / time
+                            + (1.0 - s) * (1.0 - 3.0 * s) * start_rate)
 
     def _smooth(self, wanted: np.ndarray, rate: np.ndarray, dt: float
                 ) -> tuple[np.ndarray, np.ndarray]:
         """Add a difference that starts where the output was and dies out."""
         if self._jump is None:
             self._jump = (self._wanted + dt * self._rate - wanted, self._rate - rate)
-        self._absorbed += dt
+        else:
+            self._absorbed += dt
         s = min(1.0, self._absorbed / ABSORB)
         share, share_rate = ease(s)
         gap, gap_rate = self._jump

@@ -165,12 +165,13 @@ def simulate(network: Delayed | Sequence[Delayed], history: History | Sequence[H
         done = 0
         while done < steps:
             chunk = min(steps - done, max(1, CHUNK // x[:, 0].size))
+            seeds = np.random.SeedSequence([seed, done]).generate_state(blocks)
             if blocks == 1:
                 kernel.integrate(kind, flat_p[0], tau[0], gain, basis, step,
-                                 *(array[0] for array in flat), head, chunk, noise, seed + done)
+                                 *(array[0] for array in flat), head, chunk, noise, seeds[0])
             else:
                 kernel.integrate_many(kind, flat_p, tau, gain, basis, step, *flat, head, chunk,
-                                      noise, seed + done)
+                                      noise, seeds)
             head, done = head + chunk, done + chunk
             bar(done)
 

@@ -90,6 +90,11 @@ class Stepper:
         twin.set(self.network, self.gain, self.mode)
         return twin
 
+    @property
+    def ahead(self) -> float:
+        """Model time from the output instant to the newest node, less than a step."""
+        return float(self._clock[1])
+
     def newest(self) -> np.ndarray:
         """Return the state at the newest node, shape (cells,)."""
         return self._x[int(self._clock[0])].copy()

@@ -26,7 +26,7 @@ class Track:
         self.rise = np.zeros_like(self.angle)
         self.legs = np.zeros(len(program.robot.legs))
         self.stepper = program.seed.copy()
-        self.settling = 0.0
+        self.settling = self._calm = 0.0
         self.follow(program)
 
     def follow(self, program: Program) -> None:
@@ -62,9 +62,9 @@ class Track:
         # The clock follows the network's own phase within two strides.
         self.phase = (expected + min(1.0, 0.5 * strides) * error) % 1.0
         if self.settling > 0.0:
-            self.settling -= strides
-            if distance < FAR / 3:
-                self.settling = 0.0
+            # A stride on the orbit is the end of it; for an instant a small state may look so.
+            self._calm = self._calm + strides if distance < FAR / 3 else 0.0
+            self.settling = 0.0 if self._calm > 1.0 else self.settling - strides
             self.phase = float(self.legs[0])
         elif distance > FAR or abs(error) > ASTRAY:
             self._astray += strides
@@ -90,6 +90,7 @@ class Track:
         basis = orbit.mode.basis
         if np.linalg.norm(basis @ state) < KICK * np.linalg.norm(basis @ target):
             self.stepper.disturb(KICK * target)
-        self.stepper.advance(0.0)
+        # On to the node where the change is, so that all of it shows at once.
+        self.stepper.advance(self.stepper.ahead)
         self.follow(program)
-        self.settling = SETTLING
+        self.settling, self._calm = SETTLING, 0.0
