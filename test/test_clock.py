@@ -89,6 +89,20 @@ def test_a_long_jump_forward_is_not_run_through(simulated):
     assert after[-1][0] == pytest.approx(501.0, abs=0.02)
 
 
+def test_simulated_time_can_be_turned_on_and_off_live(start):
+    _, watcher = start('-p', 'rate:=100', '-p', 'frequency:=2')
+    watcher.record(1.2)
+    assert watcher.set(use_sim_time=True)[0].successful
+    before = len(settled(watcher))
+    SimulatedTime(watcher).run(50.0, 51.0)
+    assert len(settled(watcher)) - before >= 90
+    assert watcher.samples[-1][0] == pytest.approx(51.0, abs=0.02)
+    assert watcher.set(use_sim_time=False)[0].successful
+    times, positions, _ = watcher.record(1.0)
+    assert times[0] > 1e9 and np.diff(times).mean() == pytest.approx(0.01, rel=1e-2)
+    assert np.abs(np.diff(positions, axis=0)).max() < 0.01 * 6.0
+
+
 def test_a_set_system_clock_shows_in_the_stamps_alone(monkeypatch):
     # The machine's clock is not ours to set: the ticker runs against one that is.
     offset = [0]
