@@ -40,9 +40,11 @@ def harass(client: ParameterClient, count: int, seed: int) -> dict[str, object]:
     tally: Counter[str] = Counter()
     wrong: list[str] = []
     unanswered = ''
+    sent: list[tuple[int, str]] = []
     for number, (atomically, batch) in enumerate(requests(types, count, seed)):
         if number % 1000 == 0:
             log(f'{number} requests of {count}')
+        sent.append((time.monotonic_ns(), f'{number}: {[described(p) for p in batch][:6]}'))
         try:
             results = client.set(batch, atomically)
             after = client.get(names)
@@ -67,7 +69,8 @@ def harass(client: ParameterClient, count: int, seed: int) -> dict[str, object]:
         values = after
     keys = ('accepted', 'refused', 'refused_without_reason', 'changed_by_refusals',
             'otherwise_wrong', 'not_finite_accepted')
-    return {**{key: tally[key] for key in keys}, 'wrong': wrong[:5], 'unanswered': unanswered}
+    return {**{key: tally[key] for key in keys}, 'wrong': wrong[:5], 'unanswered': unanswered,
+            'sent': sent}
 
 
 def gaps(instants: np.ndarray) -> dict[str, float]:
@@ -107,14 +110,20 @@ def main() -> None:
     gap = {key: {state: gaps(record[key][part]) for state, part in (('idle', idle),
                                                                     ('busy', busy))}
            for key in ('arrival', 'source')}
+    # The requests that were sent last before the three longest pauses ended.
+    sent = result.pop('sent')
+    ends = arrival[busy][1:][np.argsort(np.diff(arrival[busy]))[-3:]]
+    suspects = [sent[np.searchsorted([instant for instant, _ in sent], end) - 1][1]
+                for end in ends[::-1]]
     answers = np.concatenate([client.answer_ms['set_parameters'],
                               client.answer_ms['set_parameters_atomically']])
     figures = {'died': died, 'largest_gap_ms': gap['arrival']['busy']['largest'],
                'changed_by_refusals': result['changed_by_refusals'] + result['otherwise_wrong']}
     emit(benchmark='hostile', rate=RATE, requests=answers.size, seconds=(busy_until - busy_from)
          * 1e-9, **result | figures, largest_gap_idle_ms=gap['arrival']['idle']['largest'],
-         gap_ms=gap, answer_ms={'p50': float(np.median(answers)), 'max': float(answers.max()),
-                                'p99': float(np.percentile(answers, 99))},
+         gap_ms=gap, requests_at_largest_gaps=suspects,
+         answer_ms={'p50': float(np.median(answers)), 'p99': float(np.percentile(answers, 99)),
+                    'max': float(answers.max())},
          exceptions_logged=output.count('a request failed'),
          exceptions=Counter(line for line in output.splitlines() if 'Error' in line[:60]
                             ).most_common(5),

@@ -28,6 +28,7 @@ def main() -> None:
     rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
     node = Node('null_node')
     rate = node.declare_parameter('rate', 100.0).value
+    node.declare_parameter('nothing', '')
     robot = find_robot(node.declare_parameter('robot', 'quadruped').value)
     outputs = Outputs(node, robot, 'joint_states', 'none')
     position, velocity = robot.column('offset'), np.zeros(len(robot.joints))

@@ -74,6 +74,12 @@ class Process:
         status = Path(f'/proc/{self.pid}/status').read_text()
         return int(status.partition('VmRSS:')[2].split()[0]) / 1024
 
+    def signal(self, number: int) -> None:
+        self._child.send_signal(number)
+
+    def wait(self, timeout: float = 30.0) -> int:
+        return self._child.wait(timeout)
+
     def end(self) -> int:
         """Interrupt it, once, and wait; return the exit code."""
         if self.alive:

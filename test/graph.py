@@ -1,4 +1,4 @@
-"""Real processes on a real ROS graph: a generator of its own domain, and a node that watches it."""
+"""Real processes on a real ROS graph: a generator in a domain of its own, and its watcher."""
 
 import os
 import re

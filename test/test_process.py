@@ -1,6 +1,7 @@
 """The node as a process: how it starts, ends, and lives beside others."""
 
 import signal
+import time
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +10,7 @@ import yaml
 from ament_index_python.packages import get_package_share_directory
 from diagnostic_msgs.msg import DiagnosticStatus
 from graph import Watcher, until
+from std_srvs.srv import SetBool
 
 CONFIG = Path(get_package_share_directory('cpg_ros')) / 'config'
 
@@ -40,7 +42,7 @@ def test_a_second_generator_in_another_namespace_is_left_alone(start):
     assert watcher.set(gait='pace')[0].successful
     one.signal(signal.SIGTERM)
     assert one.wait() == 0
-    times, positions, _ = other.record(0.5)
+    _, positions, _ = other.record(0.5)
     stamps = np.array([sample[0] for sample in other.samples])
     gaps = np.diff(stamps)
     assert np.abs(gaps - 0.005).max() < 1e-3, (len(gaps), np.nonzero(gaps > 0.006), gaps.max())
@@ -54,10 +56,10 @@ def test_late_ticks_are_made_up_for_and_counted(start):
     process, watcher = start('-p', 'rate:=200')
     watcher.record(0.5)
     process.signal(signal.SIGSTOP)
-    until(lambda: 'T' in Path(f'/proc/{process.pid}/stat').read_text().rsplit(')')[1][:4], 'a stop')
+    state = Path(f'/proc/{process.pid}/stat')
+    until(lambda: state.read_text().rsplit(')')[1].split()[0] == 'T', 'a stop')
     count = len(watcher.samples)
     # Waits for the wall clock: what is being tested is what happens after that much of it.
-    import time
     time.sleep(0.4)
     process.signal(signal.SIGCONT)
     watcher.record(1.0)
@@ -75,7 +77,6 @@ def test_a_longer_stop_is_not_run_through_in_a_burst(start):
     process, watcher = start('-p', 'rate:=200')
     watcher.record(0.5)
     process.signal(signal.SIGSTOP)
-    import time
     time.sleep(1.5)
     process.signal(signal.SIGCONT)
     watcher.record(3.0)
@@ -147,7 +148,6 @@ def test_a_bad_parameter_is_refused_at_start(start, argument, reason):
 
 
 def test_without_autostart_it_stands_until_enabled(start):
-    from std_srvs.srv import SetBool
     _, watcher = start('-p', 'autostart:=false')
     _, positions, velocities = watcher.record(0.5)
     assert np.ptp(positions, axis=0).max() == 0.0 and not velocities.any()

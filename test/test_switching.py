@@ -60,7 +60,8 @@ def test_all_ordered_pairs_switch_without_a_jerk(running, programs):
         positions = by_leg(watcher, positions)
         assert np.abs(np.diff(times) - 0.005).max() < 1e-3, 'a message is missing'
         speed = np.maximum(programs[old].speed, programs[new].speed)
-        assert (np.abs(np.diff(positions, axis=0)) <= 0.005 * speed * 1.001 + 1e-9).all(), (old, new)
+        steps = np.abs(np.diff(positions, axis=0))
+        assert (steps <= 0.005 * speed * 1.001 + 1e-9).all(), (old, new)
         low = np.minimum(programs[old].span[0], programs[new].span[0]) + OFFSET
         high = np.maximum(programs[old].span[1], programs[new].span[1]) + OFFSET
         assert (positions >= low - 1e-6).all() and (positions <= high + 1e-6).all(), (old, new)

@@ -17,129 +17,161 @@ import numpy as np
 from numba import njit, prange
 
 from cpg_ros.networks import delayed
-from cpg_ros.networks.jit import OPTIONS, jit, sources_digest
+from cpg_ros.networks.jit import OPTIONS, jit, part, sources_digest
 
 
-@jit
-def drive(kind, past, p, lanes, out):
-    """Contribution of the delayed states in the network of this kind."""
-    if kind == 0:
-        delayed.drive(past, p, lanes, out)
+def _compiled(decorate):
+    """Compile the stepping with a numba decorator; return past_state, restart and steps_of."""
+    delayed_drive, delayed_field = delayed.compiled(decorate)
+
+    @decorate
+    def drive(n, kind, past, p, lanes, out):
+        """Contribution of the delayed states in the network of this kind."""
+        if kind == 0:
+            delayed_drive(n, past, p, lanes, out)
+
+    @decorate
+    def field(n, kind, x, k, weight, driven, p, gain, basis, lanes, work, out):
+        """Right-hand side at z = x + weight k, with the symmetry lock -gain (I - P) z.
+
+        P projects on the rows of basis, shape (r, cells); work is scratch.
+        """
+        if kind == 0:
+            delayed_field(n, x, k, weight, driven, p, lanes, work, out)
+        if gain != 0.0:
+            z, along = work[0], work[1]
+            for i in range(n):
+                out[i] -= gain * z[i]
+            for r in range(basis.shape[0]):
+                if lanes == 1:
+                    sum_ = 0.0
+                    for cell in range(basis.shape[1]):
+                        sum_ += basis[r, cell] * z[cell]
+                    for cell in range(basis.shape[1]):
+                        out[cell] += gain * sum_ * basis[r, cell]
+                else:
+                    along[:lanes] = 0.0
+                    for cell in range(basis.shape[1]):
+                        for lane in range(lanes):
+                            along[lane] += basis[r, cell] * z[cell * lanes + lane]
+                    for cell in range(basis.shape[1]):
+                        for lane in range(lanes):
+                            out[cell * lanes + lane] += gain * along[lane] * basis[r, cell]
+
+    @decorate
+    def past_state(n, x, after, before, head, c, tau, step, first, stride, out):
+        """State at t_head + c step - tau, for tau >= c step, by the cubic Hermite interpolant.
+
+        Only every stride-th component from first on is filled in.
+        """
+        back = tau / step - c
+        nodes = max(1, math.ceil(back))
+        start = head - nodes
+        if start < 0:
+            start += x.shape[0]
+        end = start + 1 if start + 1 < x.shape[0] else 0
+        s = nodes - back
+        h11 = s * s * (s - 1.0) * step
+        h10 = s * (s - 1.0) * (s - 1.0) * step
+        h01 = s * s * (3.0 - 2.0 * s)
+        h00 = 1.0 - h01
+        if stride == 1:
+            for i in range(n):
+                out[i] = (h00 * x[start, i] + h10 * after[start, i]
+                          + h01 * x[end, i] + h11 * before[end, i])
+        else:
+            for i in range(first, n, stride):
+                out[i] = (h00 * x[start, i] + h10 * after[start, i]
+                          + h01 * x[end, i] + h11 * before[end, i])
+
+    @decorate
+    def past_states(n, x, after, before, head, c, tau, step, out):
+        """The same with a delay for each lane, tau of shape (lanes,); one pass if all agree."""
+        lanes = tau.shape[0]
+        same = True
+        for lane in range(1, lanes):
+            same = same and tau[lane] == tau[0]
+        if same:
+            past_state(n, x, after, before, head, c, tau[0], step, 0, 1, out)
+        else:
+            for lane in range(lanes):
+                past_state(n, x, after, before, head, c, tau[lane], step, lane, lanes, out)
+
+    @decorate
+    def steps_of(n, lanes, kind, p, tau, gain, basis, step, x, after, before, head, steps, noise,
+                 states, slopes, row):
+        """Take RK4 steps from the head node; return the new head.
+
+        ``noise`` is the standard deviation of white noise per square root of model time, added
+        once a step (Euler-Maruyama); the caller seeds.
+        """
+        past, middle, end = np.empty(n), np.zeros(n), np.zeros(n)
+        work = np.zeros((2, n + 2 * lanes))
+        k2, k3, k4 = np.empty(n), np.empty(n), np.empty(n)
+        kick = noise * math.sqrt(step)
+        for _ in range(steps):
+            new = head + 1 if head + 1 < x.shape[0] else 0
+            now, k1 = x[head], after[head]
+            # Stages 2 and 3 share one delayed state, stage 4 and the next step's first another.
+            past_states(n, x, after, before, head, 0.5, tau, step, past)
+            drive(n, kind, past, p, lanes, middle)
+            past_states(n, x, after, before, head, 1.0, tau, step, past)
+            drive(n, kind, past, p, lanes, end)
+            field(n, kind, now, k1, 0.5 * step, middle, p, gain, basis, lanes, work, k2)
+            field(n, kind, now, k2, 0.5 * step, middle, p, gain, basis, lanes, work, k3)
+            field(n, kind, now, k3, step, end, p, gain, basis, lanes, work, k4)
+            for i in range(n):
+                x[new, i] = now[i] + step / 6.0 * (k1[i] + 2.0 * (k2[i] + k3[i]) + k4[i])
+            if noise > 0.0:
+                for i in range(n):
+                    x[new, i] += kick * np.random.normal()
+            field(n, kind, x[new], k4, 0.0, end, p, gain, basis, lanes, work, after[new])
+            for i in range(n):
+                before[new, i] = after[new, i]
+            for lane in range(states.shape[0]):
+                for cell in range(states.shape[2]):
+                    states[lane, row, cell] = x[new, cell * lanes + lane]
+                    slopes[lane, row, cell] = after[new, cell * lanes + lane]
+            row += 1
+            head = new
+        return head
+
+    @decorate
+    def restart(n, lanes, kind, p, tau, gain, basis, step, x, after, before, head):
+        """Recompute the slope that leaves the head node, after parameters have changed."""
+        past, driven, work = np.empty(n), np.zeros(n), np.zeros((2, n + 2 * lanes))
+        past_states(n, x, after, before, head, 0.0, tau, step, past)
+        drive(n, kind, past, p, lanes, driven)
+        field(n, kind, x[head], x[head], 0.0, driven, p, gain, basis, lanes, work, after[head])
+    return past_state, restart, steps_of
 
 
-@jit
-def field(kind, x, k, weight, driven, p, gain, basis, lanes, work, out):
-    """Right-hand side at z = x + weight k, with the symmetry lock -gain (I - P) z.
-
-    P projects on the rows of basis, shape (r, cells); work is scratch.
-    """
-    if kind == 0:
-        delayed.field(x, k, weight, driven, p, lanes, work, out)
-    if gain != 0.0:
-        z, along = work[0], work[1]
-        for i in range(out.shape[0]):
-            out[i] -= gain * z[i]
-        for r in range(basis.shape[0]):
-            if lanes == 1:
-                sum_ = 0.0
-                for cell in range(basis.shape[1]):
-                    sum_ += basis[r, cell] * z[cell]
-                for cell in range(basis.shape[1]):
-                    out[cell] += gain * sum_ * basis[r, cell]
-            else:
-                along[:lanes] = 0.0
-                for cell in range(basis.shape[1]):
-                    for lane in range(lanes):
-                        along[lane] += basis[r, cell] * z[cell * lanes + lane]
-                for cell in range(basis.shape[1]):
-                    for lane in range(lanes):
-                        out[cell * lanes + lane] += gain * along[lane] * basis[r, cell]
-
-
-@jit
-def past_state(x, after, before, head, c, tau, step, first, stride, out):
-    """State at t_head + c step - tau, for tau >= c step, by the cubic Hermite interpolant.
-
-    Only every stride-th component from first on is filled in.
-    """
-    back = tau / step - c
-    nodes = max(1, math.ceil(back))
-    start = head - nodes
-    if start < 0:
-        start += x.shape[0]
-    end = start + 1 if start + 1 < x.shape[0] else 0
-    s = nodes - back
-    h11 = s * s * (s - 1.0) * step
-    h10 = s * (s - 1.0) * (s - 1.0) * step
-    h01 = s * s * (3.0 - 2.0 * s)
-    h00 = 1.0 - h01
-    if stride == 1:
-        for i in range(out.shape[0]):
-            out[i] = (h00 * x[start, i] + h10 * after[start, i]
-                      + h01 * x[end, i] + h11 * before[end, i])
-    else:
-        for i in range(first, out.shape[0], stride):
-            out[i] = (h00 * x[start, i] + h10 * after[start, i]
-                      + h01 * x[end, i] + h11 * before[end, i])
-
-
-@jit
-def past_states(x, after, before, head, c, tau, step, out):
-    """The same with a delay for each lane, tau of shape (lanes,); one pass if all are equal."""
-    lanes = tau.shape[0]
-    same = True
-    for lane in range(1, lanes):
-        same = same and tau[lane] == tau[0]
-    if same:
-        past_state(x, after, before, head, c, tau[0], step, 0, 1, out)
-    else:
-        for lane in range(lanes):
-            past_state(x, after, before, head, c, tau[lane], step, lane, lanes, out)
+# One network by itself has code of its own: built in one piece, its loops unrolled. Lanes run
+# through loops of any length in vector registers, which need functions of their own.
+_, _, _steps_of_one = _compiled(part)
+_past_state, _restart_lanes, _steps_of_lanes = _compiled(jit)
 
 
 @jit
 def restart(kind, p, tau, gain, basis, step, x, after, before, head):
     """Recompute the slope that leaves the head node, after parameters have changed."""
-    n, lanes = x.shape[1], tau.shape[0]
-    past, driven, work = np.empty(n), np.zeros(n), np.zeros((2, n + 2 * lanes))
-    past_states(x, after, before, head, 0.0, tau, step, past)
-    drive(kind, past, p, lanes, driven)
-    field(kind, x[head], x[head], 0.0, driven, p, gain, basis, lanes, work, after[head])
+    _restart_lanes(x.shape[1], tau.shape[0], kind, p, tau, gain, basis, step, x, after, before,
+                   head)
 
 
 @jit
-def run(kind, p, tau, gain, basis, step, x, after, before, head, steps, noise):
+def run(kind, p, tau, gain, basis, step, x, after, before, head, steps, noise, states, slopes,
+        row):
     """Take RK4 steps from the head node; return the new head.
 
-    ``noise`` is the standard deviation of white noise per square root of model time, added
-    once a step (Euler-Maruyama); the caller seeds.
+    What is reached is recorded in states and slopes, shape (lanes, rows, cells), from the row
+    given on; arrays without lanes record nothing.
     """
-    n, lanes = x.shape[1], tau.shape[0]
-    past, middle, end = np.empty(n), np.zeros(n), np.zeros(n)
-    work = np.zeros((2, n + 2 * lanes))
-    k2, k3, k4 = np.empty(n), np.empty(n), np.empty(n)
-    kick = noise * math.sqrt(step)
-    for _ in range(steps):
-        new = head + 1 if head + 1 < x.shape[0] else 0
-        now, k1 = x[head], after[head]
-        # Stages 2 and 3 share one delayed state, stage 4 and the next step's first another.
-        past_states(x, after, before, head, 0.5, tau, step, past)
-        drive(kind, past, p, lanes, middle)
-        past_states(x, after, before, head, 1.0, tau, step, past)
-        drive(kind, past, p, lanes, end)
-        field(kind, now, k1, 0.5 * step, middle, p, gain, basis, lanes, work, k2)
-        field(kind, now, k2, 0.5 * step, middle, p, gain, basis, lanes, work, k3)
-        field(kind, now, k3, step, end, p, gain, basis, lanes, work, k4)
-        for i in range(n):
-            x[new, i] = now[i] + step / 6.0 * (k1[i] + 2.0 * (k2[i] + k3[i]) + k4[i])
-        if noise > 0.0:
-            for i in range(n):
-                x[new, i] += kick * np.random.normal()
-        field(kind, x[new], k4, 0.0, end, p, gain, basis, lanes, work, after[new])
-        for i in range(n):
-            before[new, i] = after[new, i]
-        head = new
-    return head
+    if tau.shape[0] == 1 and x.shape[1] == 8:
+        return _steps_of_one(8, 1, kind, p, tau, gain, basis, step, x, after, before, head,
+                             steps, noise, states, slopes, row)
+    return _steps_of_lanes(x.shape[1], tau.shape[0], kind, p, tau, gain, basis, step, x, after,
+                           before, head, steps, noise, states, slopes, row)
 
 
 def _cached(digest):
@@ -163,13 +195,15 @@ def _cached(digest):
         ahead = clock[1] - duration
         if ahead < 0.0:
             steps = math.ceil(-ahead / step)
-            head = run(kind, p, tau, gain, basis, step, x, after, before, head, steps, 0.0)
+            nothing = np.empty((0, 0, 0))
+            head = run(kind, p, tau, gain, basis, step, x, after, before, head, steps, 0.0,
+                       nothing, nothing, 0)
             ahead = max(0.0, ahead + steps * step)
         clock[0] = head
         clock[1] = ahead
         start = head - 1 if head > 0 else x.shape[0] - 1
         s = 1.0 - ahead / step
-        past_state(x, after, before, head, 0.0, ahead, step, 0, 1, out[0])
+        _past_state(x.shape[1], x, after, before, head, 0.0, ahead, step, 0, 1, out[0])
         for i in range(x.shape[1]):
             rise = (x[head, i] - x[start, i]) / step
             out[1, i] = ((1.0 - s) * (1.0 - 3.0 * s) * after[start, i]
@@ -178,21 +212,29 @@ def _cached(digest):
                          + (6.0 * s - 2.0) * before[head, i]) / step
 
     @njit(cache=True, **OPTIONS)
-    def integrate(kind, p, tau, gain, basis, step, x, after, before, head, steps, noise, seed):
-        """Take steps in one block of lanes."""
+    def integrate(kind, p, tau, gain, basis, step, x, after, before, head, steps, noise, seed,
+                  states, slopes, row):
+        """Take and record steps of one block of lanes; return the new head."""
         digest  # noqa: B018
         np.random.seed(seed)
-        return run(kind, p, tau, gain, basis, step, x, after, before, head, steps, noise)
+        return run(kind, p, tau, gain, basis, step, x, after, before, head, steps, noise, states,
+                   slopes, row)
 
     @njit(cache=True, parallel=True, **OPTIONS)
     def integrate_many(kind, p, tau, gain, basis, step, x, after, before, head, steps, noise,
-                       seeds):
-        """Take steps in many blocks on all cores; arrays have a leading axis, the block."""
+                       seeds, states, slopes, row):
+        """Take and record steps of many blocks on all cores; return the new head.
+
+        Arrays have a leading axis, the block; states and slopes stay as they are.
+        """
         digest  # noqa: B018
+        lanes = tau.shape[1]
         for m in prange(x.shape[0]):
             np.random.seed(seeds[m])
+            mine = slice(m * lanes, min((m + 1) * lanes, states.shape[0]))
             run(kind, p[m], tau[m], gain, basis, step, x[m], after[m], before[m], head, steps,
-                noise)
+                noise, states[mine], slopes[mine], row)
+        return (head + steps) % x.shape[1]
 
     return set_slope, advance, integrate, integrate_many
 

@@ -14,6 +14,8 @@ from cpg_ros.robot import Robot
 
 #: Longest delay the generator's history holds, in model time.
 MAX_DELAY = 5.0
+#: Strides per second below which a robot would seem to stand (Hz).
+SLOWEST = 0.01
 #: A period needs this many steps for the integrator to stay on the orbit.
 STEPS_A_PERIOD = 40
 
@@ -111,6 +113,10 @@ def plan(robot: Robot, name: str, gait: str, network: Delayed, frequency: float 
         Refused: there is no such orbit, it does not attract, or a joint would leave its limits.
 
     """
+    if 0.0 < frequency < SLOWEST:
+        raise Refused(f'frequency {frequency:g} is neither 0 nor at least {SLOWEST:g} Hz')
+    if not STEP <= network.tau <= MAX_DELAY:
+        raise Refused(f'tau {network.tau:g} must be from {STEP} to {MAX_DELAY:g}')
     try:
         orbit = solve_orbit(network, gait)
     except ValueError as error:
@@ -118,8 +124,6 @@ def plan(robot: Robot, name: str, gait: str, network: Delayed, frequency: float 
     if orbit.period < STEPS_A_PERIOD * STEP:
         raise Refused(f'the {gait} has a period of {orbit.period:.3g} model time units, too short '
                       f'for steps of {STEP}: at least {STEPS_A_PERIOD * STEP:g} is needed')
-    if not STEP <= network.tau <= MAX_DELAY:
-        raise Refused(f'tau {network.tau:g} must be from {STEP} to {MAX_DELAY:g}')
     gain = default_symmetry_gain(network) if gain < 0.0 else gain
     if not attracts(orbit, gain):
         raise Refused(f'the {gait} exists at tau {network.tau:g} but does not attract: the '

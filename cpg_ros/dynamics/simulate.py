@@ -1,4 +1,4 @@
-"""Offline simulation: the real-time kernel over a ring so long that it never wraps."""
+"""Offline simulation: the real-time kernel, every node of it recorded."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -26,15 +26,14 @@ class Trajectory:
     Attributes:
         t: nodes from t = 0 on, model time, shape (nodes,).
         x: states there, shape (nodes, cells) or (batch, nodes, cells).
-        after: slopes that leave each node, shaped like x.
-        before: slopes that reach each node, shaped like x.
+        slopes: time derivatives there, shaped like x; at t = 0 that of the network, not of the
+            history.
 
     """
 
     t: np.ndarray
     x: np.ndarray
-    after: np.ndarray
-    before: np.ndarray
+    slopes: np.ndarray
 
     def __call__(self, times: np.ndarray | float) -> np.ndarray:
         """Return the states at the times given, cubic Hermite, shape (..., times, cells).
@@ -52,8 +51,8 @@ class Trajectory:
         s = (times / step - left)[:, None]
         h01 = s * s * (3.0 - 2.0 * s)
         return ((1.0 - h01) * self.x[..., left, :] + h01 * self.x[..., left + 1, :]
-                + s * (s - 1.0) ** 2 * step * self.after[..., left, :]
-                + s * s * (s - 1.0) * step * self.before[..., left + 1, :])
+                + s * (s - 1.0) ** 2 * step * self.slopes[..., left, :]
+                + s * s * (s - 1.0) * step * self.slopes[..., left + 1, :])
 
 
 def sample_history(history: History, nodes: int, step: float, cells: int
@@ -119,6 +118,8 @@ def simulate(network: Delayed | Sequence[Delayed], history: History | Sequence[H
 
     """
     networks = [network] if isinstance(network, Delayed) else list(network)
+    if not networks or not (callable(history) or len(history)):
+        raise ValueError('there is no network, or no history, to start from')
     one_history = callable(history) or not (callable(history[0]) or np.ndim(history[0]))
     histories: list = [history] if one_history else list(history)  # type: ignore[arg-type]
     batch = max(len(networks), len(histories))
@@ -141,7 +142,7 @@ def simulate(network: Delayed | Sequence[Delayed], history: History | Sequence[H
 
     # Trajectory m is lane m % lanes of block m // lanes; spare lanes repeat the last one.
     members = np.minimum(np.arange(blocks * lanes), batch - 1).reshape(blocks, lanes)
-    x = np.empty((blocks, nodes + steps, cells, lanes))
+    x = np.empty((blocks, nodes, cells, lanes))
     after, before = np.empty_like(x), np.empty_like(x)
     p = np.empty((blocks, networks[0].coefficients.shape[0], cells, lanes))
     tau = np.empty((blocks, lanes))
@@ -150,9 +151,9 @@ def simulate(network: Delayed | Sequence[Delayed], history: History | Sequence[H
         for lane, m in enumerate(row):
             one = networks[m if len(networks) > 1 else 0]
             p[block, :, :, lane], tau[block, lane] = one.coefficients, one.tau
-            states, slopes = samples[m if len(histories) > 1 else 0]
-            x[block, :nodes, :, lane] = states
-            after[block, :nodes, :, lane] = before[block, :nodes, :, lane] = slopes
+            past, past_slopes = samples[m if len(histories) > 1 else 0]
+            x[block, :, :, lane] = past
+            after[block, :, :, lane] = before[block, :, :, lane] = past_slopes
     flat = [array.reshape(*array.shape[:2], cells * lanes) for array in (x, after, before)]
     flat_p = p.reshape(blocks, -1, cells * lanes)
     gain, basis = (0.0, np.zeros((1, cells))) if lock is None else (lock[0], lock[1].basis)
@@ -161,24 +162,27 @@ def simulate(network: Delayed | Sequence[Delayed], history: History | Sequence[H
     for block in range(blocks):
         kernel.set_slope(kind, flat_p[block], tau[block], gain, basis, step,
                          *(array[block] for array in flat), head)
+    states = np.empty((batch, steps + 1, cells))
+    slopes = np.empty_like(states)
+    for m, (block, lane) in enumerate(np.ndindex(blocks, lanes)):
+        if m < batch:
+            states[m, 0], slopes[m, 0] = x[block, head, :, lane], after[block, head, :, lane]
     with progress_bar('simulating', steps, enabled=progress) as bar:
         done = 0
         while done < steps:
             chunk = min(steps - done, max(1, CHUNK // x[:, 0].size))
             seeds = np.random.SeedSequence([seed, done]).generate_state(blocks)
             if blocks == 1:
-                kernel.integrate(kind, flat_p[0], tau[0], gain, basis, step,
-                                 *(array[0] for array in flat), head, chunk, noise, seeds[0])
+                head = kernel.integrate(kind, flat_p[0], tau[0], gain, basis, step,
+                                        *(array[0] for array in flat), head, chunk, noise,
+                                        seeds[0], states, slopes, done + 1)
             else:
-                kernel.integrate_many(kind, flat_p, tau, gain, basis, step, *flat, head, chunk,
-                                      noise, seeds)
-            head, done = head + chunk, done + chunk
+                head = kernel.integrate_many(kind, flat_p, tau, gain, basis, step, *flat, head,
+                                             chunk, noise, seeds, states, slopes, done + 1)
+            done += chunk
             bar(done)
 
-    def shaped(array: np.ndarray) -> np.ndarray:
-        kept = array[:, nodes - 1:].transpose(0, 3, 1, 2)
-        if isinstance(network, Delayed) and one_history:
-            return kept[0, 0]
-        return kept[0, :batch] if blocks == 1 else kept.reshape(-1, *kept.shape[2:])[:batch]
-
-    return Trajectory(np.arange(steps + 1) * step, shaped(x), shaped(after), shaped(before))
+    times = np.arange(steps + 1) * step
+    if isinstance(network, Delayed) and one_history:
+        return Trajectory(times, states[0], slopes[0])
+    return Trajectory(times, states, slopes)

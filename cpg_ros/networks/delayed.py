@@ -11,7 +11,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from cpg_ros.networks.jit import jit, tanh
+from cpg_ros.networks.jit import tanh
 
 CELLS = 8
 
@@ -143,34 +143,40 @@ def default_symmetry_gain(network: Delayed, rate: float = 0.5) -> float:
     return max(0.0, bound)
 
 
-# The kernels below take `lanes` copies of the network at once, cell by cell: component
-# cell * lanes + lane. The coefficients p have shape (4, cells * lanes).
+def compiled(decorate):
+    """Compile the two halves of the right-hand side, drive and field, with a numba decorator.
 
-@jit
-def drive(past, p, lanes, out):
-    """out_i = c tanh(x_{s(i)}(t - tau)), the part that depends on delayed states alone."""
-    for i in range(out.shape[0]):
-        out[i] = p[2, i] * tanh(past[i])
-    for i in range(0, out.shape[0], 2 * lanes):
-        for lane in range(i, i + lanes):
-            out[lane], out[lane + lanes] = out[lane + lanes], out[lane]
-
-
-@jit
-def field(x, k, weight, driven, p, lanes, work, out):
-    """Right-hand side at z = x + weight k: a z_i + b tanh(z_i) + d tanh(z_{i-2}) + driven_i.
-
-    work is scratch of shape (2, components + 2 lanes); its first row holds z afterwards.
+    They take ``lanes`` copies of the network at once, cell by cell: component
+    ``cell * lanes + lane`` of n. The coefficients p have shape (4, n).
     """
-    n, ring = out.shape[0], 2 * lanes
-    # The ring laid out straight: `behind` is `squashed` seen from two cells before. (Slices,
-    # not index sums, because those would be checked for negative values in every pass.)
-    z, behind, squashed = work[0, :n], work[1], work[1, ring:]
-    for i in range(n):
-        z[i] = x[i] + weight * k[i]
-    for i in range(n):
-        squashed[i] = tanh(z[i])
-    for i in range(ring):
-        behind[i] = squashed[n - ring + i]
-    for i in range(n):
-        out[i] = p[0, i] * z[i] + p[1, i] * squashed[i] + p[3, i] * behind[i] + driven[i]
+    @decorate
+    def drive(n, past, p, lanes, out):
+        """out_i = c tanh(x_{s(i)}(t - tau)), the part that depends on delayed states alone."""
+        for i in range(n):
+            out[i] = p[2, i] * tanh(past[i])
+        for i in range(0, n, 2 * lanes):
+            here, other = out[i:i + lanes], out[i + lanes:i + 2 * lanes]
+            for lane in range(lanes):
+                here[lane], other[lane] = other[lane], here[lane]
+
+
+    @decorate
+    def field(n, x, k, weight, driven, p, lanes, work, out):
+        """Right-hand side at z = x + weight k: a z_i + b tanh(z_i) + d tanh(z_{i-2}) + driven_i.
+
+        work is scratch of shape (2, n + 2 lanes); its first row holds z afterwards.
+        """
+        ring = 2 * lanes
+        # The ring laid out straight: `behind` is `squashed` seen from two cells before. (Slices,
+        # not index sums, because those would be checked for negative values in every pass.)
+        z, behind, squashed = work[0], work[1], work[1, ring:]
+        for i in range(n):
+            z[i] = x[i] + weight * k[i]
+        for i in range(n):
+            squashed[i] = tanh(z[i])
+        for i in range(ring):
+            behind[i] = squashed[n - ring + i]
+        for i in range(n):
+            out[i] = p[0, i] * z[i] + p[1, i] * squashed[i] + p[3, i] * behind[i] + driven[i]
+
+    return drive, field

@@ -13,6 +13,8 @@ from numba import njit
 OPTIONS: dict[str, Any] = {'error_model': 'numpy', 'fastmath': {'contract'}, 'nogil': True}
 
 jit = njit(**OPTIONS)
+#: For what is built into its caller, where a loop of known length can be unrolled.
+part = njit(inline='always', **OPTIONS)
 
 
 def sources_digest() -> int:

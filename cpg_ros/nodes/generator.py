@@ -25,6 +25,7 @@ from std_srvs.srv import SetBool
 from cpg_ros.dynamics.pattern import Pattern
 from cpg_ros.dynamics.program import Refused
 from cpg_ros.dynamics.warm import warm
+from cpg_ros.networks.delayed import default_symmetry_gain
 from cpg_ros.nodes.diagnostics import Diagnostics
 from cpg_ros.nodes.outputs import Outputs
 from cpg_ros.nodes.parameter_services import StrictParameterService
@@ -181,9 +182,11 @@ class Generator(Node):
         self.get_logger().info(f'{program.name} at {program.frequency:.4g} Hz, period '
                                f'{program.orbit.period:.6f} model time, symmetry gain '
                                f'{program.gain:.3g}')
-        if program.gain == 0.0:
-            self.get_logger().warning('symmetry_gain is 0: no gait is stable in the full '
-                                      'network, the watchdog will have to put it back')
+        enough = default_symmetry_gain(program.orbit.network)
+        if program.gain < enough:
+            self.get_logger().warning(f'symmetry_gain {program.gain:g} may be too low for the gait '
+                                      f'to attract ({enough:.3g} is enough): if it does not, the '
+                                      'watchdog has to put it back again and again')
 
     # -- the robot ------------------------------------------------------------------------
 
