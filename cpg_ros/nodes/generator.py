@@ -184,9 +184,9 @@ class Generator(Node):
                                f'{program.gain:.3g}')
         enough = default_symmetry_gain(program.orbit.network)
         if program.gain < enough:
-            self.get_logger().warning(f'symmetry_gain {program.gain:g} may be too low for the gait '
-                                      f'to attract ({enough:.3g} is enough): if it does not, the '
-                                      'watchdog has to put it back again and again')
+            self.get_logger().warning(
+                f'symmetry_gain {program.gain:g} may be too low for the gait to attract '
+                f'({enough:.3g} is enough): the watchdog may have to put it back again and again')
 
     # -- the robot ------------------------------------------------------------------------
 
