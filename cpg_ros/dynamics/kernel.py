@@ -21,7 +21,7 @@ from cpg_ros.networks.jit import OPTIONS, jit, part, sources_digest
 
 
 def _compiled(decorate):
-    """Compile the stepping with a numba decorator; return past_state, restart and steps_of."""
+    """Compile the stepping with a numba decorator; return past_state, restart, steps_of."""
     delayed_drive, delayed_field = delayed.compiled(decorate)
 
     @decorate
@@ -143,6 +143,7 @@ def _compiled(decorate):
         past_states(n, x, after, before, head, 0.0, tau, step, past)
         drive(n, kind, past, p, lanes, driven)
         field(n, kind, x[head], x[head], 0.0, driven, p, gain, basis, lanes, work, after[head])
+
     return past_state, restart, steps_of
 
 
