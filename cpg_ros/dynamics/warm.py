@@ -3,7 +3,6 @@
 import numpy as np
 
 from cpg_ros.dynamics.readout import confine, observe
-from cpg_ros.dynamics.simulate import simulate
 from cpg_ros.dynamics.stepper import Stepper
 from cpg_ros.networks.delayed import PRESETS, Mode
 
@@ -11,7 +10,6 @@ from cpg_ros.networks.delayed import PRESETS, Mode
 def warm() -> None:
     """Run each kernel once, on the types the generator uses."""
     network = PRESETS['trot'].network
-    simulate(network, np.zeros(8), 0.01, 0.01, lock=(1.0, Mode(2, 1)), progress=False)
     stepper = Stepper(network, np.zeros(8), max_delay=1.0, gain=1.0, mode=Mode(2, 1))
     stepper.advance(0.01)
     joints, table = np.zeros(1), np.zeros(4)

@@ -239,7 +239,7 @@ def compile_kernels() -> None:
     logger = get_logger(NAME)
     began = time.monotonic()
     notice = threading.Timer(1.0, logger.info, ['compiling the numerical kernels; only the very '
-                                                'first start needs this (about 20 s)'])
+                                                'first start needs this (10 to 20 s)'])
     notice.daemon = True
     notice.start()
     warm()
