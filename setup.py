@@ -10,6 +10,7 @@ setup(
         ('share/ament_index/resource_index/packages', ['resource/cpg_ros']),
         ('share/cpg_ros', ['package.xml']),
         ('share/cpg_ros/config', glob('config/*.yaml')),
+        ('share/cpg_ros/config/presets', glob('config/presets/*.yaml')),
         ('share/cpg_ros/launch', glob('launch/*.launch.py')),
     ],
     python_requires='>=3.10',

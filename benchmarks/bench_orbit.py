@@ -15,7 +15,7 @@ from scipy.optimize import brentq, root
 from cpg_ros.dynamics.hopf import hopf_point
 from cpg_ros.dynamics.orbit import Orbit, solve_orbit
 from cpg_ros.dynamics.simulate import simulate
-from cpg_ros.networks.delayed import PRESETS, Preset, default_symmetry_gain, mode_of
+from cpg_ros.networks.delayed import PRESETS, Preset, default_symmetry_gain
 
 #: Preset -> period, to eight decimals. The legs' phases differ, the waveforms are two.
 PERIODS = {'trot': 1.27827056, 'pace': 1.27827056, 'bound': 1.27827056, 'pronk': 1.27827056,
@@ -40,7 +40,7 @@ def residual(orbit: Orbit) -> float:
 
 def by_simulation(preset: Preset) -> float:
     """Period, from the last two upward zero crossings of cell 1 once they agree to 1e-8."""
-    network, mode = preset.network, mode_of(preset.gait, preset.network)
+    network, mode = preset.network, preset.network.symmetry(preset.gait)
     omega = hopf_point(network, mode).omega
 
     def history(times: np.ndarray) -> np.ndarray:
@@ -61,7 +61,7 @@ def by_simulation(preset: Preset) -> float:
 
 def by_root_finder(preset: Preset) -> float:
     """Period, by MINPACK's hybrid method with differences for derivatives."""
-    network, mode = preset.network, mode_of(preset.gait, preset.network)
+    network, mode = preset.network, preset.network.symmetry(preset.gait)
     a, b, c, d, tau = network.as_dict().values()
     waves = 2j * np.pi * np.arange(NODES // 2 + 1)
 

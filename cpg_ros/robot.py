@@ -1,26 +1,25 @@
 """Robot files: legs, joints, which cell drives each joint and how, and the joints' limits.
 
-A joint's angle is ``offset + amplitude * sum_k w_k psi_k(x, y)``: x is its cell over the gait's
-peak, y the derivative of that by phase (in radians), psi = x, y, x^2, x y, x^3, x^2 y
-(DESIGN 3). On every gait x runs from -1 to 1, so weights are in radians.
+A joint's angle is ``offset + amplitude * sum_k w_k psi_k(x, y)``: x is its cell's waveform (of a
+Morris-Lecar cell: the first harmonics of it), y the derivative of that by phase (in radians),
+psi = x, y, x^2, x y, x^3, x^2 y (DESIGN 3). On every gait x runs from -1 to 1, so weights are in
+radians.
 """
 
-import math
-from collections.abc import Mapping, Set
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import yaml
 
-from cpg_ros.networks import delayed
-
-#: Network -> leg -> cells (numbered from 1), the first of which gives the leg's phase.
-LEGS: dict[str, Mapping[str, tuple[int, ...]]] = {'delayed': delayed.LEGS}
+from cpg_ros.checked import Reader, shown
+from cpg_ros.networks.registry import NETWORKS
 
 #: No angle (rad) or speed (rad/s) of a joint is larger.
 LARGEST = 1e6
+
+#: Harmonics of a Morris-Lecar cell that joints follow, if the file does not say.
+HARMONICS = 3
 
 #: How many weights each readout order takes; the bare scale is an order of its own.
 WEIGHTS = (1, 2, 4, 6)
@@ -50,14 +49,18 @@ class Robot:
 
     Attributes:
         name: the file's stem.
-        network: the network whose cells drive it.
+        networks: names of the networks whose cells can drive it; all have the same legs.
+        assignment: which of their cells drive which leg.
+        harmonics: of a Morris-Lecar cell's waveform that joints follow.
         legs: leg -> its joints.
         order: all joints' names in the order in which controllers take them.
 
     """
 
     name: str
-    network: str
+    networks: tuple[str, ...]
+    assignment: str
+    harmonics: int
     legs: dict[str, tuple[Joint, ...]]
     order: tuple[str, ...]
 
@@ -86,65 +89,20 @@ class Robot:
     @property
     def leg_cells(self) -> np.ndarray:
         """Index from 0 of the cell that gives each leg's phase, shape (legs,)."""
-        return np.array([LEGS[self.network][leg][0] - 1 for leg in self.legs])
+        cells = NETWORKS[self.networks[0]].legs[self.assignment]
+        return np.array([cells[leg][0] - 1 for leg in self.legs])
 
 
-class _UniqueKeys(yaml.SafeLoader):
-    """YAML without silently overwritten keys."""
+class _Reader(Reader):
+    """Reads networks and joints, too."""
 
-    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict:
-        seen = set()
-        for key_node, _ in node.value:
-            key = self.construct_object(key_node, deep=True)
-            if not isinstance(key, str):
-                raise yaml.constructor.ConstructorError(
-                    None, None, f'the key {_shown(key)} is not a name', key_node.start_mark)
-            if key in seen:
-                raise yaml.constructor.ConstructorError(
-                    None, None, f"the key '{key}' is there twice", key_node.start_mark)
-            seen.add(key)
-        return super().construct_mapping(node, deep)
-
-
-class _Reader:
-    """Reads checked values out of one file's tree, and says where a bad one stands."""
-
-    def __init__(self, path: Path) -> None:
-        self.path = path
-
-    def fail(self, where: str, why: str) -> RobotError:
-        return RobotError(' '.join(f'robot file {self.path}: {where}: {why}'.split()))
-
-    def keys(self, tree: Any, where: str, required: Set[str], optional: Set[str] = frozenset()
-             ) -> Mapping[str, Any]:
-        if not isinstance(tree, Mapping):
-            raise self.fail(where, f'must be a mapping, not {_shown(tree)}')
-        for key in tree:
-            if key not in required | optional:
-                allowed = ', '.join(sorted(required | optional))
-                raise self.fail(f'{where}.{key}', f'unknown key (allowed: {allowed})')
-        for key in sorted(required - set(tree)):
-            raise self.fail(f'{where}.{key}', 'is missing')
-        return tree
-
-    def number(self, value: Any, where: str) -> float:
-        if isinstance(value, bool) or not isinstance(value, int | float):
-            raise self.fail(where, f'must be a number, not {_shown(value)}')
-        if value != value or value in (math.inf, -math.inf):
-            raise self.fail(where, f'must be finite, not {value}')
-        if abs(value) > LARGEST:
-            raise self.fail(where, f'must be at most {LARGEST:g}, not {_shown(value)}')
-        return float(value)
-
-    def text(self, value: Any, where: str) -> str:
-        if not isinstance(value, str) or not value.strip():
-            raise self.fail(where, f'must be a name, not {_shown(value)}')
-        return value
-
-    def items(self, value: Any, where: str) -> list:
-        if not isinstance(value, list) or not value:
-            raise self.fail(where, f'must be a list with at least one entry, not {_shown(value)}')
-        return value
+    def networks(self, value: Any) -> tuple[str, ...]:
+        names = value if isinstance(value, list) else [value]
+        for k, name in enumerate(self.items(names, 'network')):
+            where = f'network[{k}]' if isinstance(value, list) else 'network'
+            if self.text(name, where) not in NETWORKS:
+                raise self.fail(where, f"'{name}' is not one of {', '.join(NETWORKS)}")
+        return tuple(names)
 
     def joint(self, tree: Any, where: str, leg: str, cells: tuple[int, ...]) -> Joint:
         numbers = {'offset', 'lower', 'upper', 'velocity'}
@@ -154,7 +112,7 @@ class _Reader:
         values = {key: self.number(tree[key], f'{where}.{key}') for key in sorted(numbers)}
         if type(tree['cell']) is not int or tree['cell'] not in cells:
             raise self.fail(f'{where}.cell', f"leg '{leg}' has the cells "
-                            f'{" and ".join(map(str, cells))}, not {_shown(tree["cell"])}')
+                            f'{" and ".join(map(str, cells))}, not {shown(tree["cell"])}')
         if ('amplitude' in tree) == ('weights' in tree):
             raise self.fail(where, "needs exactly one of 'amplitude' and 'weights'")
         if 'amplitude' in tree:
@@ -177,10 +135,6 @@ class _Reader:
         return Joint(name=name, leg=leg, cell=tree['cell'], weights=tuple(weights), **values)
 
 
-def _shown(value: Any) -> str:
-    return 'nothing' if value is None else repr(value)[:60]
-
-
 def load_robot(path: str | Path) -> Robot:
     """Read and check a robot file.
 
@@ -190,21 +144,23 @@ def load_robot(path: str | Path) -> Robot:
 
     """
     path = Path(path)
-    reader = _Reader(path)
-    try:
-        tree = yaml.load(path.read_text(encoding='utf-8'), Loader=_UniqueKeys)
-    except OSError as error:
-        raise RobotError(f'robot file {path}: {error.strerror}') from error
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
-        mark = getattr(error, 'problem_mark', None)
-        line = f'line {mark.line + 1}' if mark else 'file'
-        raise reader.fail(line, str(getattr(error, 'problem', error))) from error
-
-    tree = reader.keys(tree, 'file', {'network', 'legs'}, {'joint_order'})
-    network = reader.text(tree['network'], 'network')
-    if network not in LEGS:
-        raise reader.fail('network', f"'{network}' is not one of {', '.join(LEGS)}")
-    cells = LEGS[network]
+    reader = _Reader(path, 'robot file', RobotError, LARGEST)
+    tree = reader.keys(reader.tree(), 'file', {'network', 'legs'},
+                       {'joint_order', 'assignment', 'harmonics'})
+    networks = reader.networks(tree['network'])
+    first = NETWORKS[networks[0]]
+    assignment = reader.text(tree.get('assignment', next(iter(first.legs))), 'assignment')
+    for name in networks:
+        if assignment not in NETWORKS[name].legs:
+            raise reader.fail('assignment', f"'{assignment}' is not one of the network {name}: "
+                              f'{", ".join(NETWORKS[name].legs)}')
+        if NETWORKS[name].legs[assignment] != first.legs[assignment]:
+            raise reader.fail('network', f"'{name}' has other legs or cells than '{networks[0]}'")
+    harmonics = tree.get('harmonics', HARMONICS)
+    if type(harmonics) is not int or not 1 <= harmonics <= 32:
+        raise reader.fail('harmonics', f'must be a whole number from 1 to 32, not '
+                          f'{shown(harmonics)}')
+    cells = first.legs[assignment]
     reader.keys(tree['legs'], 'legs', set(cells))
 
     legs: dict[str, tuple[Joint, ...]] = {}
@@ -236,4 +192,4 @@ def load_robot(path: str | Path) -> Robot:
         for name, place in seen.items():
             if name not in order:
                 raise reader.fail('joint_order', f"joint '{name}' of {place} is missing")
-    return Robot(path.stem, network, legs, tuple(order))
+    return Robot(path.stem, networks, assignment, harmonics, legs, tuple(order))

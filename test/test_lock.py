@@ -75,7 +75,7 @@ def test_the_lock_changes_neither_waveform_nor_period(gait):
     network = PRESETS[gait].network
     orbit = solve_orbit(network, gait)
     for gain in (default_symmetry_gain(network), 8.0, 30.0):
-        run = simulate(network, orbit, 20.5 * orbit.period, 0.0025, lock=(gain, orbit.mode))
+        run = simulate(network, orbit, 20.5 * orbit.period, 0.0025, lock=(gain, orbit.symmetry))
         assert np.abs(run.x - orbit(run.t)).max() < 1e-8
         assert rhythm(run, orbit.period, 0.0)[1] == pytest.approx(orbit.period, rel=1e-6)
 
@@ -86,7 +86,7 @@ def test_noise_with_and_without_the_lock(gait):
     network = PRESETS[gait].network
     orbit = solve_orbit(network, gait)
     locked, free = (simulate(network, orbit, 200.0, orbit.period / 400, noise=0.02, seed=7,
-                             lock=(gain, orbit.mode))
+                             lock=(gain, orbit.symmetry))
                     for gain in (default_symmetry_gain(network), 0.0))
     amplitude, period, phases = rhythm(locked, orbit.period, 100.0)
     # The first harmonic is 1 % below the peak here.
@@ -102,9 +102,9 @@ def test_noise_with_and_without_the_lock(gait):
 def test_a_small_disturbance_kills_the_trot_without_the_lock():
     network = PRESETS['trot'].network
     orbit = solve_orbit(network, 'trot')
-    steppers = [Stepper(network, orbit, gain=gain, mode=orbit.mode)
+    steppers = [Stepper(network, orbit, gain=gain, symmetry=orbit.symmetry)
                 for gain in (0.0, default_symmetry_gain(network))]
-    outside = np.eye(8)[0] - np.eye(8)[0] @ orbit.mode.basis.T @ orbit.mode.basis
+    outside = np.eye(8)[0] - np.eye(8)[0] @ orbit.symmetry.basis.T @ orbit.symmetry.basis
     for stepper in steppers:
         stepper.disturb(1e-6 * outside / np.linalg.norm(outside))
         stepper.advance(60.0)

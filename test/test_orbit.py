@@ -10,7 +10,7 @@ from scipy.special import lambertw
 
 from cpg_ros.dynamics.hopf import hopf_point
 from cpg_ros.dynamics.orbit import NoOrbit, solve_orbit
-from cpg_ros.networks.delayed import GAITS, MODES, PARAMETERS, PRESETS, Delayed, mode_of
+from cpg_ros.networks.delayed import GAITS, MODES, PRESETS, Delayed
 
 EXAMPLE = Delayed(-4.5, 1.0, 6.5, -2.0, 0.4)
 SWAP = [1, 0, 3, 2, 5, 4, 7, 6]
@@ -71,7 +71,7 @@ def test_exact_derivatives(gait):
     network, width = PRESETS[gait].network, 1e-5
     orbit = solve_orbit(network, gait)
     theta = np.arange(orbit.values.size) / orbit.values.size
-    for k, name in enumerate(PARAMETERS):
+    for k, name in enumerate(Delayed.parameters()):
         value = getattr(network, name)
         low, high = (solve_orbit(replace(network, **{name: value + side * width}), gait)
                      for side in (-1, 1))
@@ -83,7 +83,7 @@ def test_exact_derivatives(gait):
 
 @pytest.mark.parametrize(('network', 'gait', 'omega', 'tau', 'k1', 'k2'), ONSETS)
 def test_onset(network, gait, omega, tau, k1, k2):
-    point = hopf_point(network, mode_of(gait, network))
+    point = hopf_point(network, network.symmetry(gait))
     assert (point.omega, point.tau) == pytest.approx((omega, tau), abs=1e-4)
     # Just beyond it the normal form gives the amplitude, and the period is 2 pi / omega.
     orbit = solve_orbit(replace(network, tau=point.tau + 5e-4), gait)
@@ -109,7 +109,7 @@ def test_hopf_points_make_the_characteristic_matrix_singular(network, mode, sign
 
 @pytest.mark.parametrize(('network', 'gait'), [row[:2] for row in ONSETS])
 def test_the_critical_delay_is_where_the_mode_turns_unstable(network, gait):
-    a, b = (mode := mode_of(gait, network)).eigenvalue_terms(network)
+    a, b = (mode := network.symmetry(gait)).eigenvalue_terms(network)
     critical = hopf_point(network, mode).tau
     for tau, sign in ((0.3 * critical, -1), (0.99 * critical, -1), (1.01 * critical, 1)):
         roots = a + lambertw(b * tau * np.exp(-a * tau), np.arange(-9, 10)) / tau
@@ -125,7 +125,7 @@ def test_symmetry_laws(network, factor, s):
             (('trot', c, d, 1), ('pace', c, -d, 1), ('pronk', -c, -d, 1), ('bound', -c, d, 1)),
             (('walk', c, d, 1), ('walk', c, -d, 1), ('jump', -c, d, 1), ('jump', -c, -d, 1)),
             (('trot', c, d, 1), ('trot', c, d, s)), (('walk', c, d, 1), ('walk', c, d, s))):
-        tau = factor * hopf_point(network, mode_of(families[0][0], network)).tau
+        tau = factor * hopf_point(network, network.symmetry(families[0][0])).tau
         first, *others = (
             solve_orbit(Delayed(a * rate, b * rate, c * rate, d * rate, tau / rate), gait)
             for gait, c, d, rate in families)

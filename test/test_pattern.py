@@ -19,7 +19,8 @@ PAIRS = [(old, new) for old in GAITS for new in GAITS if old != new]
 
 @cache
 def program(gait, frequency=1.0, amplitude=1.0, robot='goat', gain=-1.0):
-    return plan(ROBOTS[robot], gait, gait, PRESETS[gait].network, frequency, amplitude, gain)
+    preset = PRESETS[gait]
+    return plan(ROBOTS[robot], gait, preset, preset.network, frequency, amplitude, gain)
 
 
 def drive(pattern, duration, dt):
@@ -130,7 +131,7 @@ def test_ramps_from_and_to_the_stand(ramps, dt):
 def test_watchdog(history, offset, dt, gain):
     pattern = in_swing(one := program('trot', gain=gain))
     history = program(history).orbit if isinstance(history, str) else history
-    stepper = Stepper(one.orbit.network, history, gain=one.gain, mode=one.orbit.mode)
+    stepper = Stepper(one.orbit.network, history, gain=one.gain, symmetry=one.orbit.symmetry)
     stepper.disturb(np.full(8, offset))
     pattern._tracks[-1].stepper = stepper
     check_the_robot_can_follow(one.robot, drive(pattern, 2.0, dt), dt)
@@ -146,5 +147,6 @@ def test_watchdog(history, offset, dt, gain):
     ({'network': Delayed(-450, 100, 650, -200, 0.004)}, r'period of 0.0128 .* at least 0.1')])
 def test_refused(change, words):
     with pytest.raises(Refused, match=words):
-        plan(ROBOTS['goat'], 'x', 'trot', **{'network': PRESETS['trot'].network, **change})
+        plan(ROBOTS['goat'], 'x', PRESETS['trot'],
+             **{'network': PRESETS['trot'].network, **change})
     program('trot', 1.0, 2.5)  # 0.40 rad * 2.5 is right at the limit, which is not refused

@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 
 from cpg_ros.dynamics.orbit import solve_orbit
 from cpg_ros.dynamics.simulate import simulate
-from cpg_ros.dynamics.stepper import STEP, Stepper
-from cpg_ros.networks.delayed import Delayed, Mode
+from cpg_ros.dynamics.stepper import Stepper
+from cpg_ros.networks.delayed import STEP, Delayed, Mode
 
 WALK = Delayed(-4.5, 1.0, 6.5, -2.0, 0.4)
 START = np.array([0.1, -0.1, 0.1, -0.1, -0.1, 0.1, -0.1, 0.1])
@@ -23,7 +23,7 @@ def snapshot(stepper):
     arrays = {name: value.copy() for name, value in vars(stepper).items()
               if isinstance(value, np.ndarray)}
     assert sum(array.nbytes for array in arrays.values()) > 3 * 8 * stepper.max_delay / STEP
-    return arrays, stepper.network, stepper.gain, stepper.mode
+    return arrays, stepper.network, stepper.gain, stepper.symmetry
 
 
 def same(one, other):
@@ -103,7 +103,7 @@ def test_parameters_changed_while_it_runs(changed):
 
 
 def test_a_refused_change_changes_nothing():
-    stepper = Stepper(WALK, START, max_delay=1.0, gain=2.0, mode=LOCK)
+    stepper = Stepper(WALK, START, max_delay=1.0, gain=2.0, symmetry=LOCK)
     stepper.advance(2.3456)
     before, twin = snapshot(stepper), stepper.copy()
     for network, gain, mode, words in (
@@ -126,7 +126,7 @@ def test_a_bad_start_is_refused(change, words):
 
 
 def test_memory_is_constant():
-    stepper = Stepper(WALK, solve_orbit(WALK, 'walk'), gain=10.0, mode=LOCK)
+    stepper = Stepper(WALK, solve_orbit(WALK, 'walk'), gain=10.0, symmetry=LOCK)
     arrays = {name: id(value) for name, value in vars(stepper).items()
               if isinstance(value, np.ndarray)}
     sizes = {name: array.shape for name, array in snapshot(stepper)[0].items()}

@@ -42,7 +42,7 @@ def off(measured, expected):
 
 @pytest.fixture(scope='module')
 def programs():
-    return {gait: plan(ROBOT, gait, gait, PRESETS[gait].network, 2.0) for gait in GAITS}
+    return {gait: plan(ROBOT, gait, PRESETS[gait], PRESETS[gait].network, 2.0) for gait in GAITS}
 
 
 def test_all_ordered_pairs_switch_without_a_jerk(running, programs):

@@ -7,8 +7,10 @@ a simulation and where parameters are changed. Delayed values come from the cubi
 interpolant of their interval, so the method is of fourth order in the step for any delay of at
 least one step.
 
-Components are cells times lanes: several copies of the network (lanes) with their own
-coefficients and delays advance together in vector registers. In real time there is one lane.
+Components are those of the network (cells, or cells times their variables) times lanes: several
+copies of the network (lanes) with their own coefficients and delays advance together in vector
+registers. In real time there is one lane. For networks without delay the ring only serves the
+interpolation between nodes.
 """
 
 import math
@@ -16,28 +18,53 @@ import math
 import numpy as np
 from numba import njit, prange
 
-from cpg_ros.networks import delayed
+from cpg_ros.networks import biped, delayed, quadruped
 from cpg_ros.networks.jit import OPTIONS, jit, part, sources_digest
 
+DELAYED = delayed.Delayed.kind
+QUADRUPED = quadruped.Quadruped.kind
 
-def _compiled(decorate):
-    """Compile the stepping with a numba decorator; return past_state, restart, steps_of."""
-    delayed_drive, delayed_field = delayed.compiled(decorate)
+
+def _rates(decorate):
+    """Compile every network's right-hand side, given the delayed network's drive."""
+    drive, delayed_rates = delayed.compiled(decorate)
+    quadruped_rates, biped_rates = quadruped.compiled(decorate), biped.compiled(decorate)
 
     @decorate
-    def drive(n, kind, past, p, lanes, out):
-        """Contribution of the delayed states in the network of this kind."""
-        if kind == 0:
-            delayed_drive(n, past, p, lanes, out)
+    def rates(n, kind, x, k, weight, driven, p, lanes, work, out):
+        """Right-hand side at z = x + weight k in the network of this kind."""
+        if kind == DELAYED:
+            delayed_rates(n, x, k, weight, driven, p, lanes, work, out)
+        elif kind == QUADRUPED:
+            quadruped_rates(n, x, k, weight, p, lanes, work, out)
+        else:
+            biped_rates(n, x, k, weight, p, lanes, work, out)
+
+    return drive, rates
+
+
+def _delayed_rates(decorate):
+    """Compile the right-hand side of the delayed network alone."""
+    drive, delayed_rates = delayed.compiled(decorate)
+
+    @decorate
+    def rates(n, kind, x, k, weight, driven, p, lanes, work, out):
+        """Right-hand side at z = x + weight k."""
+        delayed_rates(n, x, k, weight, driven, p, lanes, work, out)
+
+    return drive, rates
+
+
+def _compiled(decorate, drive, rates):
+    """Compile the stepping with a numba decorator; return past_state, restart, steps_of."""
 
     @decorate
     def field(n, kind, x, k, weight, driven, p, gain, basis, lanes, work, out):
         """Right-hand side at z = x + weight k, with the symmetry lock -gain (I - P) z.
 
-        P projects on the rows of basis, shape (r, cells); work is scratch.
+        P projects on the rows of basis, shape (r, components); work is scratch.
         """
-        if kind == 0:
-            delayed_field(n, x, k, weight, driven, p, lanes, work, out)
+        rates(n, kind, x, k, weight, driven, p, lanes, work, out)
         if gain != 0.0:
             z, along = work[0], work[1]
             for i in range(n):
@@ -99,7 +126,7 @@ def _compiled(decorate):
 
     @decorate
     def steps_of(n, lanes, kind, p, tau, gain, basis, step, x, after, before, head, steps, noise,
-                 states, slopes, row):
+                 states, slopes, row, every):
         """Take RK4 steps from the head node; return the new head.
 
         ``noise`` is the standard deviation of white noise per square root of model time, added
@@ -113,10 +140,11 @@ def _compiled(decorate):
             new = head + 1 if head + 1 < x.shape[0] else 0
             now, k1 = x[head], after[head]
             # Stages 2 and 3 share one delayed state, stage 4 and the next step's first another.
-            past_states(n, x, after, before, head, 0.5, tau, step, past)
-            drive(n, kind, past, p, lanes, middle)
-            past_states(n, x, after, before, head, 1.0, tau, step, past)
-            drive(n, kind, past, p, lanes, end)
+            if kind == DELAYED:
+                past_states(n, x, after, before, head, 0.5, tau, step, past)
+                drive(n, past, p, lanes, middle)
+                past_states(n, x, after, before, head, 1.0, tau, step, past)
+                drive(n, past, p, lanes, end)
             field(n, kind, now, k1, 0.5 * step, middle, p, gain, basis, lanes, work, k2)
             field(n, kind, now, k2, 0.5 * step, middle, p, gain, basis, lanes, work, k3)
             field(n, kind, now, k3, step, end, p, gain, basis, lanes, work, k4)
@@ -128,10 +156,11 @@ def _compiled(decorate):
             field(n, kind, x[new], k4, 0.0, end, p, gain, basis, lanes, work, after[new])
             for i in range(n):
                 before[new, i] = after[new, i]
-            for lane in range(states.shape[0]):
-                for cell in range(states.shape[2]):
-                    states[lane, row, cell] = x[new, cell * lanes + lane]
-                    slopes[lane, row, cell] = after[new, cell * lanes + lane]
+            if row % every == 0:
+                for lane in range(states.shape[0]):
+                    for i in range(states.shape[2]):
+                        states[lane, row // every, i] = x[new, i * lanes + lane]
+                        slopes[lane, row // every, i] = after[new, i * lanes + lane]
             row += 1
             head = new
         return head
@@ -140,17 +169,18 @@ def _compiled(decorate):
     def restart(n, lanes, kind, p, tau, gain, basis, step, x, after, before, head):
         """Recompute the slope that leaves the head node, after parameters have changed."""
         past, driven, work = np.empty(n), np.zeros(n), np.zeros((2, n + 2 * lanes))
-        past_states(n, x, after, before, head, 0.0, tau, step, past)
-        drive(n, kind, past, p, lanes, driven)
+        if kind == DELAYED:
+            past_states(n, x, after, before, head, 0.0, tau, step, past)
+            drive(n, past, p, lanes, driven)
         field(n, kind, x[head], x[head], 0.0, driven, p, gain, basis, lanes, work, after[head])
 
     return past_state, restart, steps_of
 
 
-# One network by itself has code of its own: built in one piece, its loops unrolled. Lanes run
-# through loops of any length in vector registers, which need functions of their own.
-_, _, _steps_of_one = _compiled(part)
-_past_state, _restart_lanes, _steps_of_lanes = _compiled(jit)
+# One delayed network by itself has code of its own: built in one piece, its loops unrolled. Lanes
+# run through loops of any length in vector registers, which need functions of their own.
+_, _, _steps_of_one = _compiled(part, *_delayed_rates(part))
+_past_state, _restart_lanes, _steps_of_lanes = _compiled(jit, *_rates(jit))
 
 
 @jit
@@ -158,21 +188,6 @@ def restart(kind, p, tau, gain, basis, step, x, after, before, head):
     """Recompute the slope that leaves the head node, after parameters have changed."""
     _restart_lanes(x.shape[1], tau.shape[0], kind, p, tau, gain, basis, step, x, after, before,
                    head)
-
-
-@jit
-def run(kind, p, tau, gain, basis, step, x, after, before, head, steps, noise, states, slopes,
-        row):
-    """Take RK4 steps from the head node; return the new head.
-
-    What is reached is recorded in states and slopes, shape (lanes, rows, cells), from the row
-    given on; arrays without lanes record nothing.
-    """
-    if tau.shape[0] == 1 and x.shape[1] == 8:
-        return _steps_of_one(8, 1, kind, p, tau, gain, basis, step, x, after, before, head,
-                             steps, noise, states, slopes, row)
-    return _steps_of_lanes(x.shape[1], tau.shape[0], kind, p, tau, gain, basis, step, x, after,
-                           before, head, steps, noise, states, slopes, row)
 
 
 def _cached(digest):
@@ -189,7 +204,7 @@ def _cached(digest):
         """Advance the output instant of one lane by duration and evaluate there.
 
         clock is (head, ahead): the newest node and its distance beyond the output instant, in
-        [0, step). out receives x, x', x'' at that instant, shape (3, cells).
+        [0, step). out receives x, x', x'' at that instant, shape (3, components).
         """
         digest  # noqa: B018
         head = int(clock[0])
@@ -199,7 +214,8 @@ def _cached(digest):
             nothing = np.empty((0, 0, 0))
             # Not the unrolled code: it gains nothing here and takes 15 s more to compile.
             head = _steps_of_lanes(x.shape[1], tau.shape[0], kind, p, tau, gain, basis, step, x,
-                                   after, before, head, steps, 0.0, nothing, nothing, np.int64(0))
+                                   after, before, head, steps, 0.0, nothing, nothing,
+                                   np.int64(0), np.int64(1))
             ahead = max(0.0, ahead + steps * step)
         clock[0] = head
         clock[1] = ahead
@@ -214,17 +230,30 @@ def _cached(digest):
                          + (6.0 * s - 2.0) * before[head, i]) / step
 
     @njit(cache=True, **OPTIONS)
-    def integrate(kind, p, tau, gain, basis, step, x, after, before, head, steps, noise, seed,
-                  states, slopes, row):
-        """Take and record steps of one block of lanes; return the new head."""
+    def integrate_one(kind, p, tau, gain, basis, step, x, after, before, head, steps, noise,
+                      seed, states, slopes, row, every):
+        """The same as integrate for a single trajectory of the delayed network, unrolled."""
         digest  # noqa: B018
         np.random.seed(seed)
-        return run(kind, p, tau, gain, basis, step, x, after, before, head, steps, noise, states,
-                   slopes, row)
+        return _steps_of_one(8, 1, kind, p, tau, gain, basis, step, x, after, before, head, steps,
+                             noise, states, slopes, row, every)
+
+    @njit(cache=True, **OPTIONS)
+    def integrate(kind, p, tau, gain, basis, step, x, after, before, head, steps, noise, seed,
+                  states, slopes, row, every):
+        """Take steps of one block of lanes; return the new head.
+
+        What is reached is recorded in states and slopes, shape (lanes, rows, components): every
+        ``every``-th step, the first one here being number ``row``.
+        """
+        digest  # noqa: B018
+        np.random.seed(seed)
+        return _steps_of_lanes(x.shape[1], tau.shape[0], kind, p, tau, gain, basis, step, x, after,
+                               before, head, steps, noise, states, slopes, row, every)
 
     @njit(cache=True, parallel=True, **OPTIONS)
     def integrate_many(kind, p, tau, gain, basis, step, x, after, before, head, steps, noise,
-                       seeds, states, slopes, row):
+                       seeds, states, slopes, row, every):
         """Take and record steps of many blocks on all cores; return the new head.
 
         Arrays have a leading axis, the block; states and slopes stay as they are.
@@ -234,11 +263,12 @@ def _cached(digest):
         for m in prange(x.shape[0]):
             np.random.seed(seeds[m])
             mine = slice(m * lanes, min((m + 1) * lanes, states.shape[0]))
-            run(kind, p[m], tau[m], gain, basis, step, x[m], after[m], before[m], head, steps,
-                noise, states[mine], slopes[mine], row)
+            _steps_of_lanes(x.shape[2], lanes, kind, p[m], tau[m], gain, basis, step, x[m],
+                            after[m], before[m], head, steps, noise, states[mine], slopes[mine],
+                            row, every)
         return (head + steps) % x.shape[1]
 
-    return set_slope, advance, integrate, integrate_many
+    return set_slope, advance, integrate_one, integrate, integrate_many
 
 
-set_slope, advance, integrate, integrate_many = _cached(sources_digest())
+set_slope, advance, integrate_one, integrate, integrate_many = _cached(sources_digest())

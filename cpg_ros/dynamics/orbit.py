@@ -1,227 +1,36 @@
-"""Primary gaits of the delayed network as exact periodic orbits.
+"""Gaits as exact periodic orbits, for every network."""
 
-On a primary gait every cell is x_1 shifted by a known phase, so the eight delay equations
-collapse to one periodic problem (DESIGN 3): with theta = t / T in cycles,
-``u'(theta)/T = a u + b tanh u + d tanh u(theta + phi_d) + c tanh u(theta + phi_c - tau/T)``,
-solved by Fourier collocation with the period as unknown. Phase zero is where x_1 peaks.
-"""
+from cpg_ros.dynamics import cell_orbit, delayed_orbit
+from cpg_ros.dynamics.mesh_orbit import MeshOrbit
+from cpg_ros.dynamics.periodic import NoOrbit, Orbit
+from cpg_ros.networks.delayed import Delayed
+from cpg_ros.networks.network import Network, Preset
 
-from dataclasses import dataclass, replace
-from functools import cached_property
-
-import numpy as np
-from scipy.optimize import brentq
-
-from cpg_ros.dynamics import collocation
-from cpg_ros.dynamics.hopf import hopf_point, weakened
-from cpg_ros.networks.delayed import PARAMETERS, Delayed, Mode, mode_of
-
-NODES = 63
-MOST_NODES = 255
-#: Newton stops at this residual; a waveform is resolved when its last harmonics are this small.
-TOLERANCE = 1e-12
-RESOLVED = 1e-12
-#: Below this amplitude Newton has fallen to the rest state.
-SMALLEST = 1e-7
+__all__ = ['NoOrbit', 'Orbit', 'solve_orbit', 'solve_preset']
 
 
-class NoOrbit(ValueError):
-    """The parameter set has no such gait; the message says what stands against it."""
-
-
-@dataclass(frozen=True)
-class Orbit:
-    """A primary gait of a network: one waveform, one period, the cells' phases.
-
-    Called with times it gives the states, so it serves as a history for the simulation.
-
-    Attributes:
-        network: the parameters it solves.
-        mode: its symmetry class.
-        period: T in model time.
-        values: x_1 at the nodes theta = m / n, shape (n,); values[0] is the peak.
-        residual: largest residual of the equation at the nodes.
-        d_period: derivatives of the period by a, b, c, d, tau, shape (5,).
-        d_values: derivatives of the nodal values, at fixed theta, shape (n, 5).
-
-    """
-
-    network: Delayed
-    mode: Mode
-    period: float
-    values: np.ndarray
-    residual: float
-    d_period: np.ndarray
-    d_values: np.ndarray
-
-    @property
-    def peak(self) -> float:
-        """Amplitude: the largest value of every cell."""
-        return float(self.values[0])
-
-    @cached_property
-    def phases(self) -> np.ndarray:
-        """Phase of each cell in cycles, shape (8,)."""
-        return self.mode.phases
-
-    def waveform(self, theta: np.ndarray, order: int = 0) -> np.ndarray:
-        """x_1, or its derivative in theta of the given order, at theta in cycles."""
-        return collocation.evaluate(self.values, theta, order)
-
-    def __call__(self, times: np.ndarray) -> np.ndarray:
-        """All cells at model times, x_1 peaking at 0; shape times.shape + (8,)."""
-        theta = np.asarray(times, dtype=float) / self.period
-        return collocation.evaluate(self.values, theta, 0, self.phases)
-
-    def derivative(self, times: np.ndarray) -> np.ndarray:
-        """Slopes of all cells, per model time; shape times.shape + (8,)."""
-        theta = np.asarray(times, dtype=float) / self.period
-        return collocation.evaluate(self.values, theta, 1, self.phases) / self.period
-
-
-def _equations(network: Delayed, mode: Mode, u: np.ndarray, period: float
-               ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Residual (n + 1,), its Jacobian in (u, T), and its derivative in (a, b, c, d, tau)."""
-    n = u.size
-    a, b, c, d, tau = network.as_dict().values()
-    derive = collocation.derivative_matrix(n)
-    ring, _ = collocation.shift_matrices(n, -mode.j / 4)
-    delayed, delayed_slope = collocation.shift_matrices(n, mode.k / 2 - tau / period)
-
-    slope, past, past_slope = derive @ u, delayed @ u, delayed_slope @ u
-    here, neighbour, across = np.tanh(u), np.tanh(ring @ u), np.tanh(past)
-    residual = np.empty(n + 1)
-    residual[:n] = slope / period - a * u - b * here - d * neighbour - c * across
-    residual[n] = slope[0]
-
-    jacobian = np.zeros((n + 1, n + 1))
-    jacobian[:n, :n] = (derive / period - d * (1.0 - neighbour**2)[:, None] * ring
-                        - c * (1.0 - across**2)[:, None] * delayed)
-    jacobian[np.arange(n), np.arange(n)] -= a + b * (1.0 - here**2)
-    by_shift = c * (1.0 - across**2) * past_slope
-    jacobian[:n, n] = -slope / period**2 - by_shift * tau / period**2
-    jacobian[n, :n] = derive[0]
-
-    by_parameter = np.zeros((n + 1, 5))
-    by_parameter[:n] = np.stack([-u, -here, -across, -neighbour, by_shift / period], axis=1)
-    return residual, jacobian, by_parameter
-
-
-def _newton(network: Delayed, mode: Mode, u: np.ndarray, period: float) -> Orbit | None:
-    """Newton from a guess, doubling the nodes until the waveform is resolved."""
-    while True:
-        for _ in range(12):
-            residual, jacobian, by_parameter = _equations(network, mode, u, period)
-            size = float(np.abs(residual[:-1]).max())
-            if size <= TOLERANCE * max(1.0, float(np.abs(u).max()) * abs(network.c)):
-                break
-            # numpy's solver, unlike scipy's, releases the interpreter lock: a node publishes
-            # while it solves.
-            try:
-                step = np.linalg.solve(jacobian, residual)
-            except np.linalg.LinAlgError:
-                return None
-            u, period = u - step[:-1], period - float(step[-1])
-            # A period that leaves the range of the delay has run away, and so has a waveform.
-            if not (1e-3 * network.tau < period < 1e3 * network.tau and np.abs(u).max() < 1e3):
-                return None
-        else:
-            return None
-        if np.abs(u).max() < SMALLEST:
-            return None
-        if collocation.tail(u) <= RESOLVED:
-            break
-        if u.size >= MOST_NODES:
-            raise NoOrbit(f'the waveform is too steep for {MOST_NODES} nodes')
-        u = collocation.resample(u, 2 * u.size + 1)
-    derivatives = -np.linalg.solve(jacobian, by_parameter)
-    return Orbit(network, mode, period, u, size, derivatives[-1], derivatives[:-1])
-
-
-def _continued(network: Delayed, mode: Mode, onset: float) -> Orbit | None:
-    """Follow the orbit in the delay from near its onset, halving steps that fail."""
-    tau, reached = network.tau, onset
-    ahead = onset + 0.1 * (tau - onset)
-    orbit, tries = None, 0
-    while reached < tau and tries < 10:
-        tries += 1
-        here = replace(network, tau=ahead)
-        guess = _guess(here, mode) if orbit is None else (orbit.values, orbit.period + float(
-            orbit.d_period[-1]) * (ahead - reached))
-        found = None if guess is None else _newton(here, mode, *guess)
-        if found is None or found.values.argmax() != 0:
-            ahead = reached + 0.4 * (ahead - reached)
-            continue
-        reached, orbit = ahead, found
-        ahead = min(tau, reached + 1.6 * max(ahead - reached, 0.1 * (tau - onset)))
-    return orbit if reached >= tau else None
-
-
-def _describing_gain(amplitude: float) -> float:
-    """First-harmonic gain of tanh for an input amplitude * cos."""
-    angle = np.arange(32) * (2.0 * np.pi / 32)
-    return float(2.0 / 32 * (np.tanh(amplitude * np.cos(angle)) @ np.cos(angle)) / amplitude)
-
-
-def _guess(network: Delayed, mode: Mode) -> tuple[np.ndarray, float] | None:
-    """First-harmonic waveform and period: the amplitude whose weakened network is at its Hopf."""
-    def excess(amplitude: float) -> float:
-        point = hopf_point(weakened(network, _describing_gain(amplitude)), mode)
-        return 1e3 if point is None else point.tau - network.tau
-
-    low, high = 0.0, 1e-3
-    while excess(high) < 0.0:
-        low, high = high, 2.0 * high
-        if high > 1e3:
-            return None
-    low = max(low, 1e-6)
-    if excess(low) >= 0.0:
-        return None
-    amplitude = brentq(excess, low, high, rtol=1e-3)
-    point = hopf_point(weakened(network, _describing_gain(amplitude)), mode)
-    if point is None:
-        return None
-    return amplitude * np.cos(2.0 * np.pi * np.arange(NODES) / NODES), 2.0 * np.pi / point.omega
-
-
-def solve_orbit(network: Delayed, gait: str) -> Orbit:
+def solve_orbit(network: Network, gait: str, near: Orbit | None = None) -> Orbit:
     """Solve for the gait's orbit, with exact derivatives by every parameter.
 
     Args:
         network: parameters.
-        gait: one of the six primary gaits.
+        gait: one of the network's gaits.
+        near: an orbit of that gait to start from, where the network has no delay; by default
+            that of the shipped preset.
 
     Raises:
         ValueError: an unknown gait, or parameters that are not finite or a delay not positive.
-        NoOrbit: this set has no such orbit; the message names the threshold.
+        NoOrbit: this set has no such orbit, or none was found; the message says how far off
+            the parameters are.
 
     """
-    mode = mode_of(gait, network)
-    for name in PARAMETERS:
-        value = getattr(network, name)
-        if not np.isfinite(value):
-            raise ValueError(f'{name} is {value}, not a finite number')
-    if network.tau <= 0.0:
-        raise ValueError(f'tau is {network.tau}, it must be positive')
-    a, b = mode.eigenvalue_terms(network)
-    if mode.j % 2 == 0 and b >= 0.0:
-        wanted = 'positive' if mode.k else 'negative'
-        raise NoOrbit(f'c {network.c:g} gives no {gait}: c must be {wanted}')
-    point = hopf_point(network, mode)
-    if point is None:
-        raise NoOrbit(f'|c| {abs(network.c):g} gives no {gait} at any delay: it must be above '
-                      f'{abs(a.real):.4f}')
-    if network.tau <= point.tau:
-        raise NoOrbit(f"tau {network.tau:g} is below the {gait}'s critical delay {point.tau:.4f}")
-    reason = 'no orbit was found'
-    try:
-        guess = _guess(network, mode)
-        orbit = None if guess is None else _newton(network, mode, *guess)
-        if orbit is None or orbit.values.argmax() != 0:
-            orbit = _continued(network, mode, point.tau)
-    except NoOrbit as error:
-        orbit, reason = None, str(error)
-    if orbit is None:
-        raise NoOrbit(f'no {gait} at tau {network.tau:g}, far from its critical delay '
-                      f'{point.tau:.4f}: {reason}')
-    return orbit
+    if isinstance(network, Delayed):
+        return delayed_orbit.solve(network, gait)
+    return cell_orbit.solve(network, gait, near if isinstance(near, MeshOrbit) else None)
+
+
+def solve_preset(preset: Preset) -> Orbit:
+    """Solve for a preset's orbit; errors as in solve_orbit."""
+    if preset.start is None:
+        return solve_orbit(preset.network, preset.gait)
+    return cell_orbit.from_preset(preset)

@@ -1,10 +1,15 @@
-"""From cells to joints: what a network in its gait means for the legs, compiled."""
+"""From cells to joints: what a network in its gait means for the legs, compiled.
+
+Here for cells whose waveform drives the joints as it is (the delayed network): x is the cell over
+the gait's peak, y its derivative by phase. See phase_readout for those whose phase does.
+"""
 
 import math
 
 import numpy as np
 from numba import njit
 
+from cpg_ros.dynamics.periodic import Orbit
 from cpg_ros.networks.jit import OPTIONS, jit, sources_digest
 
 #: Entries of the tables over one cycle.
@@ -123,3 +128,73 @@ def lead_table(x: np.ndarray, y: np.ndarray) -> np.ndarray:
         raise ValueError('the waveform has more than one hump a cycle')
     grid = np.arange(TABLE) / TABLE
     return np.interp(grid, angle, phase) - grid
+
+
+def monomials(x: np.ndarray, y: np.ndarray, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Evaluate x, y, x^2, x y, x^3, x^2 y and their derivatives by phase in cycles.
+
+    Args:
+        x: readout signal, any shape.
+        y: its derivative by phase in radians.
+        z: the second one.
+
+    Returns:
+        Two arrays of shape (6, ...).
+
+    """
+    values = np.stack([x, y, x * x, x * y, x**3, x * x * y])
+    slopes = TURN * np.stack([y, z, 2 * x * y, y * y + x * z, 3 * x * x * y,
+                              2 * x * y * y + x * x * z])
+    return values, slopes
+
+
+class WaveReadout:
+    """Joints driven by the cells' waveform.
+
+    Attributes:
+        start: phase of the first leg at the orbit's phase 0, cycles.
+
+    """
+
+    def __init__(self, orbit: Orbit, cells: np.ndarray, weights: np.ndarray,
+                 leg_cells: np.ndarray) -> None:
+        """Prepare for an orbit.
+
+        Args:
+            orbit: the gait.
+            cells: the cell behind each joint, from 0, shape (joints,).
+            weights: in rad, shape (joints, 6).
+            leg_cells: the cell that gives each leg's phase, shape (legs,).
+
+        Raises:
+            ValueError: the waveform does not tell the phase.
+
+        """
+        theta = np.arange(TABLE) / TABLE
+        x = orbit.waveform(theta) / orbit.peak
+        y = orbit.waveform(theta, 1) / (TURN * orbit.peak)
+        z = orbit.waveform(theta, 2) / (TURN**2 * orbit.peak)
+        self._view = (orbit.peak, orbit.period, cells, weights, orbit.phases, leg_cells, x,
+                      lead_table(x, y))
+        self.start = float(orbit.phases[leg_cells[0]])
+        values, slopes = monomials(x, y, z)
+        self.angles, self.rises = weights @ values, weights @ slopes
+
+    def look(self, now: np.ndarray, angle: np.ndarray, rise: np.ndarray, legs: np.ndarray
+             ) -> float:
+        """Read joints and legs off a state; see observe."""
+        return observe(now, *self._view, angle, rise, legs)
+
+
+def extremes(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Minimum and maximum of each row, a periodic function on even points, by parabolas."""
+    return -_highest(-values), _highest(values)
+
+
+def _highest(values: np.ndarray) -> np.ndarray:
+    top = values.argmax(axis=1)
+    rows = np.arange(len(values))
+    before, here, after = (values[rows, (top + k) % values.shape[1]] for k in (-1, 0, 1))
+    bend = 2.0 * here - before - after
+    return here + np.divide((after - before)**2, 8.0 * bend, out=np.zeros_like(here),
+                            where=bend > 0.0)

@@ -2,15 +2,17 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from cpg_ros.dynamics import kernel
 from cpg_ros.dynamics.progress import progress_bar
-from cpg_ros.networks.delayed import Delayed, Mode
+from cpg_ros.networks.network import Network
 
-#: A constant state, shape (cells,), or a function of times t <= 0, shape (m,), that returns
-#: states, shape (m, cells); an attribute ``derivative`` of the same form gives the slopes.
+#: A constant state, shape (components,), or a function of times t <= 0, shape (m,), that
+#: returns states, shape (m, components); an attribute ``derivative`` of the same form gives the
+#: slopes.
 History = np.ndarray | Sequence[float] | Callable[[np.ndarray], np.ndarray]
 
 #: Trajectories that advance together in vector registers.
@@ -25,7 +27,7 @@ class Trajectory:
 
     Attributes:
         t: nodes from t = 0 on, model time, shape (nodes,).
-        x: states there, shape (nodes, cells) or (batch, nodes, cells).
+        x: states there, shape (nodes, components) or (batch, nodes, components).
         slopes: time derivatives there, shaped like x; at t = 0 that of the network, not of the
             history.
 
@@ -36,7 +38,7 @@ class Trajectory:
     slopes: np.ndarray
 
     def __call__(self, times: np.ndarray | float) -> np.ndarray:
-        """Return the states at the times given, cubic Hermite, shape (..., times, cells).
+        """Return the states at the times given, cubic Hermite, shape (..., times, components).
 
         Raises:
             ValueError: a time lies outside the simulated span.
@@ -55,12 +57,12 @@ class Trajectory:
                 + s * s * (s - 1.0) * step * self.slopes[..., left + 1, :])
 
 
-def sample_history(history: History, nodes: int, step: float, cells: int
+def sample_history(history: History, nodes: int, step: float, components: int
                    ) -> tuple[np.ndarray, np.ndarray]:
     """Sample states and slopes of a history at t = -(nodes - 1) step .. 0.
 
     Returns:
-        Two arrays of shape (nodes, cells). Slopes of a function come from its attribute
+        Two arrays of shape (nodes, components). Slopes of a function come from its attribute
         ``derivative`` if it has one, otherwise from five-point differences a step apart.
 
     Raises:
@@ -86,20 +88,21 @@ def sample_history(history: History, nodes: int, step: float, cells: int
     else:
         x = np.repeat(np.asarray(history, dtype=float)[None], nodes, axis=0)
         slopes = np.zeros_like(x)
-    if x.shape != (nodes, cells):
-        raise ValueError(f'a history has the shape ({cells},), not {x.shape[1:]}')
+    if x.shape != (nodes, components):
+        raise ValueError(f'a history has the shape ({components},), not {x.shape[1:]}')
     if not (np.isfinite(x).all() and np.isfinite(slopes).all()):
         raise ValueError('the history has a value that is not finite')
     return x, slopes
 
 
-def simulate(network: Delayed | Sequence[Delayed], history: History | Sequence[History],
-             t_end: float, step: float, *, lock: tuple[float, Mode] | None = None,
-             noise: float = 0.0, seed: int = 0, progress: bool = True) -> Trajectory:
+def simulate(network: Network | Sequence[Network], history: History | Sequence[History],
+             t_end: float, step: float, *, lock: tuple[float, Any] | None = None,
+             noise: float = 0.0, seed: int = 0, every: int = 1, progress: bool = True
+             ) -> Trajectory:
     """Integrate a network from a history, RK4 with cubic Hermite delayed values.
 
     One network and one history give one trajectory. A sequence of networks, an array of
-    histories of shape (batch, cells) or a list of histories give a batch, which runs on all
+    histories of shape (batch, components) or a list of histories give a batch, which runs on all
     cores; a single one of either goes with every one of the other.
 
     Args:
@@ -107,9 +110,10 @@ def simulate(network: Delayed | Sequence[Delayed], history: History | Sequence[H
         history: constant state, function of times t <= 0, or orbit (see History); or many.
         t_end: model time to reach; rounded up to whole steps.
         step: model time per step; every delay must be at least one step.
-        lock: symmetry lock (gain in 1/model time, symmetry class), or none.
+        lock: symmetry lock (gain in 1/model time, the gait's symmetry), or none.
         noise: standard deviation of white noise per square root of model time.
         seed: seeds the noise of the whole batch.
+        every: keep every so many steps only; t_end is rounded up to such a multiple.
         progress: show a progress bar on work of more than about two seconds.
 
     Raises:
@@ -117,7 +121,7 @@ def simulate(network: Delayed | Sequence[Delayed], history: History | Sequence[H
             shorter than a step, or shapes that do not fit.
 
     """
-    networks = [network] if isinstance(network, Delayed) else list(network)
+    networks = [network] if isinstance(network, Network) else list(network)
     if not networks or not (callable(history) or len(history)):
         raise ValueError('there is no network, or no history, to start from')
     one_history = callable(history) or not (callable(history[0]) or np.ndim(history[0]))
@@ -130,39 +134,45 @@ def simulate(network: Delayed | Sequence[Delayed], history: History | Sequence[H
     for one in networks:
         if not all(np.isfinite(value) for value in one.as_dict().values()):
             raise ValueError(f'a parameter is not finite: {one}')
-        if one.tau < step:
-            raise ValueError(f'the delay {one.tau} is shorter than the step {step}')
+        if 0.0 < one.delay < step or (one.delay <= 0.0 and one.kind == kernel.DELAYED):
+            raise ValueError(f'the delay {one.delay} is shorter than the step {step}')
+        if one.kind != networks[0].kind:
+            raise ValueError(f'a batch has one kind of network, not {networks[0].name} and '
+                             f'{one.name}')
 
-    cells, kind = networks[0].cells, networks[0].kind
-    steps = int(np.ceil(t_end / step - 1e-9))
+    components, kind = networks[0].components, networks[0].kind
+    if every < 1:
+        raise ValueError(f'every {every} must be at least 1')
+    rows = int(np.ceil(t_end / (step * every) - 1e-9))
+    steps = rows * every
     # Five nodes at least, so that slopes of a given history are of fourth order.
-    nodes = max(5, int(np.ceil(max(one.tau for one in networks) / step)) + 2)
+    nodes = max(5, int(np.ceil(max(one.delay for one in networks) / step)) + 2)
     lanes = min(LANES, batch)
     blocks = -(-batch // lanes)
 
     # Trajectory m is lane m % lanes of block m // lanes; spare lanes repeat the last one.
     members = np.minimum(np.arange(blocks * lanes), batch - 1).reshape(blocks, lanes)
-    x = np.empty((blocks, nodes, cells, lanes))
+    x = np.empty((blocks, nodes, components, lanes))
     after, before = np.empty_like(x), np.empty_like(x)
-    p = np.empty((blocks, networks[0].coefficients.shape[0], cells, lanes))
+    p = np.empty((blocks, networks[0].coefficients.shape[0], components, lanes))
     tau = np.empty((blocks, lanes))
-    samples = [sample_history(one, nodes, step, cells) for one in histories]
+    samples = [sample_history(one, nodes, step, components) for one in histories]
     for block, row in enumerate(members):
         for lane, m in enumerate(row):
             one = networks[m if len(networks) > 1 else 0]
-            p[block, :, :, lane], tau[block, lane] = one.coefficients, one.tau
+            p[block, :, :, lane], tau[block, lane] = one.coefficients, one.delay
             past, past_slopes = samples[m if len(histories) > 1 else 0]
             x[block, :, :, lane] = past
             after[block, :, :, lane] = before[block, :, :, lane] = past_slopes
-    flat = [array.reshape(*array.shape[:2], cells * lanes) for array in (x, after, before)]
-    flat_p = p.reshape(blocks, -1, cells * lanes)
-    gain, basis = (0.0, np.zeros((1, cells))) if lock is None else (lock[0], lock[1].basis)
+    flat = [array.reshape(*array.shape[:2], components * lanes) for array in (x, after, before)]
+    flat_p = p.reshape(blocks, -1, components * lanes)
+    gain, basis = (0.0, np.zeros((1, components))) if lock is None else (lock[0], lock[1].basis)
 
     head = nodes - 1
     for block in range(blocks):
         kernel.set_slope(kind, flat_p[block], tau[block], gain, basis, step,
                          *(array[block] for array in flat), head)
-    states = np.empty((batch, steps + 1, cells))
+    states = np.empty((batch, rows + 1, components))
     slopes = np.empty_like(states)
     for m, (block, lane) in enumerate(np.ndindex(blocks, lanes)):
         if m < batch:
@@ -173,16 +183,19 @@ def simulate(network: Delayed | Sequence[Delayed], history: History | Sequence[H
             chunk = min(steps - done, max(1, CHUNK // x[:, 0].size))
             seeds = np.random.SeedSequence([seed, done]).generate_state(blocks)
             if blocks == 1:
-                head = kernel.integrate(kind, flat_p[0], tau[0], gain, basis, step,
-                                        *(array[0] for array in flat), head, chunk, noise,
-                                        seeds[0], states, slopes, done + 1)
+                alone = lanes == 1 and kind == kernel.DELAYED
+                one_block = kernel.integrate_one if alone else kernel.integrate
+                head = one_block(kind, flat_p[0], tau[0], gain, basis, step,
+                                 *(array[0] for array in flat), head, chunk, noise, seeds[0],
+                                 states, slopes, done + 1, every)
             else:
                 head = kernel.integrate_many(kind, flat_p, tau, gain, basis, step, *flat, head,
-                                             chunk, noise, seeds, states, slopes, done + 1)
+                                             chunk, noise, seeds, states, slopes, done + 1,
+                                             every)
             done += chunk
             bar(done)
 
-    times = np.arange(steps + 1) * step
-    if isinstance(network, Delayed) and one_history:
+    times = np.arange(rows + 1) * (step * every)
+    if isinstance(network, Network) and one_history:
         return Trajectory(times, states[0], slopes[0])
     return Trajectory(times, states, slopes)

@@ -5,7 +5,6 @@ import math
 import numpy as np
 
 from cpg_ros.dynamics.program import Program
-from cpg_ros.dynamics.readout import observe
 
 #: Off the orbit: a cell further away than this share of the peak, or the phase behind or ahead
 #: of the clock by this share of a cycle, for longer than this many strides.
@@ -32,23 +31,20 @@ class Track:
     def follow(self, program: Program) -> None:
         """Read joints and judge health by this program from now on."""
         self.program = program
-        orbit, robot = program.orbit, program.robot
-        self._view = (orbit.peak, orbit.period, robot.cells, program.weights, orbit.phases,
-                      robot.leg_cells, program.wave, program.lead, self.angle, self.rise,
-                      self.legs)
         self._astray = 0.0
         self._look()
         self.phase = float(self.legs[0])
 
     def align(self, phase: float) -> None:
         """Bring the first leg to this phase, from the orbit's start."""
-        self.stepper.advance(phase % 1.0 * self.program.orbit.period)
+        ahead = (phase - self.program.readout.start) % 1.0
+        self.stepper.advance(ahead * self.program.orbit.period)
         self._look()
         self.phase = float(self.legs[0])
         self._astray = 0.0
 
     def _look(self) -> float:
-        return observe(self.stepper.now, *self._view)
+        return self.program.readout.look(self.stepper.now, self.angle, self.rise, self.legs)
 
     def advance(self, strides: float) -> bool:
         """Advance by some strides; tell whether the network is still on its orbit."""
@@ -85,9 +81,10 @@ class Track:
         orbits, gets a small start; the lock would otherwise hold the network at rest.
         """
         orbit = program.orbit
-        self.stepper.set(orbit.network, program.gain, orbit.mode)
-        state, target = self.stepper.newest(), orbit(np.array(self.phase * orbit.period))
-        basis = orbit.mode.basis
+        self.stepper.set(orbit.network, program.gain, orbit.symmetry)
+        mean, basis = program.wave
+        ahead = (self.phase - program.readout.start) % 1.0
+        state, target = self.stepper.newest() - mean, orbit(np.array(ahead * orbit.period)) - mean
         if np.linalg.norm(basis @ state) < KICK * np.linalg.norm(basis @ target):
             self.stepper.disturb(KICK * target)
         # On to the node where the change is, so that all of it shows at once.

@@ -2,17 +2,28 @@
 
 import numpy as np
 
+from cpg_ros.dynamics.phase_readout import observe_phases
 from cpg_ros.dynamics.readout import confine, observe
+from cpg_ros.dynamics.simulate import simulate
 from cpg_ros.dynamics.stepper import Stepper
-from cpg_ros.networks.delayed import PRESETS, Mode
+from cpg_ros.networks.registry import NETWORKS, PRESETS
 
 
-def warm() -> None:
-    """Run each kernel once, on the types the generator uses."""
-    network = PRESETS['trot'].network
-    stepper = Stepper(network, np.zeros(8), max_delay=1.0, gain=1.0, mode=Mode(2, 1))
-    stepper.advance(0.01)
-    joints, table = np.zeros(1), np.zeros(4)
-    observe(stepper.now, 1.0, 1.0, np.zeros(1, dtype=int), np.zeros((1, 6)), np.zeros(8),
-            np.zeros(1, dtype=int), table, table, joints, joints, joints)
+def warm(name: str) -> None:
+    """Run each kernel that a network needs once, on the types the generator uses."""
+    preset = next(iter(PRESETS[name].values()))
+    network = preset.network
+    stepper = Stepper(network, np.zeros(network.components), gain=1.0,
+                      symmetry=network.symmetry(preset.gait))
+    stepper.advance(2.0 * network.step)
+    joints, table, cells = np.zeros(1), np.zeros(4), np.zeros(1, dtype=int)
+    weights = np.zeros((1, 6))
+    if NETWORKS[name].variables == 1:
+        observe(stepper.now, 1.0, 1.0, cells, weights, np.zeros(8), cells, table, table, joints,
+                joints, joints)
+    else:
+        simulate(network, np.zeros(network.components), network.step, network.step)
+        observe_phases(stepper.now, 1.0, 1, cells, np.zeros(1), np.ones((1, 4)),
+                       np.ones((1, 3, 4)), np.zeros((1, 2, 2)), joints, cells, weights, cells,
+                       np.zeros((2, 1)), joints, joints, joints)
     confine(joints, joints, joints, joints, joints, 1.0, joints, joints)

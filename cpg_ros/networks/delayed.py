@@ -6,43 +6,19 @@ equivariant under Z4 (i -> i + 2), Z2 (s) and x -> -x.
 """
 
 import math
-from dataclasses import asdict, astuple, dataclass
+from dataclasses import astuple, dataclass
 from typing import ClassVar
 
 import numpy as np
 
 from cpg_ros.networks.jit import tanh
+from cpg_ros.networks.network import Network, Preset, Range, known
 
 CELLS = 8
-
-#: Leg -> its two cells, numbered from 1 as in the paper; the first one gives the leg's phase.
-LEGS = {'lh': (1, 7), 'rh': (2, 8), 'lf': (3, 5), 'rf': (4, 6)}
-
-
-@dataclass(frozen=True)
-class Delayed:
-    """Parameters of the delayed network; a, b, c, d in 1/model time, tau in model time."""
-
-    a: float
-    b: float
-    c: float
-    d: float
-    tau: float
-
-    kind: ClassVar[int] = 0
-    cells: ClassVar[int] = CELLS
-
-    @property
-    def coefficients(self) -> np.ndarray:
-        """The kernel's coefficients a, b, c, d, shape (4, cells)."""
-        return np.repeat(np.array(astuple(self)[:4], dtype=float)[:, None], CELLS, axis=1)
-
-    def as_dict(self) -> dict[str, float]:
-        """Return the parameters by name, in the order a, b, c, d, tau."""
-        return asdict(self)
-
-
-PARAMETERS = ('a', 'b', 'c', 'd', 'tau')
+#: Model time per step in real time: 500 steps a cycle, error of a waveform about 1e-9.
+STEP = 0.0025
+#: Longest delay that may be set at run time, in model time.
+MAX_DELAY = 5.0
 
 
 @dataclass(frozen=True)
@@ -51,6 +27,11 @@ class Mode:
 
     j: int
     k: int
+
+    @property
+    def waves(self) -> np.ndarray:
+        """Number of each cell's waveform, shape (8,): all have the same."""
+        return np.zeros(CELLS, dtype=int)
 
     @property
     def phases(self) -> np.ndarray:
@@ -70,7 +51,7 @@ class Mode:
         rows = [vector.real] if self.j % 2 == 0 else [vector.real, vector.imag]
         return np.array([row / np.linalg.norm(row) for row in rows])
 
-    def eigenvalue_terms(self, network: Delayed) -> tuple[complex, float]:
+    def eigenvalue_terms(self, network: 'Delayed') -> tuple[complex, float]:
         """Return (A, B) of the characteristic equation ``lambda = A + B exp(-lambda tau)``."""
         turn = (1, -1j, -1, 1j)[self.j]
         return (network.a + network.b + network.d * turn, network.c * (-1) ** self.k)
@@ -83,27 +64,57 @@ GAITS = {'pronk': (0, 0), 'pace': (0, 1), 'bound': (2, 0), 'trot': (2, 1),
          'jump': (1, 0), 'walk': (1, 1)}
 
 
-def mode_of(gait: str, network: Delayed) -> Mode:
-    """Return the gait's symmetry class in this network.
-
-    The sign of d turns the ring: the wave of walk and jump runs forward (j = 1, LF leads LH)
-    for d < 0 and backward (j = 3, LH leads LF) otherwise.
-
-    Raises:
-        ValueError: the gait is not one of the six primary ones.
-    """
-    if gait not in GAITS:
-        raise ValueError(f"gait '{gait}' is not one of {', '.join(GAITS)}")
-    j, k = GAITS[gait]
-    return Mode(3 if j == 1 and network.d >= 0 else j, k)
-
-
 @dataclass(frozen=True)
-class Preset:
-    """A named parameter set and the primary gait it runs."""
+class Delayed(Network):
+    """Parameters of the delayed network; a, b, c, d in 1/model time, tau in model time."""
 
-    gait: str
-    network: Delayed
+    a: float
+    b: float
+    c: float
+    d: float
+    tau: float
+
+    name: ClassVar[str] = 'delayed'
+    kind: ClassVar[int] = 0
+    cells: ClassVar[int] = CELLS
+    longest_delay: ClassVar[float] = MAX_DELAY
+    step: ClassVar[float] = STEP
+    ranges: ClassVar[dict[str, Range]] = {
+        'a': Range(-20.0, 20.0, 'linear rate of each cell [1/model time]'),
+        'b': Range(-20.0, 20.0, 'weight of each cell on itself [1/model time]'),
+        'c': Range(-20.0, 20.0, "weight of the opposite leg's cell, delayed [1/model time]"),
+        'd': Range(-20.0, 20.0, 'weight of the cell before it on the same side [1/model time]'),
+        'tau': Range(STEP, MAX_DELAY, 'delay between opposite legs [model time]')}
+    legs: ClassVar[dict[str, dict[str, tuple[int, ...]]]] = {
+        'implicit': {'lh': (1, 7), 'rh': (2, 8), 'lf': (3, 5), 'rf': (4, 6)}}
+
+    @property
+    def delay(self) -> float:
+        """How far back the rates look: tau."""
+        return self.tau
+
+    @property
+    def coefficients(self) -> np.ndarray:
+        """The kernel's coefficients a, b, c, d, shape (4, cells)."""
+        return np.repeat(np.array(astuple(self)[:4], dtype=float)[:, None], CELLS, axis=1)
+
+    @classmethod
+    def gaits(cls) -> tuple[str, ...]:
+        """Names of the six primary gaits."""
+        return tuple(GAITS)
+
+    def symmetry(self, gait: str) -> Mode:
+        """Return the gait's symmetry class.
+
+        The sign of d turns the ring: the wave of walk and jump runs forward (j = 1, LF leads
+        LH) for d < 0 and backward (j = 3, LH leads LF) otherwise.
+
+        Raises:
+            ValueError: the gait is not one of the six primary ones.
+
+        """
+        j, k = GAITS[known(gait, self.gaits())]
+        return Mode(3 if j == 1 and self.d >= 0 else j, k)
 
 
 # Ours share one time scale: trot, pace, bound and pronk have one waveform (T = 1.2783), walk

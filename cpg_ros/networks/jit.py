@@ -41,15 +41,8 @@ _ROUND = 6755399441055744.0
 
 
 @jit
-def tanh(x):
-    """Hyperbolic tangent, within 4 units in the last place, without a branch.
-
-    libm's tanh cannot be vectorised; this one runs over the cells of a network several at a
-    time. expm1 by reduction to |r| <= ln(2)/2 and a Taylor polynomial of degree 13, then
-    tanh x = expm1(2x) / (expm1(2x) + 2). NaN stays NaN.
-    """
-    z = abs(x)
-    z = 2.0 * (20.0 if z > 20.0 else z)
+def _reduced(z):
+    """Return 2^n and expm1(r) with z = n ln 2 + r, |r| <= ln(2)/2, for |z| <= 708."""
     rounded = z * _LOG2E + _ROUND
     n = rounded - _ROUND
     r = (z - n * _LN2_HIGH) - n * _LN2_LOW
@@ -61,5 +54,27 @@ def tanh(x):
     high = (1 / 3628800 + r * (1 / 39916800)) + r2 * (1 / 479001600 + r * (1 / 6227020800))
     q = low + r4 * (middle + r4 * high)
     power = np.int64((np.float64(rounded).view(np.int64) + 1023) << 52).view(np.float64)
-    expm1 = power * (r + r2 * q) + (power - 1.0)
+    return power, r + r2 * q
+
+
+@jit
+def tanh(x):
+    """Hyperbolic tangent, within 4 units in the last place, without a branch.
+
+    libm's tanh cannot be vectorised; this one runs over the cells of a network several at a
+    time. expm1 by reduction and a Taylor polynomial of degree 13, then
+    tanh x = expm1(2x) / (expm1(2x) + 2). NaN stays NaN.
+    """
+    z = abs(x)
+    power, rest = _reduced(2.0 * (20.0 if z > 20.0 else z))
+    expm1 = power * rest + (power - 1.0)
     return math.copysign(expm1 / (expm1 + 2.0), x)
+
+
+@jit
+def exp(x):
+    """Exponential, within 4 units in the last place for |x| <= 700, limited beyond; see tanh."""
+    z = 700.0 if x > 700.0 else x
+    z = -700.0 if z < -700.0 else z
+    power, rest = _reduced(z)
+    return power + power * rest

@@ -25,22 +25,13 @@ from std_srvs.srv import SetBool
 from cpg_ros.dynamics.pattern import Pattern
 from cpg_ros.dynamics.program import Refused
 from cpg_ros.dynamics.warm import warm
-from cpg_ros.networks.delayed import default_symmetry_gain
+from cpg_ros.networks.network import Preset
+from cpg_ros.networks.presets import PresetError, read_presets
+from cpg_ros.networks.registry import NETWORKS, PRESETS
 from cpg_ros.nodes.diagnostics import Diagnostics
 from cpg_ros.nodes.outputs import Outputs
 from cpg_ros.nodes.parameter_services import StrictParameterService
-from cpg_ros.nodes.settings import (
-    COMMANDS,
-    GAIT_NAMES,
-    NETWORKS,
-    SPECS,
-    Planner,
-    Settings,
-    Spec,
-    as_doubles,
-    network_specs,
-    with_preset,
-)
+from cpg_ros.nodes.settings import COMMANDS, NETWORK, Planner, Spec, as_doubles, specs
 from cpg_ros.nodes.ticker import Ticker
 from cpg_ros.robot import Robot, RobotError, load_robot
 
@@ -87,22 +78,27 @@ class Generator(Node):
         self._parameter_service = StrictParameterService(self)
         self._doubles: set[str] = set()
         self.failure: BaseException | None = None
-        for name, spec in SPECS.items():
+        self._declare('network', NETWORK)
+        self._one_of('network', tuple(NETWORKS))
+        network = self._value('network')
+        compile_kernels(network)
+        self._planner = Planner(NETWORKS[network], dict(PRESETS[network]))
+        for name, spec in specs(network).items():
             self._declare(name, spec)
-            if name == 'network':
-                self._one_of(name, NETWORKS)
-        self._one_of('gait', GAIT_NAMES)
+        self._planner.presets.update(self._further_presets())
+        self._one_of('gait', tuple(self._planner.presets))
         self._one_of('command', COMMANDS)
-        for name, spec in network_specs(self._value('gait')).items():
+        self._given_groups()
+        for name, spec in self._planner.specs(self._value('gait')).items():
             self._declare(name, spec)
 
         robot = find_robot(self._value('robot'))
-        if robot.network != self._value('network'):
-            raise StartError(f"robot file '{robot.name}' is for the network '{robot.network}', "
-                             f"not '{self._value('network')}'")
-        self._planner = Planner(robot)
+        if network not in robot.networks:
+            raise StartError(f"robot file '{robot.name}' is for the network "
+                             f"{' or '.join(robot.networks)}, not '{network}'")
+        self._planner.serve(robot)
         try:
-            program = self._planner.plan(Settings.merged(self._values()))
+            program = self._planner.plan(self._values())
         except Refused as error:
             raise StartError(str(error)) from error
 
@@ -125,6 +121,23 @@ class Generator(Node):
                 self.get_logger().warning(f"there is no parameter '{name}': ignored")
 
     # -- parameters -----------------------------------------------------------------------
+
+    def _further_presets(self) -> dict[str, Preset]:
+        path = self._value('presets')
+        try:
+            return read_presets(Path(path).expanduser(), self._planner.network) if path else {}
+        except PresetError as error:
+            raise StartError(str(error)) from error
+
+    def _given_groups(self) -> None:
+        """Let what is given for a group at start stand for each of its members."""
+        preset = self._planner.presets[self._value('gait')]
+        names = set(self._planner.specs(self._value('gait')))
+        given = [p for p in self._parameter_overrides.values() if p.name in names]
+        current = {f'{preset.network.name}.{key}': value
+                   for key, value in preset.network.as_dict().items()}
+        for parameter in self._planner.complete(as_doubles(given, names), current):
+            self._parameter_overrides[parameter.name] = parameter
 
     def _declare(self, name: str, spec: Spec) -> None:
         override = self._parameter_overrides.get(name)
@@ -150,18 +163,18 @@ class Generator(Node):
             raise StartError(f"{name} '{self._value(name)}' is not one of {', '.join(allowed)}")
 
     def _values(self, changes: list[Parameter] | None = None) -> dict:
-        values = {name: self._value(name) for name in Settings.planned_names()}
+        values = {name: self._value(name) for name in self._planner.names}
         values.update({p.name: p.value for p in changes or [] if p.name in values})
         return values
 
     def _complete(self, parameters: list[Parameter]) -> list[Parameter]:
-        return with_preset(as_doubles(parameters, self._doubles))
+        return self._planner.complete(as_doubles(parameters, self._doubles), self._values())
 
     def _judge(self, parameters: list[Parameter]) -> SetParametersResult:
         """Say whether a batch can run as a whole; changes nothing."""
-        if any(p.name in Settings.planned_names() for p in parameters):
+        if any(p.name in self._planner.names for p in parameters):
             try:
-                self._planner.plan(Settings.merged(self._values(parameters)))
+                self._planner.plan(self._values(parameters))
             except Refused as error:
                 return SetParametersResult(successful=False, reason=str(error))
         return SetParametersResult(successful=True)
@@ -171,18 +184,18 @@ class Generator(Node):
         for parameter in parameters:
             if parameter.name == 'rate':
                 self.ticker.rate = parameter.value
-        if any(p.name in Settings.planned_names() for p in parameters):
-            program = self._planner.plan(Settings.merged(self._values()))
+        if any(p.name in self._planner.names for p in parameters):
+            program = self._planner.plan(self._values())
             self.pattern.apply(program, self._value('transition'))
             self._announce()
 
     def _announce(self) -> None:
-        program = self._planner.plan(Settings.merged(self._values()))
+        program = self._planner.plan(self._values())
         self._gait.publish(String(data=program.name))
         self.get_logger().info(f'{program.name} at {program.frequency:.4g} Hz, period '
                                f'{program.orbit.period:.6f} model time, symmetry gain '
                                f'{program.gain:.3g}')
-        enough = default_symmetry_gain(program.orbit.network)
+        enough = program.stability.enough
         if program.gain < enough:
             self.get_logger().warning(
                 f'symmetry_gain {program.gain:g} may be too low for the gait to attract '
@@ -234,7 +247,7 @@ class Generator(Node):
         self.ticker.join(timeout=0.2)
 
 
-def compile_kernels() -> None:
+def compile_kernels(network: str) -> None:
     """Compile or load the numerical kernels, saying so where it takes long."""
     logger = get_logger(NAME)
     began = time.monotonic()
@@ -242,7 +255,7 @@ def compile_kernels() -> None:
                                                 'first start needs this (10 to 20 s)'])
     notice.daemon = True
     notice.start()
-    warm()
+    warm(network)
     notice.cancel()
     if time.monotonic() - began > 1.0:
         logger.info(f'compiled in {time.monotonic() - began:.1f} s')
@@ -271,7 +284,6 @@ def main(args: list[str] | None = None) -> int:
     sys.setswitchinterval(2e-4)
     rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
     try:
-        compile_kernels()
         node = Generator()
     except StartError as error:
         get_logger(NAME).fatal(str(error))

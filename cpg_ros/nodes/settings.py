@@ -8,14 +8,15 @@ from typing import Any
 from rcl_interfaces.msg import FloatingPointRange, ParameterDescriptor
 from rclpy.parameter import Parameter
 
-from cpg_ros.dynamics.program import MAX_DELAY, Program, Refused, plan
-from cpg_ros.dynamics.stepper import STEP
-from cpg_ros.networks.delayed import PARAMETERS, PRESETS, Delayed
+from cpg_ros.dynamics.program import Program, Refused, plan
+from cpg_ros.networks.network import Network, Preset
+from cpg_ros.networks.registry import NETWORKS, PRESETS
 from cpg_ros.robot import Robot
 
-NETWORKS = ('delayed',)
 COMMANDS = ('none', 'joint_trajectory', 'forward_position')
-GAIT_NAMES = tuple(PRESETS)
+#: Network -> the robot file and the gait it starts with.
+USUAL = {'delayed': ('quadruped', 'trot'), 'quadruped': ('quadruped', 'trot'),
+         'biped': ('biped', 'walk')}
 
 
 @dataclass(frozen=True)
@@ -39,45 +40,35 @@ class Spec:
                                    additional_constraints=self.constraints)
 
 
-#: Every parameter of the generator but the network's own; the order is that of declaration.
-SPECS: dict[str, Spec] = {
-    'network': Spec('delayed', 'network of cells that makes the rhythm', read_only=True,
-                    constraints='one of: ' + ', '.join(NETWORKS)),
-    'robot': Spec('quadruped', 'robot file, or the name of a shipped one', read_only=True,
-                  constraints='quadruped, goat, or the path of a YAML file'),
-    'gait': Spec('trot', 'gait; setting it loads its preset of network parameters',
-                 constraints='one of: ' + ', '.join(GAIT_NAMES)),
-    'rate': Spec(100.0, 'messages per second on every output topic [Hz]', 1.0, 2000.0),
-    'frequency': Spec(1.0, "strides per second [Hz]; 0 runs in the model's own time, one unit "
-                      'a second', 0.0, 10.0),
-    'amplitude': Spec(1.0, "factor on the robot file's joint amplitudes", 0.0, 3.0),
-    'transition': Spec(1.0, 'duration of a change of gait or parameters [s]; 0 leaves it to the '
-                       "network's own dynamics", 0.0, 30.0),
-    'ramp': Spec(1.0, 'duration of the ramp between the stand and the gait [s]', 0.0, 30.0),
-    'symmetry_gain': Spec(-1.0, 'gain of the symmetry lock [1/model time]; -1 chooses one that '
-                          "makes the gait attract, 0 is the paper's model, in which it does not",
-                          -1.0, 200.0),
-    'combined_topic': Spec('joint_states', 'topic with all joints in one message; empty for none',
-                           read_only=True),
-    'command': Spec('none', 'command topic for ros2_control', read_only=True,
-                    constraints='one of: ' + ', '.join(COMMANDS)),
-    'autostart': Spec(True, 'ramp into the gait at start; false waits for ~/enable',
-                      read_only=True),
-}
-
-_RANGES = {'a': (-20.0, 20.0, 'linear rate of each cell'),
-           'b': (-20.0, 20.0, 'weight of each cell on itself'),
-           'c': (-20.0, 20.0, "weight of the opposite leg's cell, delayed"),
-           'd': (-20.0, 20.0, 'weight of the cell before it on the same side'),
-           'tau': (STEP, MAX_DELAY, 'delay between opposite legs')}
+NETWORK = Spec('delayed', 'network of cells that makes the rhythm', read_only=True,
+               constraints='one of: ' + ', '.join(NETWORKS))
 
 
-def network_specs(preset: str) -> dict[str, Spec]:
-    """Return the network's own parameters, with a preset's values as defaults."""
-    values = PRESETS[preset].network.as_dict()
-    return {f'delayed.{key}': Spec(values[key], f'{text} [model time]' if key == 'tau'
-                                   else f'{text} [1/model time]', low, high)
-            for key, (low, high, text) in _RANGES.items()}
+def specs(network: str) -> dict[str, Spec]:
+    """Return every parameter but ``network`` and the network's own, in order of declaration."""
+    robot, gait = USUAL[network]
+    return {
+        'presets': Spec('', 'file with further presets; empty for none', read_only=True),
+        'robot': Spec(robot, 'robot file, or the name of a shipped one', read_only=True,
+                      constraints='a shipped name, or the path of a YAML file'),
+        'gait': Spec(gait, 'gait; setting it loads its preset of network parameters',
+                     constraints='one of: ' + ', '.join(PRESETS[network])
+                     + ', and those of the file given by presets'),
+        'rate': Spec(100.0, 'messages per second on every output topic [Hz]', 1.0, 2000.0),
+        'frequency': Spec(1.0, "strides per second [Hz]; 0 runs in the model's own time, one "
+                          'unit a second', 0.0, 10.0),
+        'amplitude': Spec(1.0, "factor on the robot file's joint amplitudes", 0.0, 3.0),
+        'transition': Spec(1.0, 'duration of a change of gait or parameters [s]; 0 leaves it to '
+                           "the network's own dynamics", 0.0, 30.0),
+        'ramp': Spec(1.0, 'duration of the ramp between the stand and the gait [s]', 0.0, 30.0),
+        'symmetry_gain': Spec(-1.0, 'gain of the symmetry lock [1/model time]; -1 chooses one '
+                              "that makes the gait attract, 0 is the paper's model", -1.0, 200.0),
+        'combined_topic': Spec('joint_states', 'topic with all joints in one message; empty for '
+                               'none', read_only=True),
+        'command': Spec('none', 'command topic for ros2_control', read_only=True,
+                        constraints='one of: ' + ', '.join(COMMANDS)),
+        'autostart': Spec(True, 'ramp into the gait at start; false waits for ~/enable',
+                          read_only=True)}
 
 
 @dataclass(frozen=True)
@@ -85,49 +76,111 @@ class Settings:
     """What a program is planned from; hashable, so that a plan is made once."""
 
     gait: str
-    network: Delayed
+    network: Network
     frequency: float
     amplitude: float
     symmetry_gain: float
 
-    @staticmethod
-    def planned_names() -> tuple[str, ...]:
-        """Names of the parameters that make up the settings."""
-        return ('gait', 'frequency', 'amplitude', 'symmetry_gain',
-                *(f'delayed.{key}' for key in PARAMETERS))
 
-    @classmethod
-    def merged(cls, values: dict[str, Any]) -> 'Settings':
-        """Build from all parameters by name.
+class Planner:
+    """Turns parameters into programs for one network and one robot.
+
+    Attributes:
+        presets: name -> preset, all that ``gait`` can be set to.
+        names: of the parameters that make up the settings.
+
+    """
+
+    def __init__(self, network: type[Network], presets: dict[str, Preset]) -> None:
+        self.network, self.presets = network, presets
+        self.names = ('gait', 'frequency', 'amplitude', 'symmetry_gain',
+                      *(f'{network.name}.{key}' for key in network.parameters()))
+        self._robot: Robot | None = None
+        self.program = functools.lru_cache(maxsize=32)(self._program)
+
+    def serve(self, robot: Robot) -> None:
+        """Plan for this robot from now on."""
+        self._robot = robot
+
+    def specs(self, preset: str) -> dict[str, Spec]:
+        """Return the network's own parameters, with a preset's values as defaults."""
+        network, values = self.network, self._values(self.presets[preset].network)
+        found = {f'{network.name}.{key}': Spec(values[key], allowed.text, allowed.low,
+                                               allowed.high)
+                 for key, allowed in network.ranges.items()}
+        for group, members in network.groups.items():
+            allowed = network.ranges[members[0]]
+            found[f'{network.name}.{group}'] = Spec(
+                values[group], f'{" ".join(members)}: the mean; setting it sets all of them',
+                allowed.low, allowed.high)
+        return found
+
+    def _values(self, network: Network) -> dict[str, float]:
+        """Parameters and groups by their bare names."""
+        values = network.as_dict()
+        return {**values, **{group: math.fsum(values[key] for key in members) / len(members)
+                             for group, members in network.groups.items()}}
+
+    def settings(self, values: dict[str, Any]) -> Settings:
+        """Build settings from all parameters by name.
 
         Raises:
             Refused: a value of the wrong kind, not finite, or an unknown gait.
 
         """
-        for name in cls.planned_names():
+        for name in self.names:
             value = values[name]
             if name != 'gait' and not (isinstance(value, float) and math.isfinite(value)):
                 raise Refused(f'{name} must be a finite number, not {value!r}')
-        if values['gait'] not in PRESETS:
-            raise Refused(f"gait '{values['gait']}' is not one of {', '.join(GAIT_NAMES)}")
+        if values['gait'] not in self.presets:
+            raise Refused(f"gait '{values['gait']}' is not one of {', '.join(self.presets)}")
         gain = values['symmetry_gain']
         if -1.0 < gain < 0.0:
             raise Refused(f'symmetry_gain {gain:g} is neither -1 (chosen) nor at least 0')
-        network = Delayed(*(values[f'delayed.{key}'] for key in PARAMETERS))
-        return cls(values['gait'], network, values['frequency'], values['amplitude'], gain)
+        network = self.network(*(values[f'{self.network.name}.{key}']
+                                 for key in self.network.parameters()))
+        return Settings(values['gait'], network, values['frequency'], values['amplitude'], gain)
 
+    def plan(self, values: dict[str, Any]) -> Program:
+        """Work out the program that all parameters, by name, ask for.
 
-class Planner:
-    """Plans programs for one robot, remembering the latest ones."""
+        Raises:
+            Refused: it cannot be run.
 
-    def __init__(self, robot: Robot) -> None:
-        self._robot = robot
-        self.plan = functools.lru_cache(maxsize=16)(self._plan)
+        """
+        return self.program(self.settings(values))
 
-    def _plan(self, settings: Settings) -> Program:
-        gait = PRESETS[settings.gait].gait
-        return plan(self._robot, settings.gait, gait, settings.network, settings.frequency,
-                    settings.amplitude, settings.symmetry_gain)
+    def _program(self, settings: Settings) -> Program:
+        assert self._robot is not None, 'serve() comes first'
+        return plan(self._robot, settings.gait, self.presets[settings.gait], settings.network,
+                    settings.frequency, settings.amplitude, settings.symmetry_gain)
+
+    def complete(self, parameters: list[Parameter], current: dict[str, Any]) -> list[Parameter]:
+        """Add to a batch what follows from it.
+
+        The gait's preset, then what a group sets, then the means of the groups; single
+        parameters in the batch win over all of them. An unknown gait adds nothing; it is
+        refused later.
+        """
+        prefix = f'{self.network.name}.'
+        given = {p.name: p.value for p in parameters}
+        gait = given.get('gait')
+        preset = self.presets.get(gait) if isinstance(gait, str) else None
+        wanted: dict[str, float] = {} if preset is None else {
+            prefix + key: value for key, value in preset.network.as_dict().items()}
+        for group, members in self.network.groups.items():
+            if isinstance(given.get(prefix + group), float):
+                wanted.update({prefix + key: given[prefix + group] for key in members})
+        wanted = {name: value for name, value in wanted.items() if name not in given}
+        values = {**current, **wanted, **given}
+        for group, members in self.network.groups.items():
+            parts = [values[prefix + key] for key in members]
+            if (any(prefix + key in wanted or prefix + key in given for key in members)
+                    and all(isinstance(part, float) for part in parts)):
+                parameters = [p for p in parameters if p.name != prefix + group]
+                wanted[prefix + group] = math.fsum(parts) / len(parts)
+        return [Parameter(name, Parameter.Type.DOUBLE, value)
+                for name, value in wanted.items()] + parameters
 
 
 def as_doubles(parameters: list[Parameter], doubles: set[str]) -> list[Parameter]:
@@ -138,21 +191,3 @@ def as_doubles(parameters: list[Parameter], doubles: set[str]) -> list[Parameter
     return [Parameter(p.name, Parameter.Type.DOUBLE, float(p.value))
             if p.name in doubles and p.type_ == Parameter.Type.INTEGER else p
             for p in parameters]
-
-
-def with_preset(parameters: list[Parameter]) -> list[Parameter]:
-    """Add the preset's network parameters to a batch that sets the gait.
-
-    Network parameters in the same batch come after it and win. An unknown gait adds nothing;
-    it is refused later.
-    """
-    preset = next((p.value for p in reversed(parameters)
-                   if p.name == 'gait' and p.type_ == Parameter.Type.STRING), None)
-    if preset not in PRESETS:
-        return parameters
-    given = {p.name for p in parameters}
-    loaded = [Parameter(f'delayed.{key}', Parameter.Type.DOUBLE, value)
-              for key, value in PRESETS[preset].network.as_dict().items()
-              if f'delayed.{key}' not in given]
-    return loaded + parameters
-

@@ -12,7 +12,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from cpg_ros.dynamics.orbit import Orbit, solve_orbit
-from cpg_ros.networks.delayed import LEGS, PRESETS
+from cpg_ros.networks.delayed import PRESETS, Delayed
 
 STRIDES = 2.0
 #: Rows from the top, and a colour for each girdle.
@@ -30,7 +30,7 @@ def stances(orbit: Orbit, leg: str, strides: float = STRIDES) -> list[tuple[floa
 
     """
     theta = np.linspace(0.0, strides, int(1000 * strides) + 1)
-    phase = orbit.phases[LEGS[leg][0] - 1]
+    phase = orbit.phases[Delayed.legs['implicit'][leg][0] - 1]
     # Not merely below 0: at a peak on the grid the sign of the slope is that of rounding.
     standing = orbit.waveform(theta + phase, 1) < -1e-9
     edges = np.flatnonzero(np.diff(np.concatenate([[False], standing, [False]]).astype(int)))
@@ -45,7 +45,8 @@ def draw(axes: Axes, orbit: Orbit, title: str) -> None:
     for row, (leg, colour) in enumerate(ROWS.items()):
         height = len(ROWS) - 1 - row
         axes.broken_barh(stances(orbit, leg), (height - 0.36, 0.72), color=colour, alpha=0.85)
-        wave = orbit.waveform(theta + orbit.phases[LEGS[leg][0] - 1]) / orbit.peak
+        phase = orbit.phases[Delayed.legs['implicit'][leg][0] - 1]
+        wave = orbit.waveform(theta + phase) / orbit.peak
         axes.plot(theta, height + 0.33 * wave, color='#1a202c', linewidth=0.9)
     axes.set_yticks(range(len(ROWS)), [leg.upper() for leg in reversed(ROWS)])
     axes.set_xlim(0.0, STRIDES)

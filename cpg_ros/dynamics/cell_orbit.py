@@ -1,0 +1,183 @@
+"""Finding the orbit of a gait of the Morris-Lecar networks, from the nearest one known.
+
+From the given start Newton's method is tried at once; failing that, the network is left to find
+its gait by itself, held in its symmetry; failing that, the orbit is followed from the known
+parameters to the wanted ones, which also tells how far it exists.
+"""
+
+from collections.abc import Callable
+from dataclasses import replace
+from functools import lru_cache
+
+import numpy as np
+
+from cpg_ros.dynamics.mesh_newton import collocate
+from cpg_ros.dynamics.mesh_orbit import MeshOrbit
+from cpg_ros.dynamics.periodic import NoOrbit
+from cpg_ros.dynamics.simulate import simulate
+from cpg_ros.networks.network import Network, Preset
+from cpg_ros.networks.registry import PRESETS
+from cpg_ros.networks.symmetry import Symmetry
+
+#: Periods the network gets to find its gait, held by a lock of this gain (1/model time).
+SETTLING, HOLD = 30, 1.0
+#: Two signals this close, over their range, are one.
+SAME = 1e-4
+
+
+def richer(orbit: MeshOrbit) -> str:
+    """Name a symmetry that an orbit has beyond its gait's, or '' if it has none.
+
+    Newton's method may end on an orbit with more symmetry, which every equation of the gait
+    also holds for: a walk is a skip whose two waveforms agree.
+    """
+    symmetry, points = orbit.symmetry, 64
+    x = orbit(np.arange(points) / points * orbit.period)[:, :orbit.network.cells]
+    size = np.ptp(x)
+    own, identity = dict(symmetry.shifts), tuple(range(orbit.network.cells))
+    for name, element in symmetry.group.elements.items():
+        order, power = 1, element
+        while power != identity:
+            order, power = order + 1, tuple(element[i] for i in power)
+        for k in range(order):
+            if own.get(name) == k / order:
+                continue
+            gap = x[:, list(element)] - np.roll(x, -(points * k // order), axis=0)
+            if np.abs(gap).max() < SAME * size:
+                return f'{name} shifts it by {k}/{order} of a cycle'
+    return ''
+
+
+def _accepted(orbit: MeshOrbit | None) -> MeshOrbit | None:
+    return orbit if orbit is not None and not richer(orbit) else None
+
+
+def settled(network: Network, symmetry: Symmetry, start: np.ndarray, period: float,
+            hold: float = HOLD) -> tuple[Callable[[np.ndarray], np.ndarray], float] | None:
+    """Let the network run from a state and find its period: (states over cycles, period).
+
+    None where it comes to rest or repeats nothing within three of the given periods.
+    """
+    step = min(network.step, period / 400.0)
+    lock = (hold, symmetry) if hold else None
+    run = simulate(network, start, (SETTLING + 3) * period, step, lock=lock, progress=False)
+    first = int(SETTLING * period / step)
+    v, rise = run.x[first:, 0], run.slopes[first:, 0]
+    if not np.isfinite(run.x[-1]).all() or np.ptp(v) < 1e-3:
+        return None
+    peaks = first + np.flatnonzero((rise[:-1] > 0.0) & (rise[1:] <= 0.0))
+    peaks = peaks[run.x[peaks, 0] > v.max() - 0.02 * np.ptp(v)]
+    if peaks.size < 2:
+        return None
+    size = np.ptp(run.x[first:], axis=0).max()
+    gaps = np.abs(run.x[peaks[1:]] - run.x[peaks[0]]).max(axis=1) / size
+    close = np.flatnonzero(gaps < max(0.05, 1.5 * gaps.min()))
+    if gaps.min() > 0.2:
+        return None
+    begin, found = run.t[peaks[0]], float(run.t[peaks[1 + close[0]]] - run.t[peaks[0]])
+    return lambda theta: run(begin + theta * found), found
+
+
+@lru_cache(maxsize=64)
+def from_preset(preset: Preset) -> MeshOrbit:
+    """Solve for a preset's orbit from its start.
+
+    Raises:
+        NoOrbit: the start does not lead to an orbit of the gait.
+
+    """
+    if preset.start is None:
+        raise ValueError(f'the preset of {preset.gait} has no start')
+    network, start = preset.network, np.array(preset.start)
+    symmetry = network.symmetry(preset.gait)
+    run = simulate(network, start, 1.05 * preset.period, network.step, progress=False)
+    orbit = _accepted(collocate(network, symmetry, lambda theta: run(theta * preset.period),
+                                preset.period))
+    if orbit is None:
+        orbit = _by_itself(network, symmetry, start, preset.period)
+    if orbit is None:
+        raise NoOrbit(f'no {preset.gait} was found from the start given')
+    return orbit
+
+
+def _by_itself(network: Network, symmetry: Symmetry, start: np.ndarray, period: float
+               ) -> MeshOrbit | None:
+    found = settled(network, symmetry, start, period)
+    return None if found is None else _accepted(collocate(network, symmetry, *found))
+
+
+def _on_cycles(orbit: MeshOrbit) -> Callable[[np.ndarray], np.ndarray]:
+    return lambda theta: orbit(theta * orbit.period)
+
+
+def _followed(known: MeshOrbit, network: Network) -> tuple[MeshOrbit | None, float]:
+    """Follow an orbit along the line to other parameters; also return the share reached."""
+    start, end = known.network.as_dict(), network.as_dict()
+    orbit, reached, step = known, 0.0, 0.25
+    while reached < 1.0 and step > 0.004:
+        share = min(1.0, reached + step)
+        here = replace(network, **{key: start[key] + share * (end[key] - start[key])
+                                   for key in start})  # type: ignore[type-var]
+        found = _accepted(collocate(here, known.symmetry, _on_cycles(orbit), orbit.period))
+        # A jump to another branch would be no continuation.
+        if found is None or not 0.5 < found.period / orbit.period < 2.0:
+            step *= 0.5
+            continue
+        orbit, reached, step = found, share, 1.5 * step
+    return (orbit if reached >= 1.0 else None), reached
+
+
+def solve(network: Network, gait: str, near: MeshOrbit | None = None) -> MeshOrbit:
+    """Solve for the gait's orbit, with exact derivatives by every parameter.
+
+    Args:
+        network: parameters.
+        gait: one of the network's.
+        near: an orbit of the same gait to start from; the shipped preset's if not given.
+
+    Raises:
+        ValueError: an unknown gait, or parameters that are not finite.
+        NoOrbit: none was found; the message says how far from the known one it exists.
+
+    """
+    symmetry = network.symmetry(gait)
+    for name, value in network.as_dict().items():
+        if not np.isfinite(value):
+            raise ValueError(f'{name} is {value}, not a finite number')
+    if near is None:
+        near = from_preset(PRESETS[network.name][gait])
+    if near.network == network:
+        return near
+    orbit = None
+    if near.symmetry == symmetry:
+        orbit = _accepted(collocate(network, symmetry, _on_cycles(near), near.period))
+    if orbit is None:
+        start = near(np.array(0.0))
+        if near.symmetry != symmetry:
+            # A wave that runs the other way: the same signals with other phases.
+            start = _states(near, symmetry)
+        orbit = _by_itself(network, symmetry, start, near.period)
+    if orbit is not None:
+        return orbit
+    if near.symmetry == symmetry:
+        orbit, reached = _followed(near, network)
+        if orbit is not None:
+            return orbit
+        changed = ', '.join(
+            f'{name} {known + reached * (value - known):.4g}' for (name, value), known
+            in zip(network.as_dict().items(), near.network.as_dict().values(), strict=True)
+            if value != known)
+        raise NoOrbit(f'no {gait} at these parameters: from its preset on the way there it was '
+                      f'followed to {changed}, no further')
+    raise NoOrbit(f'no {gait} at these parameters')
+
+
+def _states(orbit: MeshOrbit, symmetry: Symmetry) -> np.ndarray:
+    """State at phase 0 of the orbit's waveforms with the phases of another symmetry."""
+    cells = orbit.network.cells
+    out = np.empty(orbit.network.components)
+    for cell in range(cells):
+        for variable in range(orbit.network.variables):
+            out[cell + variable * cells] = orbit.waveform(
+                np.array(symmetry.phases[cell]), 0, int(symmetry.waves[cell]), variable)
+    return out

@@ -1,0 +1,243 @@
+"""Gaits of the networks without delay as exact periodic orbits, by Gauss collocation on a mesh.
+
+On a gait the cells of one class under K are equal, and after T/m, m the order of H/K, the classes
+have changed places. So the network collapses to one cell a class and 1/m of the period, with the
+boundary condition ``y(T/m) = Pi y(0)`` and the period as unknown. Newton's method eliminates each
+interval's inner values, which leaves a linear system in y(0) and T. Secondary gaits, with two
+waveforms, are no different.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.polynomial import polynomial
+
+from cpg_ros.dynamics import gauss
+from cpg_ros.dynamics.mesh_orbit import MeshOrbit
+from cpg_ros.networks.symmetry import Symmetry
+
+#: A mesh is fine enough when its polynomials end with terms of this share of the whole.
+RESOLVED = 1e-11
+FEWEST, MOST_INTERVALS = 12, 300
+#: Newton stops at steps this small, against the size of the states and the period.
+TOLERANCE = 1e-10
+#: Below this range the orbit has fallen to an equilibrium.
+SMALLEST = 1e-5
+
+
+class Reduced:
+    """A network on the gait's Fix(K): one cell of each class."""
+
+    def __init__(self, network, symmetry: Symmetry) -> None:
+        classes = symmetry.classes
+        first = np.array([np.flatnonzero(classes == c)[0] for c in range(classes.max() + 1)])
+        self.network, self.symmetry = network, symmetry
+        self.classes, self.size = classes, classes.max() + 1
+        blocks = np.arange(network.variables)[:, None]
+        self.kept = (first + blocks * network.cells).ravel()
+        #: Where each component of the network finds its value in the reduced state.
+        self.place = (classes + blocks * self.size).ravel()
+        #: y(T/m) = y(0)[turn]
+        self.turn = (classes[symmetry.turn[first]] + blocks * self.size).ravel()
+        self._gather = np.eye(len(self.kept))[self.place]
+
+    def rates(self, y: np.ndarray) -> np.ndarray:
+        """Right-hand side at reduced states, shape (..., d)."""
+        return self.network.rates(y[..., self.place])[..., self.kept]
+
+    def jacobian(self, y: np.ndarray) -> np.ndarray:
+        """Its derivative, shape (..., d, d)."""
+        return self.network.jacobian(y[..., self.place])[..., self.kept, :] @ self._gather
+
+    def by_parameter(self, y: np.ndarray) -> np.ndarray:
+        """Its derivative by the network's parameters, shape (..., d, parameters)."""
+        return self.network.by_parameter(y[..., self.place])[..., self.kept, :]
+
+
+@dataclass
+class _Solution:
+    """What Newton's method works on: values at mesh points, at nodes, and L = T/m."""
+
+    mesh: np.ndarray
+    points: np.ndarray
+    stages: np.ndarray
+    length: float
+
+
+def transfer(jacobians: np.ndarray, lengths: np.ndarray, sources: np.ndarray
+             ) -> tuple[np.ndarray, np.ndarray]:
+    """Solve the linear problem of every interval: ``dY = 1 dy + L h A J dY + g``.
+
+    Args:
+        jacobians: of the rates at the nodes, shape (n, S, d, d).
+        lengths: of the intervals in model time, shape (n,).
+        sources: g at the nodes for k right-hand sides, shape (n, S, d, k).
+
+    Returns:
+        Nodes' answer to dy, shape (n, S, d, d), and to the sources, shape (n, S, d, k).
+
+    """
+    n, s, d = jacobians.shape[:3]
+    matrix = -np.einsum('st,ntij->nsitj', gauss.A, lengths[:, None, None, None] * jacobians)
+    matrix = matrix.reshape(n, s * d, s * d)
+    matrix[:, np.arange(s * d), np.arange(s * d)] += 1.0
+    ones = np.broadcast_to(np.eye(d), (n, s, d, d))
+    right = np.concatenate([ones, sources], axis=-1).reshape(n, s * d, -1)
+    found = np.linalg.solve(matrix, right).reshape(n, s, d, -1)
+    return found[..., :d], found[..., d:]
+
+
+def _linear(reduced: Reduced, now: _Solution, extra: np.ndarray | None = None):
+    """Linearise: return increments at mesh points as functions of (dy0, dL, extras).
+
+    The answer is (P, R, stage answer to dy, stage answer to the sources): dy_k = P_k dy_0 +
+    R_k (dL, 1, extras...).
+    """
+    h = np.diff(now.mesh)
+    slopes, jacobians = reduced.rates(now.stages), reduced.jacobian(now.stages)
+    step = now.length * h
+    by_length = h[:, None, None] * np.einsum('st,ntd->nsd', gauss.A, slopes)
+    gap = now.points[:-1, None] + now.length * by_length - now.stages
+    ends = np.stack([h[:, None] * (gauss.WEIGHTS @ slopes),
+                     now.points[:-1] + step[:, None] * (gauss.WEIGHTS @ slopes)
+                     - now.points[1:]], axis=-1)
+    sources = np.stack([by_length, gap], axis=-1)
+    if extra is not None:
+        sources = np.concatenate([sources, step[:, None, None, None] * np.einsum(
+            'st,ntdp->nsdp', gauss.A, extra)], axis=-1)
+        ends = np.concatenate([ends, step[:, None, None] * np.einsum(
+            't,ntdp->ndp', gauss.WEIGHTS, extra)], axis=-1)
+    by_start, by_source = transfer(jacobians, step, sources)
+    weighted = step[:, None, None, None] * gauss.WEIGHTS[:, None, None] * jacobians
+    phi = np.eye(h_size := jacobians.shape[-1]) + np.einsum('nsij,nsjk->nik', weighted, by_start)
+    rest = ends + np.einsum('nsij,nsjk->nik', weighted, by_source)
+    p, r = np.empty((h.size + 1, h_size, h_size)), np.zeros((h.size + 1, h_size, rest.shape[-1]))
+    p[0] = np.eye(h_size)
+    for k in range(h.size):
+        p[k + 1] = phi[k] @ p[k]
+        r[k + 1] = phi[k] @ r[k] + rest[k]
+    return p, r, by_start, by_source
+
+
+def _bordered(reduced: Reduced, now: _Solution, p: np.ndarray, r: np.ndarray) -> np.ndarray:
+    """The matrix of boundary and phase conditions in (dy_0, dL)."""
+    d = p.shape[-1]
+    matrix = np.zeros((d + 1, d + 1))
+    matrix[:d, :d] = p[-1] - np.eye(d)[reduced.turn]
+    matrix[:d, d] = r[-1, :, 0]
+    matrix[d, :d] = reduced.jacobian(now.points[0])[0]
+    return matrix
+
+
+def _newton(reduced: Reduced, now: _Solution, steps: int = 15) -> bool:
+    """Solve on a fixed mesh, in place; tell whether it converged."""
+    scale = np.abs(now.points).max()
+    d, longest = now.points.shape[1], 20.0 * now.length
+    for _ in range(steps):
+        p, r, by_start, by_source = _linear(reduced, now)
+        right = np.empty(d + 1)
+        right[:d] = now.points[0, reduced.turn] - now.points[-1] - r[-1, :, 1]
+        right[d] = -reduced.rates(now.points[0])[0]
+        try:
+            found = np.linalg.solve(_bordered(reduced, now, p, r), right)
+        except np.linalg.LinAlgError:
+            return False
+        start, length = found[:d], found[d]
+        moved = p @ start + r[..., 0] * length + r[..., 1]
+        inner = (np.einsum('nsij,nj->nsi', by_start, moved[:-1]) + by_source[..., 0] * length
+                 + by_source[..., 1])
+        size = float(max(np.abs(moved).max() / scale, np.abs(inner).max() / scale,
+                         abs(length) / now.length))
+        if not np.isfinite(size):
+            return False
+        # A long first step would leave the range where cosh is tame.
+        share = min(1.0, 0.5 / max(size, 1e-300))
+        now.points += share * moved
+        now.stages += share * inner
+        now.length += share * float(length)
+        if not 0.0 < now.length < longest:
+            return False
+        if size <= TOLERANCE:
+            return True
+    return False
+
+
+def _sampled(path: Callable[[np.ndarray], np.ndarray], mesh: np.ndarray, length: float
+             ) -> _Solution:
+    """Take a guess at the points of a mesh from a path over the places 0 to 1."""
+    inner = mesh[:-1, None] + np.diff(mesh)[:, None] * gauss.NODES
+    return _Solution(mesh, path(mesh), path(inner.ravel()).reshape(*inner.shape, -1), length)
+
+
+def _path(now: _Solution, coefficients: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
+    def path(places: np.ndarray) -> np.ndarray:
+        k = np.clip(np.searchsorted(now.mesh, places, side='right') - 1, 0, now.mesh.size - 2)
+        xi = (places - now.mesh[k]) / np.diff(now.mesh)[k]
+        return polynomial.polyval(xi[:, None], coefficients[:, k], tensor=False)
+    return path
+
+
+def collocate(network, symmetry: Symmetry, path: Callable[[np.ndarray], np.ndarray],
+              period: float) -> MeshOrbit | None:
+    """Solve for an orbit from a guess; None where Newton's method leads to none.
+
+    Args:
+        network: parameters.
+        symmetry: of the gait.
+        path: states, shape (m, components), as a function of times in cycles, shape (m,).
+        period: in model time.
+
+    """
+    reduced = Reduced(network, symmetry)
+    coarse = np.linspace(0.0, 1.0, 513)
+
+    def guess(places: np.ndarray) -> np.ndarray:
+        return path(places / symmetry.order)[:, reduced.kept]
+
+    bend = np.abs(np.diff(reduced.rates(guess(coarse)), axis=0)).max(axis=1)
+    now = _sampled(guess, gauss.spread(coarse, np.sqrt(bend + 1e-3 * bend.max() + 1e-12), 30),
+                   period / symmetry.order)
+    while True:
+        with np.errstate(all='ignore'):
+            converged = _newton(reduced, now)
+        if not converged or np.ptp(now.points[:, :reduced.size]) < SMALLEST:
+            return None
+        h, slopes = np.diff(now.mesh), reduced.rates(now.stages)
+        ends = gauss.last_share(slopes) * now.length * h / np.abs(now.points).max()
+        coefficients = gauss.power_coefficients(now.points[:-1], slopes, now.length * h)
+        if ends.max() <= RESOLVED:
+            break
+        wanted = 1.1 * (ends**(1.0 / gauss.S)).mean() / RESOLVED**(1.0 / gauss.S) * h.size
+        if wanted > MOST_INTERVALS:
+            return None
+        mesh = gauss.spread(now.mesh, ends**(1.0 / gauss.S) / h, max(FEWEST, int(wanted)))
+        now = _sampled(_path(now, coefficients), mesh, now.length)
+    return _orbit(reduced, now, coefficients)
+
+
+def _orbit(reduced: Reduced, now: _Solution, coefficients: np.ndarray) -> MeshOrbit:
+    """Complete a solution by its derivatives and its residual."""
+    extra = reduced.by_parameter(now.stages)
+    p, r, by_start, by_source = _linear(reduced, now, extra)
+    right = -r[-1, :, 2:]
+    right = np.vstack([right, -reduced.by_parameter(now.points[0])[0]])
+    found = np.linalg.solve(_bordered(reduced, now, p, r), right)
+    start, d_length = found[:-1], found[-1]
+    moved = p @ start + r[..., :1] * d_length + r[..., 2:]
+    inner = (by_start @ moved[:-1, None] + by_source[..., :1] * d_length + by_source[..., 2:])
+    h = np.diff(now.mesh)
+    # Slopes in place: d(L F)/dp at the nodes.
+    slopes = reduced.rates(now.stages)
+    d_slopes = now.length * (reduced.jacobian(now.stages) @ inner + extra) \
+        + slopes[..., None] * d_length
+    d_coefficients = h[:, None, None] * np.einsum('sq,nsdp->qndp', gauss.INTEGRALS, d_slopes)
+    d_coefficients[0] += moved[:-1]
+
+    m = reduced.symmetry.order
+    between = np.array([0.02, 0.3, 0.5, 0.7, 0.98])
+    values, rise = (polynomial.polyval(between, c).transpose(0, 2, 1)
+                    for c in (coefficients, polynomial.polyder(coefficients)))
+    residual = np.abs(rise / (now.length * h)[:, None, None] - reduced.rates(values))
+    return MeshOrbit(reduced.network, reduced.symmetry, m * now.length, float(residual.max()),
+                     m * d_length, now.mesh, now.stages, coefficients, d_coefficients)

@@ -1,0 +1,70 @@
+"""Orbits as polynomials on a mesh: the gaits of the networks without delay.
+
+A gait with m = order of H/K is known from the cells of one class each, over one m-th of the cycle:
+``x_i(t + T/m) = x_turn(i)(t)``.
+"""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from cpg_ros.dynamics.periodic import Orbit
+
+
+@dataclass(frozen=True, eq=False)
+class MeshOrbit(Orbit):
+    """An orbit as polynomials on a mesh.
+
+    Attributes:
+        mesh: ends of the intervals over T/m, from 0 to 1, shape (n + 1,).
+        stages: reduced states at the nodes, shape (n, S, d).
+        coefficients: of the polynomials on each interval, shape (S + 1, n, d).
+        d_coefficients: their derivatives by the parameters at fixed theta, shape
+            (S + 1, n, d, parameters).
+
+    """
+
+    mesh: np.ndarray = field(repr=False)
+    stages: np.ndarray = field(repr=False)
+    coefficients: np.ndarray = field(repr=False)
+    d_coefficients: np.ndarray = field(repr=False)
+
+    def _columns(self, wave: int, variable: int) -> list[int]:
+        """Where u_wave is found in the reduced state, in each m-th of the cycle."""
+        symmetry, columns = self.symmetry, []
+        cell = int(np.flatnonzero((symmetry.waves == wave) & (symmetry.phases == 0.0))[0])
+        for _ in range(symmetry.order):
+            columns.append(int(symmetry.classes[cell]
+                               + variable * (symmetry.classes.max() + 1)))
+            cell = int(symmetry.turn[cell])
+        return columns
+
+    def _evaluate(self, coefficients: np.ndarray, theta: np.ndarray, order: int, wave: int,
+                  variable: int) -> np.ndarray:
+        theta = np.asarray(theta, dtype=float)
+        places = (theta - np.floor(theta)) * self.symmetry.order
+        part = np.minimum(places.astype(int), self.symmetry.order - 1)
+        places = places - part
+        interval = np.clip(np.searchsorted(self.mesh, places, side='right') - 1, 0,
+                           self.mesh.size - 2)
+        length = np.diff(self.mesh)[interval]
+        xi = (places - self.mesh[interval]) / length
+        column = np.array(self._columns(wave, variable))[part]
+        terms = coefficients
+        for _ in range(order):
+            terms = terms[1:] * np.arange(1, terms.shape[0]).reshape(-1, *[1] * (terms.ndim - 1))
+        picked = terms[:, interval, column]
+        xi = xi.reshape(xi.shape + (1,) * (picked.ndim - 1 - xi.ndim))
+        out = np.zeros(picked.shape[1:])
+        for term in picked[::-1]:
+            out = out * xi + term
+        return out * ((self.symmetry.order / length)**order).reshape(xi.shape)
+
+    def waveform(self, theta: np.ndarray, order: int = 0, wave: int = 0, variable: int = 0
+                 ) -> np.ndarray:
+        """A waveform, or its derivative in theta of order 1 or 2, at theta in cycles."""
+        return self._evaluate(self.coefficients, theta, order, wave, variable)
+
+    def d_waveform(self, theta: np.ndarray, wave: int = 0, variable: int = 0) -> np.ndarray:
+        """Derivatives of a waveform by the parameters, shape theta.shape + (parameters,)."""
+        return self._evaluate(self.d_coefficients, theta, 0, wave, variable)

@@ -1,0 +1,175 @@
+"""Symmetry groups of networks, and gaits as what a group does to a periodic solution.
+
+A symmetry g of a network permutes its cells. It is a spatio-temporal symmetry of a periodic
+solution with shift theta if ``x_{g(i)}(t) = x_i(t + theta T)`` for every cell (Buono & Golubitsky
+2001, section 2.1). Those of a solution form a group H, those with shift 0 its subgroup K, and
+H/K is cyclic (eq. 2.2). So a gait is a homomorphism from a subgroup H into the circle.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import cached_property
+from itertools import product
+
+import numpy as np
+
+#: g as a permutation: cell i (from 0) goes to cell g[i].
+Permutation = tuple[int, ...]
+
+
+def _compose(outer: Permutation, inner: Permutation) -> Permutation:
+    return tuple(outer[i] for i in inner)
+
+
+@dataclass(frozen=True)
+class Group:
+    """An abelian group of permutations of cells.
+
+    Attributes:
+        cells: how many cells it permutes.
+        generators: name -> permutation; the names of all elements are made of these.
+
+    """
+
+    cells: int
+    generators: tuple[tuple[str, Permutation], ...]
+
+    @cached_property
+    def elements(self) -> dict[str, Permutation]:
+        """Name -> permutation; the identity is '1', powers are written 'omega^2'."""
+        names, powers = [], []
+        for name, generator in self.generators:
+            power = tuple(range(self.cells))
+            listed: list[Permutation] = []
+            while not listed or power != listed[0]:
+                listed.append(power)
+                power = _compose(generator, power)
+            powers.append(listed)
+            names.append(['', name, *(f'{name}^{k}' for k in range(2, len(listed)))])
+        found: dict[str, Permutation] = {}
+        for choice in product(*(range(len(listed)) for listed in powers)):
+            element = tuple(range(self.cells))
+            for listed, k in zip(powers, choice, strict=True):
+                element = _compose(listed[k], element)
+            name = ' '.join(names[g][k] for g, k in enumerate(choice) if k)
+            found[name or '1'] = element
+        return found
+
+    def generated(self, shifts: Mapping[str, Fraction]) -> dict[str, Fraction]:
+        """Extend shifts of some elements to the subgroup they generate, element name -> shift.
+
+        Raises:
+            ValueError: the shifts contradict one another.
+
+        """
+        names = {element: name for name, element in self.elements.items()}
+        found = {tuple(range(self.cells)): Fraction(0)}
+        waiting = list(found)
+        while waiting:
+            element = waiting.pop()
+            for name, shift in shifts.items():
+                image = _compose(self.elements[name], element)
+                theta = (found[element] + shift) % 1
+                if image not in found:
+                    found[image] = theta
+                    waiting.append(image)
+                elif found[image] != theta:
+                    raise ValueError(f'{names[image]} would have the shifts {theta} and '
+                                     f'{found[image]}')
+        return {name: found[element] for name, element in self.elements.items()
+                if element in found}
+
+
+#: omega: i -> i + 2 round both rings; kappa swaps 1-2, 3-4, 5-6, 7-8 (two rings of four cells).
+Z4_Z2 = Group(8, (('omega', (2, 3, 4, 5, 6, 7, 0, 1)), ('kappa', (1, 0, 3, 2, 5, 4, 7, 6))))
+#: rho: 1-2, 3-4 (left and right); tau: 1-3, 2-4 (flexor and extensor).
+D2 = Group(4, (('rho', (1, 0, 3, 2)), ('tau', (2, 3, 0, 1))))
+
+
+@dataclass(frozen=True)
+class Symmetry:
+    """The spatio-temporal symmetry of a gait: a shift for every element of H.
+
+    Attributes:
+        group: of the network.
+        shifts: element name -> shift in cycles, a homomorphism on H.
+        variables: state variables of each cell.
+
+    """
+
+    group: Group
+    shifts: tuple[tuple[str, Fraction], ...]
+    variables: int = 2
+
+    @classmethod
+    def of(cls, group: Group, shifts: Mapping[str, Fraction | float], variables: int = 2
+           ) -> 'Symmetry':
+        """Build from the shifts of elements that generate H.
+
+        Raises:
+            ValueError: the shifts contradict one another.
+
+        """
+        exact = {name: Fraction(shift).limit_denominator(64) % 1
+                 for name, shift in shifts.items()}
+        return cls(group, tuple(group.generated(exact).items()), variables)
+
+    @property
+    def h(self) -> tuple[str, ...]:
+        """Names of the elements of H."""
+        return tuple(name for name, _ in self.shifts)
+
+    @property
+    def k(self) -> tuple[str, ...]:
+        """Names of the elements of K, the purely spatial symmetries."""
+        return tuple(name for name, shift in self.shifts if shift == 0)
+
+    @cached_property
+    def order(self) -> int:
+        """Order m of the cyclic group H/K: after T/m the cells have changed places."""
+        return len(self.shifts) // len(self.k)
+
+    @cached_property
+    def turn(self) -> np.ndarray:
+        """Cells, shape (cells,), with ``x_i(t + T/m) = x_turn(i)(t)``."""
+        name = next(name for name, shift in self.shifts
+                    if shift == Fraction(1, self.order) % 1)
+        return np.array(self.group.elements[name])
+
+    @cached_property
+    def _orbit_of_cells(self) -> tuple[np.ndarray, np.ndarray]:
+        waves, phases = np.full(self.group.cells, -1), np.zeros(self.group.cells)
+        for cell in range(self.group.cells):
+            if waves[cell] < 0:
+                wave = waves.max() + 1
+                for name, shift in self.shifts:
+                    image = self.group.elements[name][cell]
+                    waves[image], phases[image] = wave, float(shift)
+        return waves, phases
+
+    @property
+    def waves(self) -> np.ndarray:
+        """Number of each cell's waveform, from 0, shape (cells,)."""
+        return self._orbit_of_cells[0]
+
+    @property
+    def phases(self) -> np.ndarray:
+        """Phase of each cell in cycles, shape (cells,): x_i(t) = u_wave(i)(t + phase_i T)."""
+        return self._orbit_of_cells[1]
+
+    @cached_property
+    def classes(self) -> np.ndarray:
+        """Number of each cell's class under K, from 0, shape (cells,): such cells are equal."""
+        found = np.full(self.group.cells, -1)
+        for cell in range(self.group.cells):
+            if found[cell] < 0:
+                found[[self.group.elements[name][cell] for name in self.k]] = found.max() + 1
+        return found
+
+    @cached_property
+    def basis(self) -> np.ndarray:
+        """Orthonormal rows that span Fix(K), shape (variables * classes, variables * cells)."""
+        rows = (np.arange(self.classes.max() + 1)[:, None] == self.classes).astype(float)
+        rows /= np.linalg.norm(rows, axis=1, keepdims=True)
+        return np.kron(np.eye(self.variables), rows)
