@@ -12,6 +12,9 @@ import numpy as np
 from common import emit, log
 from processes import Listener, enter_workspace, start_node
 
+from cpg_ros.nodes.generator import find_robot
+from cpg_ros.nodes.settings import USUAL
+
 RATE = 1000.0
 SETTLE = 4.0
 TARGETS = {'cpu_ratio': 1.3, 'rate_error': 1e-3, 'missing': 0, 'misstamped': 0,
@@ -50,10 +53,11 @@ def judge(record: dict, health: list[dict]) -> dict[str, object]:
         'behind_stamp_us': tails(source - stamp)}
 
 
-def measure(kind: str, seconds: float) -> dict[str, object]:
+def measure(kind: str, network: str, seconds: float) -> dict[str, object]:
     """One start of a node: CPU without and with a subscriber, and what that one saw."""
-    log(f'{kind}: {2 * (seconds + SETTLE):.0f} s')
-    with start_node(kind, rate=RATE, robot='quadruped') as node:
+    log(f'{kind} ({network}): {2 * (seconds + SETTLE):.0f} s')
+    own = {'network': network} if kind == 'generator' else {}
+    with start_node(kind, rate=RATE, robot=USUAL[network][0], **own) as node:
         def cpu_percent() -> float:
             before, began = node.cpu_s(), time.monotonic()
             time.sleep(seconds)
@@ -70,11 +74,20 @@ def measure(kind: str, seconds: float) -> dict[str, object]:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument('--seconds', type=float, default=30.0, help='length of each window')
-    seconds = parser.parse_args().seconds
+    parser.add_argument('--network', choices=sorted(USUAL), help='by default all, in turn')
+    arguments = parser.parse_args()
     enter_workspace()
+    found = {network: compare(network, arguments.seconds)
+             for network in ([arguments.network] if arguments.network else USUAL)}
+    emit(benchmark='generator', rate=RATE, seconds=arguments.seconds, networks=found,
+         targets=TARGETS, passed=all(each['passed'] for each in found.values()))
+
+
+def compare(network: str, seconds: float) -> dict[str, object]:
+    """Measure one network's generator against the null node with the same robot."""
     runs: dict[str, list] = {'null': [], 'generator': []}
     for kind in ('null', 'generator', 'generator', 'null'):
-        runs[kind].append(measure(kind, seconds))
+        runs[kind].append(measure(kind, network, seconds))
         log(f'{runs[kind][-1]}')
 
     def mean(kind: str, key: str) -> float:
@@ -92,13 +105,13 @@ def main() -> None:
         'rate_error': worst('rate_error'), 'drift_periods': worst('drift_periods'),
         'missing': worst('missing') + worst('ticks_dropped'), 'misstamped': worst('misstamped')}
     keys = ('cpu_percent', 'cpu_percent_with_subscriber')
-    emit(benchmark='generator', rate=RATE, joints=12, seconds=seconds, **figures,
-         **{key: {kind: mean(kind, key) for kind in runs} for key in keys},
-         cpu_ratio_with_subscriber=mean('generator', keys[1]) / mean('null', keys[1]),
-         arrival_period_error_us=jitter('arrival_period_error_us'),
-         source_period_error_us=jitter('source_period_error_us'),
-         behind_stamp_us=jitter('behind_stamp_us'), runs=runs, targets=TARGETS,
-         passed=all(figures[key] <= goal for key, goal in TARGETS.items()))
+    return {'joints': len(find_robot(USUAL[network][0]).joints), **figures,
+            **{key: {kind: mean(kind, key) for kind in runs} for key in keys},
+            'cpu_ratio_with_subscriber': mean('generator', keys[1]) / mean('null', keys[1]),
+            'arrival_period_error_us': jitter('arrival_period_error_us'),
+            'source_period_error_us': jitter('source_period_error_us'),
+            'behind_stamp_us': jitter('behind_stamp_us'), 'runs': runs,
+            'passed': all(figures[key] <= goal for key, goal in TARGETS.items())}
 
 
 if __name__ == '__main__':

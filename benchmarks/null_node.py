@@ -40,7 +40,8 @@ def main() -> None:
 
     ticker = Ticker(node, rate, tick, lambda: None, lambda error: stop.set())
     program = SimpleNamespace(name='null', frequency=1.0, gain=1.0,
-                              orbit=SimpleNamespace(period=1.0))
+                              character='none', orbit=SimpleNamespace(
+                                  period=1.0, network=SimpleNamespace(name='none')))
     still = SimpleNamespace(program=program, robot=robot, faults=0, held=0, recovering=False,
                             standing=True)
     diagnostics = Diagnostics(node, still, ticker)

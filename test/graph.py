@@ -18,7 +18,7 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from sensor_msgs.msg import JointState
-from std_msgs.msg import String
+from std_msgs.msg import Float64MultiArray, String
 
 EXECUTABLE = Path(get_package_prefix('cpg_ros')) / 'lib' / 'cpg_ros' / 'generator'
 #: Long enough for a loaded machine; nothing waits that long when all is well.
@@ -122,6 +122,9 @@ class Watcher:
         self.node.create_subscription(
             String, f'{generator}/gait', lambda m: self.gaits.append(m.data),
             QoSProfile(depth=10, durability=DurabilityPolicy.TRANSIENT_LOCAL))
+        self.phases: list[list[float]] = []
+        self.node.create_subscription(Float64MultiArray, f'{generator}/phase',
+                                      lambda m: self.phases.append(m.data.tolist()), 100)
         self._clients: dict = {}
         self._executor = SingleThreadedExecutor(context=self.context)
         self._executor.add_node(self.node)
@@ -178,6 +181,12 @@ class Watcher:
         times, positions, velocities = zip(*self.samples[first:], strict=True)
         return np.array(times), np.array(positions), np.array(velocities)
 
+    def next_phases(self, count: int) -> np.ndarray:
+        """Wait for the next phases of the legs, shape (count, legs)."""
+        first = len(self.phases)
+        until(lambda: len(self.phases) >= first + count, 'phases')
+        return np.array(self.phases[first:first + count])
+
     def end(self) -> None:
         """Leave the graph."""
         self._ending = True
@@ -188,5 +197,5 @@ class Watcher:
 
 
 def _messages(values: dict) -> list[ParameterMessage]:
-    return [Parameter(name.replace('delayed_', 'delayed.'), value=value).to_parameter_msg()
-            for name, value in values.items()]
+    return [Parameter(re.sub('^(delayed|quadruped|biped)_', r'\1.', name), value=value)
+            .to_parameter_msg() for name, value in values.items()]

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 from ament_index_python.packages import get_package_share_directory
 from graph import until
-from std_msgs.msg import Float64MultiArray
 from std_srvs.srv import SetBool
 
 from cpg_ros.dynamics.program import plan
@@ -24,15 +23,6 @@ PHASES = {'pronk': (0, 0, 0, 0), 'pace': (0, .5, 0, .5), 'bound': (0, 0, .5, .5)
 def by_leg(watcher, table):
     """Reorder recorded joints from the declared order to that of the robot's legs."""
     return table[:, [watcher.names.index(joint.name) for joint in ROBOT.joints]]
-
-
-def phases(watcher):
-    seen = []
-    subscription = watcher.node.create_subscription(Float64MultiArray, '/cpg_generator/phase',
-                                                    lambda m: seen.append(m.data.tolist()), 100)
-    until(lambda: len(seen) > 40, 'phases')
-    watcher.node.destroy_subscription(subscription)
-    return np.array(seen)
 
 
 def off(measured, expected):
@@ -65,7 +55,7 @@ def test_all_ordered_pairs_switch_without_a_jerk(running, programs):
         low = np.minimum(programs[old].span[0], programs[new].span[0]) + OFFSET
         high = np.maximum(programs[old].span[1], programs[new].span[1]) + OFFSET
         assert (positions >= low - 1e-6).all() and (positions <= high + 1e-6).all(), (old, new)
-        assert off(phases(watcher), PHASES[new]) < 0.02, (old, new)
+        assert off(watcher.next_phases(40), PHASES[new]) < 0.02, (old, new)
         assert watcher.gaits[-1] == new
 
 
@@ -85,7 +75,7 @@ def test_the_papers_walk_is_the_diagonal_sequence_one(running):
     _, watcher = running
     assert watcher.set(gait='liu2024_walk')[0].successful
     watcher.record(0.7)
-    assert off(phases(watcher), (0, .5, .25, .75)) < 1e-4
+    assert off(watcher.next_phases(40), (0, .5, .25, .75)) < 1e-4
 
 
 @pytest.mark.parametrize('changes, reason', [
@@ -153,5 +143,5 @@ def test_a_transition_of_zero_leaves_it_to_the_network(running):
     positions = by_leg(watcher, np.array([sample[1] for sample in watcher.samples[first:]]))
     limit = ROBOT.column('velocity')
     assert (np.abs(np.diff(positions, axis=0)) <= 0.005 * limit).all()
-    assert off(phases(watcher), PHASES['walk']) < 0.02
+    assert off(watcher.next_phases(40), PHASES['walk']) < 0.02
     assert watcher.set(transition=0.4)[0].successful

@@ -14,57 +14,43 @@ interpolation between nodes.
 """
 
 import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from types import FunctionType
 
 import numpy as np
 from numba import njit, prange
 
 from cpg_ros.networks import biped, delayed, quadruped
-from cpg_ros.networks.jit import OPTIONS, jit, part, sources_digest
+from cpg_ros.networks.jit import OPTIONS, jit, part, renamed, sources_digest
 
 DELAYED = delayed.Delayed.kind
-QUADRUPED = quadruped.Quadruped.kind
 
 
-def _rates(decorate):
-    """Compile every network's right-hand side, given the delayed network's drive."""
-    drive, delayed_rates = delayed.compiled(decorate)
-    quadruped_rates, biped_rates = quadruped.compiled(decorate), biped.compiled(decorate)
+def _compiled(decorate, network, delays):
+    """Compile the stepping of a network with a numba decorator.
 
-    @decorate
-    def rates(n, kind, x, k, weight, driven, p, lanes, work, out):
-        """Right-hand side at z = x + weight k in the network of this kind."""
-        if kind == DELAYED:
-            delayed_rates(n, x, k, weight, driven, p, lanes, work, out)
-        elif kind == QUADRUPED:
-            quadruped_rates(n, x, k, weight, p, lanes, work, out)
-        else:
-            biped_rates(n, x, k, weight, p, lanes, work, out)
+    Args:
+        decorate: numba's decorator.
+        network: module whose ``compiled`` gives drive and rates; drive only with a delay.
+        delays: whether the network has a delay.
 
-    return drive, rates
+    Returns:
+        The functions past_state, restart and steps_of.
 
+    """
+    def own(function):
+        return decorate(renamed(function, network.__name__))
 
-def _delayed_rates(decorate):
-    """Compile the right-hand side of the delayed network alone."""
-    drive, delayed_rates = delayed.compiled(decorate)
+    drive, rates = network.compiled(own)
 
-    @decorate
-    def rates(n, kind, x, k, weight, driven, p, lanes, work, out):
-        """Right-hand side at z = x + weight k."""
-        delayed_rates(n, x, k, weight, driven, p, lanes, work, out)
-
-    return drive, rates
-
-
-def _compiled(decorate, drive, rates):
-    """Compile the stepping with a numba decorator; return past_state, restart, steps_of."""
-
-    @decorate
-    def field(n, kind, x, k, weight, driven, p, gain, basis, lanes, work, out):
+    @own
+    def field(n, x, k, weight, driven, p, gain, basis, lanes, work, out):
         """Right-hand side at z = x + weight k, with the symmetry lock -gain (I - P) z.
 
         P projects on the rows of basis, shape (r, components); work is scratch.
         """
-        rates(n, kind, x, k, weight, driven, p, lanes, work, out)
+        rates(n, x, k, weight, driven, p, lanes, work, out)
         if gain != 0.0:
             z, along = work[0], work[1]
             for i in range(n):
@@ -85,7 +71,7 @@ def _compiled(decorate, drive, rates):
                         for lane in range(lanes):
                             out[cell * lanes + lane] += gain * along[lane] * basis[r, cell]
 
-    @decorate
+    @own
     def past_state(n, x, after, before, head, c, tau, step, first, stride, out):
         """State at t_head + c step - tau, for tau >= c step, by the cubic Hermite interpolant.
 
@@ -111,7 +97,7 @@ def _compiled(decorate, drive, rates):
                 out[i] = (h00 * x[start, i] + h10 * after[start, i]
                           + h01 * x[end, i] + h11 * before[end, i])
 
-    @decorate
+    @own
     def past_states(n, x, after, before, head, c, tau, step, out):
         """The same with a delay for each lane, tau of shape (lanes,); one pass if all agree."""
         lanes = tau.shape[0]
@@ -124,8 +110,8 @@ def _compiled(decorate, drive, rates):
             for lane in range(lanes):
                 past_state(n, x, after, before, head, c, tau[lane], step, lane, lanes, out)
 
-    @decorate
-    def steps_of(n, lanes, kind, p, tau, gain, basis, step, x, after, before, head, steps, noise,
+    @own
+    def steps_of(n, lanes, p, tau, gain, basis, step, x, after, before, head, steps, noise,
                  states, slopes, row, every):
         """Take RK4 steps from the head node; return the new head.
 
@@ -140,20 +126,20 @@ def _compiled(decorate, drive, rates):
             new = head + 1 if head + 1 < x.shape[0] else 0
             now, k1 = x[head], after[head]
             # Stages 2 and 3 share one delayed state, stage 4 and the next step's first another.
-            if kind == DELAYED:
+            if delays:
                 past_states(n, x, after, before, head, 0.5, tau, step, past)
                 drive(n, past, p, lanes, middle)
                 past_states(n, x, after, before, head, 1.0, tau, step, past)
                 drive(n, past, p, lanes, end)
-            field(n, kind, now, k1, 0.5 * step, middle, p, gain, basis, lanes, work, k2)
-            field(n, kind, now, k2, 0.5 * step, middle, p, gain, basis, lanes, work, k3)
-            field(n, kind, now, k3, step, end, p, gain, basis, lanes, work, k4)
+            field(n, now, k1, 0.5 * step, middle, p, gain, basis, lanes, work, k2)
+            field(n, now, k2, 0.5 * step, middle, p, gain, basis, lanes, work, k3)
+            field(n, now, k3, step, end, p, gain, basis, lanes, work, k4)
             for i in range(n):
                 x[new, i] = now[i] + step / 6.0 * (k1[i] + 2.0 * (k2[i] + k3[i]) + k4[i])
             if noise > 0.0:
                 for i in range(n):
                     x[new, i] += kick * np.random.normal()
-            field(n, kind, x[new], k4, 0.0, end, p, gain, basis, lanes, work, after[new])
+            field(n, x[new], k4, 0.0, end, p, gain, basis, lanes, work, after[new])
             for i in range(n):
                 before[new, i] = after[new, i]
             if row % every == 0:
@@ -165,42 +151,53 @@ def _compiled(decorate, drive, rates):
             head = new
         return head
 
-    @decorate
-    def restart(n, lanes, kind, p, tau, gain, basis, step, x, after, before, head):
+    @own
+    def restart(n, lanes, p, tau, gain, basis, step, x, after, before, head):
         """Recompute the slope that leaves the head node, after parameters have changed."""
         past, driven, work = np.empty(n), np.zeros(n), np.zeros((2, n + 2 * lanes))
-        if kind == DELAYED:
+        if delays:
             past_states(n, x, after, before, head, 0.0, tau, step, past)
             drive(n, past, p, lanes, driven)
-        field(n, kind, x[head], x[head], 0.0, driven, p, gain, basis, lanes, work, after[head])
+        field(n, x[head], x[head], 0.0, driven, p, gain, basis, lanes, work, after[head])
 
     return past_state, restart, steps_of
 
 
 # One delayed network by itself has code of its own: built in one piece, its loops unrolled. Lanes
 # run through loops of any length in vector registers, which need functions of their own.
-_, _, _steps_of_one = _compiled(part, *_delayed_rates(part))
-_past_state, _restart_lanes, _steps_of_lanes = _compiled(jit, *_rates(jit))
+_, _, _steps_of_one = _compiled(part, delayed, True)
+_past_state, _restart, _steps = _compiled(jit, delayed, True)
 
 
-@jit
-def restart(kind, p, tau, gain, basis, step, x, after, before, head):
-    """Recompute the slope that leaves the head node, after parameters have changed."""
-    _restart_lanes(x.shape[1], tau.shape[0], kind, p, tau, gain, basis, step, x, after, before,
-                   head)
+def _with(function, names):
+    """Copy a function that is to use other functions instead of its module's of these names.
+
+    numba keys its disk cache on closed-over values, and a compiled function is another value in
+    every process; what a function finds among its globals does not count.
+    """
+    copy = FunctionType(function.__code__, {**globals(), **names}, function.__name__,
+                        function.__defaults__, function.__closure__)
+    copy.__qualname__, copy.__doc__ = function.__qualname__, function.__doc__
+    return copy
 
 
-def _cached(digest):
-    """Build the cached entry points; see sources_digest for why they are closures."""
+def _cached(digest, network, **functions):
+    """Build a network's cached entry points; see sources_digest for why they are closures.
 
-    @njit(cache=True, **OPTIONS)
-    def set_slope(kind, p, tau, gain, basis, step, x, after, before, head):
+    Args:
+        digest: of the sources, for the cache.
+        network: its name.
+        functions: the network's _restart and _steps.
+
+    """
+
+    def set_slope(p, tau, gain, basis, step, x, after, before, head):
         """Recompute the slope that leaves the head node, after parameters have changed."""
         digest  # noqa: B018
-        restart(kind, p, tau, gain, basis, step, x, after, before, head)
+        _restart(x.shape[1], tau.shape[0], p, tau, gain, basis, step, x, after, before,
+                       head)
 
-    @njit(cache=True, **OPTIONS)
-    def advance(kind, p, tau, gain, basis, step, x, after, before, clock, duration, out):
+    def advance(p, tau, gain, basis, step, x, after, before, clock, duration, out):
         """Advance the output instant of one lane by duration and evaluate there.
 
         clock is (head, ahead): the newest node and its distance beyond the output instant, in
@@ -213,7 +210,7 @@ def _cached(digest):
             steps = math.ceil(-ahead / step)
             nothing = np.empty((0, 0, 0))
             # Not the unrolled code: it gains nothing here and takes 15 s more to compile.
-            head = _steps_of_lanes(x.shape[1], tau.shape[0], kind, p, tau, gain, basis, step, x,
+            head = _steps(x.shape[1], tau.shape[0], p, tau, gain, basis, step, x,
                                    after, before, head, steps, 0.0, nothing, nothing,
                                    np.int64(0), np.int64(1))
             ahead = max(0.0, ahead + steps * step)
@@ -229,17 +226,15 @@ def _cached(digest):
             out[2, i] = ((6.0 * s - 4.0) * after[start, i] + 6.0 * (1.0 - 2.0 * s) * rise
                          + (6.0 * s - 2.0) * before[head, i]) / step
 
-    @njit(cache=True, **OPTIONS)
-    def integrate_one(kind, p, tau, gain, basis, step, x, after, before, head, steps, noise,
+    def integrate_one(p, tau, gain, basis, step, x, after, before, head, steps, noise,
                       seed, states, slopes, row, every):
         """The same as integrate for a single trajectory of the delayed network, unrolled."""
         digest  # noqa: B018
         np.random.seed(seed)
-        return _steps_of_one(8, 1, kind, p, tau, gain, basis, step, x, after, before, head, steps,
+        return _steps_of_one(8, 1, p, tau, gain, basis, step, x, after, before, head, steps,
                              noise, states, slopes, row, every)
 
-    @njit(cache=True, **OPTIONS)
-    def integrate(kind, p, tau, gain, basis, step, x, after, before, head, steps, noise, seed,
+    def integrate(p, tau, gain, basis, step, x, after, before, head, steps, noise, seed,
                   states, slopes, row, every):
         """Take steps of one block of lanes; return the new head.
 
@@ -248,11 +243,10 @@ def _cached(digest):
         """
         digest  # noqa: B018
         np.random.seed(seed)
-        return _steps_of_lanes(x.shape[1], tau.shape[0], kind, p, tau, gain, basis, step, x, after,
+        return _steps(x.shape[1], tau.shape[0], p, tau, gain, basis, step, x, after,
                                before, head, steps, noise, states, slopes, row, every)
 
-    @njit(cache=True, parallel=True, **OPTIONS)
-    def integrate_many(kind, p, tau, gain, basis, step, x, after, before, head, steps, noise,
+    def integrate_many(p, tau, gain, basis, step, x, after, before, head, steps, noise,
                        seeds, states, slopes, row, every):
         """Take and record steps of many blocks on all cores; return the new head.
 
@@ -263,12 +257,34 @@ def _cached(digest):
         for m in prange(x.shape[0]):
             np.random.seed(seeds[m])
             mine = slice(m * lanes, min((m + 1) * lanes, states.shape[0]))
-            _steps_of_lanes(x.shape[2], lanes, kind, p[m], tau[m], gain, basis, step, x[m],
+            _steps(x.shape[2], lanes, p[m], tau[m], gain, basis, step, x[m],
                             after[m], before[m], head, steps, noise, states[mine], slopes[mine],
                             row, every)
         return (head + steps) % x.shape[1]
 
-    return set_slope, advance, integrate_one, integrate, integrate_many
+    def ready(function, parallel=False):
+        mine = renamed(_with(function, functions), network)
+        return njit(cache=True, parallel=parallel, **OPTIONS)(mine)
+
+    return Kernels(ready(set_slope), ready(advance), ready(integrate_one), ready(integrate),
+                   ready(integrate_many, parallel=True))
 
 
-set_slope, advance, integrate_one, integrate, integrate_many = _cached(sources_digest())
+@dataclass(frozen=True)
+class Kernels:
+    """The compiled entry points of one kind of network; see _cached for what they do."""
+
+    set_slope: Callable[..., None]
+    advance: Callable[..., None]
+    integrate_one: Callable[..., int]
+    integrate: Callable[..., int]
+    integrate_many: Callable[..., int]
+
+
+def _kernels(network):
+    _, restart, steps = _compiled(jit, network, network is delayed)
+    return _cached(sources_digest(), network.__name__, _restart=restart, _steps=steps)
+
+
+#: By kind of network.
+KERNELS = tuple(_kernels(network) for network in (delayed, quadruped, biped))

@@ -206,6 +206,8 @@ def collocate(network, symmetry: Symmetry, path: Callable[[np.ndarray], np.ndarr
         h, slopes = np.diff(now.mesh), reduced.rates(now.stages)
         ends = gauss.last_share(slopes) * now.length * h / np.abs(now.points).max()
         coefficients = gauss.power_coefficients(now.points[:-1], slopes, now.length * h)
+        if not np.isfinite(ends).all():
+            return None
         if ends.max() <= RESOLVED:
             break
         wanted = 1.1 * (ends**(1.0 / gauss.S)).mean() / RESOLVED**(1.0 / gauss.S) * h.size

@@ -4,7 +4,10 @@ A Morris-Lecar cell jumps: its potential crosses most of its range within a few 
 stride, which no joint can follow. But the cell's two variables tell its phase at any instant, and
 a joint can be a smooth function of that: x is the cell's waveform up to a few harmonics, y the
 derivative of x by phase in radians. Phase is read as the angle in the plane of the two variables
-about a centre that the orbit turns round steadily.
+about a centre that the orbit turns round steadily. A cell far inside its orbit, coming to rest or
+changing gait, moves its joints less: both are scaled by ``1 - (1 - q)^3``, q the square of its
+radius over the orbit's, at most 1; so joints depend smoothly on the state, and on the orbit not
+on the radius at all.
 """
 
 import math
@@ -46,7 +49,8 @@ def _cached(digest):
             cells: the cell behind each joint, shape (joints,).
             weights: readout weights of each joint in rad, shape (joints, 6).
             leg_cells: the cell that gives each leg's phase.
-            turned: scratch, phase and speed of each cell, shape (2, size).
+            turned: scratch, phase, speed (cycles a cycle), scale of each cell and the scale's
+                rate (per cycle), shape (4, size).
             angle: filled with the joints' deviation from their offset, rad.
             rise: filled with its derivative by phase, rad per cycle.
             legs: filled with the legs' phases in cycles, [0, 1), 0 where x peaks.
@@ -64,11 +68,21 @@ def _cached(digest):
             square = x * x + y * y
             turn = math.atan2(y, x) / TURN
             turned[0, cell] = turn + lookup(table[0], turn)
-            turned[1, cell] = 0.0
+            turned[1, cell] = turned[2, cell] = turned[3, cell] = 0.0
+            radius = lookup(table[2], turn)
             if square > 1e-6:
                 speed = (x * dy - y * dx) / square * period / TURN
                 turned[1, cell] = speed / lookup(table[1], turn)
-            off = abs(math.sqrt(square) / lookup(table[2], turn) - 1.0)
+                q = square / (radius * radius)
+                if q < 1.0:
+                    grows = (lookup(table[2], turn + 0.5 / TABLE)
+                             - lookup(table[2], turn - 0.5 / TABLE)) * TABLE * speed
+                    rate = 2.0 * q * ((x * dx + y * dy) * period / square - grows / radius)
+                    turned[2, cell] = 1.0 - (1.0 - q)**3
+                    turned[3, cell] = 3.0 * (1.0 - q) * (1.0 - q) * rate
+                else:
+                    turned[2, cell] = 1.0
+            off = abs(math.sqrt(square) / radius - 1.0)
             # Written so that a NaN comes through.
             distance = distance if off <= distance else off
         base = turned[0, leg_cells[0]] - phases[leg_cells[0]]
@@ -88,12 +102,15 @@ def _cached(digest):
                 x += along
                 y += k * across
                 z -= k * k * along
+            speed, scale, rate = TURN * turned[1, cell], turned[2, cell], turned[3, cell]
+            dx, dy = scale * y * speed + rate * x, scale * z * speed + rate * y
+            x, y = scale * x, scale * y
             w = weights[joint]
             angle[joint] = (w[0] * x + w[1] * y + w[2] * x * x + w[3] * x * y
                             + (w[4] * x + w[5] * y) * x * x)
-            rise[joint] = TURN * turned[1, cell] * (
-                (w[0] + 2.0 * w[2] * x + w[3] * y + 3.0 * w[4] * x * x + 2.0 * w[5] * x * y) * y
-                + (w[1] + w[3] * x + w[5] * x * x) * z)
+            rise[joint] = ((w[0] + 2.0 * w[2] * x + w[3] * y + 3.0 * w[4] * x * x
+                            + 2.0 * w[5] * x * y) * dx
+                           + (w[1] + w[3] * x + w[5] * x * x) * dy)
         for leg in range(leg_cells.shape[0]):
             phase = turned[0, leg_cells[leg]] - crests[waves[leg_cells[leg]]]
             phase -= math.floor(phase)
@@ -228,7 +245,7 @@ class PhaseReadout:
         known = phase_map(orbit, harmonics)
         self._view = (orbit.period, orbit.network.cells, orbit.waves, orbit.phases, known.shape,
                       known.tables, known.terms, known.crests, cells, weights, leg_cells,
-                      np.zeros((2, orbit.network.cells)))
+                      np.zeros((4, orbit.network.cells)))
         self.start = float((orbit.phases[leg_cells[0]]
                             - known.crests[orbit.waves[leg_cells[0]]]) % 1.0)
         theta = np.arange(512) / 512

@@ -29,6 +29,7 @@ class Program:
 
     Attributes:
         name: the preset's or gait's name.
+        gait: one of the network's gaits.
         orbit: the gait's orbit.
         stability: whether it attracts, and with what symmetry gain.
         gain: symmetry lock in 1/model time.
@@ -41,6 +42,7 @@ class Program:
 
     name: str
     robot: Robot
+    gait: str
     orbit: Orbit
     stability: Stability
     gain: float
@@ -54,6 +56,11 @@ class Program:
         """A stepper on the orbit at phase 0; copy it, do not advance it."""
         network = self.orbit.network
         return Stepper(network, self.orbit, gain=self.gain, symmetry=self.orbit.symmetry)
+
+    @property
+    def character(self) -> str:
+        """Walk-like, run-like or neither: how the two cells of each leg go together."""
+        return self.orbit.network.character(self.gait, self.robot.assignment)
 
     @cached_property
     def wave(self) -> tuple[np.ndarray, np.ndarray]:
@@ -137,5 +144,5 @@ def plan(robot: Robot, name: str, preset: Preset, network: Network, frequency: f
             raise Refused(f'frequency {strides:.3g} Hz at amplitude {amplitude:g} moves '
                           f'{joint.name} at {fastest:.2f} rad/s, above its limit '
                           f'{joint.velocity:g}')
-    return Program(name, robot, orbit, judged, judged.chosen if gain < 0.0 else gain, strides,
-                   readout, span, speed)
+    gain = judged.chosen if gain < 0.0 else gain
+    return Program(name, robot, gait, orbit, judged, gain, strides, readout, span, speed)

@@ -22,7 +22,8 @@ TURN = 2.0 * math.pi
 def lookup(table, cycles):
     """Periodic table with linear interpolation, at a place in cycles."""
     place = (cycles - math.floor(cycles)) * table.shape[0]
-    low = int(place)
+    # A comparison that NaN fails, too: it must not become an index.
+    low = int(place) if place >= 0.0 else 0
     rest = place - low
     low = low if low < table.shape[0] else 0
     high = low + 1 if low + 1 < table.shape[0] else 0

@@ -168,9 +168,10 @@ def simulate(network: Network | Sequence[Network], history: History | Sequence[H
     flat_p = p.reshape(blocks, -1, components * lanes)
     gain, basis = (0.0, np.zeros((1, components))) if lock is None else (lock[0], lock[1].basis)
 
+    compiled = kernel.KERNELS[kind]
     head = nodes - 1
     for block in range(blocks):
-        kernel.set_slope(kind, flat_p[block], tau[block], gain, basis, step,
+        compiled.set_slope(flat_p[block], tau[block], gain, basis, step,
                          *(array[block] for array in flat), head)
     states = np.empty((batch, rows + 1, components))
     slopes = np.empty_like(states)
@@ -184,12 +185,12 @@ def simulate(network: Network | Sequence[Network], history: History | Sequence[H
             seeds = np.random.SeedSequence([seed, done]).generate_state(blocks)
             if blocks == 1:
                 alone = lanes == 1 and kind == kernel.DELAYED
-                one_block = kernel.integrate_one if alone else kernel.integrate
-                head = one_block(kind, flat_p[0], tau[0], gain, basis, step,
+                one_block = compiled.integrate_one if alone else compiled.integrate
+                head = one_block(flat_p[0], tau[0], gain, basis, step,
                                  *(array[0] for array in flat), head, chunk, noise, seeds[0],
                                  states, slopes, done + 1, every)
             else:
-                head = kernel.integrate_many(kind, flat_p, tau, gain, basis, step, *flat, head,
+                head = compiled.integrate_many(flat_p, tau, gain, basis, step, *flat, head,
                                              chunk, noise, seeds, states, slopes, done + 1,
                                              every)
             done += chunk

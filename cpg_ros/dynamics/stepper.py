@@ -70,12 +70,13 @@ class Stepper:
         if gain and symmetry is None:
             raise ValueError('a symmetry gain needs the symmetry class')
         self.network, self.gain, self.symmetry = network, gain, symmetry
+        self._kernels = kernel.KERNELS[network.kind]
         self._tau[0] = network.delay
-        self._fixed = (network.kind, network.coefficients, self._tau, float(gain),
+        self._fixed = (network.coefficients, self._tau, float(gain),
                        np.zeros((1, network.components)) if symmetry is None else symmetry.basis,
                        self.step,
                        self._x, self._after, self._before)
-        kernel.set_slope(*self._fixed, int(self._clock[0]))
+        self._kernels.set_slope(*self._fixed, int(self._clock[0]))
 
     def advance(self, duration: float) -> np.ndarray:
         """Advance by a duration in model time (0 or more).
@@ -84,7 +85,7 @@ class Stepper:
 
         The array returned is the same one every time.
         """
-        kernel.advance(*self._fixed, self._clock, duration, self.now)
+        self._kernels.advance(*self._fixed, self._clock, duration, self.now)
         return self.now
 
     def copy(self) -> 'Stepper':
@@ -107,4 +108,4 @@ class Stepper:
     def disturb(self, offset: np.ndarray) -> None:
         """Add an offset, shape (components,), to the newest state; the history before it stays."""
         self._x[int(self._clock[0])] += offset
-        kernel.set_slope(*self._fixed, int(self._clock[0]))
+        self._kernels.set_slope(*self._fixed, int(self._clock[0]))

@@ -11,6 +11,8 @@ from cpg_ros.dynamics.program import Program
 FAR, ASTRAY, PATIENCE = 0.3, 0.15, 0.5
 #: Strides the network gets to find its new gait by itself after a transition of 0 s.
 SETTLING = 40.0
+#: At rest: no state changes by more than this share of a cell's range in a stride.
+AT_REST = 0.05
 #: Such a transition starts with at least this share of the new gait in the state.
 KICK = 0.05
 
@@ -25,12 +27,13 @@ class Track:
         self.rise = np.zeros_like(self.angle)
         self.legs = np.zeros(len(program.robot.legs))
         self.stepper = program.seed.copy()
-        self.settling = self._calm = 0.0
+        self.settling = self._calm = self._still = 0.0
         self.follow(program)
 
     def follow(self, program: Program) -> None:
         """Read joints and judge health by this program from now on."""
         self.program = program
+        self._least = AT_REST * float(program.orbit.levels[0, 0, 1])
         self._astray = 0.0
         self._look()
         self.phase = float(self.legs[0])
@@ -61,6 +64,11 @@ class Track:
             # A stride on the orbit is the end of it; for an instant a small state may look so.
             self._calm = self._calm + strides if distance < FAR / 3 else 0.0
             self.settling = 0.0 if self._calm > 1.0 else self.settling - strides
+            # Come to rest, where the network has a stable equilibrium beside the gait?
+            moving = np.abs(self.stepper.now[1]).max() * self.program.orbit.period
+            self._still = self._still + strides if moving < self._least else 0.0
+            if self._still > 1.0:
+                self.settling, self._astray = 0.0, 2.0 * PATIENCE
             self.phase = float(self.legs[0])
         elif distance > FAR or abs(error) > ASTRAY:
             self._astray += strides
@@ -90,4 +98,4 @@ class Track:
         # On to the node where the change is, so that all of it shows at once.
         self.stepper.advance(self.stepper.ahead)
         self.follow(program)
-        self.settling, self._calm = SETTLING, 0.0
+        self.settling, self._calm, self._still = SETTLING, 0.0, 0.0

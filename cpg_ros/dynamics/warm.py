@@ -25,5 +25,5 @@ def warm(name: str) -> None:
         simulate(network, np.zeros(network.components), network.step, network.step)
         observe_phases(stepper.now, 1.0, 1, cells, np.zeros(1), np.ones((1, 4)),
                        np.ones((1, 3, 4)), np.zeros((1, 2, 2)), joints, cells, weights, cells,
-                       np.zeros((2, 1)), joints, joints, joints)
+                       np.zeros((4, 1)), joints, joints, joints)
     confine(joints, joints, joints, joints, joints, 1.0, joints, joints)

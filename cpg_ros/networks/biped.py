@@ -141,11 +141,11 @@ class Biped(Network):
 
 
 def compiled(decorate):
-    """Compile the right-hand side with a numba decorator; coefficients have shape (4, n)."""
+    """Compile (no drive, right-hand side); coefficients have shape (4, n), driven is unused."""
     cell_rates = morris_lecar.compiled(decorate, CELL)
 
     @decorate
-    def field(n, x, k, weight, p, lanes, work, out):
+    def field(n, x, k, weight, driven, p, lanes, work, out):
         """Right-hand side at z = x + weight k; the first row of work holds z afterwards."""
         z = work[0]
         for i in range(n):
@@ -164,7 +164,7 @@ def compiled(decorate):
                 for lane in range(lanes):
                     rate[lane] -= mine[lane] * (here[lane] - heard[lane])
 
-    return field
+    return None, field
 
 
 PRESETS = shipped(Biped)

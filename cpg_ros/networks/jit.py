@@ -17,6 +17,17 @@ jit = njit(**OPTIONS)
 part = njit(inline='always', **OPTIONS)
 
 
+def renamed(function, network: str):
+    """Give a function that is compiled once for each network a name of its own for this one.
+
+    numba names machine code by the function's qualified name and a running number. Code that two
+    processes have put into the disk cache under one name is taken for the same when a third one
+    loads both: a network would run another's equations, on arrays of another length.
+    """
+    function.__qualname__ = f'{function.__qualname__}_{network.rpartition(".")[2]}'
+    return function
+
+
 def sources_digest() -> int:
     """Return a number that changes whenever a file with compiled code does.
 

@@ -86,6 +86,25 @@ class Network(ABC):
 
         """
 
+    def character(self, gait: str, assignment: str) -> str:
+        """Tell whether a gait is walk-like or run-like (Buono & Golubitsky 2001, section 7).
+
+        Walk-like: the two cells of every leg, its flexors and extensors, are half a cycle
+        apart; run-like: in phase; neither otherwise.
+
+        Raises:
+            ValueError: an unknown gait, or an assignment that is not one of ``legs``.
+
+        """
+        if assignment not in self.legs:
+            raise ValueError(f"assignment '{assignment}' is not one of {', '.join(self.legs)}")
+        symmetry = self.symmetry(gait)
+        pairs = [(a - 1, b - 1) for a, b in self.legs[assignment].values()]
+        alike = all(symmetry.waves[a] == symmetry.waves[b] for a, b in pairs)
+        apart = {float((symmetry.phases[b] - symmetry.phases[a]) % 1.0) for a, b in pairs}
+        return ('run-like' if alike and apart == {0.0} else
+                'walk-like' if alike and apart == {0.5} else 'neither')
+
 
 @dataclass(frozen=True)
 class Preset:

@@ -120,30 +120,12 @@ class Quadruped(Network):
         return columns
 
 
-def character(gait: str, assignment: str) -> str:
-    """Tell whether a gait is walk-like or run-like (section 7).
-
-    Walk-like: the two cells of a leg, its flexors and extensors, are half a cycle apart;
-    run-like: in phase; neither in the implicit assignment's walk and jump.
-
-    Raises:
-        ValueError: an unknown gait, or an assignment that is not one of Quadruped.legs.
-
-    """
-    if assignment not in Quadruped.legs:
-        raise ValueError(f"assignment '{assignment}' is not one of {', '.join(Quadruped.legs)}")
-    phases = Quadruped(0.0, 0.0, 0.0, 0.0).symmetry(gait).phases
-    apart = {float((phases[b - 1] - phases[a - 1]) % 1.0)
-             for a, b in Quadruped.legs[assignment].values()}
-    return 'run-like' if apart == {0.0} else 'walk-like' if apart == {0.5} else 'neither'
-
-
 def compiled(decorate):
-    """Compile the right-hand side with a numba decorator; coefficients have shape (4, n)."""
+    """Compile (no drive, right-hand side); coefficients have shape (4, n), driven is unused."""
     cell_rates = morris_lecar.compiled(decorate, CELL)
 
     @decorate
-    def field(n, x, k, weight, p, lanes, work, out):
+    def field(n, x, k, weight, driven, p, lanes, work, out):
         """Right-hand side at z = x + weight k; the first row of work holds z afterwards."""
         z = work[0]
         for i in range(n):
@@ -176,7 +158,7 @@ def compiled(decorate):
                     rate[lane] += mine[lane] * there[lane]
                     other[lane] += its[lane] * here[lane]
 
-    return field
+    return None, field
 
 
 PRESETS = shipped(Quadruped)

@@ -46,7 +46,8 @@ class Diagnostics:
         else:
             level, text = DiagnosticStatus.OK, self._state()
         values = {
-            'gait': program.name, 'state': self._state(), 'network': program.orbit.network.name,
+            'gait': program.name, 'character': program.character, 'state': self._state(),
+            'network': program.orbit.network.name,
             'frequency [Hz]': f'{program.frequency:.6g}',
             'period [model time]': f'{program.orbit.period:.8g}',
             'symmetry gain [1/model time]': f'{program.gain:.4g}',

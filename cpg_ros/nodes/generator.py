@@ -101,6 +101,7 @@ class Generator(Node):
             program = self._planner.plan(self._values())
         except Refused as error:
             raise StartError(str(error)) from error
+        self._planner.prepare()
 
         self.pattern = Pattern(program, self._value('ramp'), self._value('autostart'))
         self._outputs = Outputs(self, robot, self._value('combined_topic'),

@@ -1,5 +1,6 @@
 """The generator's parameters: descriptors, presets, and what a batch of changes asks for."""
 
+import contextlib
 import functools
 import math
 from dataclasses import dataclass
@@ -8,7 +9,7 @@ from typing import Any
 from rcl_interfaces.msg import FloatingPointRange, ParameterDescriptor
 from rclpy.parameter import Parameter
 
-from cpg_ros.dynamics.program import Program, Refused, plan
+from cpg_ros.dynamics.program import Program, Refused, gait_of, plan
 from cpg_ros.networks.network import Network, Preset
 from cpg_ros.networks.registry import NETWORKS, PRESETS
 from cpg_ros.robot import Robot
@@ -101,6 +102,13 @@ class Planner:
     def serve(self, robot: Robot) -> None:
         """Plan for this robot from now on."""
         self._robot = robot
+
+    def prepare(self) -> None:
+        """Solve every preset's gait ahead, so that a switch to it is answered at once."""
+        for preset in self.presets.values():
+            # What cannot run is refused when it is asked for, with the reason.
+            with contextlib.suppress(ValueError):
+                gait_of(preset, preset.network)
 
     def specs(self, preset: str) -> dict[str, Spec]:
         """Return the network's own parameters, with a preset's values as defaults."""

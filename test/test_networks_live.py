@@ -1,0 +1,196 @@
+"""The Morris-Lecar networks in the generator: as the delayed one, by the same services."""
+
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+from ament_index_python.packages import get_package_share_directory
+from graph import Process, Watcher, until
+
+from cpg_ros.dynamics.program import plan
+from cpg_ros.networks.presets import write_presets
+from cpg_ros.networks.registry import NETWORKS, PRESETS
+from cpg_ros.robot import load_robot
+
+CONFIG = Path(get_package_share_directory('cpg_ros')) / 'config'
+# DESIGN 2.1 and 2.3: phases of the legs, where the gait's symmetry prescribes them.
+PHASES = {'quadruped': {'pronk': (0, 0, 0, 0), 'pace': (0, .5, 0, .5), 'bound': (0, 0, .5, .5),
+                        'trot': (0, .5, .5, 0), 'jump': (0, 0, .75, .75),
+                        'walk': (0, .5, .75, .25)},
+          'biped': {'walk': (0, .5), 'run': (0, .5), 'two_legged_jump': (0, 0),
+                    'two_legged_hop': (0, 0), 'skip': (0, .5)}}
+DEFAULT = {'quadruped': 'trot', 'biped': 'walk'}
+
+
+@pytest.fixture(scope='module', params=['quadruped', 'biped'])
+def live(request):
+    process = Process('-p', f'network:={request.param}', '-p', 'rate:=200.0', '-p',
+                      'frequency:=3.0', '-p', 'transition:=0.25')
+    process.wait_for('publishing')
+    watcher = Watcher(process.domain)
+    yield request.param, process, watcher
+    watcher.end()
+    process.end()
+
+
+def tour(names):
+    """Visit every ordered pair of names once, one after the other."""
+    edges = {name: [other for other in names if other != name] for name in names}
+    path, stack = [], [names[0]]
+    while stack:
+        if edges[stack[-1]]:
+            stack.append(edges[stack[-1]].pop())
+        else:
+            path.append(stack.pop())
+    return path[::-1]
+
+
+def test_all_ordered_pairs_switch_without_a_jerk(live):
+    network, _, watcher = live
+    robot = load_robot(CONFIG / f'{network}.yaml')
+    gaits = [name for name, preset in PRESETS[network].items() if name == preset.gait]
+    programs = {gait: plan(robot, gait, PRESETS[network][gait], PRESETS[network][gait].network,
+                           3.0) for gait in gaits}
+    offset = robot.column('offset')
+    way = tour(gaits)
+    assert len(set(pairwise(way))) == len(gaits) * (len(gaits) - 1)
+    watcher.set(gait=way[0])
+    watcher.record(0.6)
+    for old, new in pairwise(way):
+        first = len(watcher.samples)
+        assert watcher.set(gait=new)[0].successful
+        watcher.record(0.5)
+        times, positions, _ = (np.array(part) for part in
+                               zip(*watcher.samples[first:], strict=True))
+        positions = positions[:, [watcher.names.index(j.name) for j in robot.joints]]
+        assert np.abs(np.diff(times) - 0.005).max() < 1e-3, 'a message is missing'
+        speed = np.maximum(programs[old].speed, programs[new].speed)
+        steps = np.abs(np.diff(positions, axis=0))
+        assert (steps <= 0.005 * speed * 1.001 + 1e-9).all(), (old, new)
+        low = np.minimum(programs[old].span[0], programs[new].span[0]) + offset
+        high = np.maximum(programs[old].span[1], programs[new].span[1]) + offset
+        assert (positions >= low - 1e-5).all() and (positions <= high + 1e-5).all(), (old, new)
+        if new in PHASES[network]:
+            seen = watcher.next_phases(20)
+            late = (seen - seen[:, :1] - PHASES[network][new] + 0.5) % 1.0 - 0.5
+            assert np.abs(late).max() < 0.02, (old, new)
+        assert watcher.gaits[-1] == new
+
+
+def test_every_gait_comes_to_its_phases_and_stays_healthy(live):
+    network, _, watcher = live
+    for gait, expected in PHASES[network].items():
+        if gait not in PRESETS[network]:
+            continue
+        assert watcher.set(gait=gait)[0].successful
+        watcher.record(1.0)
+        seen = watcher.next_phases(20)
+        assert np.abs((seen - seen[:, :1] - expected + 0.5) % 1.0 - 0.5).max() < 1e-3, gait
+        begin = len(watcher.diagnostics)
+        health = until(lambda begin=begin: watcher.diagnostics[begin + 1:], 'diagnostics')[-1]
+        values = {pair.key: pair.value for pair in health.values}
+        assert values['gait'] == gait and values['network'] == network
+        assert values['watchdog re-seeds'] == '0', gait
+
+
+@pytest.mark.parametrize('network, changes, reason', [
+    ('quadruped', {'quadruped_gamma': 3.0}, 'no trot at these parameters'),
+    ('quadruped', {'quadruped_alpha': 9.0}, 'out of range'),
+    ('quadruped', {'quadruped_beta': float('nan')}, 'out of range'),
+    ('quadruped', {'gait': 'skip'}, "gait 'skip' is not one of"),
+    ('quadruped', {'delayed_tau': 0.4}, 'delayed.tau'),
+    ('biped', {'biped_current': 0.0}, 'no walk at these parameters'),
+    ('biped', {'biped_w_21': 5.0}, 'out of range'),
+    ('biped', {'gait': 'trot'}, "gait 'trot' is not one of"),
+    ('biped', {'gait': 'run', 'frequency': 9.9, 'amplitude': 1.2}, 'above its limit')])
+def test_refused_with_the_reason_and_as_a_whole(live, network, changes, reason):
+    if live[0] != network:
+        pytest.skip('for the other network')
+    _, _, watcher = live
+    assert watcher.set(gait=DEFAULT[network])[0].successful
+    names = ['gait', 'frequency', 'amplitude',
+             *(f'{network}.{key}' for key in NETWORKS[network].parameters())]
+    before = watcher.get(*names)
+    result = watcher.set_together(**changes)
+    assert not result.successful
+    assert reason in result.reason and '\n' not in result.reason
+    assert watcher.get(*names) == before
+
+
+def test_a_gait_loads_its_preset_and_small_changes_run(live):
+    network, _, watcher = live
+    gait = {'quadruped': 'pace', 'biped': 'run'}[network]
+    preset = PRESETS[network][gait].network
+    names = [f'{network}.{key}' for key in preset.parameters()]
+    assert watcher.set(gait=gait)[0].successful
+    assert watcher.get(*names) == list(preset.as_dict().values())
+    key = names[-1].replace('.', '_') if network == 'biped' else 'quadruped_gamma'
+    value = preset.as_dict()[key.partition('_')[2]] * 1.05
+    assert watcher.set(**{key: value})[0].successful
+    watcher.record(0.5)
+    assert watcher.get('gait') == [gait]
+    assert watcher.set(gait=gait)[0].successful
+
+
+def test_a_group_of_weights_is_set_together():
+    process = Process('-p', 'network:=biped', '-p', 'biped.w_b:=-0.65', '-p', 'biped.w_31:=-0.7')
+    process.wait_for('publishing')
+    watcher = Watcher(process.domain)
+    try:
+        b = [f'biped.w_{pair}' for pair in ('31', '42', '13', '24')]
+        assert watcher.get(*b) == [-0.7, -0.65, -0.65, -0.65]
+        assert watcher.get('biped.w_b') == [pytest.approx(-0.6625)]
+        assert watcher.set(biped_w_b=-0.681)[0].successful
+        assert watcher.get(*b, 'biped.w_b') == [-0.681] * 5
+        assert watcher.set(biped_w_24=-0.68)[0].successful
+        assert watcher.get('biped.w_b') == [pytest.approx(-0.68075)]
+        # A gait's preset, a group over it, and one weight over the group, in one batch.
+        assert watcher.set_together(gait='run', biped_w_a=-0.9, biped_w_21=-0.95).successful
+        assert watcher.get('biped.w_21', 'biped.w_12', 'biped.w_31') == [-0.95, -0.9, 1.0]
+    finally:
+        watcher.end()
+        process.end()
+
+
+def test_presets_of_a_file_are_gaits_like_the_shipped_ones(tmp_path, start):
+    path = tmp_path / 'mine.yaml'
+    write_presets(path, NETWORKS['biped'], {'stroll': PRESETS['biped']['walk']})
+    _, watcher = start('-p', 'network:=biped', '-p', f'presets:={path}', '-p', 'gait:=stroll')
+    until(lambda: watcher.gaits, 'the gait')
+    assert watcher.gaits[-1] == 'stroll'
+    assert watcher.set(gait='run')[0].successful and watcher.set(gait='stroll')[0].successful
+    path.write_text(path.read_text().replace('gait: walk', 'gait: crawl'))
+    process = start('-p', 'network:=biped', '-p', f'presets:={path}', watch=False)
+    assert process.wait() == 1
+    assert "presets.stroll.gait: 'crawl' is not one of walk" in process.log
+
+
+@pytest.mark.parametrize('arguments, words', [
+    (['network:=hexapod'], "network 'hexapod' is not one of delayed, quadruped, biped"),
+    (['network:=biped', 'robot:=goat'], "robot file 'goat' is for the network delayed or "
+     "quadruped, not 'biped'"),
+    (['network:=biped', 'gait:=trot'], "gait 'trot' is not one of walk, run"),
+    (['network:=quadruped', 'presets:=/no/such.yaml'], '/no/such.yaml: No such file')])
+def test_nonsense_at_start_ends_in_one_line(start, arguments, words):
+    process = start(*(word for each in arguments for word in ('-p', each)), watch=False)
+    assert process.wait() == 1
+    assert words in process.log and 'Traceback' not in process.log
+
+
+def test_the_zig_zag_assignment_drives_a_leg_by_two_cells(tmp_path, start):
+    text = (CONFIG / 'quadruped.yaml').read_text()
+    text = text.replace('network: [delayed, quadruped]', 'network: quadruped\n'
+                        'assignment: zigzag')
+    for leg, cells in {'lh': (1, 5), 'rh': (2, 6), 'lf': (3, 7), 'rf': (4, 8)}.items():
+        text = text.replace(f'{leg}_calf_joint, cell: {cells[0]}',
+                            f'{leg}_calf_joint, cell: {cells[1]}')
+    path = tmp_path / 'zigzag.yaml'
+    path.write_text(text)
+    _, watcher = start('-p', 'network:=quadruped', '-p', 'gait:=walk', '-p', f'robot:={path}')
+    health = until(lambda: watcher.diagnostics, 'diagnostics')[-1]
+    assert {pair.key: pair.value for pair in health.values}['character'] == 'walk-like'
+    path.write_text(text.replace('assignment: zigzag', 'assignment: crisscross'))
+    process = start('-p', 'network:=quadruped', '-p', f'robot:={path}', watch=False)
+    assert process.wait() == 1
+    assert "leg 'lh' has the cells 1 and 6, not 5" in process.log
