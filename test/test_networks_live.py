@@ -125,8 +125,9 @@ def test_a_gait_loads_its_preset_and_small_changes_run(live):
     names = [f'{network}.{key}' for key in preset.parameters()]
     assert watcher.set(gait=gait)[0].successful
     assert watcher.get(*names) == list(preset.as_dict().values())
-    key = names[-1].replace('.', '_') if network == 'biped' else 'quadruped_gamma'
-    value = preset.as_dict()[key.partition('_')[2]] * 1.05
+    key = {'quadruped': 'quadruped_gamma', 'biped': 'biped_w_c'}[network]
+    value = 1.05 * {'quadruped': preset.as_dict().get('gamma'),
+                    'biped': preset.as_dict().get('w_14')}[network]
     assert watcher.set(**{key: value})[0].successful
     watcher.record(0.5)
     assert watcher.get('gait') == [gait]
@@ -134,20 +135,27 @@ def test_a_gait_loads_its_preset_and_small_changes_run(live):
 
 
 def test_a_group_of_weights_is_set_together():
-    process = Process('-p', 'network:=biped', '-p', 'biped.w_b:=-0.65', '-p', 'biped.w_31:=-0.7')
+    process = Process('-p', 'network:=biped', '-p', 'biped.w_b:=-0.65')
     process.wait_for('publishing')
     watcher = Watcher(process.domain)
     try:
         b = [f'biped.w_{pair}' for pair in ('31', '42', '13', '24')]
-        assert watcher.get(*b) == [-0.7, -0.65, -0.65, -0.65]
-        assert watcher.get('biped.w_b') == [pytest.approx(-0.6625)]
+        assert watcher.get(*b, 'biped.w_b') == [-0.65] * 5
         assert watcher.set(biped_w_b=-0.681)[0].successful
         assert watcher.get(*b, 'biped.w_b') == [-0.681] * 5
-        assert watcher.set(biped_w_24=-0.68)[0].successful
-        assert watcher.get('biped.w_b') == [pytest.approx(-0.68075)]
-        # A gait's preset, a group over it, and one weight over the group, in one batch.
-        assert watcher.set_together(gait='run', biped_w_a=-0.9, biped_w_21=-0.95).successful
-        assert watcher.get('biped.w_21', 'biped.w_12', 'biped.w_31') == [-0.95, -0.9, 1.0]
+        # One weight alone would break the walk's symmetry: no such gait, and nothing is changed.
+        result = watcher.set(biped_w_24=-0.68)[0]
+        assert not result.successful
+        assert result.reason == ('no walk with these weights: its symmetry needs '
+                                 'w_31, w_42, w_13, w_24 to be equal')
+        assert watcher.get(*b, 'biped.w_b') == [-0.681] * 5
+        # A gait's preset and a group over it, in one batch.
+        assert watcher.set_together(gait='run', biped_w_a=-0.9).successful
+        assert watcher.get('biped.w_21', 'biped.w_12', 'biped.w_31') == [-0.9, -0.9, 1.0]
+        # All four, one by one in a batch, set the group's mean.
+        assert watcher.set_together(**{f'biped_w_{pair}': -0.91 for pair in
+                                       ('21', '12', '43', '34')}).successful
+        assert watcher.get('biped.w_a') == [pytest.approx(-0.91)]
     finally:
         watcher.end()
         process.end()

@@ -89,6 +89,7 @@ def from_preset(preset: Preset) -> MeshOrbit:
     if preset.start is None:
         raise ValueError(f'the preset of {preset.gait} has no start')
     network, start = preset.network, np.array(preset.start)
+    _check(network, preset.gait)
     symmetry = network.symmetry(preset.gait)
     run = simulate(network, start, 1.05 * preset.period, network.step, progress=False)
     orbit = _accepted(collocate(network, symmetry, lambda theta: run(theta * preset.period),
@@ -98,6 +99,12 @@ def from_preset(preset: Preset) -> MeshOrbit:
     if orbit is None:
         raise NoOrbit(f'no {preset.gait} was found from the start given')
     return orbit
+
+
+def _check(network: Network, gait: str) -> None:
+    broken = network.broken(gait)
+    if broken:
+        raise NoOrbit(f'no {gait} with these weights: its symmetry needs {broken} to be equal')
 
 
 def _by_itself(network: Network, symmetry: Symmetry, start: np.ndarray, period: float
@@ -144,6 +151,7 @@ def solve(network: Network, gait: str, near: MeshOrbit | None = None) -> MeshOrb
     for name, value in network.as_dict().items():
         if not np.isfinite(value):
             raise ValueError(f'{name} is {value}, not a finite number')
+    _check(network, gait)
     if near is None:
         near = from_preset(PRESETS[network.name][gait])
     if near.network == network:

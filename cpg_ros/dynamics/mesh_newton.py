@@ -198,6 +198,7 @@ def collocate(network, symmetry: Symmetry, path: Callable[[np.ndarray], np.ndarr
     bend = np.abs(np.diff(reduced.rates(guess(coarse)), axis=0)).max(axis=1)
     now = _sampled(guess, gauss.spread(coarse, np.sqrt(bend + 1e-3 * bend.max() + 1e-12), 30),
                    period / symmetry.order)
+    fewest = FEWEST
     while True:
         with np.errstate(all='ignore'):
             converged = _newton(reduced, now)
@@ -210,10 +211,13 @@ def collocate(network, symmetry: Symmetry, path: Callable[[np.ndarray], np.ndarr
             return None
         if ends.max() <= RESOLVED:
             break
-        wanted = 1.1 * (ends**(1.0 / gauss.S)).mean() / RESOLVED**(1.0 / gauss.S) * h.size
+        wanted = 1.15 * (ends**(1.0 / gauss.S)).mean() / RESOLVED**(1.0 / gauss.S) * h.size
+        wanted = max(fewest, int(wanted))
         if wanted > MOST_INTERVALS:
             return None
-        mesh = gauss.spread(now.mesh, ends**(1.0 / gauss.S) / h, max(FEWEST, int(wanted)))
+        # Finer every time: equal shares of the error alone may stay short of the goal for ever.
+        fewest = wanted + 1 + wanted // 16
+        mesh = gauss.spread(now.mesh, ends**(1.0 / gauss.S) / h, wanted)
         now = _sampled(_path(now, coefficients), mesh, now.length)
     return _orbit(reduced, now, coefficients)
 

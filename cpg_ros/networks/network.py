@@ -86,6 +86,10 @@ class Network(ABC):
 
         """
 
+    def broken(self, gait: str) -> str:
+        """Name the parameters that break the gait's symmetry, or '' where none does."""
+        return ''
+
     def character(self, gait: str, assignment: str) -> str:
         """Tell whether a gait is walk-like or run-like (Buono & Golubitsky 2001, section 7).
 
