@@ -147,7 +147,7 @@ def test_a_group_of_weights_is_set_together():
         result = watcher.set(biped_w_24=-0.68)[0]
         assert not result.successful
         assert result.reason == ('no walk with these weights: its symmetry needs '
-                                 'w_31, w_42, w_13, w_24 to be equal')
+                                 'w_31, w_13, w_42, w_24 to be equal')
         assert watcher.get(*b, 'biped.w_b') == [-0.681] * 5
         # A gait's preset and a group over it, in one batch.
         assert watcher.set_together(gait='run', biped_w_a=-0.9).successful
