@@ -153,15 +153,17 @@ def solve(network: Network, gait: str, near: MeshOrbit | None = None) -> MeshOrb
             raise ValueError(f'{name} is {value}, not a finite number')
     _check(network, gait)
     if near is None:
+        if gait not in PRESETS[network.name]:
+            raise NoOrbit(f'no preset of {gait} is known to start from')
         near = from_preset(PRESETS[network.name][gait])
-    if near.network == network:
+    if near.network == network and near.symmetry == symmetry:
         return near
     orbit = None
     if near.symmetry == symmetry:
         orbit = _accepted(collocate(network, symmetry, _on_cycles(near), near.period))
     if orbit is None:
         start = near(np.array(0.0))
-        if near.symmetry != symmetry:
+        if near.symmetry != symmetry and near.symmetry.h == symmetry.h:
             # A wave that runs the other way: the same signals with other phases.
             start = _states(near, symmetry)
         orbit = _by_itself(network, symmetry, start, near.period)

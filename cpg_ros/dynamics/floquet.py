@@ -60,8 +60,11 @@ def multipliers(orbit: MeshOrbit) -> Multipliers:
             found.append(np.zeros(0, dtype=complex))
             continue
         step = _propagated(columns.T @ jacobians @ columns, lengths)
-        # After T/m the cells have changed places; m of these make a period.
-        whole = np.linalg.eigvals((columns.T @ turn @ columns).T @ step)**symmetry.order
+        # After T/m the cells have changed places; m of these make a period. After m changes a
+        # cell is another one of its class, which only matters outside Fix(K).
+        change, m = columns.T @ turn @ columns, symmetry.order
+        whole = np.linalg.eigvals(np.linalg.matrix_power(change, m)
+                                  @ np.linalg.matrix_power(change.T @ step, m))
         found.append(whole[np.argsort(-np.abs(whole))])
     trivial = int(np.abs(found[0] - 1.0).argmin())
     return Multipliers(orbit.period, np.delete(found[0], trivial), found[1],

@@ -240,10 +240,16 @@ def _orbit(reduced: Reduced, now: _Solution, coefficients: np.ndarray) -> MeshOr
     d_coefficients = h[:, None, None] * np.einsum('sq,nsdp->qndp', gauss.INTEGRALS, d_slopes)
     d_coefficients[0] += moved[:-1]
 
-    m = reduced.symmetry.order
+    d_period, m = reduced.symmetry.order * d_length, reduced.symmetry.order
+    # One cell of each class has seen only those of its family's weights that end on it.
+    names = reduced.network.parameters()
+    for family in reduced.network.families(reduced.symmetry):
+        members = [names.index(name) for name in family]
+        d_period[members] = d_period[members].mean()
+        d_coefficients[..., members] = d_coefficients[..., members].mean(axis=-1, keepdims=True)
     between = np.array([0.02, 0.3, 0.5, 0.7, 0.98])
     values, rise = (polynomial.polyval(between, c).transpose(0, 2, 1)
                     for c in (coefficients, polynomial.polyder(coefficients)))
     residual = np.abs(rise / (now.length * h)[:, None, None] - reduced.rates(values))
     return MeshOrbit(reduced.network, reduced.symmetry, m * now.length, float(residual.max()),
-                     m * d_length, now.mesh, now.stages, coefficients, d_coefficients)
+                     d_period, now.mesh, now.stages, coefficients, d_coefficients)

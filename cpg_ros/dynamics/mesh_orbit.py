@@ -20,7 +20,8 @@ class MeshOrbit(Orbit):
         stages: reduced states at the nodes, shape (n, S, d).
         coefficients: of the polynomials on each interval, shape (S + 1, n, d).
         d_coefficients: their derivatives by the parameters at fixed theta, shape
-            (S + 1, n, d, parameters).
+            (S + 1, n, d, parameters). A family of weights that the symmetry carries into one
+            another acts as one: each has an equal share of what moving all of them does.
 
     """
 

@@ -75,12 +75,13 @@ def _cached(digest):
             phase = turn + lookup(lead, turn)
             leg_phases[leg] = phase - math.floor(phase)
         base = leg_phases[0] - phases[leg_cells[0]]
-        distance = 0.0
+        distance, sum_ = 0.0, 0.0
         for cell in range(phases.shape[0]):
             off = abs(now[0, cell] / peak - lookup(wave, base + phases[cell]))
-            # Written so that a NaN comes through.
-            distance = distance if off <= distance else off
-        return distance
+            distance = max(distance, off)
+            sum_ += off
+        # Whatever max makes of a NaN: it comes through the sum.
+        return distance + 0.0 * sum_
 
     @njit(cache=True, **OPTIONS)
     def confine(wanted, wanted_rate, lower, upper, speed, dt, position, velocity):

@@ -107,20 +107,15 @@ class Biped(Network):
         """
         return Symmetry.of(D2, GAITS[known(gait, self.gaits())])
 
-    def broken(self, gait: str) -> str:
-        """Name the weights that would have to be equal for the gait, or '' if all are.
-
-        H of the gait has to carry the couplings into one another: w(g j -> g i) = w(j -> i).
-        """
-        elements = [D2.elements[name] for name in self.symmetry(gait).h]
-        values = self.as_dict()
-        for names in WEIGHTS.values():
-            for name in names:
-                j, i = int(name[2]) - 1, int(name[3]) - 1
-                alike = dict.fromkeys(f'w_{g[j] + 1}{g[i] + 1}' for g in elements)
-                if len({values[other] for other in alike}) > 1:
-                    return ', '.join(alike)
-        return ''
+    def families(self, symmetry: Symmetry) -> tuple[tuple[str, ...], ...]:
+        """Weights that H of a gait carries into one another: w(g j -> g i) and w(j -> i)."""
+        elements = [D2.elements[name] for name in symmetry.h]
+        found: dict[str, tuple[str, ...]] = {'current': ('current',), 'phi': ('phi',)}
+        for name in (name for names in WEIGHTS.values() for name in names):
+            j, i = int(name[2]) - 1, int(name[3]) - 1
+            family = tuple(dict.fromkeys(f'w_{g[j] + 1}{g[i] + 1}' for g in elements))
+            found.setdefault(min(family), family)
+        return tuple(found.values())
 
     def rates(self, x: np.ndarray) -> np.ndarray:
         """Right-hand side at states x, shape (..., components)."""

@@ -86,9 +86,15 @@ class Network(ABC):
 
         """
 
+    def families(self, symmetry: Any) -> tuple[tuple[str, ...], ...]:
+        """Parameters that a gait's symmetry carries into one another, and so has to find equal."""
+        return tuple((name,) for name in self.parameters())
+
     def broken(self, gait: str) -> str:
-        """Name the parameters that break the gait's symmetry, or '' where none does."""
-        return ''
+        """Name parameters that would have to be equal for the gait, or '' if all are."""
+        values = self.as_dict()
+        return next((', '.join(family) for family in self.families(self.symmetry(gait))
+                     if len({values[name] for name in family}) > 1), '')
 
     def character(self, gait: str, assignment: str) -> str:
         """Tell whether a gait is walk-like or run-like (Buono & Golubitsky 2001, section 7).

@@ -84,6 +84,9 @@ def write_presets(path: str | Path, network: type[Network], presets: dict[str, P
     path = Path(path)
     lines = ''.join(f'# {line}\n' for line in comment.splitlines())
     beside = path.with_name(f'.{path.name}.part')
-    beside.write_text(lines + yaml.safe_dump(tree, sort_keys=False, default_flow_style=None,
-                                             width=96), encoding='utf-8')
-    beside.replace(path)
+    try:
+        beside.write_text(lines + yaml.safe_dump(tree, sort_keys=False, default_flow_style=None,
+                                                 width=96), encoding='utf-8')
+        beside.replace(path)
+    finally:
+        beside.unlink(missing_ok=True)

@@ -1,0 +1,163 @@
+"""Floquet multipliers against flows of the whole network; which gaits attract, and in noise."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from cpg_ros.dynamics.floquet import multipliers
+from cpg_ros.dynamics.orbit import solve_preset
+from cpg_ros.dynamics.phase_readout import PhaseReadout
+from cpg_ros.dynamics.simulate import simulate
+from cpg_ros.dynamics.stability import RATE, stability
+from cpg_ros.networks.biped import Biped
+from cpg_ros.networks.network import Preset
+from cpg_ros.networks.registry import PRESETS
+
+ALL = [(network, name) for network in ('quadruped', 'biped') for name in PRESETS[network]]
+EVERY = pytest.mark.parametrize(('network', 'name'), ALL)
+
+
+@cache
+def solved(network, name):
+    orbit = solve_preset(PRESETS[network][name])
+    return orbit, multipliers(orbit), stability(orbit)
+
+
+def on_class(orbit):
+    """The projector on Fix(K): the mean over the permutations that shift by nothing."""
+    size, whole = orbit.network.cells, []
+    for name in orbit.symmetry.k:
+        g = np.eye(size)[list(orbit.symmetry.group.elements[name])]
+        whole.append(np.kron(np.eye(2), g))
+    return np.mean(whole, axis=0)
+
+
+def paired(found, wanted):
+    """Largest distance of each wanted number to the found one that is left for it."""
+    found, gaps = list(found), []
+    for one in sorted(wanted, key=abs, reverse=True):
+        gaps.append(min(abs(found - np.array(one))))
+        found.pop(int(np.abs(found - np.array(one)).argmin()))
+    return max(gaps, default=0.0)
+
+
+def monodromy(orbit, flow, width=1e-5):
+    """Derivative of the state a period later by that at phase 0, by differences."""
+    start = orbit(np.array(0.0))
+    moved = flow(np.concatenate([start + width * np.eye(start.size),
+                                 start - width * np.eye(start.size)]))
+    return (moved[:start.size] - moved[start.size:]).T / (2.0 * width)
+
+
+def strides(orbit, starts, count, gain=0.0):
+    """States after each of some periods of simulation, shape (batch, count, components)."""
+    steps = int(np.ceil(orbit.period / orbit.network.step))
+    return simulate(orbit.network, starts, count * orbit.period, orbit.period / steps,
+                    lock=(gain, orbit.symmetry), every=steps).x[:, 1:]
+
+
+@EVERY
+def test_multipliers_are_those_of_the_flow(network, name):
+    orbit, mine, _ = solved(network, name)
+
+    def flow(starts):
+        sizes = starts.shape
+        return solve_ivp(lambda t, x: orbit.network.rates(x.reshape(sizes)).ravel(),
+                         (0.0, orbit.period), starts.ravel(), 'DOP853', rtol=1e-10,
+                         atol=1e-12).y[:, -1].reshape(sizes)
+    matrix, inside = monodromy(orbit, flow), on_class(orbit)
+    assert np.linalg.matrix_rank(inside) == mine.within.size + 1
+    outside = np.eye(len(inside)) - inside
+    # The flow keeps the class and, to first order, what is orthogonal to it.
+    assert max(np.abs(a @ matrix @ b).max() for a, b in ((inside, outside), (outside, inside))
+               ) < 1e-4
+    assert abs(mine.trivial - 1.0) < 1e-6
+    for own, part in (([mine.trivial, *mine.within], inside), (mine.transverse, outside)):
+        found = np.linalg.eigvals(part @ matrix @ part)
+        assert paired(found, own) < 1e-4 * max(abs(found).max(), 1e-2)
+    sizes = np.abs(mine.within), np.abs(mine.transverse)
+    assert all((np.diff(size) <= 1e-12).all() for size in sizes)
+
+
+@EVERY
+def test_small_disturbances_grow_by_the_multipliers(network, name):
+    # Along eigenvectors in and outside the class, for three periods, with and without a lock.
+    orbit, mine, _ = solved(network, name)
+    start, inside = orbit(np.array(0.0)), on_class(orbit)
+    values, vectors = np.linalg.eig(monodromy(orbit, lambda x: strides(orbit, x, 1)[:, 0]))
+    parts = (inside, mine.within, 0.0), (np.eye(start.size) - inside, mine.transverse, 0.1)
+    for part, own, locked in parts:
+        for value, vector, left in zip(values, vectors.T, np.linalg.inv(vectors), strict=True):
+            belongs = np.linalg.norm(part @ vector) > 0.99 and abs(value - 1.0) > 1e-3
+            if not belongs or abs(value) < 0.01:
+                continue
+            wanted = own[np.abs(own - value).argmin()]
+            width = 1e-5 * min(1.0, abs(value)**-3)
+            rows = width * np.array([vector.real, vector.imag, -vector.real, -vector.imag])
+            for gain in (0.0, 0.1):
+                runs = strides(orbit, start + rows, 3, gain)
+                later = (runs[0] - runs[2] + 1j * (runs[1] - runs[3])) / (2.0 * width)
+                decay = np.exp(-locked * orbit.period) if gain else 1.0
+                growth = later @ left
+                assert np.allclose(growth, (wanted * decay)**np.arange(1, 4), 2e-3, 1e-5)
+
+
+@EVERY
+def test_shipped_gaits_attract(network, name):
+    orbit, mine, judged = solved(network, name)
+    assert judged.flaw == '' and mine.leading(judged.chosen) < 1.0
+    # The gain chosen lets what is transverse decay by RATE at least, and none is spent beyond.
+    slowest = np.log(max(np.abs(mine.transverse), default=1e-300)) / orbit.period - judged.chosen
+    assert slowest <= -RATE + 1e-9 and (judged.chosen == 0.0 or slowest >= -RATE - 1e-9)
+    assert judged.enough == mine.gain <= judged.chosen
+    assert np.abs(mine.transverse).max(initial=0.0) <= np.exp(mine.gain * orbit.period) + 1e-9
+
+
+@EVERY
+def test_shipped_gaits_survive_noise(network, name):
+    orbit, _, judged = solved(network, name)
+    cells = np.arange(orbit.network.cells)
+    readout = PhaseReadout(orbit, cells, np.zeros((cells.size, 6)), cells, 3)
+    scratch = np.zeros((2, cells.size))
+    runs = simulate(orbit.network, [orbit, orbit], 500.0, orbit.network.step, every=20,
+                    lock=(judged.chosen, orbit.symmetry), noise=0.01, seed=3)
+    for x, slopes in zip(runs.x, runs.slopes, strict=True):
+        phases = np.empty((len(x), cells.size))
+        for k, now in enumerate(zip(x, slopes, slopes, strict=True)):
+            readout.look(np.array(now), *scratch, phases[k])
+        unwound = np.unwrap(phases[:, 0], period=1.0)
+        assert unwound[-1] - unwound[0] == pytest.approx(500.0 / orbit.period, rel=0.02)
+        stride = int(orbit.period / runs.t[1])
+        assert (unwound[stride:] - unwound[:-stride] > 0.75).all()
+        waves = [np.flatnonzero(orbit.waves == wave)[0] for wave in orbit.waves]
+        late = np.exp(2j * np.pi * (phases - phases[:, waves] - orbit.phases))
+        means = np.add.reduceat(late, np.arange(0, len(late) - stride, stride))
+        # The paper's jump couples its pairs of cells by 0.01 only (multipliers 0.96): they wander.
+        wander = 0.2 if (network, name) == ('quadruped', 'jump') else 0.05
+        assert np.abs(np.angle(means)).max() < 2.0 * np.pi * wander
+
+
+def test_an_orbit_that_does_not_attract_is_told():
+    # Hopping cells feel no coupling; beside rest this one has an unstable cycle, which attracts
+    # when time runs backward.
+    network = Biped.symmetric(0.4, 0.15, 0.3, 0.3, 0.3)
+    back = solve_ivp(lambda t, x: -network.rates(x), (0.0, 300.0), np.repeat([0.1, 0.45], 4),
+                     'DOP853', rtol=1e-9, atol=1e-11, dense_output=True).sol
+    times = np.linspace(270.0, 300.0, 30_001)
+    v = back(times)[0]
+    peaks = np.flatnonzero((v[1:-1] > v[:-2]) & (v[1:-1] >= v[2:])) + 1
+    period = float(np.diff(times[peaks]).mean())
+    start = tuple(float(value) for value in back(times[peaks[0]]))
+    orbit = solve_preset(Preset('two_legged_hop', network, start, period))
+    assert orbit.period == pytest.approx(period, rel=1e-4)
+    assert np.abs(orbit(np.array(0.0)) - start).max() < 1e-4
+    nudge = 1e-7 * np.ones((2, 1)) * orbit(np.array(0.0)) * [[1.0], [-1.0]]
+    apart = np.diff(strides(orbit, orbit(np.array(0.0)) + nudge, 12), axis=0)[0]
+    # Differences of successive strides are free of the shift along the orbit.
+    grown = np.linalg.norm(np.diff(apart, axis=0), axis=1)
+    (within,) = multipliers(orbit).within
+    assert grown[-1] / grown[-2] == pytest.approx(within.real, rel=1e-3)
+    assert within.real == pytest.approx(1.5715, abs=1e-4)
+    assert stability(orbit).flaw.endswith('own symmetry class grows 1.571 times a stride')
