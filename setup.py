@@ -15,11 +15,14 @@ setup(
     ],
     python_requires='>=3.10',
     install_requires=['setuptools', 'numpy', 'scipy', 'numba', 'matplotlib', 'PyYAML'],
-    extras_require={'test': ['pytest', 'hypothesis', 'jitcdde']},
+    extras_require={'optimize': ['pymoo>=0.6.2,<0.7'],
+                    'test': ['pytest', 'hypothesis', 'jitcdde']},
     zip_safe=False,
     maintainer='cpg_ros maintainers',
     maintainer_email='maintainers@cpg-ros.example',
     description='Central pattern generators for legged robots on ROS 2',
     license='Apache-2.0',
-    entry_points={'console_scripts': ['generator = cpg_ros.nodes.generator:main']},
+    entry_points={'console_scripts': [
+        'generator = cpg_ros.nodes.generator:main',
+        'optimize = cpg_ros.tools.optimize:main']},
 )

@@ -1,0 +1,120 @@
+"""The mean cycle of a recording: one harmonic series per channel, fitted to all its cycles.
+
+Being a fit, it takes times as they come, and averages noise.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import solve_toeplitz, toeplitz
+
+#: Most harmonics of a mean cycle.
+HARMONICS = 32
+#: Least eigenvalue of the normal matrix of harmonics, of at most 1.
+DETERMINED = 0.1
+#: Places in the cycle told apart for that; many more than harmonics.
+BINS = 4096
+
+
+@dataclass(frozen=True)
+class Cycle:
+    """The mean cycle of a recording.
+
+    Attributes:
+        period: in the unit of the recording's times.
+        coefficients: c_n of ``x(t) = Re(c_0 + 2 sum_n c_n exp(2 pi i n (t - start) / period))``,
+            complex, shape (harmonics + 1, channels).
+        start: where the cycle begins.
+        residual: RMS of what the cycle leaves, over that of the signals about their means.
+
+    """
+
+    period: float
+    coefficients: np.ndarray
+    start: float
+    residual: float
+
+    def __call__(self, phases: np.ndarray) -> np.ndarray:
+        """Return the signals at phases in cycles, shape (m,), as an array (m, channels)."""
+        c = self.coefficients
+        weights = np.vstack([c.real[:1], 2.0 * c.real[1:], -2.0 * c.imag[1:]])
+        return series(weights, rows_of(np.asarray(phases, dtype=float), len(c) - 1)).T
+
+
+def rows_of(phases: np.ndarray, harmonics: int) -> np.ndarray:
+    """Return 1, cos(2 pi n phase), sin(2 pi n phase) as rows, shape (2 harmonics + 1, m)."""
+    rows = np.ones((2 * harmonics + 1, phases.size))
+    if harmonics:
+        powers = np.cumprod(np.broadcast_to(np.exp(2j * np.pi * phases),
+                                            (harmonics, phases.size)), axis=0)
+        rows[1:1 + harmonics], rows[1 + harmonics:] = powers.real, powers.imag
+    return rows
+
+
+def determined(t: np.ndarray, period: float) -> int:
+    """Return how many harmonics the times determine once folded onto one cycle; 0 if none.
+
+    As many as a least-squares fit bears without magnifying noise: the smallest eigenvalue of
+    its normal matrix (1 for even sampling, 0 where harmonics are aliases) is kept from 0.
+    """
+    most = min(HARMONICS, (t.size - 1) // 4)
+    bins = np.bincount((t / period % 1.0 * BINS).astype(int) % BINS, minlength=BINS)
+    sums = np.fft.fft(bins)[:2 * most + 1] / t.size
+    low, high = 0, most + 1
+    while high - low > 1:
+        middle = (low + high) // 2
+        if np.linalg.eigvalsh(toeplitz(sums[:2 * middle + 1]))[0] > DETERMINED:
+            low = middle
+        else:
+            high = middle
+    return low
+
+
+def series(weights: np.ndarray, rows: np.ndarray) -> np.ndarray:
+    """Return the channels, shape (channels, m), that weights (2 n + 1, channels) give."""
+    return np.einsum('nc,nm->cm', weights, rows)
+
+
+def weights_for(values: np.ndarray, rows: np.ndarray) -> np.ndarray:
+    """Return the least-squares weights (2 n + 1, channels) of rows for values (channels, m).
+
+    The normal matrix of exp(2 pi i n phase), n = -N..N, is Toeplitz. No BLAS here: on a busy
+    computer waiting for its threads takes longer than all of this.
+    """
+    n = len(rows) // 2
+    cos, sin = rows[1:1 + n], rows[1 + n:]
+    sums = np.ones(2 * n + 1, dtype=complex)
+    sums[1:1 + n] = (cos - 1j * sin).mean(axis=1)
+    if n:
+        last = cos[-1] - 1j * sin[-1]
+        sums[1 + n:] = np.einsum('nm,m->n', cos, last) - 1j * np.einsum('nm,m->n', sin, last)
+        sums[1 + n:] /= values.shape[1]
+    means = np.einsum('nm,cm->nc', rows, values) / values.shape[1]
+    upper = means[1:1 + n] - 1j * means[1 + n:]
+    c = solve_toeplitz(sums, np.vstack([upper[::-1].conj(), means[:1], upper]))[n:]
+    return np.vstack([c[:1].real, 2.0 * c[1:].real, -2.0 * c[1:].imag])
+
+
+def mean_cycle(t: np.ndarray, signals: np.ndarray, period: float) -> Cycle:
+    """Fold a recording onto one cycle of the period given.
+
+    Args:
+        t: increasing times, evenly or unevenly spaced, shape (m,).
+        signals: one channel per column, shape (m, channels).
+        period: in the unit of t.
+
+    Raises:
+        ValueError: the samples do not even determine the first harmonic.
+
+    """
+    harmonics = determined(t, period)
+    if harmonics < 1:
+        raise ValueError(f'the samples, folded onto one period of {period:g}, leave too much of '
+                         f'it empty')
+    rows = rows_of((t - t[0]) / period, harmonics)
+    weights = weights_for(signals.T, rows)
+    left = signals.T - series(weights, rows)
+    coefficients = np.vstack([weights[:1], 0.5 * (weights[1:1 + harmonics]
+                                                  - 1j * weights[1 + harmonics:])])
+    return Cycle(period, coefficients, float(t[0]),
+                 float(np.sqrt(np.mean(left * left) / signals.var(axis=0).mean())))

@@ -1,0 +1,77 @@
+"""Comparing waveforms: how far one lags another, how much they differ, how steadily they turn."""
+
+import numpy as np
+
+TURN = 2.0 * np.pi
+#: Centres that are tried in each direction, over the middle part of a closed curve's extent.
+CENTRES = np.linspace(-0.6, 0.6, 13)
+
+
+def lag(a: np.ndarray, b: np.ndarray) -> float:
+    """Shift theta in cycles, -0.5 to 0.5, that brings b(t + theta) nearest to a(t).
+
+    The largest circular cross-correlation, refined by Newton's method on its Fourier series: no
+    single harmonic or extreme decides.
+
+    Args:
+        a: a waveform on even points of a cycle, shape (m,).
+        b: another one.
+
+    """
+    cross = np.fft.rfft(a) * np.fft.rfft(b).conj()
+    cross[0] = 0.0
+    k = np.arange(cross.size)
+    theta = -float(np.fft.irfft(cross, a.size).argmax()) / a.size
+    for _ in range(4):
+        turned = cross * np.exp(-TURN * 1j * k * theta)
+        slope, bend = (k * turned).imag.sum(), -TURN * (k * k * turned).real.sum()
+        if bend < 0.0:
+            theta -= float(np.clip(slope / bend, -0.5 / a.size, 0.5 / a.size))
+    return float((theta + 0.5) % 1.0 - 0.5)
+
+
+def shifted(a: np.ndarray, theta: float) -> np.ndarray:
+    """a(t + theta), theta in cycles, by its Fourier series."""
+    terms = np.fft.rfft(a)
+    return np.fft.irfft(terms * np.exp(TURN * 1j * np.arange(terms.size) * theta), a.size)
+
+
+def shape_difference(a: np.ndarray, b: np.ndarray, plain: bool = False) -> float:
+    """How much two waveforms differ, whatever their shift: the smallest RMS over all shifts.
+
+    Args:
+        a: a waveform on even points of a cycle, shape (m,).
+        b: another one.
+        plain: compare them as they are, over the RMS of the stronger one about its mean; by
+            default both are first given mean 0 and RMS 1, so that only shape counts.
+
+    """
+    sizes = a.std(), b.std()
+    if min(sizes) == 0.0:
+        return 0.0 if max(sizes) == 0.0 else 1.0
+    if plain:
+        return float(np.sqrt(np.mean((a - shifted(b, lag(a, b)))**2)) / max(sizes))
+    a, b = (a - a.mean()) / sizes[0], (b - b.mean()) / sizes[1]
+    return float(np.sqrt(np.mean((a - shifted(b, lag(a, b)))**2)))
+
+
+def steadiness(v: np.ndarray, w: np.ndarray) -> float:
+    """Smallest angular speed, over its mean, at which a closed curve turns about a centre.
+
+    The best of the centres tried; both variables are scaled to run from -1 to 1. At most 1; not
+    positive where the curve turns back somewhere or turns twice, so that the angle does not tell
+    the phase.
+
+    Args:
+        v: a cell's first variable on even points of a cycle, shape (m,).
+        w: its second one.
+
+    """
+    if min(np.ptp(v), np.ptp(w)) == 0.0:
+        return 0.0
+    v, w = ((2.0 * q - q.max() - q.min()) / np.ptp(q) for q in (v, w))
+    x, y = v - CENTRES[:, None, None], w - CENTRES[:, None]
+    speed = (x * np.roll(y, -1, -1) - y * np.roll(x, -1, -1)) / (x * x + y * y)
+    # About a centre outside the curve the sum is 0, and where it turns twice in a cycle 4 pi.
+    once = np.abs(speed.sum(-1) - TURN) < np.pi
+    return float(np.where(once, speed.min(-1), -1.0).max()) * v.size / TURN

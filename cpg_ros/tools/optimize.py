@@ -1,0 +1,156 @@
+"""Executable ``optimize``: weights that give a network a gait, found by NSGA-II.
+
+``optimize --network biped --gait skip --seed 0`` prints the set that was chosen and writes the
+Pareto front (``front.csv``, ``front.png``) and a preset file that ``generator`` loads.
+"""
+
+import argparse
+import re
+import shlex
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import NoReturn
+
+from cpg_ros.fitting.search_space import NETWORKS
+from cpg_ros.fitting.weights import Front, NothingFound, NotInstalled, optimise
+from cpg_ros.networks.presets import write_presets
+from cpg_ros.tools.front import draw_front, write_front
+
+DESCRIPTION = '''\
+Look for weights that give a network a gait, by NSGA-II. What is minimised: the phase errors of
+the cells, the leading Floquet multiplier of the gait's orbit and, where a gait has two waveforms,
+minus their difference in shape. The set that is chosen from the Pareto front has the smallest
+phase errors and then the smallest multiplier; it is proven by its exact orbit and under noise.'''
+EPILOG = '''\
+variables: biped, primary gaits: w_a w_b w_c current phi; secondary gaits: six directed weights
+such as w_12 (from cell 1 to cell 2), each with its partner under the gait's symmetry, current and
+phi; quadruped: alpha beta gamma delta, and xi and eta if --bounds are given for them.
+
+files: front.csv, front.png and preset.yaml, for
+  ros2 run cpg_ros generator --ros-args -p network:=... -p presets:=FILE -p gait:=NAME
+
+exit codes: 0 found, 1 nothing found, 2 wrong arguments.'''
+
+
+class _Parser(argparse.ArgumentParser):
+    """Says what is wrong in one line."""
+
+    def error(self, message: str) -> NoReturn:
+        print(f'{self.prog}: {message}', file=sys.stderr)
+        sys.exit(2)
+
+
+def _number(text: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"'{text}' is not a number") from None
+
+
+def _fixed(text: str) -> tuple[str, float]:
+    name, sign, value = text.partition('=')
+    if not (name and sign):
+        raise argparse.ArgumentTypeError(f"'{text}' is not of the form name=value")
+    return name, _number(value)
+
+
+def _bounds(text: str) -> tuple[str, tuple[float, float]]:
+    name, sign, limits = text.partition('=')
+    low, colon, high = limits.partition(':')
+    if not (name and sign and colon):
+        raise argparse.ArgumentTypeError(f"'{text}' is not of the form name=low:high")
+    return name, (_number(low), _number(high))
+
+
+def _name(text: str) -> str:
+    if not re.fullmatch(r'[A-Za-z]\w*', text, re.ASCII):
+        raise argparse.ArgumentTypeError(f"'{text}' is not a name of letters, digits and _")
+    return text
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = _Parser(prog='optimize', description=DESCRIPTION, epilog=EPILOG,
+                     formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument('--network', default='biped', metavar='NAME',
+                        help=f'{" or ".join(NETWORKS)} (default: %(default)s)')
+    parser.add_argument('--gait', required=True, metavar='NAME', help='; '.join(
+        f'{name}: {" ".join(network.gaits())}' for name, network in NETWORKS.items()))
+    parser.add_argument('--population', type=int, default=60, metavar='N',
+                        help='sets in a generation (default: %(default)s)')
+    parser.add_argument('--generations', type=int, default=12, metavar='N',
+                        help='how many (default: %(default)s)')
+    parser.add_argument('--seed', type=int, default=0, metavar='N',
+                        help='the same seed finds the same (default: %(default)s)')
+    parser.add_argument('--fix', nargs='+', action='extend', default=[], type=_fixed,
+                        metavar='VARIABLE=VALUE', help='keep variables at a value, such as '
+                        'current=0.229 phi=0.254')
+    parser.add_argument('--bounds', nargs='+', action='extend', default=[], type=_bounds,
+                        metavar='VARIABLE=LOW:HIGH', help='look elsewhere than usual, such as '
+                        'w_a=-0.5:0.5')
+    parser.add_argument('--out', type=Path, default=Path('out'), metavar='DIR',
+                        help='where the files go (default: %(default)s)')
+    parser.add_argument('--name', type=_name, help='of the preset (default: the gait and '
+                        '_optimised)')
+    return parser
+
+
+def table(front: Front) -> str:
+    """Say what was chosen, in lines of a name, a value and a unit."""
+    chosen, space = front.chosen, front.space
+    parameters = chosen.preset.network.as_dict()
+    rows = []
+    for variable in space.variables:
+        members = variable.members if len(variable.members) == 2 else (variable.name,)
+        rows.append((' = '.join(members), f'{parameters[variable.members[0]]:.4f}',
+                     '' if variable.free else 'given'))
+    rows.append(('phase errors', ', '.join(f'{error:.3f}' for error in chosen.errors), 'degrees'))
+    rows.append(('period', f'{chosen.orbit.period:.4f}', 'model time'))
+    rows.append(('leading multiplier', f'{chosen.leading:.4f}', 'a cycle'))
+    if chosen.orbit.waves.max():
+        rows.append(('waveforms differ by', f'{chosen.differences[0]:.3f}', 'of their RMS'))
+    width, middle = (max(len(row[k]) for row in rows) for k in (0, 1))
+    lines = [f'{space.gait} of the {space.network.name}: {len(front.tried)} sets tried, '
+             f'{len(front.scores)} on the Pareto front; chosen:']
+    return '\n'.join([*lines, *(f'  {name:<{width}}  {value:>{middle}}  {unit}'.rstrip()
+                                for name, value, unit in rows)])
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the search; return the exit code."""
+    arguments = sys.argv[1:] if arguments is None else arguments
+    parser = _parser()
+    chosen = parser.parse_args(arguments)
+    for option in ('fix', 'bounds'):
+        names = [name for name, _ in getattr(chosen, option)]
+        twice = [name for name in names if names.count(name) > 1]
+        if twice:
+            parser.error(f'argument --{option}: {twice[0]} is given twice')
+    name = chosen.name or f'{chosen.gait}_optimised'
+    try:
+        # Now, and not when the work is done.
+        chosen.out.mkdir(parents=True, exist_ok=True)
+        front = optimise(chosen.network, chosen.gait, chosen.population, chosen.generations,
+                         chosen.seed, dict(chosen.bounds), dict(chosen.fix),
+                         progress=sys.stderr.isatty())
+        command = shlex.join(['optimize', *arguments])
+        print(table(front))
+        write_front(chosen.out / 'front.csv', front)
+        draw_front(chosen.out / 'front.png', front)
+        write_presets(chosen.out / 'preset.yaml', front.space.network,
+                      {name: front.chosen.preset}, f'Found by: {command}')
+    except (ValueError, NotInstalled, OSError) as error:
+        print(f'optimize: {error}', file=sys.stderr)
+        return 2
+    except NothingFound as error:
+        print(f'optimize: {error}', file=sys.stderr)
+        return 1
+    except KeyboardInterrupt:
+        print('optimize: stopped', file=sys.stderr)
+        return 130
+    print(f'written: front.csv, front.png and preset.yaml (preset {name}) in {chosen.out}')
+    return 0
+
+
+if __name__ == '__main__':
+    sys.exit(main())
