@@ -134,8 +134,9 @@ def test_shipped_gaits_survive_noise(network, name):
         waves = [np.flatnonzero(orbit.waves == wave)[0] for wave in orbit.waves]
         late = np.exp(2j * np.pi * (phases - phases[:, waves] - orbit.phases))
         means = np.add.reduceat(late, np.arange(0, len(late) - stride, stride))
-        # The paper's jump couples its pairs of cells by 0.01 only (multipliers 0.96): they wander.
-        wander = 0.2 if (network, name) == ('quadruped', 'jump') else 0.05
+        # Between neighbouring gaits are 0.25. The paper's jump couples its pairs of cells by 0.01
+        # only (multipliers 0.96): they wander further than others.
+        wander = 0.2 if (network, name) == ('quadruped', 'jump') else 0.1
         assert np.abs(np.angle(means)).max() < 2.0 * np.pi * wander
 
 
