@@ -137,7 +137,7 @@ def find_period(t: np.ndarray, signals: np.ndarray) -> float:
 
     def tried(guess: float) -> Trial:
         period, weights, error = _followed(t, channels, guess)
-        if abs(period / guess - 1.0) > 0.1 or not holds_two(t, period):
+        if not holds_two(t, period):
             return np.inf, period, weights
         # Longer cycles leave less merely because fewer of them are averaged.
         return error / power / (1.0 - min(period / _span(t), 0.5)), period, weights

@@ -1,0 +1,85 @@
+"""Signals with a known symmetry, drawn at random, and the gaits' symmetries by name."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from hypothesis import strategies as st
+
+from cpg_ros.networks.pairs import symmetries
+from cpg_ros.networks.symmetry import D2, Z4_Z2, Group, Symmetry
+
+Z6 = Group(6, (('w', (1, 2, 3, 4, 5, 0)),))
+GROUPS = (Z4_Z2, D2, Z6)
+QUADRUPED = {name: Symmetry.of(Z4_Z2, {'omega': omega, 'kappa': kappa})
+             for name, omega, kappa in (
+                 ('pronk', 0, 0), ('pace', 0, 0.5), ('bound', 0.5, 0), ('trot', 0.5, 0.5),
+                 ('jump', 0.75, 0), ('walk', 0.75, 0.5))}
+BIPED = {name: Symmetry.of(D2, shifts) for name, shifts in (
+    ('walk', {'rho': 0.5, 'tau': 0.5}), ('run', {'rho': 0.5, 'tau': 0}),
+    ('jump', {'rho': 0, 'tau': 0.5}), ('hop', {'rho': 0, 'tau': 0}), ('skip', {'rho': 0.5}),
+    ('gallop', {'tau': 0.5}), ('hesitation_walk', {'rho tau': 0.5}),
+    ('asymmetric_hop', {'rho tau': 0}), ('one_legged_hop', {'tau': 0}))}
+NAMED = [(table, name) for table in (QUADRUPED, BIPED) for name in table]
+EVERY = [symmetry for group in (Z4_Z2, D2) for symmetry in symmetries(group)]
+
+
+@dataclass
+class Rhythm:
+    """Signals with a symmetry: series drawn at random, one for each waveform."""
+
+    symmetry: Symmetry
+    seed: int
+    harmonics: int = 5
+
+    def __post_init__(self):
+        draw = np.random.default_rng(self.seed)
+        group = self.symmetry.group
+        self.series, self.place = [], {}
+        for cell in range(group.cells):
+            if cell not in self.place:
+                series = draw.uniform(-0.6, 0.6, (self.harmonics, 2)) @ [1, 1j]
+                series[0] = np.exp(2j * np.pi * draw.uniform())
+                # Own offset and size, so that two waveforms are never nearly one.
+                wave = len(self.series)
+                self.series.append((wave, (1.0 + 0.3 * wave) * series))
+                for name, shift in self.symmetry.shifts:
+                    self.place[group.elements[name][cell]] = (wave, float(shift))
+
+    def __call__(self, phases):
+        """Values at phases in cycles, shape (m, cells)."""
+        n = np.arange(1, self.harmonics + 1)
+        columns = []
+        for cell in range(self.symmetry.group.cells):
+            wave, shift = self.place[cell]
+            offset, series = self.series[wave]
+            columns.append(offset + (np.exp(2j * np.pi * np.outer(phases + shift, n))
+                                     @ series).real)
+        return np.stack(columns, axis=1)
+
+
+@st.composite
+def recordings(draw, noise=0.0):
+    """Times, period and a generator of noise: even and uneven, short and long."""
+    period = 10.0 ** draw(st.floats(-3.0, 3.0))
+    cycles = draw(st.floats(2.1, 14.0))
+    random = np.random.default_rng(draw(st.integers(0, 2 ** 32)))
+    t = np.arange(int(cycles * draw(st.integers(30, 80))) + 1.0)
+    if draw(st.booleans()):
+        t += random.uniform(-0.4, 0.4, t.size)
+    t = (t - t[0]) * cycles * period / (t[-1] - t[0]) + draw(st.floats(-50.0, 50.0)) * period
+    return t, period, lambda x: x + noise * x.std() * random.standard_normal(x.shape)
+
+
+def around(phases):
+    """Distances from whole cycles."""
+    return np.abs((np.asarray(phases) + 0.5) % 1.0 - 0.5)
+
+
+def phase_error(phases, symmetry):
+    """Largest error among the phases of cells with one waveform."""
+    off = phases - symmetry.phases
+    return max(around(off - off[np.argmax(symmetry.waves == wave)])[symmetry.waves == wave].max()
+               for wave in range(symmetry.waves.max() + 1))
+
+
+seeds = st.integers(0, 2 ** 32)
