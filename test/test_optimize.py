@@ -193,6 +193,15 @@ def test_nothing_is_left_half_written(found, tmp_path):
     assert [file.name for file in tmp_path.iterdir()] == ['front.csv']
 
 
+def test_a_reader_that_has_seen_enough_is_no_error(tmp_path):
+    process = subprocess.Popen([sys.executable, '-m', 'cpg_ros.tools.optimize', *SMALL, '--out',
+                                tmp_path], stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+    process.stdout.close()
+    assert process.stderr.read() == b''
+    assert process.wait() == 0
+    assert (tmp_path / 'preset.yaml').is_file()
+
+
 @pytest.mark.parametrize('gait', GAITS)
 def test_weights_of_a_search_keep_the_gaits_symmetry(gait):
     space = search_space.search_space('biped', gait, {}, {})

@@ -99,19 +99,21 @@ def _mismatch(signals: np.ndarray, symmetry: Symmetry) -> float:
 
 
 def phase_errors(signals: np.ndarray, symmetry: Symmetry) -> np.ndarray:
-    """Phase errors of the groups of ``pairs`` in degrees, 0 to 180.
+    """Phase errors of the groups of ``pairs`` in degrees, 0 to 180, shape (..., groups).
 
     Args:
-        signals: of the cells on even points of a cycle, shape (m, cells or more).
+        signals: of the cells on even points of a cycle, shape (..., m, cells or more).
         symmetry: of the gait.
 
     """
+    waves = np.swapaxes(signals, -1, -2)
     errors = []
     for group in pairs(symmetry):
-        off = [lag(signals[:, cell], signals[:, one]) - symmetry.phases[cell]
-               + symmetry.phases[one] for cell, one in group]
-        errors.append(max(abs((one + 0.5) % 1.0 - 0.5) for one in off) * 360.0)
-    return np.array(errors)
+        cells, first = np.array(group).T
+        off = (lag(waves[..., cells, :], waves[..., first, :]) - symmetry.phases[cells]
+               + symmetry.phases[first])
+        errors.append(np.abs((off + 0.5) % 1.0 - 0.5).max(axis=-1) * 360.0)
+    return np.stack(errors, axis=-1)
 
 
 def waveform_shortfall(signals: np.ndarray, symmetry: Symmetry, margin: float = 1.0) -> float:

@@ -7,27 +7,32 @@ TURN = 2.0 * np.pi
 CENTRES = np.linspace(-0.6, 0.6, 13)
 
 
-def lag(a: np.ndarray, b: np.ndarray) -> float:
+def lag(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """Shift theta in cycles, -0.5 to 0.5, that brings b(t + theta) nearest to a(t).
 
     The largest circular cross-correlation, refined by Newton's method on its Fourier series: no
     single harmonic or extreme decides.
 
     Args:
-        a: a waveform on even points of a cycle, shape (m,).
-        b: another one.
+        a: waveforms on even points of a cycle, shape (..., m).
+        b: others, of the same shape.
+
+    Returns:
+        The shifts, shape (...).
 
     """
+    m = a.shape[-1]
     cross = np.fft.rfft(a) * np.fft.rfft(b).conj()
-    cross[0] = 0.0
-    k = np.arange(cross.size)
-    theta = -float(np.fft.irfft(cross, a.size).argmax()) / a.size
+    cross[..., 0] = 0.0
+    k = np.arange(cross.shape[-1])
+    theta = -np.fft.irfft(cross, m).argmax(axis=-1) / m
     for _ in range(4):
-        turned = cross * np.exp(-TURN * 1j * k * theta)
-        slope, bend = (k * turned).imag.sum(), -TURN * (k * k * turned).real.sum()
-        if bend < 0.0:
-            theta -= float(np.clip(slope / bend, -0.5 / a.size, 0.5 / a.size))
-    return float((theta + 0.5) % 1.0 - 0.5)
+        turned = cross * np.exp(-TURN * 1j * k * theta[..., None])
+        slope, bend = turned.imag @ k, -TURN * (turned.real @ (k * k))
+        peak = bend < 0.0
+        step = np.clip(slope / np.where(peak, bend, 1.0), -0.5 / m, 0.5 / m)
+        theta = theta - np.where(peak, step, 0.0)
+    return (theta + 0.5) % 1.0 - 0.5
 
 
 def shifted(a: np.ndarray, theta: float) -> np.ndarray:
@@ -50,9 +55,9 @@ def shape_difference(a: np.ndarray, b: np.ndarray, plain: bool = False) -> float
     if min(sizes) == 0.0:
         return 0.0 if max(sizes) == 0.0 else 1.0
     if plain:
-        return float(np.sqrt(np.mean((a - shifted(b, lag(a, b)))**2)) / max(sizes))
+        return float(np.sqrt(np.mean((a - shifted(b, float(lag(a, b))))**2)) / max(sizes))
     a, b = (a - a.mean()) / sizes[0], (b - b.mean()) / sizes[1]
-    return float(np.sqrt(np.mean((a - shifted(b, lag(a, b)))**2)))
+    return float(np.sqrt(np.mean((a - shifted(b, float(lag(a, b))))**2)))
 
 
 def steadiness(v: np.ndarray, w: np.ndarray) -> float:

@@ -108,9 +108,12 @@ class Symmetry:
         """Build from the shifts of elements that generate H.
 
         Raises:
-            ValueError: the shifts contradict one another.
+            ValueError: the shifts contradict one another, or an element is not of the group.
 
         """
+        for name in shifts:
+            if name not in group.elements:
+                raise ValueError(f"'{name}' is not one of {', '.join(group.elements)}")
         exact = {name: Fraction(shift).limit_denominator(64) % 1
                  for name, shift in shifts.items()}
         return cls(group, tuple(group.generated(exact).items()), variables)

@@ -39,8 +39,8 @@ def write_front(path: Path, front: Front) -> None:
     with _beside(path) as part, part.open('w', newline='', encoding='utf-8') as file:
         rows = csv.writer(file)
         rows.writerow([*(f'{name} [1]' for name in names), *errors, 'leading multiplier [1]',
-                       *(['difference of waveforms [1]'] if two else []), 'period [model time]',
-                       'chosen'])
+                       *(['difference of waveforms [1]'] if two else []),
+                       'period [model time]', 'chosen'])
         for score in front.scores:
             parameters = score.network.as_dict()
             values = [parameters[variable.members[0]] for variable in front.space.variables]

@@ -5,6 +5,7 @@ Pareto front (``front.csv``, ``front.png``) and a preset file that ``generator``
 """
 
 import argparse
+import os
 import re
 import shlex
 import sys
@@ -133,10 +134,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         front = optimise(chosen.network, chosen.gait, chosen.population, chosen.generations,
                          chosen.seed, dict(chosen.bounds), dict(chosen.fix),
                          progress=sys.stderr.isatty())
-        command = shlex.join(['optimize', *arguments])
-        print(table(front))
         write_front(chosen.out / 'front.csv', front)
         draw_front(chosen.out / 'front.png', front)
+        command = shlex.join(['optimize', *arguments])
         write_presets(chosen.out / 'preset.yaml', front.space.network,
                       {name: front.chosen.preset}, f'Found by: {command}')
     except (ValueError, NotInstalled, OSError) as error:
@@ -148,7 +148,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt:
         print('optimize: stopped', file=sys.stderr)
         return 130
-    print(f'written: front.csv, front.png and preset.yaml (preset {name}) in {chosen.out}')
+    said = (f'{table(front)}\n'
+            f'written: front.csv, front.png and preset.yaml (preset {name}) in {chosen.out}')
+    try:
+        print(said, flush=True)
+    except BrokenPipeError:
+        # As in `optimize ... | head -1`. Python flushes once more at its end: into nothing.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     return 0
 
 
