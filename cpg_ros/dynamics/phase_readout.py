@@ -18,7 +18,7 @@ from numba import njit
 from scipy.optimize import minimize
 
 from cpg_ros.dynamics.periodic import Orbit
-from cpg_ros.dynamics.readout import TURN, lookup, monomials
+from cpg_ros.dynamics.readout import TURN, monomials
 from cpg_ros.networks.jit import OPTIONS, sources_digest
 
 #: Entries of the tables over the angle, and points of a cycle they are made from. On the plateaus
@@ -44,7 +44,7 @@ def _cached(digest):
             phases: phase of each cell in the gait, cycles, shape (size,).
             shape: centre and half range of both variables of each wave, shape (waves, 4).
             tables: phase minus angle (cycles), angular speed (cycles a cycle) and radius over
-                the angle, shape (waves, 3, TABLE).
+                the angle, shape (waves, TABLE, 3): a row is one place in memory.
             harmonics: cosine and sine terms of x, shape (waves, 1 + H, 2).
             crests: phase at which x peaks, shape (waves,).
             cells: the cell behind each joint, shape (joints,).
@@ -64,20 +64,26 @@ def _cached(digest):
         distance, sum_ = 0.0, 0.0
         for cell in range(size):
             s, table = shape[waves[cell]], tables[waves[cell]]
+            count = table.shape[0]
             x, y = (now[0, cell] - s[0]) / s[2], (now[0, size + cell] - s[1]) / s[3]
             dx, dy = now[1, cell] / s[2], now[1, size + cell] / s[3]
             square = x * x + y * y
             turn = math.atan2(y, x) / TURN
-            turned[0, cell] = turn + lookup(table[0], turn)
+            # Linear between two rows; the comparison keeps NaN from becoming an index.
+            place = (turn - math.floor(turn)) * count
+            low = int(place) if place >= 0.0 else 0
+            rest = place - low
+            low = low if low < count else 0
+            here, there = table[low], table[low + 1 if low + 1 < count else 0]
+            turned[0, cell] = turn + here[0] + rest * (there[0] - here[0])
             turned[1, cell] = turned[2, cell] = turned[3, cell] = 0.0
-            radius = lookup(table[2], turn)
+            radius = here[2] + rest * (there[2] - here[2])
             if square > 1e-6:
                 speed = (x * dy - y * dx) / square * period / TURN
-                turned[1, cell] = speed / lookup(table[1], turn)
+                turned[1, cell] = speed / (here[1] + rest * (there[1] - here[1]))
                 q = square / (radius * radius)
                 if q < 1.0:
-                    grows = (lookup(table[2], turn + 0.5 / TABLE)
-                             - lookup(table[2], turn - 0.5 / TABLE)) * TABLE * speed
+                    grows = (there[2] - here[2]) * count * speed
                     rate = 2.0 * q * ((x * dx + y * dy) * period / square - grows / radius)
                     turned[2, cell] = 1.0 - (1.0 - q)**3
                     turned[3, cell] = 3.0 * (1.0 - q) * (1.0 - q) * rate
@@ -94,9 +100,10 @@ def _cached(digest):
             cell = cells[joint]
             terms = harmonics[waves[cell]]
             x, y, z = terms[0, 0], 0.0, 0.0
+            c1, s1 = math.cos(TURN * turned[0, cell]), math.sin(TURN * turned[0, cell])
+            c, s_ = 1.0, 0.0
             for k in range(1, terms.shape[0]):
-                c = math.cos(k * TURN * turned[0, cell])
-                s_ = math.sin(k * TURN * turned[0, cell])
+                c, s_ = c * c1 - s_ * s1, s_ * c1 + c * s1
                 along = terms[k, 0] * c + terms[k, 1] * s_
                 across = terms[k, 1] * c - terms[k, 0] * s_
                 x += along
@@ -192,7 +199,7 @@ class PhaseMap:
     def __init__(self, orbit: Orbit, harmonics: int) -> None:
         count = int(orbit.waves.max()) + 1
         theta, grid = np.arange(POINTS) / POINTS, np.arange(TABLE) / TABLE
-        self.shape, self.tables = np.empty((count, 4)), np.empty((count, 3, TABLE))
+        self.shape, self.tables = np.empty((count, 4)), np.empty((count, TABLE, 3))
         self.terms, self.crests = np.empty((count, 1 + harmonics, 2)), np.empty(count)
         for wave, ((v_mid, v_half), (w_mid, w_half)) in enumerate(orbit.levels):
             v, dv = ((orbit.waveform(theta, order, wave, 0) - (v_mid if order == 0 else 0.0))
@@ -210,7 +217,7 @@ class PhaseMap:
             late = np.concatenate([theta - 1.0, theta, theta + 1.0]) - angles
             speed = (x * dw - y * dv) / (x * x + y * y) / TURN
             for row, values in enumerate((late, np.tile(speed, 3), np.tile(np.hypot(x, y), 3))):
-                self.tables[wave, row] = np.interp(grid, angles, values)
+                self.tables[wave, :, row] = np.interp(grid, angles, values)
             self.terms[wave] = smooth_terms(v, harmonics)
             self.crests[wave] = _crest(self.terms[wave])
 
