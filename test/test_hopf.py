@@ -61,7 +61,7 @@ def test_verified_figures(network, gait, omega, tau, k1, k2, p1, p2):
     found = (point.omega, point.tau, point.normal_form.k1.real, point.normal_form.k2.real,
              point.published.k1.real, point.published.k2.real)
     assert found == pytest.approx((omega, tau, k1, k2, p1, p2), abs=6e-5)
-    assert point.direction == 1 and point.supercritical and point.stable_on_centre_manifold
+    assert point.direction == 1 and point.supercritical and point.normal_form.side == 1
     # None of them is stable in the full network (DESIGN 2.4, no. 3).
     assert point.unstable_transverse_roots > 0
 
