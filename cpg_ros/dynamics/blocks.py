@@ -48,12 +48,9 @@ class Block:
         return all(2 * shift % 1 == 0 for _, shift in self.symmetry.shifts)
 
     @property
-    def wave(self) -> str | None:
-        """How the wave of walk and jump runs round the rings; None where there is none.
-
-        'forward': cell i + 2 leads cell i, j = 1; 'reverse': it follows, j = 3.
-        """
-        return None if self.real else 'forward' if self.mode[0] == 1 else 'reverse'
+    def wave(self) -> str:
+        """How the wave of walk and jump runs round the rings: '' for the gaits that stand."""
+        return '' if self.real else ('LF leads LH' if self.mode[0] == 1 else 'LH leads LF')
 
     @property
     def vector(self) -> np.ndarray:

@@ -82,8 +82,8 @@ class CellHopf:
         return self.block.mode
 
     @property
-    def wave(self) -> str | None:
-        """Of walk and jump, 'forward' or 'reverse', as in the block."""
+    def wave(self) -> str:
+        """How the wave of walk and jump runs round the rings, as in the block."""
         return self.block.wave
 
     @property
@@ -98,18 +98,8 @@ class CellHopf:
 
     @property
     def supercritical(self) -> bool:
-        """Whether l1 < 0: the orbits lie where the pair is unstable, on either side of value."""
-        return self.lyapunov < 0.0
-
-    @property
-    def stable_on_centre_manifold(self) -> bool:
-        """Whether the orbits attract on the centre manifold, l1 < 0 again."""
-        return self.normal_form.stable
-
-    @property
-    def side(self) -> int:
-        """1 where the orbits lie at larger values, -1 at smaller ones."""
-        return 1 if self.normal_form.supercritical else -1
+        """Whether the orbits attract on the centre manifold, l1 < 0."""
+        return self.normal_form.supercritical
 
     @property
     def simple(self) -> bool:

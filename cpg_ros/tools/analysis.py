@@ -10,12 +10,10 @@ from cpg_ros.dynamics.cell_hopf import CellHopf, cell_hopf_points
 from cpg_ros.dynamics.characteristic import leading_roots, unstable_roots
 from cpg_ros.dynamics.hopf import HopfPoint, hopf_points
 from cpg_ros.dynamics.stand import NoStand, stand
-from cpg_ros.dynamics.theorem_4_2 import theorem_4_2
 from cpg_ros.dynamics.verdict import Verdict, nearest_threshold
 from cpg_ros.networks.along import Along
 from cpg_ros.networks.delayed import MODES, Delayed
 from cpg_ros.networks.network import Network
-from cpg_ros.networks.quadruped import Quadruped
 from cpg_ros.tools.arguments import table
 
 
@@ -57,7 +55,9 @@ class Analysis:
         """Gaits that there are."""
         return [verdict for verdict in self.gaits.values() if verdict.orbit is not None]
 
-    def _parameters(self) -> str:
+    @property
+    def parameters(self) -> str:
+        """The network's parameters in a line."""
         values = self.network.as_dict()
         for name, members in self.network.groups.items():
             if len({values[member] for member in members}) == 1:
@@ -114,7 +114,7 @@ class Analysis:
 
     def text(self) -> str:
         """Tables for people."""
-        return '\n'.join([f'{self.network.name}: {self._parameters()}', '', *self._rest(), '',
+        return '\n'.join([f'{self.network.name}: {self.parameters}', '', *self._rest(), '',
                           *self._gaits(), '', self._conclusion()])
 
     def _rest(self) -> list[str]:
@@ -211,6 +211,11 @@ class CellAnalysis(Analysis):
         """Hopf points of the stand, by rising parameter."""
         return self._found[0]
 
+    @property
+    def blocks(self) -> tuple[Block, ...]:
+        """The linearisation at the stand, by symmetry class."""
+        return self._found[1]
+
     def _rest(self) -> list[str]:
         points, parts, state, why = self._found
         if why:
@@ -236,10 +241,6 @@ class CellAnalysis(Analysis):
         lines += [f'Hopf points with {where} (omega in rad per model time; others: further '
                   'eigenvalues with positive', 'real part, transverse: of them outside the '
                   'class):', *(f'  {line}' for line in table(rows, '<<>>>>>><<>>'))]
-        if isinstance(self.network, Quadruped):
-            lines += ['', 'Theorem 4.2 of Buono & Golubitsky at these points:']
-            lines += [f'  {point.gait} at {point.value:.4f}: {theorem_4_2(point)}'
-                      for point in points]
         return lines
 
     def as_dict(self) -> dict[str, Any]:

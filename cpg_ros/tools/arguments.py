@@ -13,6 +13,7 @@ class Parser(argparse.ArgumentParser):
     """Says what is wrong in one line, with code 2."""
 
     def error(self, message: str) -> NoReturn:
+        """Print the message and end."""
         print(f'{self.prog}: {message}', file=sys.stderr)
         sys.exit(2)
 
