@@ -107,7 +107,8 @@ class Biped(Network):
         """
         return Symmetry.of(D2, GAITS[known(gait, self.gaits())])
 
-    def families(self, symmetry: Symmetry) -> tuple[tuple[str, ...], ...]:
+    @classmethod
+    def families(cls, symmetry: Symmetry) -> tuple[tuple[str, ...], ...]:
         """Weights that H of a gait carries into one another: w(g j -> g i) and w(j -> i)."""
         elements = [D2.elements[name] for name in symmetry.h]
         found: dict[str, tuple[str, ...]] = {'current': ('current',), 'phi': ('phi',)}
