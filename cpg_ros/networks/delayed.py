@@ -13,6 +13,7 @@ import numpy as np
 
 from cpg_ros.networks.jit import tanh
 from cpg_ros.networks.network import Network, Preset, Range, known
+from cpg_ros.networks.symmetry import GAITS
 
 CELLS = 8
 #: Model time per step in real time: 500 steps a cycle, error of a waveform about 1e-9.
@@ -58,10 +59,6 @@ class Mode:
 
 
 MODES = tuple(Mode(j, k) for j in range(4) for k in range(2))
-
-#: Primary gait -> (j, k); j = 1 stands for both senses in which a wave can run round the ring.
-GAITS = {'pronk': (0, 0), 'pace': (0, 1), 'bound': (2, 0), 'trot': (2, 1),
-         'jump': (1, 0), 'walk': (1, 1)}
 
 
 @dataclass(frozen=True)

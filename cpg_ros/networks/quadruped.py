@@ -14,7 +14,7 @@ import numpy as np
 from cpg_ros.networks import morris_lecar
 from cpg_ros.networks.network import Network, Range, known
 from cpg_ros.networks.presets import shipped
-from cpg_ros.networks.symmetry import Z4_Z2, Symmetry
+from cpg_ros.networks.symmetry import GAITS, Z4_Z2, Symmetry
 
 CELLS = 8
 CURRENT, PHI = 1.0, 0.2
@@ -24,11 +24,6 @@ CELL = morris_lecar.Cell(g_ca=3.0, v_ca=1.0, g_k=1.8, v_k=-0.8, g_l=0.6, v_l=-1.
 
 #: Where v and w of cell i hear: i - 2, s(i) and i + 4.
 _HEARD = (np.roll(np.arange(CELLS), 2), np.arange(CELLS) ^ 1, np.roll(np.arange(CELLS), 4))
-
-#: Gait -> (j, k): shifts j/4 of omega and k/2 of kappa (Table 2). j = 1 stands for both senses
-#: in which a wave can run round the ring.
-GAITS = {'pronk': (0, 0), 'pace': (0, 1), 'bound': (2, 0), 'trot': (2, 1),
-         'jump': (1, 0), 'walk': (1, 1)}
 
 
 @dataclass(frozen=True)
