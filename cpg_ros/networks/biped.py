@@ -128,12 +128,7 @@ class Biped(Network):
 
     def jacobian(self, x: np.ndarray) -> np.ndarray:
         """Derivative of the rates by the state, shape (..., components, components)."""
-        v, u = x[..., :CELLS], x[..., CELLS:]
-        matrix = np.zeros((*x.shape, 2 * CELLS))
-        i = np.arange(CELLS)
-        vv, vu, uv, uu = CELL.slopes(v, u, self.phi)
-        matrix[..., i, i], matrix[..., i, i + CELLS] = vv, vu
-        matrix[..., i + CELLS, i], matrix[..., i + CELLS, i + CELLS] = uv, uu
+        matrix, i = CELL.jacobian(x[..., :CELLS], x[..., CELLS:], self.phi), np.arange(CELLS)
         for weights, partners in zip(self._weights(), PARTNERS.values(), strict=True):
             matrix[..., i, i] -= weights
             matrix[..., i, partners] += weights

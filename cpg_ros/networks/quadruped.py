@@ -93,12 +93,7 @@ class Quadruped(Network):
 
     def jacobian(self, x: np.ndarray) -> np.ndarray:
         """Derivative of the rates by the state, shape (..., components, components)."""
-        v, w = x[..., :CELLS], x[..., CELLS:]
-        matrix = np.zeros((*x.shape, 2 * CELLS))
-        i = np.arange(CELLS)
-        vv, vw, wv, ww = CELL.slopes(v, w, PHI)
-        matrix[..., i, i], matrix[..., i, i + CELLS] = vv, vw
-        matrix[..., i + CELLS, i], matrix[..., i + CELLS, i + CELLS] = wv, ww
+        matrix, i = CELL.jacobian(x[..., :CELLS], x[..., CELLS:], PHI), np.arange(CELLS)
         by_v, by_w = (self.alpha, self.gamma, self.xi), (self.beta, self.delta, self.eta)
         for heard, a, b in zip(_HEARD, by_v, by_w, strict=True):
             matrix[..., i, heard] += a
