@@ -151,15 +151,12 @@ def compiled(decorate):
     cell_rates = morris_lecar.compiled(decorate, CELL)
 
     @decorate
-    def field(n, x, k, weight, driven, p, lanes, work, out):
-        """Right-hand side at z = x + weight k; the first row of work holds z afterwards."""
-        z = work[0]
-        for i in range(n):
-            z[i] = x[i] + weight * k[i]
+    def field(n, z, driven, p, lanes, work, out):
+        """Right-hand side at z; work is scratch."""
         half = n // 2
         v, u, dv, du = z[:half], z[half:n], out[:half], out[half:n]
         current, speed, weights = p[0, :half], p[0, half:n], p[1:, :half]
-        cell_rates(half, v, u, current, speed, work[1], dv, du)
+        cell_rates(half, v, u, current, speed, work, dv, du)
         for cell in range(4):
             here, rate = v[cell * lanes:(cell + 1) * lanes], dv[cell * lanes:(cell + 1) * lanes]
             for coupling in range(3):

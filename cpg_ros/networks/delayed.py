@@ -167,19 +167,16 @@ def compiled(decorate):
             for lane in range(lanes):
                 here[lane], other[lane] = other[lane], here[lane]
 
-
     @decorate
-    def field(n, x, k, weight, driven, p, lanes, work, out):
-        """Right-hand side at z = x + weight k: a z_i + b tanh(z_i) + d tanh(z_{i-2}) + driven_i.
+    def field(n, z, driven, p, lanes, work, out):
+        """Right-hand side at z: a z_i + b tanh(z_i) + d tanh(z_{i-2}) + driven_i.
 
-        work is scratch of shape (2, n + 2 lanes); its first row holds z afterwards.
+        work is scratch of shape (n + 2 lanes,).
         """
         ring = 2 * lanes
         # The ring laid out straight: `behind` is `squashed` seen from two cells before. (Slices,
         # not index sums, because those would be checked for negative values in every pass.)
-        z, behind, squashed = work[0], work[1], work[1, ring:]
-        for i in range(n):
-            z[i] = x[i] + weight * k[i]
+        behind, squashed = work, work[ring:]
         for i in range(n):
             squashed[i] = tanh(z[i])
         for i in range(ring):

@@ -115,14 +115,11 @@ def compiled(decorate):
     cell_rates = morris_lecar.compiled(decorate, CELL)
 
     @decorate
-    def field(n, x, k, weight, driven, p, lanes, work, out):
-        """Right-hand side at z = x + weight k; the first row of work holds z afterwards."""
-        z = work[0]
-        for i in range(n):
-            z[i] = x[i] + weight * k[i]
+    def field(n, z, driven, p, lanes, work, out):
+        """Right-hand side at z; work is scratch."""
         half = n // 2
         v, w, dv, dw = z[:half], z[half:n], out[:half], out[half:n]
-        cell_rates(half, v, w, p[3, :half], p[3, half:n], work[1], dv, dw)
+        cell_rates(half, v, w, p[3, :half], p[3, half:n], work, dv, dw)
         # Slices, not index sums: those would be checked for negative values in every pass.
         pair, ring = 2 * lanes, 8 * lanes
         for block in range(2):
