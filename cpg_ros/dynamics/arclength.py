@@ -9,7 +9,7 @@ fold, where it turns round, is a point like all others.
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
@@ -67,12 +67,16 @@ class Place:
         curve: the discretisation that it is a point of.
         z: unknowns; the last two are a period and the parameter.
         tangent: in the direction in which the curve is followed.
+        steps: that Newton's method took to it.
+        cosine: of the angle between the tangent and the border, if that was a unit vector.
 
     """
 
     curve: Curve
     z: np.ndarray
     tangent: np.ndarray
+    steps: int = 0
+    cosine: float = 1.0
 
     @property
     def value(self) -> float:
@@ -91,11 +95,11 @@ class Place:
 
     def reversed(self) -> 'Place':
         """The same point, to be left the other way."""
-        return Place(self.curve, self.z, -self.tangent)
+        return replace(self, tangent=-self.tangent)
 
 
-def corrected(curve: Curve, z: np.ndarray, border: np.ndarray) -> tuple[Place, int] | None:
-    """Return the curve's point near z, z + v with (v, border) = 0, and Newton's steps to it."""
+def corrected(curve: Curve, z: np.ndarray, border: np.ndarray) -> Place | None:
+    """Return the curve's point z + v with (v, border) = 0; None if Newton's method has lost it."""
     with np.errstate(all='ignore'):
         for count in range(1, NEWTON + 1):
             try:
@@ -109,44 +113,74 @@ def corrected(curve: Curve, z: np.ndarray, border: np.ndarray) -> tuple[Place, i
                 return None
             if size <= TOLERANCE:
                 length = math.sqrt(curve.product(direction, direction))
-                return Place(curve, z, direction / length), count
+                return Place(curve, z, direction / length, count, 1.0 / length)
     return None
 
 
-def resolved(place: Place) -> Place | None:
-    """Return the same point in a discretisation that resolves it; None if Newton fails there.
+def resolved(curve: Curve, z: np.ndarray, border: np.ndarray) -> Place | None:
+    """Return the curve's point near z in a discretisation that resolves it.
 
     Raises:
         NoOrbit: it cannot be resolved.
 
     """
-    again = False
-    while True:
-        new = place.curve.renewed(place.z, place.tangent, again)
+    place = first = corrected(curve, z, border)
+    while place is not None and first is not None:
+        new = place.curve.renewed(place.z, border, place is not first)
         if new is None:
-            return place
-        found = corrected(*new)
-        if found is None:
-            return None
-        place, again = found[0], True
+            return replace(place, steps=first.steps, cosine=first.cosine)
+        border = new[2]
+        place = corrected(*new)
+    return None
 
 
-def along(place: Place, step: float) -> tuple[Place, int] | None:
-    """Return the point a step along the tangent and Newton's steps to it."""
+def held(size: int, which: int) -> np.ndarray:
+    """The border that holds one of the unknowns."""
+    border = np.zeros(size)
+    border[which] = 1.0
+    return border
+
+
+def along(place: Place, step: float) -> Place | None:
+    """Return the point a step along the tangent, in the same discretisation."""
     return corrected(place.curve, place.z + step * place.tangent, place.tangent)
 
 
 def pinned(place: Place, value: float) -> Place | None:
     """Return the curve's point with a value of the parameter, from one nearby; None if lost."""
-    border = np.zeros_like(place.z)
-    border[-1] = 1.0
-    z = place.z + (value - place.value) / place.rate * place.tangent if place.rate else place.z
+    z = place.z + (value - place.value) / place.rate * place.tangent
     z[-1] = value
-    found = corrected(place.curve, z, border)
-    here = resolved(found[0]) if found is not None else None
-    if here is None:
+    found = resolved(place.curve, z, held(z.size, -1))
+    if found is None:
         return None
-    return here if here.rate * place.rate > 0.0 else here.reversed()
+    found.z[-1] = value
+    # The border makes the value rise.
+    return found if place.rate > 0.0 else found.reversed()
+
+
+def crossing(here: Place, way: float, value: float) -> Place | None:
+    """Return the next point with a value of the parameter; None if Newton's method finds none.
+
+    Args:
+        here: a point before it, which may be a fold.
+        way: 1 or -1, along the tangent or back.
+        value: that the parameter reaches monotonically from here.
+
+    """
+    def gap(step: float) -> float:
+        found = along(here, way * step)
+        if found is None:
+            raise np.linalg.LinAlgError('no point')
+        return found.value - value
+
+    reach, sign = 1e-3, math.copysign(1.0, here.value - value)
+    try:
+        while sign * gap(reach) > 0.0:
+            reach *= 2.0
+        near = along(here, way * brentq(gap, 0.0, reach, xtol=1e-2 * reach))
+    except np.linalg.LinAlgError:
+        return None
+    return pinned(near, value) if near is not None and near.rate else None
 
 
 def fold(after: Place, step: float) -> Place | None:
@@ -155,14 +189,13 @@ def fold(after: Place, step: float) -> Place | None:
         found = along(after, back)
         if found is None:
             raise np.linalg.LinAlgError('no point')
-        return found[0].rate
+        return found.rate
 
     try:
         for reach in (1.1, 1.4, 2.0):
             if rate(-reach * step) * after.rate < 0.0:
-                found = along(after, brentq(rate, -reach * step, 0.0, xtol=1e-9 * step,
-                                            rtol=1e-12))
-                return found[0] if found is not None else None
+                return along(after, brentq(rate, -reach * step, 0.0, xtol=1e-9 * step,
+                                           rtol=1e-12))
     except np.linalg.LinAlgError:
         # Where two curves cross, as at a gain of symmetry, Newton's method may fail.
         return None
@@ -204,12 +237,10 @@ def follow(start: Place, low: float, high: float, visit: Callable[[Place], str],
         if step < SHORTEST:
             return folds, 'lost'
         try:
-            found = along(here, step)
-            ahead = resolved(found[0]) if found is not None else None
+            ahead = resolved(here.curve, here.z + step * here.tangent, here.tangent)
         except NoOrbit:
             return folds, 'steep'
-        turned = 0.0 if found is None else here.curve.product(here.tangent, found[0].tangent)
-        if found is None or ahead is None or turned < ALIGNED:
+        if ahead is None or ahead.cosine < ALIGNED:
             step *= 0.5
             continue
         stations = [ahead]
@@ -231,6 +262,6 @@ def follow(start: Place, low: float, high: float, visit: Callable[[Place], str],
                 folds.append(count)
             count += 1
         here = ahead
-        if found[1] <= 4 and turned > 1.0 - 0.3 * (1.0 - ALIGNED):
+        if ahead.steps <= 4 and ahead.cosine > 1.0 - 0.3 * (1.0 - ALIGNED):
             step *= 1.5
     return folds, 'steps'

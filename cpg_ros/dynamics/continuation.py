@@ -5,7 +5,7 @@ how it ends: at a Hopf point of the rest state, where its amplitude falls to zer
 more symmetry, near a homoclinic orbit, where its period has no bound, or at the ends asked for.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -35,7 +35,7 @@ class BranchPoint:
     Attributes:
         value: where on the line.
         orbit: of the network there. At a fold its derivatives by parameters have no bound.
-        place: the same as continuation has it.
+        place: the same as continuation has it, with the tangent along the branch.
 
     """
 
@@ -118,9 +118,10 @@ class Branch:
             if left.value == value:
                 found.append(left.orbit)
             elif (left.value - value) * (right.value - value) < 0.0:
-                # From the end that is farther from a fold.
-                near = max(left.place, right.place, key=lambda place: abs(place.rate))
-                place = arclength.pinned(near, value)
+                # From the end that is nearer to a fold, where the value is yet to pick up.
+                place = (arclength.crossing(left.place, 1.0, value)
+                         if abs(left.place.rate) < abs(right.place.rate) else
+                         arclength.crossing(right.place, -1.0, value))
                 if place is None:
                     raise NoOrbit(f'no orbit was found at {self.along} {value:g}')
                 found.append(place.curve.orbit(place.z))  # type: ignore[attr-defined]
@@ -163,13 +164,9 @@ def follow(orbit: DelayedOrbit | MeshOrbit, along: Along, low: float, high: floa
         ends = np.vstack([orbit.coefficients[0], orbit.coefficients[:, -1].sum(axis=0)])
         length = orbit.period / orbit.symmetry.order
         z = curve.pack(Solution(orbit.mesh, ends, orbit.stages, length), length, value)
-    start = None
     # At a fold the value cannot be held, but the period can.
-    for held in (-1, -2):
-        border = np.zeros_like(z)
-        border[held] = 1.0
-        found = arclength.corrected(curve, z, border) if start is None else None
-        start = arclength.resolved(found[0]) if found is not None else start
+    start = (arclength.resolved(curve, z, arclength.held(z.size, -1))
+             or arclength.resolved(curve, z, arclength.held(z.size, -2)))
     if start is None:
         raise NoOrbit(f"Newton's method fails at the orbit given, {along} {value:g}")
     start = start if start.rate >= 0.0 else start.reversed()
@@ -183,7 +180,8 @@ def follow(orbit: DelayedOrbit | MeshOrbit, along: Along, low: float, high: floa
         before, back, begin = _run(start.reversed(), limits, steps)
     here = BranchPoint(value, curve.orbit(start.z), start)
     n = len(before)
-    return Branch(along, (*before[::-1], here, *points),
+    earlier = [replace(point, place=point.place.reversed()) for point in reversed(before)]
+    return Branch(along, (*earlier, here, *points),
                   (*(n - 1 - k for k in reversed(back)), *(n + 1 + k for k in turns)),
                   (begin, end))
 
@@ -234,8 +232,7 @@ def from_hopf(network: Network, symmetry: Mode | Symmetry, omega: float, along: 
         curve = MeshCurve(network, symmetry, along, scales,  # type: ignore[arg-type]
                           np.linspace(0.0, 1.0, INTERVALS + 1))
         rest, border = _harmonic(curve, stand, vector, period)
-    found = arclength.corrected(curve, rest + amplitude * border, border)
-    start = arclength.resolved(found[0]) if found is not None else None
+    start = arclength.resolved(curve, rest + amplitude * border, border)
     if start is None:
         raise NoOrbit(f'no orbit of amplitude {amplitude:g} was found near {along} {value:g}')
     points, turns, end = _run(start, (low, high, longest * period), {
