@@ -178,7 +178,7 @@ def follow(orbit: DelayedOrbit | MeshOrbit, along: Along, low: float, high: floa
     begin = End('start', value, orbit.period)
     if both:
         before, back, begin = _run(start.reversed(), limits, steps)
-    here = BranchPoint(value, curve.orbit(start.z), start)
+    here = BranchPoint(value, start.curve.orbit(start.z), start)  # type: ignore[attr-defined]
     n = len(before)
     earlier = [replace(point, place=point.place.reversed()) for point in reversed(before)]
     return Branch(along, (*earlier, here, *points),
@@ -237,7 +237,8 @@ def from_hopf(network: Network, symmetry: Mode | Symmetry, omega: float, along: 
         raise NoOrbit(f'no orbit of amplitude {amplitude:g} was found near {along} {value:g}')
     points, turns, end = _run(start, (low, high, longest * period), {
         'first_step': first_step, 'longest_step': longest_step, 'most': most})
-    here = BranchPoint(start.value, curve.orbit(start.z), start)
+    orbit = start.curve.orbit(start.z)  # type: ignore[attr-defined]
+    here = BranchPoint(start.value, orbit, start)
     return Branch(along, (here, *points), tuple(1 + k for k in turns),
                   (End('rest', value, period), end))
 

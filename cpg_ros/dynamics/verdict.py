@@ -8,13 +8,18 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
+from cpg_ros.dynamics.continuation import from_hopf
 from cpg_ros.dynamics.floquet import Multipliers, multipliers, smallest_gain
-from cpg_ros.dynamics.hopf import hopf_point
+from cpg_ros.dynamics.hopf import hopf_point, hopf_points
 from cpg_ros.dynamics.orbit import NoOrbit, Orbit, solve_orbit
 from cpg_ros.dynamics.stability import stability
+from cpg_ros.networks.along import Along
 from cpg_ros.networks.delayed import Delayed
 from cpg_ros.networks.network import Network
 
+#: Hopf points are looked at up to this many times the delay, and so many turns more than the
+#: first of their kind.
+FURTHEST, TURNS = 4.0, 1
 #: Cells of the biped, by what they drive.
 MUSCLES = ('left_flexor', 'right_flexor', 'left_extensor', 'right_extensor')
 
@@ -113,9 +118,36 @@ def verdicts(network: Network, done: Callable[[int], None] = lambda count: None
         try:
             found[gait] = Verdict(gait, solve_orbit(network, gait))
         except NoOrbit as error:
-            found[gait] = Verdict(gait, None, str(error))
+            found[gait] = (_beyond(network, gait, str(error)) if isinstance(network, Delayed)
+                           else Verdict(gait, None, str(error)))
     done(len(found))
     return found
+
+
+def _beyond(network: Delayed, gait: str, why: str) -> Verdict:
+    """Look for an orbit that the solver does not reach from the first onset.
+
+    Those born with unstable roots in their own class, and those beyond a fold, lie on the
+    branches of the gait's Hopf points.
+    """
+    points = [point for point in hopf_points(network, FURTHEST * network.tau)
+              if point.mode == network.symmetry(gait)]
+    along = Along.parse('tau', Delayed)
+    for point in points:
+        if (point.tau < network.tau) != (point.normal_form.side > 0) or point.n > TURNS:
+            continue
+        low, high = sorted((0.9 * point.tau, network.tau)) if point.normal_form.side > 0 else (
+            0.5 * network.tau, 1.1 * point.tau)
+        try:
+            branch = from_hopf(point.network, point.mode, point.omega, along, low, high, most=80)
+            orbits = branch.at(network.tau)
+        except NoOrbit:
+            continue
+        if orbits:
+            return Verdict(gait, orbits[-1])
+    if points and points[0].tau > network.tau:
+        why = f"tau {network.tau:g} is below the {gait}'s critical delay {points[0].tau:.4f}"
+    return Verdict(gait, None, why)
 
 
 def nearest_threshold(network: Delayed) -> str:
