@@ -91,7 +91,10 @@ class Analysis:
 
     @staticmethod
     def _reason(verdict: Verdict) -> str:
-        return verdict.why.removeprefix(f'no {verdict.gait} ')
+        """Why there is no such gait, without the list of all parameters."""
+        said = verdict.why.removeprefix(f'no {verdict.gait} ')
+        head, way, _ = said.partition(' of the way, to ')
+        return f'{head} of the way, no further' if way else said
 
     def _conclusion(self) -> str:
         """The whole in a sentence or two."""
@@ -165,9 +168,9 @@ class DelayAnalysis(Analysis):
 
     def _conclusion(self) -> str:
         assert isinstance(self.network, Delayed)
-        said = super()._conclusion()
-        return said if self.existing else f'{said} {nearest_threshold(self.network)}.'.replace(
-            'gait. the', 'gait: the').replace('gait. every', 'gait: every')
+        if self.existing:
+            return super()._conclusion()
+        return f'This set gives no gait; {nearest_threshold(self.network)}.'
 
     def as_dict(self) -> dict[str, Any]:
         """Everything in plain types."""
