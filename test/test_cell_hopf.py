@@ -39,7 +39,7 @@ def spectrum(point, value):
 
 def exact(point, mu):
     """The orbit at a distance mu of the parameter, on the side where the orbits lie."""
-    value = point.value + point.side * mu
+    value = point.value + point.normal_form.side * mu
     return value, collocate(point.along.at(point.network, value), point.block.symmetry,
                             lambda theta: point.path(value, theta), point.period(value))
 
@@ -98,7 +98,7 @@ def test_no_crossing_is_missed(line):
 def test_normal_form_predicts_the_exact_orbits(line):
     for point in found(line):
         # As far from onset as makes the amplitude 0.01, and half as far.
-        far = 1e-4 / point.amplitude(point.value + point.side)**2
+        far = 1e-4 / point.amplitude(point.value + point.normal_form.side)**2
         sizes, turns = [], []
         for mu in (far, far / 2.0):
             value, orbit = exact(point, mu)
@@ -110,7 +110,7 @@ def test_normal_form_predicts_the_exact_orbits(line):
         shift = orbit.period * point.omega / (2.0 * np.pi) - 1.0
         assert abs(turns[1]) < 0.03 * abs(shift)
         with pytest.raises(ValueError, match='no orbit'):
-            point.amplitude(point.value - point.side * 1e-3)
+            point.amplitude(point.value - point.normal_form.side * 1e-3)
 
 
 @EVERY
@@ -118,10 +118,11 @@ def test_stability_of_exact_orbits_is_that_of_the_normal_form(line):
     for point in found(line):
         if not point.stable:
             continue
-        value, orbit = exact(point, 1e-4 / point.amplitude(point.value + point.side)**2)
+        side = point.normal_form.side
+        value, orbit = exact(point, 1e-4 / point.amplitude(point.value + side)**2)
         mine = multipliers(orbit)
-        leading = mine.leading()
-        assert (leading < 1.0) == point.supercritical == point.stable_on_centre_manifold
+        leading = mine.leading
+        assert (leading < 1.0) == point.supercritical
         # The radius obeys r' = k1 mu r + k2 r^3: at the orbit disturbances grow by 2 k2 r^2.
         square = point.normal_form.radius(value - point.value)**2
         growth = np.log(leading) / orbit.period

@@ -28,7 +28,7 @@ TAU = Along.parse('tau', Delayed)
 SWAP = [1, 0, 3, 2, 5, 4, 7, 6]
 # Subcritical Hopf points: parameters, mode, sign of the root and n of DESIGN 2.1.
 SUBCRITICAL = {'pace': (Delayed(-3.4, 3.9, -6.2, 5.4, 1.0), Mode(0, 1), 1, 0),
-               'bound': (Delayed(-2.6, 0.4, 7.5, -9.4, 1.0), Mode(2, 1), 1, 1),
+               'trot': (Delayed(-2.6, 0.4, 7.5, -9.4, 1.0), Mode(2, 1), 1, 1),
                'walk': (Delayed(-3.2, 4.8, 7.6, -7.0, 1.0), Mode(3, 1), 1, 0)}
 
 

@@ -31,8 +31,9 @@ COLOURS = {'pronk': '#805ad5', 'pace': '#2f855a', 'bound': '#b7791f', 'trot': '#
 #: Lines of what attracts by itself, with a symmetry lock, and not at all.
 STYLES: tuple[tuple[Literal['-', '--', ':'], str], ...] = (
     ('-', 'stable'), ('--', 'stable with a lock'), (':', 'unstable'))
-#: Points of a branch at most, how far apart in arclength, and how many branches are drawn.
-POINTS, LONGEST, BRANCHES = 80, 0.2, 12
+#: Points of a branch at most, how far apart in arclength, how many times the first period the
+#: last may be (beyond, near a homoclinic orbit, branches wind), and how many branches are drawn.
+POINTS, LONGEST, SLOWEST, BRANCHES = 80, 0.2, 5.0, 12
 
 
 def branches(analysis: Analysis) -> list[tuple[str, Branch]]:
@@ -50,7 +51,7 @@ def branches(analysis: Analysis) -> list[tuple[str, Branch]]:
         if low <= value <= high and isinstance(orbit, DelayedOrbit | MeshOrbit) and not any(
                 gait == verdict.gait and _holds(branch, value, orbit) for gait, branch in found):
             found.append((verdict.gait, follow(orbit, analysis.along, low, high, most=POINTS,
-                                               longest_step=LONGEST)))
+                                               longest_step=LONGEST, longest=SLOWEST)))
     return found
 
 
@@ -68,11 +69,11 @@ def _born(point: HopfPoint | CellHopf, analysis: Analysis) -> list[Branch]:
     try:
         if isinstance(point, HopfPoint):
             return [from_hopf(point.network, point.mode, point.omega, analysis.along, low, high,
-                              most=POINTS, longest_step=LONGEST)]
+                              most=POINTS, longest=SLOWEST, longest_step=LONGEST)]
         vector = np.concatenate([entry * point.block.vector for entry in point.vector])
         return [from_hopf(point.network, point.block.symmetry, point.omega, analysis.along, low,
                           high, stand=everywhere(point.network, point.stand), vector=vector,
-                          most=POINTS, longest_step=LONGEST)]
+                          most=POINTS, longest=SLOWEST, longest_step=LONGEST)]
     except NoOrbit:
         return []
 
