@@ -75,7 +75,7 @@ def main() -> None:
             rows[f'{network} {name}'] = {
                 'ours_ms': 1e3 * ours, 'residual': orbit.residual, 'period': orbit.period,
                 'intervals': orbit.mesh.size - 1, 'multipliers_ms': 1e3 * judged,
-                'leading_multiplier': found.leading(), 'trivial_error': abs(found.trivial - 1.0),
+                'leading_multiplier': found.leading, 'trivial_error': abs(found.trivial - 1.0),
                 'scipy_ms': 1e3 * peer, 'period_difference': abs(period / orbit.period - 1.0),
                 'ratio': peer / ours}
     ratio = statistics.median(row['ratio'] for row in rows.values())

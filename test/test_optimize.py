@@ -91,7 +91,7 @@ def test_its_preset_solves_with_the_gaits_symmetry_and_is_stable(written):
     assert richer(orbit) == ''
     assert orbit(np.array(0.0)) == pytest.approx(preset.start, abs=1e-8)
     assert orbit.period == pytest.approx(preset.period, abs=1e-8)
-    assert multipliers(orbit).leading() < 1.0
+    assert multipliers(orbit).leading < 1.0
 
 
 def test_the_front_is_a_table_with_units(found, written):
@@ -111,7 +111,7 @@ def test_a_two_wave_gait_and_its_picture(tmp_path, capsys):
     assert 'waveforms differ by' in capsys.readouterr().out
     preset = read_presets(tmp_path / 'preset.yaml', Biped)['skip_optimised']
     orbit = solve_preset(preset)
-    assert richer(orbit) == '' and multipliers(orbit).leading() < 1.0
+    assert richer(orbit) == '' and multipliers(orbit).leading < 1.0
     signals = polish.orbit_signals(orbit)
     assert shape_difference(signals[:, 0], signals[:, 2]) > objectives.LEAST_DIFFERENCE
 
@@ -296,7 +296,7 @@ def test_steadiness_is_1_for_a_circle_and_not_positive_for_two_turns():
 def test_shipped_secondary_gaits_are_stable_two_waved_readable_and_stand_noise(gait):
     preset = PRESETS[gait]
     orbit = solve_preset(preset)
-    assert multipliers(orbit).leading() < 0.7
+    assert multipliers(orbit).leading < 0.7
     assert objectives.waveform_shortfall(polish.orbit_signals(orbit), orbit.symmetry) == 0.0
     PhaseReadout(orbit, np.zeros(1, int), np.zeros((1, 6)), np.array([0]), 3)
     assert polish.survives(orbit)

@@ -36,6 +36,7 @@ class DelayedOrbit(Orbit):
 
     """
 
+    network: Delayed
     values: np.ndarray
     d_values: np.ndarray
 

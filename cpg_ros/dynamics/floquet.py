@@ -1,83 +1,114 @@
-"""Floquet multipliers of the gaits of networks without delay.
+"""Floquet multipliers of a gait: what a small disturbance is multiplied by in a period.
 
-A gait lies in Fix(K), K its spatial symmetries. Along it the linearised flow keeps Fix(K) and its
-orthogonal complement apart, so the multipliers split: those within the class, 1 among them, and
-those transverse to it. The symmetry lock -g (I - P) x adds -g on the complement and nothing else:
-it multiplies the transverse multipliers by exp(-g T) exactly.
+They split into those within the gait's symmetry class, 1 among them, and those transverse to it,
+which the symmetry lock -g (I - P) x shrinks and nothing else does.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import null_space
+from scipy.optimize import brentq
 
-from cpg_ros.dynamics.gauss import WEIGHTS
-from cpg_ros.dynamics.mesh_newton import transfer
+from cpg_ros.dynamics.delay_floquet import transverse, variation
+from cpg_ros.dynamics.delayed_orbit import DelayedOrbit
+from cpg_ros.dynamics.mesh_floquet import mesh_multipliers
 from cpg_ros.dynamics.mesh_orbit import MeshOrbit
+from cpg_ros.dynamics.periodic import Orbit
+from cpg_ros.networks.delayed import default_symmetry_gain
+
+#: Gains between none and the bound among which the smallest that is enough is looked for.
+GAINS = 8
 
 
 @dataclass(frozen=True)
 class Multipliers:
-    """Floquet multipliers of an orbit over a period, largest first, without symmetry lock.
+    """Floquet multipliers of an orbit over a period, largest first.
+
+    With a delay there are infinitely many; those that decay to nothing are rounding.
 
     Attributes:
         period: T in model time.
-        within: in Fix(K), without the trivial one.
-        transverse: outside Fix(K).
+        gain: of the symmetry lock, 1/model time.
+        within: in the gait's symmetry class, without the trivial one.
+        transverse: outside of it.
         trivial: the one along the orbit, 1 but for the error of the computation.
 
     """
 
     period: float
+    gain: float
     within: np.ndarray
     transverse: np.ndarray
     trivial: complex
 
-    def leading(self, gain: float = 0.0) -> float:
-        """Modulus of the largest but the trivial one, under a symmetry lock (1/model time)."""
-        sizes = [float(np.abs(part).max(initial=0.0)) for part in (self.within, self.transverse)]
-        return max(sizes[0], sizes[1] * float(np.exp(-gain * self.period)))
+    @property
+    def leading_within(self) -> float:
+        """Modulus of the largest in the class but the trivial one; 0 if there is none."""
+        return float(np.abs(self.within).max(initial=0.0))
 
     @property
-    def gain(self) -> float:
-        """Symmetry gain above which every transverse disturbance decays, 1/model time."""
-        largest = float(np.abs(self.transverse).max(initial=0.0))
-        return max(0.0, float(np.log(largest)) / self.period) if largest > 0.0 else 0.0
+    def leading_transverse(self) -> float:
+        """Modulus of the largest outside the class; 0 if there is none."""
+        return float(np.abs(self.transverse).max(initial=0.0))
+
+    @property
+    def leading(self) -> float:
+        """Modulus of the largest but the trivial one: the gait attracts if it is below 1."""
+        return max(self.leading_within, self.leading_transverse)
 
 
-def multipliers(orbit: MeshOrbit) -> Multipliers:
-    """Compute the multipliers from the variational equation, by the orbit's own collocation."""
-    symmetry, network = orbit.symmetry, orbit.network
-    states = orbit.stages[..., np.concatenate([symmetry.classes + k * (symmetry.classes.max() + 1)
-                                               for k in range(network.variables)])]
-    jacobians = network.jacobian(states)  # type: ignore[attr-defined]
-    lengths = np.diff(orbit.mesh) * orbit.period / symmetry.order
-    blocks = np.arange(network.variables)[:, None] * network.cells
-    turn = np.eye(network.components)[(symmetry.turn + blocks).ravel()]
-    found = []
-    for columns in (symmetry.basis.T, null_space(symmetry.basis)):
-        if not columns.shape[1]:
-            found.append(np.zeros(0, dtype=complex))
-            continue
-        step = _propagated(columns.T @ jacobians @ columns, lengths)
-        # After T/m the cells have changed places; m of these make a period. After m changes a
-        # cell is another one of its class, which only matters outside Fix(K).
-        change, m = columns.T @ turn @ columns, symmetry.order
-        whole = np.linalg.eigvals(np.linalg.matrix_power(change, m)
-                                  @ np.linalg.matrix_power(change.T @ step, m))
-        found.append(whole[np.argsort(-np.abs(whole))])
-    trivial = int(np.abs(found[0] - 1.0).argmin())
-    return Multipliers(orbit.period, np.delete(found[0], trivial), found[1],
-                       complex(found[0][trivial]))
+def within_class(orbit: DelayedOrbit) -> float:
+    """Return the modulus of the leading multiplier within the class but the trivial one."""
+    return float(np.abs(_parted(variation(orbit)[1])[0]).max(initial=0.0))
 
 
-def _propagated(jacobians: np.ndarray, lengths: np.ndarray) -> np.ndarray:
-    """Solution of the linear equation over all intervals, shape (d, d)."""
-    d = jacobians.shape[-1]
-    stages, _ = transfer(jacobians, lengths, np.zeros((*jacobians.shape[:3], 0)))
-    steps = np.eye(d) + lengths[:, None, None] * np.einsum('s,nsij,nsjk->nik', WEIGHTS,
-                                                           jacobians, stages)
-    whole = np.eye(d)
-    for step in steps:
-        whole = step @ whole
-    return whole
+def multipliers(orbit: Orbit, gain: float = 0.0) -> Multipliers:
+    """Compute the multipliers from the variational equation along the orbit.
+
+    Args:
+        orbit: of any network.
+        gain: of a symmetry lock, 1/model time.
+
+    """
+    if isinstance(orbit, DelayedOrbit):
+        equation, inside = variation(orbit)
+        outside = transverse(equation, orbit.symmetry, gain)
+    elif isinstance(orbit, MeshOrbit):
+        inside, outside = mesh_multipliers(orbit)
+        outside = outside * np.exp(-gain * orbit.period)
+    else:
+        raise TypeError(f'multipliers of {type(orbit).__name__} are not known')
+    rest, trivial = _parted(inside)
+    return Multipliers(orbit.period, gain, _sorted(rest), _sorted(outside), trivial)
+
+
+def _sorted(values: np.ndarray) -> np.ndarray:
+    return values[np.argsort(-np.abs(values), kind='stable')]
+
+
+def _parted(inside: np.ndarray) -> tuple[np.ndarray, complex]:
+    """Take the trivial multiplier out of those within the class."""
+    place = int(np.abs(inside - 1.0).argmin())
+    return np.delete(inside, place), complex(inside[place])
+
+
+def smallest_gain(orbit: Orbit) -> float:
+    """Return the symmetry gain above which every transverse disturbance decays, 1/model time."""
+    if isinstance(orbit, MeshOrbit):
+        largest = multipliers(orbit).leading_transverse
+        return max(0.0, float(np.log(largest)) / orbit.period) if largest > 0.0 else 0.0
+    if not isinstance(orbit, DelayedOrbit):
+        raise TypeError(f'multipliers of {type(orbit).__name__} are not known')
+    equation, _ = variation(orbit)
+
+    def growth(gain: float) -> float:
+        """Logarithm of the leading transverse multiplier."""
+        return float(np.log(np.abs(transverse(equation, orbit.symmetry, gain)).max()))
+
+    # With a delay a lock need not help evenly: from the bound, which is enough, downward.
+    enough = default_symmetry_gain(orbit.network, rate=0.0)
+    for gain in enough * np.arange(GAINS - 1, -1, -1) / GAINS:
+        if growth(gain) >= 0.0:
+            return float(brentq(growth, gain, enough, xtol=1e-10))
+        enough = gain
+    return 0.0

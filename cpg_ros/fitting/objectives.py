@@ -170,7 +170,7 @@ def _proven(score: Score, cycle: Cycle, gait: str) -> Score:
     if orbit is None or richer(orbit) or abs(orbit.period / cycle.period - 1.0) > SAME_PERIOD:
         # What is near the gait but not on it has no right to the estimate.
         return replace(score, stability=max(1.0, score.stability))
-    return replace(score, stability=multipliers(orbit).leading(), exact=True,
+    return replace(score, stability=multipliers(orbit).leading, exact=True,
                    state=tuple(orbit(np.array(0.0)).tolist()), period=orbit.period)
 
 

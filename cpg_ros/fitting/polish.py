@@ -129,7 +129,7 @@ def polish(score: Score, gait: str, seed: int = 0) -> Chosen:
         preset, orbit = exact_preset(Preset(gait, score.network, score.state, score.period))
     except NoOrbit as error:
         raise NotGood(str(error)) from error
-    leading = multipliers(orbit).leading()
+    leading = multipliers(orbit).leading
     if leading >= 1.0:
         raise NotGood(f'its orbit is not stable, with a leading multiplier of {leading:.3f}')
     signals = orbit_signals(orbit)

@@ -98,6 +98,22 @@ class Delayed(Network):
         """The kernel's coefficients a, b, c, d, shape (4, cells)."""
         return np.repeat(np.array(astuple(self)[:4], dtype=float)[:, None], CELLS, axis=1)
 
+    def jacobian(self, x: np.ndarray) -> np.ndarray:
+        """Derivative of the rates by the state now, shape (..., 8, 8)."""
+        slopes = 1.0 - np.tanh(x)**2
+        matrix = np.zeros((*x.shape, CELLS))
+        i = np.arange(CELLS)
+        matrix[..., i, i] = self.a + self.b * slopes
+        matrix[..., i, i - 2] = self.d * slopes[..., i - 2]
+        return matrix
+
+    def delayed_jacobian(self, past: np.ndarray) -> np.ndarray:
+        """Derivative of the rates by the state a delay ago, shape (..., 8, 8)."""
+        matrix = np.zeros((*past.shape, CELLS))
+        i = np.arange(CELLS)
+        matrix[..., i, i ^ 1] = self.c * (1.0 - np.tanh(past)**2)[..., i ^ 1]
+        return matrix
+
     @classmethod
     def gaits(cls) -> tuple[str, ...]:
         """Names of the six primary gaits."""

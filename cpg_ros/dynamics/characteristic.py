@@ -1,0 +1,61 @@
+"""Characteristic roots of the delayed network's rest state, all of them, by Lambert's W.
+
+In the symmetry class (j, k) the characteristic equation is ``lambda = A + B exp(-lambda tau)``
+(DESIGN 2.1), so ``(lambda - A) tau`` is a branch of W at ``B tau exp(-A tau)``:
+``lambda_n = A + W_n(B tau exp(-A tau)) / tau``. Real parts fall as n goes from 0 to either side.
+"""
+
+import numpy as np
+from scipy.special import lambertw
+
+from cpg_ros.networks.delayed import MODES, Delayed, Mode
+
+#: Beyond this exponent exp overflows, and W is taken from the logarithm of its argument.
+LARGEST = 700.0
+
+
+def _branches(a: complex, b: float, tau: float, n: np.ndarray) -> np.ndarray:
+    """W_n(b tau exp(-a tau)), shape like n."""
+    exponent = -a * tau
+    if exponent.real <= LARGEST:
+        return lambertw(b * tau * np.exp(exponent), n)
+    # w + log w = log z + 2 pi i n: a few steps of Newton, as |log z| is large.
+    logarithm = np.log(complex(b * tau)) + exponent
+    turns = np.round((logarithm.imag - np.angle(np.exp(1j * logarithm.imag))) / (2.0 * np.pi))
+    wanted = logarithm + 2j * np.pi * (n - turns)
+    w = wanted - np.log(wanted)
+    for _ in range(8):
+        w = w - (w + np.log(w) - wanted) / (1.0 + 1.0 / w)
+    return w
+
+
+def characteristic_roots(network: Delayed, mode: Mode, count: int = 9) -> np.ndarray:
+    """Return the mode's rightmost roots, 1/model time.
+
+    Args:
+        network: parameters; c must not be zero.
+        mode: the symmetry class.
+        count: how many roots to return; those of 2 count + 1 branches are looked at.
+
+    Returns:
+        Complex numbers by falling real part, shape (count,).
+
+    """
+    a, b = mode.eigenvalue_terms(network)
+    roots = a + _branches(complex(a), b, network.tau, np.arange(-count, count + 1)) / network.tau
+    return roots[np.argsort(-roots.real, kind='stable')][:count]
+
+
+def unstable_roots(network: Delayed, mode: Mode) -> np.ndarray:
+    """Return the mode's roots with positive real part, by falling real part."""
+    count = 9
+    while True:
+        roots = characteristic_roots(network, mode, count)
+        if roots[-1].real <= 0.0:
+            return roots[roots.real > 0.0]
+        count *= 2
+
+
+def leading_roots(network: Delayed) -> dict[Mode, complex]:
+    """Return each mode's rightmost root, 1/model time."""
+    return {mode: complex(characteristic_roots(network, mode, 1)[0]) for mode in MODES}

@@ -1,0 +1,126 @@
+"""Floquet multipliers of the delayed network's gaits: the variational equation, spectrally.
+
+``z' = (J(t) - g (1 - P)) z + K(t) z(t - tau)`` along the orbit, g the symmetry lock. What two
+symmetries of every gait do, omega^2 (i -> i + 4) and kappa (s), is multiply z by +-1 in each of
+four subspaces, which the equation keeps apart; the gait's class is one of them (walk, jump) or
+half of one. A history is held at Chebyshev points of equal elements of [-tau, 0]. Elements of the
+same length march over a period, so that a delayed value always lies at a point; the monodromy
+matrix takes the values of one history to those a period later (Breda, Maset & Vermiglio 2012).
+"""
+
+import numpy as np
+
+from cpg_ros.dynamics.delayed_orbit import DelayedOrbit
+from cpg_ros.networks.delayed import CELLS, Mode
+
+#: Polynomial degree on an element, and how much of a period one holds at most.
+DEGREE, SPAN = 20, 0.3
+#: Elements are halved until the trivial multiplier is 1 to this.
+TRIVIAL = 1e-9
+HALVINGS = 4
+
+
+def subspaces(mode: Mode) -> tuple[np.ndarray, list[np.ndarray]]:
+    """Return orthonormal columns of the gait's class, and of the subspaces transverse to it."""
+    inside, outside = mode.basis.T, []
+    i = np.arange(CELLS)
+    for half, side in ((1, 1), (1, -1), (-1, 1), (-1, -1)):
+        both = 0.5 * half**(i // 4) * side**(i % 2) * (i // 2 % 2 == np.arange(2)[:, None])
+        rest = both.T - inside @ (inside.T @ both.T)
+        columns, sizes, _ = np.linalg.svd(rest, full_matrices=False)
+        if (sizes > 0.5).any():
+            outside.append(columns[:, sizes > 0.5])
+    return inside, outside
+
+
+def _differentiation(degree: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Chebyshev points of [0, 1], the derivative matrix there, and barycentric weights."""
+    k = np.arange(degree + 1)
+    points = 0.5 * (1.0 - np.cos(np.pi * k / degree))
+    weights = (-1.0) ** k
+    weights[[0, -1]] *= 0.5
+    gaps = points[:, None] - points + np.eye(degree + 1)
+    matrix = weights / weights[:, None] / gaps
+    np.fill_diagonal(matrix, 0.0)
+    np.fill_diagonal(matrix, -matrix.sum(axis=1))
+    return points, matrix, weights
+
+
+POINTS, DERIVATIVE, _WEIGHTS = _differentiation(DEGREE)
+
+
+def _interpolation(places: np.ndarray) -> np.ndarray:
+    """Matrix from values at the points to values at places in [0, 1], shape (m, degree + 1)."""
+    gaps = places[:, None] - POINTS
+    exact = np.abs(gaps) < 1e-14
+    rows = _WEIGHTS / np.where(exact, 1.0, gaps)
+    rows /= rows.sum(axis=1, keepdims=True)
+    return np.where(exact.any(axis=1, keepdims=True), exact.astype(float), rows)
+
+
+class Variation:
+    """The variational equation along an orbit, on elements of which n hold a delay."""
+
+    def __init__(self, orbit: DelayedOrbit, n: int) -> None:
+        network = orbit.network
+        self.n, self.period, self.length = n, orbit.period, network.delay / n
+        self.count = int(np.ceil(self.period / self.length * (1.0 - 1e-12)))
+        times = (np.arange(self.count)[:, None] + POINTS[1:]) * self.length
+        self.now = network.jacobian(orbit(times))
+        self.past = network.delayed_jacobian(orbit(times - network.delay))
+
+    def monodromy(self, columns: np.ndarray, gain: float) -> np.ndarray:
+        """Return the matrix that takes a history in a subspace to the one a period later.
+
+        Args:
+            columns: orthonormal, shape (8, d).
+            gain: symmetry lock, 1/model time; 0 within the class.
+
+        Returns:
+            A matrix of size d (n degree + 1).
+
+        """
+        d, degree = columns.shape[1], DEGREE
+        size = d * (self.n * degree + 1)
+        now = columns.T @ self.now @ columns - gain * np.eye(d)
+        past = columns.T @ self.past @ columns
+        system = np.zeros((self.count, degree, d, degree, d))
+        system[:] = np.einsum('st,ij->sitj', DERIVATIVE[1:, 1:], np.eye(d)) / self.length
+        s = np.arange(degree)
+        system[:, s, :, s, :] -= now.transpose(1, 0, 2, 3)
+        inverse = np.linalg.inv(system.reshape(self.count, degree * d, degree * d))
+        # Values at the points of all elements, as linear functions of the first history's.
+        values = np.zeros(((self.n + self.count) * degree + 1, d, size))
+        values[:self.n * degree + 1] = np.eye(size).reshape(-1, d, size)
+        for element in range(self.count):
+            start = (self.n + element) * degree
+            heard = values[element * degree + 1:(element + 1) * degree + 1]
+            right = past[element] @ heard - (
+                DERIVATIVE[1:, 0, None, None] / self.length * values[start])
+            values[start + 1:start + degree + 1] = (
+                inverse[element] @ right.reshape(degree * d, size)).reshape(degree, d, size)
+        # Where the last history lies among the elements.
+        points = np.append((np.arange(self.n)[:, None] + POINTS[:-1]).ravel(), self.n)
+        places = points + self.period / self.length
+        elements = np.minimum(places.astype(int), self.n + self.count - 1)
+        rows = _interpolation(places - elements)
+        nearby = values[elements[:, None] * degree + np.arange(degree + 1)]
+        return np.einsum('mk,mkds->mds', rows, nearby).reshape(size, size)
+
+
+def variation(orbit: DelayedOrbit) -> tuple[Variation, np.ndarray]:
+    """Return the variational equation, fine enough, and the multipliers within the class."""
+    inside = subspaces(orbit.symmetry)[0]
+    n = max(1, int(np.ceil(orbit.network.delay / (SPAN * orbit.period))))
+    for halving in range(HALVINGS):
+        equation = Variation(orbit, n * 2**halving)
+        within = np.linalg.eigvals(equation.monodromy(inside, 0.0))
+        if np.abs(within - 1.0).min() <= TRIVIAL:
+            break
+    return equation, within
+
+
+def transverse(equation: Variation, mode: Mode, gain: float) -> np.ndarray:
+    """Return the multipliers transverse to the gait's class under a symmetry lock."""
+    return np.concatenate([np.linalg.eigvals(equation.monodromy(columns, gain))
+                           for columns in subspaces(mode)[1]])
