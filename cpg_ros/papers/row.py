@@ -108,8 +108,10 @@ class Place:
         # The last part is for rounding of binary numbers that lie on the limit.
         limit = (0.5 * 10.0**exponent if within is None else within) * (1.0 + 1e-9)
         how = 'to the last digit printed' if within is None else f'within {within:g}'
-        digits = max(0, -exponent) + MORE
-        return Row(self.paper, self.place, quantity, published, f'{computed:.{digits}f}',
+        digits = max(0, -exponent if within is None else int(np.ceil(-np.log10(within)))) + MORE
+        # A count has no more digits than it has.
+        shown = str(computed) if isinstance(computed, int) else f'{computed:.{digits}f}'
+        return Row(self.paper, self.place, quantity, published, shown,
                    bool(abs(computed - float(published)) <= limit), how, float(computed),
                    erratum, note)
 
