@@ -86,6 +86,11 @@ def disturbed(gait: str) -> tuple[float, ...]:
     return tuple(start.tolist())
 
 
+def named(gait: str) -> str:
+    """A gait's name as the paper writes it."""
+    return gait.replace('_legged', '-legged').replace('_', ' ')
+
+
 def printed(gait: str) -> Biped:
     """The network with a row of Table 2."""
     return Biped.symmetric(*TABLE_2[gait])
@@ -157,7 +162,9 @@ def _oscillates(sign: float) -> bool:
         return 10.0 - float(np.abs(x).max())
 
     far.terminal = True  # type: ignore[attr-defined]
-    run = solve_ivp(rates, (0.0, 300.0), np.ravel(TABLE_3['walk']), events=far, max_step=0.5)
+    # A step that ends far out may pass through numbers that are no longer finite.
+    with np.errstate(over='ignore', invalid='ignore'):
+        run = solve_ivp(rates, (0.0, 300.0), np.ravel(TABLE_3['walk']), events=far, max_step=0.5)
     return bool(run.t[-1] >= 300.0 and np.ptp(run.y[0, run.t > 250.0]) > 0.1)
 
 
@@ -165,9 +172,9 @@ def primary() -> Iterator[Row | Picture]:
     """Tables 2, 3 and 5, Figures 2 to 6, equations 6 to 9: the four primary gaits."""
     for gait in PRIMARY:
         seen = settled(gait)
-        name, phases = gait.replace('_', '-', 1).replace('_', ' '), seen.found.phases
+        name, phases = named(gait), seen.found.phases
         at = Place(AUTHORS, 'Table 2')
-        yield at.word('gait with I, phi and w_a, w_b, w_c of the ' + name, gait, seen.gait,
+        yield at.word('gait with I, phi and w_a, w_b, w_c of the ' + name, name, named(seen.gait),
                       note=f'period {seen.found.period:.4f}')
         found = multipliers(solve_orbit(printed(gait), gait))
         yield at.word(f'the {name} attracts', 'stable',
@@ -189,13 +196,13 @@ def primary() -> Iterator[Row | Picture]:
         yield from _table_5(gait, seen)
         start = simulated(printed(gait), tuple(np.ravel(TABLE_3[gait]).tolist()))
         yield Place(AUTHORS, 'Table 3').word(
-            f'gait from the initial values of the {name}', gait, start.gait,
+            f'gait from the initial values of the {name}', name, named(start.gait),
             note=ODD.get(gait, ''))
         yield _drawn(f'Figure {FIGURES[gait]}', name, start, 'From the initial values of Table 3.')
 
 
 def _table_5(gait: str, seen: Rhythm) -> Iterator[Row]:
-    at, name = Place(AUTHORS, 'Table 5'), gait.replace('_', '-', 1).replace('_', ' ')
+    at, name = Place(AUTHORS, 'Table 5'), named(gait)
     h, k, response = TABLE_5[gait]
     yield at.word(f'H of the {name}', h, _written(seen.found.h))
     yield at.word(f'K of the {name}', k, _written(seen.found.k))
@@ -215,7 +222,7 @@ def _drawn(place: str, name: str, seen: Rhythm, caption: str) -> Picture:
 def secondary() -> Iterator[Row | Picture]:
     """Tables 4 and 5, Figures 8 to 11: the secondary gaits. Their weights are not printed."""
     for gait in TABLE_4:
-        seen, name = settled(gait), gait.replace('_', ' ')
+        seen, name = settled(gait), named(gait)
         one, two, three, four = signals(seen)
         yield Place(AUTHORS, 'Table 4').word(
             f'signals in the {name}, left and right leg', TABLE_4[gait],
@@ -233,11 +240,10 @@ def secondary() -> Iterator[Row | Picture]:
         network = PRESETS[gait].network
         assert isinstance(network, Biped)
         seen = simulated(network, disturbed(before))
-        text = f'{gait.replace("_", " ")}, coming from the {before.replace("_", " ")}'
         yield Place(AUTHORS, f'Figure {number}').word(
-            f'gait that follows the {before.replace("_", " ")} with other weights', gait,
-            seen.gait, note='weights are ours: none are printed')
-        yield _drawn(f'Figure {number}', text, seen,
+            f'gait that follows the {named(before)} with other weights', named(gait),
+            named(seen.gait), note='weights are ours: none are printed')
+        yield _drawn(f'Figure {number}', f'{named(gait)}, from the {named(before)}', seen,
                      'With weights of ours, as the paper prints none; settled.')
 
 
@@ -254,7 +260,7 @@ def kinds() -> Iterator[Row | Picture]:
                                            str(len(TABLE_5)), len(gaits), erratum=11)
     in_phase = [gait for gait in gaits if gait not in PRIMARY and len(settled(gait).found.k) > 1]
     yield at.holds('cells are equal at all times in primary gaits only', not in_phase,
-                   erratum=11, note='they are in: ' + ', '.join(in_phase))
+                   erratum=11, note='they are in: ' + ', '.join(map(named, in_phase)))
     walk, h = settled('walk').found, 0.0
     for letter, elements, wrong in (('K', walk.k, 'spatio-temporal'), ('H', walk.h, 'spatial')):
         # On the elements the walk's best shifts: all of them 0, or not.
