@@ -17,6 +17,7 @@ from common import emit, log
 from processes import Process, enter_workspace, start_node
 
 from cpg_ros.networks.registry import PRESETS
+from cpg_ros.nodes.settings import USUAL
 
 TARGETS = {'answer_ms_max': 100.0, 'end_s_max': 1.0}
 
@@ -48,8 +49,7 @@ def main() -> None:
     enter_workspace()
     rclpy.init()
     ours = {}
-    for network, robot in (('delayed', 'quadruped'), ('quadruped', 'quadruped'),
-                           ('biped', 'biped')):
+    for network, (robot, _) in USUAL.items():
         gaits = [name for name, preset in PRESETS[network].items() if name == preset.gait]
         pairs = list(itertools.permutations(gaits, 2))
         random.Random(0).shuffle(pairs)

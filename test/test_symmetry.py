@@ -184,6 +184,20 @@ def test_waveforms_and_phases_of_the_biped(gait, waves, phases):
     assert tuple(BIPED[gait].phases) == phases
 
 
+@pytest.mark.parametrize('gait', BIPED)
+def test_the_first_cell_of_each_waveform(gait):
+    waves = BIPED[gait].waves.tolist()
+    assert BIPED[gait].first.tolist() == [waves.index(wave) for wave in sorted(set(waves))]
+
+
+@pytest.mark.parametrize(('name', 'modulo', 'order'), [
+    ('1', ('1',), 1), ('omega', ('1',), 4), ('omega^2', ('1',), 2), ('omega kappa', ('1',), 4),
+    ('omega', ('1', 'omega^2'), 2), ('omega', ('1', 'omega^2 kappa'), 4),
+    ('omega kappa', ('1', 'kappa'), 4), ('omega', tuple(Z4_Z2.elements), 1)])
+def test_orders_of_elements(name, modulo, order):
+    assert Z4_Z2.order(name, modulo) == order
+
+
 def test_two_waveforms_are_possible_in_six_ways_and_one_in_four():
     # Rashidi et al., section 5: four primary gaits, and six responses with two waveforms.
     counts = [one.waves.max() + 1 for one in symmetries(D2)]

@@ -10,23 +10,24 @@ from scipy.special import lambertw
 
 from cpg_ros.networks.delayed import MODES, Delayed, Mode
 
-#: Beyond this exponent exp overflows, and W is taken from the logarithm of its argument.
-LARGEST = 700.0
+#: Beyond this exponent exp leaves the range of doubles, and W is taken from a logarithm.
+LARGEST = 690.0
 
 
 def _branches(a: complex, b: float, tau: float, n: np.ndarray) -> np.ndarray:
     """W_n(b tau exp(-a tau)), shape like n."""
     exponent = -a * tau
-    if exponent.real <= LARGEST:
+    if abs(exponent.real) <= LARGEST:
         return lambertw(b * tau * np.exp(exponent), n)
-    # w + log w = log z + 2 pi i n: a few steps of Newton, as |log z| is large.
-    logarithm = np.log(complex(b * tau)) + exponent
-    turns = np.round((logarithm.imag - np.angle(np.exp(1j * logarithm.imag))) / (2.0 * np.pi))
-    wanted = logarithm + 2j * np.pi * (n - turns)
+    # W_n(z) = L - log L + ... with L = log z + 2 pi i n large (Corless et al. 1996, eq. 4.18);
+    # Newton's method on w + log w = L, whatever the sheet of the logarithm.
+    argument = np.angle(b * np.exp(1j * exponent.imag))
+    wanted = np.log(abs(b) * tau) + exponent.real + 1j * (argument + 2.0 * np.pi * n)
     w = wanted - np.log(wanted)
-    for _ in range(8):
-        w = w - (w + np.log(w) - wanted) / (1.0 + 1.0 / w)
-    return w
+    for _ in range(6):
+        gap = w + np.log(w) - wanted
+        w = w - (gap - 2j * np.pi * np.round(gap.imag / (2.0 * np.pi))) / (1.0 + 1.0 / w)
+    return w if exponent.real > 0.0 else np.where(n == 0, 0.0, w)
 
 
 def characteristic_roots(network: Delayed, mode: Mode, count: int = 9) -> np.ndarray:

@@ -60,8 +60,8 @@ class DelayedOrbit(Orbit):
         return collocation.evaluate(self.values, theta, order, self.phases)
 
 
-def _equations(network: Delayed, mode: Mode, u: np.ndarray, period: float
-               ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def equations(network: Delayed, mode: Mode, u: np.ndarray, period: float
+              ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Residual (n + 1,), its Jacobian in (u, T), and its derivative in (a, b, c, d, tau)."""
     n = u.size
     a, b, c, d, tau = network.as_dict().values()
@@ -88,11 +88,19 @@ def _equations(network: Delayed, mode: Mode, u: np.ndarray, period: float
     return residual, jacobian, by_parameter
 
 
+def complete(network: Delayed, mode: Mode, u: np.ndarray, period: float, residual: np.ndarray,
+             jacobian: np.ndarray, by_parameter: np.ndarray) -> DelayedOrbit:
+    """Complete a solution by its derivatives; the last three are those of the equations."""
+    derivatives = -np.linalg.solve(jacobian, by_parameter)
+    return DelayedOrbit(network, mode, period, float(np.abs(residual[:-1]).max()),
+                        derivatives[-1], u, derivatives[:-1])
+
+
 def _newton(network: Delayed, mode: Mode, u: np.ndarray, period: float) -> DelayedOrbit | None:
     """Newton from a guess, doubling the nodes until the waveform is resolved."""
     while True:
         for _ in range(12):
-            residual, jacobian, by_parameter = _equations(network, mode, u, period)
+            residual, jacobian, by_parameter = equations(network, mode, u, period)
             size = float(np.abs(residual[:-1]).max())
             if size <= TOLERANCE * max(1.0, float(np.abs(u).max()) * abs(network.c)):
                 break
@@ -115,8 +123,7 @@ def _newton(network: Delayed, mode: Mode, u: np.ndarray, period: float) -> Delay
         if u.size >= MOST_NODES:
             raise NoOrbit(f'the waveform is too steep for {MOST_NODES} nodes')
         u = collocation.resample(u, 2 * u.size + 1)
-    derivatives = -np.linalg.solve(jacobian, by_parameter)
-    return DelayedOrbit(network, mode, period, size, derivatives[-1], u, derivatives[:-1])
+    return complete(network, mode, u, period, residual, jacobian, by_parameter)
 
 
 def _continued(network: Delayed, mode: Mode, onset: float) -> DelayedOrbit | None:

@@ -85,13 +85,8 @@ class HopfPoint:
 
     @property
     def supercritical(self) -> bool:
-        """Whether the orbits lie at delays above the critical one (theorem 2.1)."""
+        """Whether the orbits attract on the centre manifold: k2 < 0 (theorem 2.1)."""
         return self.normal_form.supercritical
-
-    @property
-    def stable_on_centre_manifold(self) -> bool:
-        """Whether the orbits attract on the centre manifold (theorem 2.1)."""
-        return self.normal_form.stable
 
     def _others(self, mode: Mode) -> int:
         """Roots of a mode with positive real part, but for the crossing one."""

@@ -27,13 +27,12 @@ from cpg_ros.networks.jit import OPTIONS, jit, part, renamed, sources_digest
 DELAYED = delayed.Delayed.kind
 
 
-def _compiled(decorate, network, delays):
+def _compiled(decorate, network):
     """Compile the stepping of a network with a numba decorator.
 
     Args:
         decorate: numba's decorator.
         network: module whose ``compiled`` gives drive and rates; drive only with a delay.
-        delays: whether the network has a delay.
 
     Returns:
         The functions past_state, restart and steps_of.
@@ -43,6 +42,7 @@ def _compiled(decorate, network, delays):
         return decorate(renamed(function, network.__name__))
 
     drive, rates = network.compiled(own)
+    delays = drive is not None
 
     @own
     def field(n, x, k, weight, driven, p, gain, basis, lanes, work, out):
@@ -50,9 +50,11 @@ def _compiled(decorate, network, delays):
 
         P projects on the rows of basis, shape (r, components); work is scratch.
         """
-        rates(n, x, k, weight, driven, p, lanes, work, out)
+        z, along = work[0], work[1]
+        for i in range(n):
+            z[i] = x[i] + weight * k[i]
+        rates(n, z, driven, p, lanes, work[1], out)
         if gain != 0.0:
-            z, along = work[0], work[1]
             for i in range(n):
                 out[i] -= gain * z[i]
             for r in range(basis.shape[0]):
@@ -165,8 +167,8 @@ def _compiled(decorate, network, delays):
 
 # One delayed network by itself has code of its own: built in one piece, its loops unrolled. Lanes
 # run through loops of any length in vector registers, which need functions of their own.
-_, _, _steps_of_one = _compiled(part, delayed, True)
-_past_state, _restart, _steps = _compiled(jit, delayed, True)
+_, _, _steps_of_one = _compiled(part, delayed)
+_past_state, _restart, _steps = _compiled(jit, delayed)
 
 
 def _with(function, names):
@@ -194,8 +196,7 @@ def _cached(digest, network, **functions):
     def set_slope(p, tau, gain, basis, step, x, after, before, head):
         """Recompute the slope that leaves the head node, after parameters have changed."""
         digest  # noqa: B018
-        _restart(x.shape[1], tau.shape[0], p, tau, gain, basis, step, x, after, before,
-                       head)
+        _restart(x.shape[1], tau.shape[0], p, tau, gain, basis, step, x, after, before, head)
 
     def advance(p, tau, gain, basis, step, x, after, before, clock, duration, out):
         """Advance the output instant of one lane by duration and evaluate there.
@@ -211,8 +212,8 @@ def _cached(digest, network, **functions):
             nothing = np.empty((0, 0, 0))
             # Not the unrolled code: it gains nothing here and takes 15 s more to compile.
             head = _steps(x.shape[1], tau.shape[0], p, tau, gain, basis, step, x,
-                                   after, before, head, steps, 0.0, nothing, nothing,
-                                   np.int64(0), np.int64(1))
+                          after, before, head, steps, 0.0, nothing, nothing,
+                          np.int64(0), np.int64(1))
             ahead = max(0.0, ahead + steps * step)
         clock[0] = head
         clock[1] = ahead
@@ -244,7 +245,7 @@ def _cached(digest, network, **functions):
         digest  # noqa: B018
         np.random.seed(seed)
         return _steps(x.shape[1], tau.shape[0], p, tau, gain, basis, step, x, after,
-                               before, head, steps, noise, states, slopes, row, every)
+                      before, head, steps, noise, states, slopes, row, every)
 
     def integrate_many(p, tau, gain, basis, step, x, after, before, head, steps, noise,
                        seeds, states, slopes, row, every):
@@ -258,8 +259,8 @@ def _cached(digest, network, **functions):
             np.random.seed(seeds[m])
             mine = slice(m * lanes, min((m + 1) * lanes, states.shape[0]))
             _steps(x.shape[2], lanes, p[m], tau[m], gain, basis, step, x[m],
-                            after[m], before[m], head, steps, noise, states[mine], slopes[mine],
-                            row, every)
+                   after[m], before[m], head, steps, noise, states[mine], slopes[mine],
+                   row, every)
         return (head + steps) % x.shape[1]
 
     def ready(function, parallel=False):
@@ -282,7 +283,7 @@ class Kernels:
 
 
 def _kernels(network):
-    _, restart, steps = _compiled(jit, network, network is delayed)
+    _, restart, steps = _compiled(jit, network)
     return _cached(sources_digest(), network.__name__, _restart=restart, _steps=steps)
 
 

@@ -15,6 +15,7 @@ from numpy.polynomial import polynomial
 
 from cpg_ros.dynamics import gauss
 from cpg_ros.dynamics.mesh_orbit import MeshOrbit
+from cpg_ros.dynamics.periodic import NoOrbit
 from cpg_ros.networks.symmetry import Symmetry
 
 #: A mesh is fine enough when its polynomials end with terms of this share of the whole.
@@ -56,7 +57,7 @@ class Reduced:
 
 
 @dataclass
-class _Solution:
+class Solution:
     """What Newton's method works on: values at mesh points, at nodes, and L = T/m."""
 
     mesh: np.ndarray
@@ -88,7 +89,7 @@ def transfer(jacobians: np.ndarray, lengths: np.ndarray, sources: np.ndarray
     return found[..., :d], found[..., d:]
 
 
-def _linear(reduced: Reduced, now: _Solution, extra: np.ndarray | None = None):
+def linearised(reduced: Reduced, now: Solution, extra: np.ndarray | None = None):
     """Linearise: return increments at mesh points as functions of (dy0, dL, extras).
 
     The answer is (P, R, stage answer to dy, stage answer to the sources): dy_k = P_k dy_0 +
@@ -120,7 +121,7 @@ def _linear(reduced: Reduced, now: _Solution, extra: np.ndarray | None = None):
     return p, r, by_start, by_source
 
 
-def _bordered(reduced: Reduced, now: _Solution, p: np.ndarray, r: np.ndarray) -> np.ndarray:
+def bordered(reduced: Reduced, now: Solution, p: np.ndarray, r: np.ndarray) -> np.ndarray:
     """The matrix of boundary and phase conditions in (dy_0, dL)."""
     d = p.shape[-1]
     matrix = np.zeros((d + 1, d + 1))
@@ -130,17 +131,17 @@ def _bordered(reduced: Reduced, now: _Solution, p: np.ndarray, r: np.ndarray) ->
     return matrix
 
 
-def _newton(reduced: Reduced, now: _Solution, steps: int = 15) -> bool:
+def _newton(reduced: Reduced, now: Solution, steps: int = 15) -> bool:
     """Solve on a fixed mesh, in place; tell whether it converged."""
     scale = np.abs(now.points).max()
     d, longest = now.points.shape[1], 20.0 * now.length
     for _ in range(steps):
-        p, r, by_start, by_source = _linear(reduced, now)
+        p, r, by_start, by_source = linearised(reduced, now)
         right = np.empty(d + 1)
         right[:d] = now.points[0, reduced.turn] - now.points[-1] - r[-1, :, 1]
         right[d] = -reduced.rates(now.points[0])[0]
         try:
-            found = np.linalg.solve(_bordered(reduced, now, p, r), right)
+            found = np.linalg.solve(bordered(reduced, now, p, r), right)
         except np.linalg.LinAlgError:
             return False
         start, length = found[:d], found[d]
@@ -163,19 +164,52 @@ def _newton(reduced: Reduced, now: _Solution, steps: int = 15) -> bool:
     return False
 
 
-def _sampled(path: Callable[[np.ndarray], np.ndarray], mesh: np.ndarray, length: float
-             ) -> _Solution:
+def sampled(path: Callable[[np.ndarray], np.ndarray], mesh: np.ndarray, length: float
+            ) -> Solution:
     """Take a guess at the points of a mesh from a path over the places 0 to 1."""
     inner = mesh[:-1, None] + np.diff(mesh)[:, None] * gauss.NODES
-    return _Solution(mesh, path(mesh), path(inner.ravel()).reshape(*inner.shape, -1), length)
+    return Solution(mesh, path(mesh), path(inner.ravel()).reshape(*inner.shape, -1), length)
 
 
-def _path(now: _Solution, coefficients: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
+def _coefficients(reduced: Reduced, now: Solution) -> np.ndarray:
+    """Of the polynomials on each interval, shape (S + 1, n, d)."""
+    return gauss.power_coefficients(now.points[:-1], reduced.rates(now.stages),
+                                    now.length * np.diff(now.mesh))
+
+
+def path_of(reduced: Reduced, now: Solution) -> Callable[[np.ndarray], np.ndarray]:
+    """Return the solution as a function of places from 0 to 1."""
+    coefficients = _coefficients(reduced, now)
+
     def path(places: np.ndarray) -> np.ndarray:
         k = np.clip(np.searchsorted(now.mesh, places, side='right') - 1, 0, now.mesh.size - 2)
         xi = (places - now.mesh[k]) / np.diff(now.mesh)[k]
         return polynomial.polyval(xi[:, None], coefficients[:, k], tensor=False)
     return path
+
+
+def finer(mesh: np.ndarray) -> int:
+    """Return the fewest intervals that the next mesh shall have where this one fell short."""
+    n = mesh.size - 1
+    return n + 1 + n // 16
+
+
+def remeshed(reduced: Reduced, now: Solution, fewest: int = FEWEST) -> np.ndarray | None:
+    """Return a better mesh for a solution, or None if it is resolved.
+
+    Raises:
+        NoOrbit: it would need more intervals than there may be.
+
+    """
+    h, slopes = np.diff(now.mesh), reduced.rates(now.stages)
+    ends = gauss.last_share(slopes) * now.length * h / np.abs(now.points).max()
+    if ends.max() <= RESOLVED:
+        return None
+    wanted = 1.15 * (ends**(1.0 / gauss.S)).mean() / RESOLVED**(1.0 / gauss.S) * h.size
+    # Not a number where the solution is not finite.
+    if not max(fewest, wanted) <= MOST_INTERVALS:
+        raise NoOrbit(f'the waveform is too steep for {MOST_INTERVALS} intervals')
+    return gauss.spread(now.mesh, ends**(1.0 / gauss.S) / h, max(fewest, int(wanted)))
 
 
 def collocate(network, symmetry: Symmetry, path: Callable[[np.ndarray], np.ndarray],
@@ -196,39 +230,33 @@ def collocate(network, symmetry: Symmetry, path: Callable[[np.ndarray], np.ndarr
         return path(places / symmetry.order)[:, reduced.kept]
 
     bend = np.abs(np.diff(reduced.rates(guess(coarse)), axis=0)).max(axis=1)
-    now = _sampled(guess, gauss.spread(coarse, np.sqrt(bend + 1e-3 * bend.max() + 1e-12), 30),
-                   period / symmetry.order)
+    now = sampled(guess, gauss.spread(coarse, np.sqrt(bend + 1e-3 * bend.max() + 1e-12), 30),
+                  period / symmetry.order)
     fewest = FEWEST
     while True:
         with np.errstate(all='ignore'):
             converged = _newton(reduced, now)
         if not converged or np.ptp(now.points[:, :reduced.size]) < SMALLEST:
             return None
-        h, slopes = np.diff(now.mesh), reduced.rates(now.stages)
-        ends = gauss.last_share(slopes) * now.length * h / np.abs(now.points).max()
-        coefficients = gauss.power_coefficients(now.points[:-1], slopes, now.length * h)
-        if not np.isfinite(ends).all():
+        try:
+            mesh = remeshed(reduced, now, fewest)
+        except NoOrbit:
             return None
-        if ends.max() <= RESOLVED:
-            break
-        wanted = 1.15 * (ends**(1.0 / gauss.S)).mean() / RESOLVED**(1.0 / gauss.S) * h.size
-        wanted = max(fewest, int(wanted))
-        if wanted > MOST_INTERVALS:
-            return None
+        if mesh is None:
+            return completed(reduced, now)
+        now = sampled(path_of(reduced, now), mesh, now.length)
         # Finer every time: equal shares of the error alone may stay short of the goal for ever.
-        fewest = wanted + 1 + wanted // 16
-        mesh = gauss.spread(now.mesh, ends**(1.0 / gauss.S) / h, wanted)
-        now = _sampled(_path(now, coefficients), mesh, now.length)
-    return _orbit(reduced, now, coefficients)
+        fewest = finer(mesh)
 
 
-def _orbit(reduced: Reduced, now: _Solution, coefficients: np.ndarray) -> MeshOrbit:
+def completed(reduced: Reduced, now: Solution) -> MeshOrbit:
     """Complete a solution by its derivatives and its residual."""
+    coefficients = _coefficients(reduced, now)
     extra = reduced.by_parameter(now.stages)
-    p, r, by_start, by_source = _linear(reduced, now, extra)
+    p, r, by_start, by_source = linearised(reduced, now, extra)
     right = -r[-1, :, 2:]
     right = np.vstack([right, -reduced.by_parameter(now.points[0])[0]])
-    found = np.linalg.solve(_bordered(reduced, now, p, r), right)
+    found = np.linalg.solve(bordered(reduced, now, p, r), right)
     start, d_length = found[:-1], found[-1]
     moved = p @ start + r[..., :1] * d_length + r[..., 2:]
     inner = (by_start @ moved[:-1, None] + by_source[..., :1] * d_length + by_source[..., 2:])

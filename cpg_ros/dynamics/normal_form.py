@@ -23,13 +23,17 @@ class NormalForm:
 
     @property
     def supercritical(self) -> bool:
-        """Whether the orbits lie where mu > 0: k1 k2 < 0 (Liu & Zhang 2024, theorem 2.1)."""
-        return self.k1.real * self.k2.real < 0.0
+        """Whether the orbits attract on the centre manifold: k2 < 0.
+
+        They then lie where rest is unstable. Liu & Zhang (2024), theorem 2.1, say stable for
+        k2 < 0 and supercritical for k1 k2 < 0; for k1 > 0, as they have it, that is one thing.
+        """
+        return self.k2.real < 0.0
 
     @property
-    def stable(self) -> bool:
-        """Whether the orbits attract on the centre manifold: k2 < 0 (theorem 2.1)."""
-        return self.k2.real < 0.0
+    def side(self) -> int:
+        """1 if the orbits lie where mu > 0 (k1 k2 < 0), -1 if where mu < 0."""
+        return 1 if self.k1.real * self.k2.real < 0.0 else -1
 
     def radius(self, mu: float) -> float:
         """Radius of the orbit at a distance mu of the parameter, ``sqrt(-k1 mu / k2)``.

@@ -82,7 +82,7 @@ def pairs(symmetry: Symmetry) -> list[list[tuple[int, int]]]:
 
     At most three errors: with more than three pairs the last one is the largest of the rest.
     """
-    first = [int(np.flatnonzero(symmetry.waves == wave)[0]) for wave in symmetry.waves]
+    first = symmetry.first[symmetry.waves].tolist()
     found = [(cell, one) for cell, one in enumerate(first) if cell != one]
     return [[pair] for pair in found[:2]] + ([found[2:]] if found[2:] else [])
 
@@ -122,9 +122,7 @@ def waveform_shortfall(signals: np.ndarray, symmetry: Symmetry, margin: float = 
     Every cell has a range and turns steadily, so that its phase can be read in spite of noise;
     two waveforms differ in shape.
     """
-    cells = symmetry.group.cells
-    first = [int(np.flatnonzero(symmetry.waves == wave)[0])
-             for wave in range(symmetry.waves.max() + 1)]
+    cells, first = symmetry.group.cells, symmetry.first
     have = [(np.ptp(signals[:, one]), LEAST_RANGE) for one in first]
     have += [(steadiness(signals[:, one], signals[:, one + cells]), LEAST_STEADINESS)
              for one in first]
@@ -136,7 +134,8 @@ def waveform_shortfall(signals: np.ndarray, symmetry: Symmetry, margin: float = 
 def _simulated(network: Network, gait: str, run: Trajectory) -> tuple[Score, Cycle | None]:
     """Score a set by its simulation; also return its cycle if that is worth solving for."""
     symmetry, cells = network.symmetry(gait), network.cells
-    two = symmetry.waves.max() == 1
+    first = symmetry.first
+    two = len(first) == 2
     finite = bool(np.isfinite(run.x[-1]).all())
     cycle = last_cycle(run, cells) if finite else None
     if cycle is None:
@@ -146,7 +145,6 @@ def _simulated(network: Network, gait: str, run: Trajectory) -> tuple[Score, Cyc
     signals = cycle.signals
     errors = phase_errors(signals, symmetry)
     mismatch = _mismatch(signals, symmetry)
-    first = [int(np.flatnonzero(symmetry.waves == wave)[0]) for wave in range(1 + two)]
     near = errors.max() <= NEAR and mismatch <= NEAR_MISMATCH
     if near:
         shortfall = waveform_shortfall(signals, symmetry, MARGIN)

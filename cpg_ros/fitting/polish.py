@@ -135,10 +135,9 @@ def polish(score: Score, gait: str, seed: int = 0) -> Chosen:
     signals = orbit_signals(orbit)
     if waveform_shortfall(signals, orbit.symmetry) > 0.0:
         raise NotGood('a waveform is too small, turns too unsteadily or is too like the other')
-    waves = orbit.symmetry.waves
-    differences = (0.0, 0.0)
-    if waves.max():
-        a, b = (signals[:, int(np.flatnonzero(waves == wave)[0])] for wave in (0, 1))
+    first, differences = orbit.symmetry.first, (0.0, 0.0)
+    if len(first) == 2:
+        a, b = (signals[:, cell] for cell in first)
         differences = shape_difference(a, b), shape_difference(a, b, plain=True)
     if not survives(orbit, seed):
         raise NotGood(f'noise of {NOISE} drives it off its gait')

@@ -21,7 +21,7 @@ DECIMALS = 4
 #: Weights as in Rashidi et al. (2016), current and phi a little beyond their Table 2. For the
 #: quadruped about what Table 13 of Buono & Golubitsky (2001) uses for most gaits; its couplings
 #: across the ring, xi and eta, are 0 there, and here unless they are bounded.
-WEIGHTS, CURRENT, PHI = (-1.0, 1.0), (0.2, 0.32), (0.15, 0.4)
+WEIGHTS, CELLS = (-1.0, 1.0), {'current': (0.2, 0.32), 'phi': (0.15, 0.4)}
 COUPLINGS = {**dict.fromkeys(('alpha', 'beta', 'gamma', 'delta'), (-0.8, 0.8)),
              'xi': (0.0, 0.0), 'eta': (0.0, 0.0)}
 
@@ -77,30 +77,15 @@ class Space:
             for member in variable.members})
 
 
-def coupling_orbits(symmetry: Symmetry) -> tuple[tuple[tuple[int, int], ...], ...]:
-    """Orbits of directed couplings (source, receiver), cells from 0, under a gait's H."""
-    elements = [symmetry.group.elements[name] for name in symmetry.h]
-    cells, found = range(symmetry.group.cells), []
-    seen: set[tuple[int, int]] = set()
-    for source in cells:
-        for receiver in cells:
-            if source != receiver and (source, receiver) not in seen:
-                orbit = tuple(sorted({(g[source], g[receiver]) for g in elements}))
-                seen.update(orbit)
-                found.append(orbit)
-    return tuple(found)
-
-
 def _biped_variables(gait: str) -> list[Variable]:
     """One variable for each orbit of couplings, then the cells' current and phi."""
+    # An orbit that is one of the paper's three couplings has the paper's name.
     letters = {frozenset(names): f'w_{letter}' for letter, names in biped.WEIGHTS.items()}
-    symmetry = Symmetry.of(biped.D2, biped.GAITS[gait])
-    found = []
-    for orbit in coupling_orbits(symmetry):
-        members = tuple(f'w_{source + 1}{receiver + 1}' for source, receiver in orbit)
-        # An orbit that is one of the paper's three couplings has the paper's name.
-        found.append(Variable(letters.get(frozenset(members), members[0]), *WEIGHTS, members))
-    return [*found, Variable('current', *CURRENT, ('current',)), Variable('phi', *PHI, ('phi',))]
+    families = biped.Biped.families(Symmetry.of(biped.D2, biped.GAITS[gait]))
+    orbits = sorted(tuple(sorted(family)) for family in families if family[0] not in CELLS)
+    return [*(Variable(letters.get(frozenset(members), members[0]), *WEIGHTS, members)
+              for members in orbits),
+            *(Variable(name, *limits, (name,)) for name, limits in CELLS.items())]
 
 
 def search_space(network_name: str, gait: str, bounds: Mapping[str, tuple[float, float]],

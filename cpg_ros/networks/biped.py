@@ -107,7 +107,8 @@ class Biped(Network):
         """
         return Symmetry.of(D2, GAITS[known(gait, self.gaits())])
 
-    def families(self, symmetry: Symmetry) -> tuple[tuple[str, ...], ...]:
+    @classmethod
+    def families(cls, symmetry: Symmetry) -> tuple[tuple[str, ...], ...]:
         """Weights that H of a gait carries into one another: w(g j -> g i) and w(j -> i)."""
         elements = [D2.elements[name] for name in symmetry.h]
         found: dict[str, tuple[str, ...]] = {'current': ('current',), 'phi': ('phi',)}
@@ -127,12 +128,7 @@ class Biped(Network):
 
     def jacobian(self, x: np.ndarray) -> np.ndarray:
         """Derivative of the rates by the state, shape (..., components, components)."""
-        v, u = x[..., :CELLS], x[..., CELLS:]
-        matrix = np.zeros((*x.shape, 2 * CELLS))
-        i = np.arange(CELLS)
-        vv, vu, uv, uu = CELL.slopes(v, u, self.phi)
-        matrix[..., i, i], matrix[..., i, i + CELLS] = vv, vu
-        matrix[..., i + CELLS, i], matrix[..., i + CELLS, i + CELLS] = uv, uu
+        matrix, i = CELL.jacobian(x[..., :CELLS], x[..., CELLS:], self.phi), np.arange(CELLS)
         for weights, partners in zip(self._weights(), PARTNERS.values(), strict=True):
             matrix[..., i, i] -= weights
             matrix[..., i, partners] += weights
@@ -155,15 +151,12 @@ def compiled(decorate):
     cell_rates = morris_lecar.compiled(decorate, CELL)
 
     @decorate
-    def field(n, x, k, weight, driven, p, lanes, work, out):
-        """Right-hand side at z = x + weight k; the first row of work holds z afterwards."""
-        z = work[0]
-        for i in range(n):
-            z[i] = x[i] + weight * k[i]
+    def field(n, z, driven, p, lanes, work, out):
+        """Right-hand side at z; work is scratch."""
         half = n // 2
         v, u, dv, du = z[:half], z[half:n], out[:half], out[half:n]
         current, speed, weights = p[0, :half], p[0, half:n], p[1:, :half]
-        cell_rates(half, v, u, current, speed, work[1], dv, du)
+        cell_rates(half, v, u, current, speed, work, dv, du)
         for cell in range(4):
             here, rate = v[cell * lanes:(cell + 1) * lanes], dv[cell * lanes:(cell + 1) * lanes]
             for coupling in range(3):

@@ -13,6 +13,7 @@ import numpy as np
 
 from cpg_ros.networks.jit import tanh
 from cpg_ros.networks.network import Network, Preset, Range, known
+from cpg_ros.networks.symmetry import GAITS
 
 CELLS = 8
 #: Model time per step in real time: 500 steps a cycle, error of a waveform about 1e-9.
@@ -58,10 +59,6 @@ class Mode:
 
 
 MODES = tuple(Mode(j, k) for j in range(4) for k in range(2))
-
-#: Primary gait -> (j, k); j = 1 stands for both senses in which a wave can run round the ring.
-GAITS = {'pronk': (0, 0), 'pace': (0, 1), 'bound': (2, 0), 'trot': (2, 1),
-         'jump': (1, 0), 'walk': (1, 1)}
 
 
 @dataclass(frozen=True)
@@ -186,19 +183,16 @@ def compiled(decorate):
             for lane in range(lanes):
                 here[lane], other[lane] = other[lane], here[lane]
 
-
     @decorate
-    def field(n, x, k, weight, driven, p, lanes, work, out):
-        """Right-hand side at z = x + weight k: a z_i + b tanh(z_i) + d tanh(z_{i-2}) + driven_i.
+    def field(n, z, driven, p, lanes, work, out):
+        """Right-hand side at z: a z_i + b tanh(z_i) + d tanh(z_{i-2}) + driven_i.
 
-        work is scratch of shape (2, n + 2 lanes); its first row holds z afterwards.
+        work is scratch of shape (n + 2 lanes,).
         """
         ring = 2 * lanes
         # The ring laid out straight: `behind` is `squashed` seen from two cells before. (Slices,
         # not index sums, because those would be checked for negative values in every pass.)
-        z, behind, squashed = work[0], work[1], work[1, ring:]
-        for i in range(n):
-            z[i] = x[i] + weight * k[i]
+        behind, squashed = work, work[ring:]
         for i in range(n):
             squashed[i] = tanh(z[i])
         for i in range(ring):

@@ -50,6 +50,15 @@ class Cell:
         return (-self.g_ca * (dm * (v - self.v_ca) + m) - self.g_k * w - self.g_l,
                 -self.g_k * (v - self.v_k), phi * (dtau * (n - w) + tau * dn), -phi * tau)
 
+    def jacobian(self, v: np.ndarray, w: np.ndarray, phi: float) -> np.ndarray:
+        """Return the slopes as a matrix of all v, then all w, shape (..., 2 cells, 2 cells)."""
+        cells = v.shape[-1]
+        matrix, i = np.zeros((*v.shape[:-1], 2 * cells, 2 * cells)), np.arange(cells)
+        vv, vw, wv, ww = self.slopes(v, w, phi)
+        matrix[..., i, i], matrix[..., i, i + cells] = vv, vw
+        matrix[..., i + cells, i], matrix[..., i + cells, i + cells] = wv, ww
+        return matrix
+
 
 def compiled(decorate, cell: Cell):
     """Compile an uncoupled cell's rates with a numba decorator; the constants are built in."""

@@ -86,9 +86,10 @@ class Network(ABC):
 
         """
 
-    def families(self, symmetry: Any) -> tuple[tuple[str, ...], ...]:
+    @classmethod
+    def families(cls, symmetry: Any) -> tuple[tuple[str, ...], ...]:
         """Parameters that a gait's symmetry carries into one another, and so has to find equal."""
-        return tuple((name,) for name in self.parameters())
+        return tuple((name,) for name in cls.parameters())
 
     def broken(self, gait: str) -> str:
         """Name parameters that would have to be equal for the gait, or '' if all are."""

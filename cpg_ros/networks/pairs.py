@@ -43,17 +43,6 @@ def _closure(group: Group, names: Iterable[str]) -> Subgroup:
     return tuple(group.generated(dict.fromkeys(names, Fraction(0))))
 
 
-def _order(group: Group, name: str, modulo: Subgroup = ('1',)) -> int:
-    """Return the smallest power of an element that lies in a subgroup."""
-    names = {element: name for name, element in group.elements.items()}
-    element = power = group.elements[name]
-    order = 1
-    while names[power] not in modulo:
-        power = tuple(element[i] for i in power)
-        order += 1
-    return order
-
-
 @cache
 def generators(group: Group, subgroup: Subgroup) -> Subgroup:
     """Return a smallest generating set; of several, the one the group lists first."""
@@ -105,7 +94,7 @@ def admissible_pairs(group: Group) -> tuple[Pair, ...]:
     for h, k in product(reversed(subgroups(group)), repeat=2):
         order = len(h) // len(k)
         # The quotient is cyclic if one element runs through all of it.
-        if set(k) <= set(h) and any(_order(group, name, k) == order for name in h):
+        if set(k) <= set(h) and any(group.order(name, k) == order for name in h):
             found.append(Pair(h, k, order, group.cells // len(h), group.cells // len(k),
                               (label(group, h), label(group, k))))
     return tuple(found)
@@ -121,7 +110,7 @@ def symmetries(group: Group) -> tuple[Symmetry, ...]:
     found = []
     for h in reversed(subgroups(group)):
         names = generators(group, h)
-        orders = [_order(group, name) for name in names]
+        orders = [group.order(name) for name in names]
         for turns in product(*(range(order) for order in orders)):
             try:
                 found.append(Symmetry.of(group, {

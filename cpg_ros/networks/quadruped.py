@@ -14,7 +14,7 @@ import numpy as np
 from cpg_ros.networks import morris_lecar
 from cpg_ros.networks.network import Network, Range, known
 from cpg_ros.networks.presets import shipped
-from cpg_ros.networks.symmetry import Z4_Z2, Symmetry
+from cpg_ros.networks.symmetry import GAITS, Z4_Z2, Symmetry
 
 CELLS = 8
 CURRENT, PHI = 1.0, 0.2
@@ -24,11 +24,6 @@ CELL = morris_lecar.Cell(g_ca=3.0, v_ca=1.0, g_k=1.8, v_k=-0.8, g_l=0.6, v_l=-1.
 
 #: Where v and w of cell i hear: i - 2, s(i) and i + 4.
 _HEARD = (np.roll(np.arange(CELLS), 2), np.arange(CELLS) ^ 1, np.roll(np.arange(CELLS), 4))
-
-#: Gait -> (j, k): shifts j/4 of omega and k/2 of kappa (Table 2). j = 1 stands for both senses
-#: in which a wave can run round the ring.
-GAITS = {'pronk': (0, 0), 'pace': (0, 1), 'bound': (2, 0), 'trot': (2, 1),
-         'jump': (1, 0), 'walk': (1, 1)}
 
 
 @dataclass(frozen=True)
@@ -98,12 +93,7 @@ class Quadruped(Network):
 
     def jacobian(self, x: np.ndarray) -> np.ndarray:
         """Derivative of the rates by the state, shape (..., components, components)."""
-        v, w = x[..., :CELLS], x[..., CELLS:]
-        matrix = np.zeros((*x.shape, 2 * CELLS))
-        i = np.arange(CELLS)
-        vv, vw, wv, ww = CELL.slopes(v, w, PHI)
-        matrix[..., i, i], matrix[..., i, i + CELLS] = vv, vw
-        matrix[..., i + CELLS, i], matrix[..., i + CELLS, i + CELLS] = wv, ww
+        matrix, i = CELL.jacobian(x[..., :CELLS], x[..., CELLS:], PHI), np.arange(CELLS)
         by_v, by_w = (self.alpha, self.gamma, self.xi), (self.beta, self.delta, self.eta)
         for heard, a, b in zip(_HEARD, by_v, by_w, strict=True):
             matrix[..., i, heard] += a
@@ -125,14 +115,11 @@ def compiled(decorate):
     cell_rates = morris_lecar.compiled(decorate, CELL)
 
     @decorate
-    def field(n, x, k, weight, driven, p, lanes, work, out):
-        """Right-hand side at z = x + weight k; the first row of work holds z afterwards."""
-        z = work[0]
-        for i in range(n):
-            z[i] = x[i] + weight * k[i]
+    def field(n, z, driven, p, lanes, work, out):
+        """Right-hand side at z; work is scratch."""
         half = n // 2
         v, w, dv, dw = z[:half], z[half:n], out[:half], out[half:n]
-        cell_rates(half, v, w, p[3, :half], p[3, half:n], work[1], dv, dw)
+        cell_rates(half, v, w, p[3, :half], p[3, half:n], work, dv, dw)
         # Slices, not index sums: those would be checked for negative values in every pass.
         pair, ring = 2 * lanes, 8 * lanes
         for block in range(2):

@@ -9,3 +9,6 @@ NETWORKS: dict[str, type[Network]] = {
 #: Network -> name -> preset; a gait's own name comes first and is the usual one.
 PRESETS: dict[str, dict[str, Preset]] = {
     'delayed': delayed.PRESETS, 'quadruped': quadruped.PRESETS, 'biped': biped.PRESETS}
+
+#: Network -> the gait it usually starts with.
+USUAL = {'delayed': 'trot', 'quadruped': 'trot', 'biped': 'walk'}

@@ -6,7 +6,7 @@ solution with shift theta if ``x_{g(i)}(t) = x_i(t + theta T)`` for every cell (
 H/K is cyclic (eq. 2.2). So a gait is a homomorphism from a subgroup H into the circle.
 """
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
@@ -56,6 +56,16 @@ class Group:
             found[name or '1'] = element
         return found
 
+    def order(self, name: str, modulo: Collection[str] = ('1',)) -> int:
+        """Return the smallest power of an element that lies in a subgroup, given by names."""
+        subgroup = [self.elements[member] for member in modulo]
+        element = power = self.elements[name]
+        order = 1
+        while power not in subgroup:
+            power = _compose(element, power)
+            order += 1
+        return order
+
     def generated(self, shifts: Mapping[str, Fraction]) -> dict[str, Fraction]:
         """Extend shifts of some elements to the subgroup they generate, element name -> shift.
 
@@ -83,6 +93,10 @@ class Group:
 
 #: omega: i -> i + 2 round both rings; kappa swaps 1-2, 3-4, 5-6, 7-8 (two rings of four cells).
 Z4_Z2 = Group(8, (('omega', (2, 3, 4, 5, 6, 7, 0, 1)), ('kappa', (1, 0, 3, 2, 5, 4, 7, 6))))
+#: Primary gait with this group -> (j, k): shifts j/4 of omega and k/2 of kappa (Buono & Golubitsky
+#: 2001, Table 2). j = 1 stands for both senses in which a wave can run round the ring.
+GAITS = {'pronk': (0, 0), 'pace': (0, 1), 'bound': (2, 0), 'trot': (2, 1),
+         'jump': (1, 0), 'walk': (1, 1)}
 #: rho: 1-2, 3-4 (left and right); tau: 1-3, 2-4 (flexor and extensor).
 D2 = Group(4, (('rho', (1, 0, 3, 2)), ('tau', (2, 3, 0, 1))))
 
@@ -160,6 +174,11 @@ class Symmetry:
     def phases(self) -> np.ndarray:
         """Phase of each cell in cycles, shape (cells,): x_i(t) = u_wave(i)(t + phase_i T)."""
         return self._orbit_of_cells[1]
+
+    @cached_property
+    def first(self) -> np.ndarray:
+        """First cell (from 0) of each waveform, shape (waves,)."""
+        return np.unique(self.waves, return_index=True)[1]
 
     @cached_property
     def classes(self) -> np.ndarray:

@@ -9,7 +9,6 @@ import traceback
 from pathlib import Path
 
 import rclpy
-from ament_index_python.packages import PackageNotFoundError, get_package_share_directory
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.exceptions import InvalidParameterTypeException, InvalidParameterValueException
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
@@ -25,7 +24,7 @@ from std_srvs.srv import SetBool
 from cpg_ros.dynamics.pattern import Pattern
 from cpg_ros.dynamics.program import Refused
 from cpg_ros.dynamics.warm import warm
-from cpg_ros.networks.network import Preset
+from cpg_ros.networks.network import Network, Preset
 from cpg_ros.networks.presets import PresetError, read_presets
 from cpg_ros.networks.registry import NETWORKS, PRESETS
 from cpg_ros.nodes.diagnostics import Diagnostics
@@ -34,6 +33,7 @@ from cpg_ros.nodes.parameter_services import StrictParameterService
 from cpg_ros.nodes.settings import COMMANDS, NETWORK, Planner, Spec, as_doubles, specs
 from cpg_ros.nodes.ticker import Ticker
 from cpg_ros.robot import Robot, RobotError, load_robot
+from cpg_ros.share import share
 
 NAME = 'cpg_generator'
 #: On SIGINT or SIGTERM the ramp takes this long, and the node ends by the later time, s.
@@ -54,13 +54,13 @@ def find_robot(name: str) -> Robot:
     try:
         if name.endswith(('.yaml', '.yml')) or '/' in name:
             return load_robot(Path(name).expanduser())
-        config = Path(get_package_share_directory('cpg_ros')) / 'config'
+        config = share() / 'config'
         path = config / f'{name}.yaml'
         if not path.is_file():
             shipped = ', '.join(sorted(file.stem for file in config.glob('*.yaml')))
             raise StartError(f"robot '{name}' is neither a .yaml file nor one of: {shipped}")
         return load_robot(path)
-    except (RobotError, PackageNotFoundError) as error:
+    except RobotError as error:
         raise StartError(str(error)) from error
 
 
@@ -82,21 +82,19 @@ class Generator(Node):
         self._one_of('network', tuple(NETWORKS))
         network = self._value('network')
         compile_kernels(network)
-        self._planner = Planner(NETWORKS[network], dict(PRESETS[network]))
         for name, spec in specs(network).items():
             self._declare(name, spec)
-        self._planner.presets.update(self._further_presets())
-        self._one_of('gait', tuple(self._planner.presets))
+        presets = PRESETS[network] | self._further_presets(NETWORKS[network])
+        self._one_of('gait', tuple(presets))
         self._one_of('command', COMMANDS)
-        self._given_groups()
-        for name, spec in self._planner.specs(self._value('gait')).items():
-            self._declare(name, spec)
-
         robot = find_robot(self._value('robot'))
         if network not in robot.networks:
             raise StartError(f"robot file '{robot.name}' is for the network "
                              f"{' or '.join(robot.networks)}, not '{network}'")
-        self._planner.serve(robot)
+        self._planner = Planner(NETWORKS[network], presets, robot)
+        self._given_groups()
+        for name, spec in self._planner.specs(self._value('gait')).items():
+            self._declare(name, spec)
         try:
             program = self._planner.plan(self._values())
         except Refused as error:
@@ -123,10 +121,10 @@ class Generator(Node):
 
     # -- parameters -----------------------------------------------------------------------
 
-    def _further_presets(self) -> dict[str, Preset]:
+    def _further_presets(self, network: type[Network]) -> dict[str, Preset]:
         path = self._value('presets')
         try:
-            return read_presets(Path(path).expanduser(), self._planner.network) if path else {}
+            return read_presets(Path(path).expanduser(), network) if path else {}
         except PresetError as error:
             raise StartError(str(error)) from error
 

@@ -87,21 +87,18 @@ class Planner:
     """Turns parameters into programs for one network and one robot.
 
     Attributes:
+        network: whose parameters.
         presets: name -> preset, all that ``gait`` can be set to.
+        robot: which the programs are for.
         names: of the parameters that make up the settings.
 
     """
 
-    def __init__(self, network: type[Network], presets: dict[str, Preset]) -> None:
-        self.network, self.presets = network, presets
+    def __init__(self, network: type[Network], presets: dict[str, Preset], robot: Robot) -> None:
+        self.network, self.presets, self.robot = network, presets, robot
         self.names = ('gait', 'frequency', 'amplitude', 'symmetry_gain',
                       *(f'{network.name}.{key}' for key in network.parameters()))
-        self._robot: Robot | None = None
         self.program = functools.lru_cache(maxsize=32)(self._program)
-
-    def serve(self, robot: Robot) -> None:
-        """Plan for this robot from now on."""
-        self._robot = robot
 
     def prepare(self) -> None:
         """Solve every preset's gait ahead, so that a switch to it is answered at once."""
@@ -159,8 +156,7 @@ class Planner:
         return self.program(self.settings(values))
 
     def _program(self, settings: Settings) -> Program:
-        assert self._robot is not None, 'serve() comes first'
-        return plan(self._robot, settings.gait, self.presets[settings.gait], settings.network,
+        return plan(self.robot, settings.gait, self.presets[settings.gait], settings.network,
                     settings.frequency, settings.amplitude, settings.symmetry_gain)
 
     def complete(self, parameters: list[Parameter], current: dict[str, Any]) -> list[Parameter]:

@@ -1,0 +1,267 @@
+"""Pseudo-arclength continuation: curves of solutions, followed past their folds.
+
+n equations in n + 1 unknowns, the last of which is a parameter, have a curve of solutions. From a
+point on it the tangent predicts the next one, and Newton's method corrects it in the hyperplane
+that the tangent is normal to (Keller 1977; Doedel, Keller & Kernevez, *Numerical analysis and
+control of bifurcation problems*, 1991). The parameter is an unknown like all others, so that a
+fold, where it turns round, is a point like all others.
+"""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Protocol
+
+import numpy as np
+from scipy.optimize import brentq
+
+from cpg_ros.dynamics.periodic import NoOrbit
+
+#: Newton stops at steps this short; what is left then is of the order of its square.
+TOLERANCE = 1e-9
+NEWTON = 8
+#: Steps along the curve, in the norm of its product: every unknown counts against its scale.
+FIRST, SHORTEST, LONGEST = 0.02, 1e-6, 0.2
+#: Least cosine of the angle between the tangents of two neighbours.
+ALIGNED = 0.9
+#: No step may take more than this share of the amplitude, so that none leaps over the rest state.
+SHARE = 0.6
+
+
+class Curve(Protocol):
+    """A curve in a fixed discretisation; the last two unknowns are a period and the parameter."""
+
+    def product(self, one: np.ndarray, other: np.ndarray) -> float:
+        """Inner product of two vectors of unknowns."""
+
+    def step(self, z: np.ndarray, border: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Linearise at z: Newton's increment normal to the border, and the tangent.
+
+        The tangent's product with the border is 1.
+
+        Raises:
+            LinAlgError: the bordered equations are singular.
+
+        """
+
+    def amplitude(self, z: np.ndarray) -> float:
+        """Half the range of what is continued; zero at a bifurcation from rest."""
+
+    def renewed(self, z: np.ndarray, border: np.ndarray, again: bool
+                ) -> tuple['Curve', np.ndarray, np.ndarray] | None:
+        """Discretise anew where z is not resolved: curve, z and border; None if it is.
+
+        Again: this discretisation was itself made to resolve z, and may have failed.
+
+        Raises:
+            NoOrbit: it cannot be resolved.
+
+        """
+
+
+@dataclass(frozen=True, eq=False)
+class Place:
+    """A point of a curve and the unit tangent there.
+
+    Attributes:
+        curve: the discretisation that it is a point of.
+        z: unknowns; the last two are a period and the parameter.
+        tangent: in the direction in which the curve is followed.
+        steps: that Newton's method took to it.
+        cosine: of the angle between the tangent and the border, if that was a unit vector.
+
+    """
+
+    curve: Curve
+    z: np.ndarray
+    tangent: np.ndarray
+    steps: int = 0
+    cosine: float = 1.0
+
+    @property
+    def value(self) -> float:
+        """The parameter."""
+        return float(self.z[-1])
+
+    @property
+    def rate(self) -> float:
+        """Derivative of the parameter by the arclength; it changes sign at a fold."""
+        return float(self.tangent[-1])
+
+    @property
+    def amplitude(self) -> float:
+        """Half the range of what is continued."""
+        return self.curve.amplitude(self.z)
+
+    def reversed(self) -> 'Place':
+        """The same point, to be left the other way."""
+        return replace(self, tangent=-self.tangent)
+
+
+def corrected(curve: Curve, z: np.ndarray, border: np.ndarray) -> Place | None:
+    """Return the curve's point z + v with (v, border) = 0; None if Newton's method has lost it."""
+    with np.errstate(all='ignore'):
+        for count in range(1, NEWTON + 1):
+            try:
+                increment, direction = curve.step(z, border)
+            except np.linalg.LinAlgError:
+                return None
+            size = math.sqrt(curve.product(increment, increment))
+            z = z + increment
+            # Steps of more than the scale of everything have lost the curve.
+            if not size < 1.0 or z[-2] <= 0.0:
+                return None
+            if size <= TOLERANCE:
+                length = math.sqrt(curve.product(direction, direction))
+                return Place(curve, z, direction / length, count, 1.0 / length)
+    return None
+
+
+def resolved(curve: Curve, z: np.ndarray, border: np.ndarray) -> Place | None:
+    """Return the curve's point near z in a discretisation that resolves it.
+
+    Raises:
+        NoOrbit: it cannot be resolved.
+
+    """
+    place = first = corrected(curve, z, border)
+    while place is not None and first is not None:
+        new = place.curve.renewed(place.z, border, place is not first)
+        if new is None:
+            return replace(place, steps=first.steps, cosine=first.cosine)
+        border = new[2]
+        place = corrected(*new)
+    return None
+
+
+def held(size: int, which: int) -> np.ndarray:
+    """The border that holds one of the unknowns."""
+    border = np.zeros(size)
+    border[which] = 1.0
+    return border
+
+
+def along(place: Place, step: float) -> Place | None:
+    """Return the point a step along the tangent, in the same discretisation."""
+    return corrected(place.curve, place.z + step * place.tangent, place.tangent)
+
+
+def pinned(place: Place, value: float) -> Place | None:
+    """Return the curve's point with a value of the parameter, from one nearby; None if lost."""
+    z = place.z + (value - place.value) / place.rate * place.tangent
+    z[-1] = value
+    found = resolved(place.curve, z, held(z.size, -1))
+    if found is None:
+        return None
+    found.z[-1] = value
+    # The border makes the value rise.
+    return found if place.rate > 0.0 else found.reversed()
+
+
+def crossing(here: Place, way: float, value: float) -> Place | None:
+    """Return the next point with a value of the parameter; None if Newton's method finds none.
+
+    Args:
+        here: a point before it, which may be a fold.
+        way: 1 or -1, along the tangent or back.
+        value: that the parameter reaches monotonically from here.
+
+    """
+    def gap(step: float) -> float:
+        found = along(here, way * step)
+        if found is None:
+            raise np.linalg.LinAlgError('no point')
+        return found.value - value
+
+    reach, sign = 1e-3, math.copysign(1.0, here.value - value)
+    try:
+        while sign * gap(reach) > 0.0:
+            reach *= 2.0
+        near = along(here, way * brentq(gap, 0.0, reach, xtol=1e-2 * reach))
+    except np.linalg.LinAlgError:
+        return None
+    return pinned(near, value) if near is not None and near.rate else None
+
+
+def fold(after: Place, step: float) -> Place | None:
+    """Return the fold that lies up to about a step before a point; None if it cannot be had."""
+    def rate(back: float) -> float:
+        found = along(after, back)
+        if found is None:
+            raise np.linalg.LinAlgError('no point')
+        return found.rate
+
+    try:
+        for reach in (1.1, 1.4, 2.0):
+            if rate(-reach * step) * after.rate < 0.0:
+                return along(after, brentq(rate, -reach * step, 0.0, xtol=1e-9 * step,
+                                           rtol=1e-12))
+    except np.linalg.LinAlgError:
+        # Where two curves cross, as at a gain of symmetry, Newton's method may fail.
+        return None
+    return None
+
+
+def _room(here: Place) -> float:
+    """Longest step that takes no more than its share of the amplitude."""
+    size = here.amplitude
+    ahead = here.curve.amplitude(here.z + 1e-3 * size * here.tangent)
+    falling = (size - ahead) / (1e-3 * size)
+    return SHARE * size / falling if falling > 0.0 else math.inf
+
+
+def follow(start: Place, low: float, high: float, visit: Callable[[Place], str], *,
+           first_step: float = FIRST, longest_step: float = LONGEST, most: int = 200
+           ) -> tuple[list[int], str]:
+    """Follow a curve from a point in the direction of its tangent.
+
+    Args:
+        start: a resolved point.
+        low: least value of the parameter.
+        high: greatest value of the parameter.
+        visit: gets every point after start; it returns why to end there, or ''.
+        first_step: arclength of the first step.
+        longest_step: of any step.
+        most: points, at most.
+
+    Returns:
+        The numbers of those points that are folds, from 0, and why it ended: what visit said,
+        'bound' (the last point is on it), 'steps', 'steep' (it cannot be resolved) or 'lost'
+        (Newton fails however short the step).
+
+    """
+    folds: list[int] = []
+    count, here, step = 0, start, first_step
+    while count < most:
+        step = min(step, longest_step, _room(here))
+        if step < SHORTEST:
+            return folds, 'lost'
+        try:
+            ahead = resolved(here.curve, here.z + step * here.tangent, here.tangent)
+        except NoOrbit:
+            return folds, 'steep'
+        if ahead is None or ahead.cosine < ALIGNED:
+            step *= 0.5
+            continue
+        stations = [ahead]
+        if ahead.rate * here.rate < 0.0:
+            between = fold(ahead, step)
+            if between is None and step > 100.0 * SHORTEST:
+                step *= 0.5
+                continue
+            if between is not None:
+                stations.insert(0, between)
+        for station in stations:
+            if not low <= station.value <= high:
+                edge = pinned(station, low if station.value < low else high)
+                return folds, ('' if edge is None else visit(edge)) or 'bound'
+            why = visit(station)
+            if why:
+                return folds, why
+            if station is not ahead:
+                folds.append(count)
+            count += 1
+        here = ahead
+        if ahead.steps <= 4 and ahead.cosine > 1.0 - 0.3 * (1.0 - ALIGNED):
+            step *= 1.5
+    return folds, 'steps'

@@ -1,0 +1,314 @@
+"""Branches of periodic orbits: a gait followed along a line of parameters, past its folds.
+
+A branch says over which range of parameters a gait exists, where two orbits of it coexist, and
+how it ends: at a Hopf point of the rest state, where its amplitude falls to zero, at an orbit of
+more symmetry, near a homoclinic orbit, where its period has no bound, or at the ends asked for.
+"""
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from cpg_ros.dynamics import arclength
+from cpg_ros.dynamics.arclength import Place
+from cpg_ros.dynamics.cell_orbit import richer
+from cpg_ros.dynamics.curves import FourierCurve, MeshCurve
+from cpg_ros.dynamics.delayed_orbit import NODES, DelayedOrbit
+from cpg_ros.dynamics.mesh_newton import Reduced, Solution, sampled
+from cpg_ros.dynamics.mesh_orbit import MeshOrbit
+from cpg_ros.dynamics.periodic import NoOrbit
+from cpg_ros.networks.along import Along
+from cpg_ros.networks.delayed import Delayed, Mode
+from cpg_ros.networks.network import Network
+from cpg_ros.networks.symmetry import Symmetry
+
+#: Below this amplitude an orbit is as good as its Hopf point.
+REST = 2e-3
+#: Intervals of the first mesh at a Hopf point; it is made finer at once if need be.
+INTERVALS = 20
+
+
+@dataclass(frozen=True, eq=False)
+class BranchPoint:
+    """A point of a branch.
+
+    Attributes:
+        value: where on the line.
+        orbit: of the network there. At a fold its derivatives by parameters have no bound.
+        place: the same as continuation has it, with the tangent along the branch.
+
+    """
+
+    value: float
+    orbit: DelayedOrbit | MeshOrbit
+    place: Place = field(repr=False)
+
+    @property
+    def amplitude(self) -> float:
+        """Half the range of cell 1's first variable."""
+        return float(self.orbit.levels[0, 0, 1])
+
+
+@dataclass(frozen=True)
+class End:
+    """How a branch ends.
+
+    Attributes:
+        why: 'rest' (the amplitude falls to zero: a Hopf point), 'symmetry' (it runs into an
+            orbit that has more of it, where it turns back as its own mirror image), 'period'
+            (it has grown too long: near a homoclinic orbit), 'bound' (an end of the range),
+            'steps', 'steep' (the waveform cannot be resolved), 'lost' (Newton's method fails
+            however short the step), 'start' (it was not followed that way).
+        value: where; of a Hopf point, extrapolated to amplitude 0.
+        period: the same of the period.
+
+    """
+
+    why: str
+    value: float
+    period: float
+
+
+@dataclass(frozen=True, eq=False)
+class Branch:
+    """Periodic orbits of one gait along a line of parameters.
+
+    Attributes:
+        along: the line.
+        points: in the order in which they follow one another on the branch.
+        turns: which of them are folds.
+        ends: of the branch, before the first point and after the last.
+
+    """
+
+    along: Along
+    points: tuple[BranchPoint, ...]
+    turns: tuple[int, ...]
+    ends: tuple[End, End]
+
+    @property
+    def folds(self) -> tuple[BranchPoint, ...]:
+        """Where the branch turns round: on one side two orbits, on the other none."""
+        return tuple(self.points[k] for k in self.turns)
+
+    @property
+    def values(self) -> np.ndarray:
+        """Of the points, shape (points,)."""
+        return np.array([point.value for point in self.points])
+
+    @property
+    def periods(self) -> np.ndarray:
+        """Of the points in model time, shape (points,)."""
+        return np.array([point.orbit.period for point in self.points])
+
+    @property
+    def amplitudes(self) -> np.ndarray:
+        """Half the range of cell 1's first variable at the points, shape (points,)."""
+        return np.array([point.amplitude for point in self.points])
+
+    def at(self, value: float) -> tuple[DelayedOrbit | MeshOrbit, ...]:
+        """All orbits of the branch at a value, in its order; at a fold it may be one or two.
+
+        Raises:
+            NoOrbit: between two points that the value lies between, Newton's method found none.
+
+        """
+        found = []
+        for left, right in zip(self.points, self.points[1:], strict=False):
+            if left.value == value:
+                found.append(left.orbit)
+            elif (left.value - value) * (right.value - value) < 0.0:
+                # From the end that is nearer to a fold, where the value is yet to pick up.
+                place = (arclength.crossing(left.place, 1.0, value)
+                         if abs(left.place.rate) < abs(right.place.rate) else
+                         arclength.crossing(right.place, -1.0, value))
+                if place is None:
+                    raise NoOrbit(f'no orbit was found at {self.along} {value:g}')
+                found.append(place.curve.orbit(place.z))  # type: ignore[attr-defined]
+        if self.points[-1].value == value:
+            found.append(self.points[-1].orbit)
+        return tuple(found)
+
+
+def follow(orbit: DelayedOrbit | MeshOrbit, along: Along, low: float, high: float, *,
+           first_step: float = arclength.FIRST, longest_step: float = arclength.LONGEST,
+           most: int = 200, both: bool = True, longest: float = 20.0) -> Branch:
+    """Follow a gait's orbit along a line of parameters, past folds.
+
+    Args:
+        orbit: of a network on the line; its gait's symmetry is kept.
+        along: the line.
+        low: least value.
+        high: greatest value.
+        first_step: arclength of the first step. States count as they are, the period against
+            the first one's, the value against high - low.
+        longest_step: arclength of any step.
+        most: points in each direction, at most.
+        both: also in the direction in which the value falls at first; its points come first.
+        longest: period, over the first one's, at which the branch ends.
+
+    Raises:
+        ValueError: the orbit's network is not on the line or not in the range, or the line
+            breaks the gait's symmetry.
+        NoOrbit: Newton's method fails at the given orbit.
+
+    """
+    _check(orbit.network, orbit.symmetry, along, low, high)
+    value, scales = along.value(orbit.network), (orbit.period, high - low)
+    curve: FourierCurve | MeshCurve
+    if isinstance(orbit, DelayedOrbit):
+        curve = FourierCurve(orbit.network, orbit.symmetry, along, scales)  # type: ignore[arg-type]
+        z = np.array([*orbit.values, orbit.period, value])
+    else:
+        curve = MeshCurve(orbit.network, orbit.symmetry, along, scales, orbit.mesh)
+        ends = np.vstack([orbit.coefficients[0], orbit.coefficients[:, -1].sum(axis=0)])
+        length = orbit.period / orbit.symmetry.order
+        z = curve.pack(Solution(orbit.mesh, ends, orbit.stages, length), length, value)
+    # At a fold the value cannot be held, but the period can.
+    start = (arclength.resolved(curve, z, arclength.held(z.size, -1))
+             or arclength.resolved(curve, z, arclength.held(z.size, -2)))
+    if start is None:
+        raise NoOrbit(f"Newton's method fails at the orbit given, {along} {value:g}")
+    start = start if start.rate >= 0.0 else start.reversed()
+    limits = (low, high, longest * orbit.period)
+    steps = {'first_step': first_step, 'longest_step': longest_step, 'most': most}
+    points, turns, end = _run(start, limits, steps)
+    before: list[BranchPoint] = []
+    back: list[int] = []
+    begin = End('start', value, orbit.period)
+    if both:
+        before, back, begin = _run(start.reversed(), limits, steps)
+    here = BranchPoint(value, start.curve.orbit(start.z), start)  # type: ignore[attr-defined]
+    n = len(before)
+    earlier = [replace(point, place=point.place.reversed()) for point in reversed(before)]
+    return Branch(along, (*earlier, here, *points),
+                  (*(n - 1 - k for k in reversed(back)), *(n + 1 + k for k in turns)),
+                  (begin, end))
+
+
+def from_hopf(network: Network, symmetry: Mode | Symmetry, omega: float, along: Along, low: float,
+              high: float, *, stand: np.ndarray | None = None, vector: np.ndarray | None = None,
+              amplitude: float = 0.02, first_step: float = arclength.FIRST,
+              longest_step: float = arclength.LONGEST, most: int = 200, longest: float = 20.0
+              ) -> Branch:
+    """Follow the orbits that bifurcate at a Hopf point, whichever side of it they are on.
+
+    The first orbit has a given amplitude and the value that goes with it, which near the Hopf
+    point is better conditioned than the reverse.
+
+    Args:
+        network: at the Hopf point; of the delayed network any Hopf point of any mode.
+        symmetry: of the critical mode.
+        omega: its angular frequency, rad per model time.
+        along: the line.
+        low: least value.
+        high: greatest value.
+        stand: equilibrium, shape (components,); not for the delayed network, where it is 0.
+        vector: critical eigenvector, complex, shape (components,); not for the delayed network.
+        amplitude: of the first orbit.
+        first_step: arclength of the first step, as in follow.
+        longest_step: arclength of any step.
+        most: points, at most.
+        longest: period, over that of the Hopf point, at which the branch ends.
+
+    Raises:
+        ValueError: the network is not on the line or not in the range, the line breaks the
+            gait's symmetry, or the eigenvector does not have it.
+        NoOrbit: Newton's method finds no orbit of this amplitude.
+
+    """
+    _check(network, symmetry, along, low, high)
+    value, period = along.value(network), 2.0 * np.pi / omega
+    scales = (period, high - low)
+    curve: FourierCurve | MeshCurve
+    if isinstance(network, Delayed):
+        curve = FourierCurve(network, symmetry, along, scales)  # type: ignore[arg-type]
+        rest, border = np.zeros(NODES + 2), np.zeros(NODES + 2)
+        border[:-2] = np.cos(2.0 * np.pi * np.arange(NODES) / NODES)
+        rest[-2:] = period, value
+    else:
+        if stand is None or vector is None:
+            raise ValueError('a network without delay needs the stand and the eigenvector')
+        curve = MeshCurve(network, symmetry, along, scales,  # type: ignore[arg-type]
+                          np.linspace(0.0, 1.0, INTERVALS + 1))
+        rest, border = _harmonic(curve, stand, vector, period)
+    start = arclength.resolved(curve, rest + amplitude * border, border)
+    if start is None:
+        raise NoOrbit(f'no orbit of amplitude {amplitude:g} was found near {along} {value:g}')
+    points, turns, end = _run(start, (low, high, longest * period), {
+        'first_step': first_step, 'longest_step': longest_step, 'most': most})
+    orbit = start.curve.orbit(start.z)  # type: ignore[attr-defined]
+    here = BranchPoint(start.value, orbit, start)
+    return Branch(along, (here, *points), tuple(1 + k for k in turns),
+                  (End('rest', value, period), end))
+
+
+def _harmonic(curve: MeshCurve, stand: np.ndarray, vector: np.ndarray, period: float
+              ) -> tuple[np.ndarray, np.ndarray]:
+    """The stand as a point of the curve, and the critical oscillation, of amplitude 1."""
+    symmetry = curve.symmetry
+    reduced = Reduced(curve.network, symmetry)
+    cells, variables = curve.network.cells, curve.network.variables
+    # Cell 1 peaks at phase 0.
+    vector = vector / vector[0]
+    for name, shift in symmetry.shifts:
+        image = np.concatenate([np.array(symmetry.group.elements[name]) + k * cells
+                                for k in range(variables)])
+        turned = vector[image] - vector * np.exp(2j * np.pi * float(shift))
+        if not np.abs(turned).max() <= 1e-6 * np.abs(vector).max():
+            raise ValueError(f'the eigenvector does not have the symmetry: {name} shifts it by '
+                             f'something else than {shift}')
+
+    def wave(places: np.ndarray) -> np.ndarray:
+        turns = np.exp(2j * np.pi * places / symmetry.order)
+        return (turns[:, None] * vector[reduced.kept]).real
+
+    def still(places: np.ndarray) -> np.ndarray:
+        return np.tile(stand[reduced.kept], (places.size, 1))
+
+    length, value = period / symmetry.order, curve.along.value(curve.network)
+    return (curve.pack(sampled(still, curve.mesh, 1.0), length, value),
+            curve.pack(sampled(wave, curve.mesh, 1.0), 0.0, 0.0))
+
+
+def _run(start: Place, limits: tuple[float, float, float], steps: dict
+         ) -> tuple[list[BranchPoint], list[int], End]:
+    """Follow in one direction: the points after start, which are folds, and the end."""
+    low, high, longest = limits
+    points: list[BranchPoint] = []
+
+    def visit(place: Place) -> str:
+        orbit = place.curve.orbit(place.z)  # type: ignore[attr-defined]
+        points.append(BranchPoint(place.value, orbit, place))
+        if place.amplitude < REST:
+            return 'rest'
+        if orbit.period > longest:
+            return 'period'
+        return 'symmetry' if isinstance(orbit, MeshOrbit) and richer(orbit) else ''
+
+    turns, why = arclength.follow(start, low, high, visit, **steps)
+    last = points[-1].place if points else start
+    value, period = last.value, last.curve.orbit(last.z).period  # type: ignore[attr-defined]
+    if why == 'rest':
+        # Near a Hopf point value and period are linear in the square of the amplitude.
+        before = points[-2] if len(points) > 1 else None
+        if before is not None:
+            one, other = before.place.amplitude**2, last.amplitude**2
+            value += (value - before.value) * other / (one - other)
+            period += (period - before.orbit.period) * other / (one - other)
+    return points, turns, End(why, value, period)
+
+
+def _check(network: Network, symmetry: Mode | Symmetry, along: Along, low: float, high: float
+           ) -> None:
+    value = along.value(network)
+    if along.at(network, value) != network:
+        raise ValueError(f'the network is not on the line {along}')
+    if not low <= value <= high:
+        raise ValueError(f'{along} {value:g} is not from {low:g} to {high:g}')
+    if isinstance(symmetry, Symmetry):
+        other = along.at(network, high if value != high else low).as_dict()
+        for family in network.families(symmetry):
+            if len({other[name] for name in family}) > 1:
+                raise ValueError(f'{along} breaks the symmetry: it needs {", ".join(family)} '
+                                 f'to be equal')

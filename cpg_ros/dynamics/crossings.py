@@ -1,0 +1,45 @@
+"""Where functions of one variable change their sign, looked for on a grid and refined."""
+
+from collections.abc import Callable
+
+import numpy as np
+from scipy.optimize import brentq, minimize_scalar
+
+#: Places are refined to this, absolute and relative to them.
+EXACT = 1e-13
+#: A turn on the grid may reach this many times further than it differs from its neighbours.
+REACH = 4.0
+
+
+def crossings(function: Callable[[float], float], grid: np.ndarray,
+              values: np.ndarray | None = None) -> list[float]:
+    """Find sign changes of a continuous function, in the order of the grid.
+
+    Where it turns back before it reaches zero, its extremum is looked up as well: two crossings
+    between neighbouring points of the grid are found, too.
+
+    Args:
+        function: of a place; nan where it has no value.
+        grid: rising places, shape (n,).
+        values: of the function there, where they are already known.
+
+    """
+    values = np.array([function(x) for x in grid]) if values is None else np.asarray(values)
+    places, found = list(grid), list(values)
+    sizes = np.abs(values)
+    bend = np.maximum(sizes[:-2], sizes[2:]) - sizes[1:-1]
+    turns = np.flatnonzero((sizes[1:-1] <= REACH * bend) & (sizes[1:-1] <= sizes[:-2])
+                           & (sizes[1:-1] <= sizes[2:])
+                           & (np.sign(values[:-2]) == np.sign(values[1:-1]))
+                           & (np.sign(values[1:-1]) == np.sign(values[2:]))) + 1
+    for k in turns[::-1]:
+        side = np.sign(values[k])
+        lowest = minimize_scalar(lambda x, side=side: side * function(x), method='bounded',
+                                 bounds=(grid[k - 1], grid[k + 1]), options={'xatol': 1e-9})
+        if lowest.fun < 0.0:
+            at = int(np.searchsorted(places, lowest.x))
+            places.insert(at, float(lowest.x))
+            found.insert(at, side * lowest.fun)
+    return [float(brentq(function, left, right, xtol=EXACT, rtol=EXACT))
+            for left, right, a, b in zip(places, places[1:], found, found[1:], strict=False)
+            if np.isfinite(a + b) and (a >= 0.0) != (b >= 0.0)]

@@ -1,0 +1,209 @@
+"""The picture of ``analyze --plot``: branches, roots, trajectories and footfalls."""
+
+import io
+from itertools import pairwise
+from typing import Literal
+
+import matplotlib
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from cpg_ros.dynamics.cell_hopf import CellHopf
+from cpg_ros.dynamics.characteristic import characteristic_roots
+from cpg_ros.dynamics.continuation import Branch, follow, from_hopf
+from cpg_ros.dynamics.delayed_orbit import DelayedOrbit
+from cpg_ros.dynamics.floquet import multipliers
+from cpg_ros.dynamics.hopf import HopfPoint
+from cpg_ros.dynamics.mesh_orbit import MeshOrbit
+from cpg_ros.dynamics.orbit import NoOrbit, Orbit
+from cpg_ros.dynamics.progress import progress_bar
+from cpg_ros.dynamics.stand import everywhere
+from cpg_ros.networks.delayed import MODES, Delayed
+from cpg_ros.tools import footfall
+from cpg_ros.tools.analysis import Analysis, CellAnalysis
+
+COLOURS = {'pronk': '#805ad5', 'pace': '#2f855a', 'bound': '#b7791f', 'trot': '#c53030',
+           'jump': '#00838f', 'walk': '#2b6cb0', 'run': '#c53030', 'two_legged_jump': '#00838f',
+           'two_legged_hop': '#805ad5', 'skip': '#2f855a', 'gallop': '#b7791f',
+           'hesitation_walk': '#97266d', 'asymmetric_hop': '#4a5568', 'one_legged_hop': '#975a16'}
+#: Lines of what attracts by itself, with a symmetry lock, and not at all.
+STYLES: tuple[tuple[Literal['-', '--', ':'], str], ...] = (
+    ('-', 'stable'), ('--', 'stable with a lock'), (':', 'unstable'))
+#: Points of a branch at most, how far apart in arclength, and how many branches are drawn.
+POINTS, LONGEST, BRANCHES = 80, 0.2, 12
+
+
+def branches(analysis: Analysis) -> list[tuple[str, Branch]]:
+    """Follow the gaits from their Hopf points within the span, and from the set's orbits.
+
+    An orbit that lies on the branch of a Hopf point is not followed again.
+    """
+    low, high = analysis.span
+    value = analysis.along.value(analysis.network)
+    found: list[tuple[str, Branch]] = []
+    for point in analysis.hopf[:BRANCHES]:
+        found.extend((point.gait, branch) for branch in _born(point, analysis))
+    for verdict in analysis.existing:
+        orbit = verdict.orbit
+        if low <= value <= high and isinstance(orbit, DelayedOrbit | MeshOrbit) and not any(
+                gait == verdict.gait and _holds(branch, value, orbit) for gait, branch in found):
+            found.append((verdict.gait, follow(orbit, analysis.along, low, high, most=POINTS,
+                                               longest_step=LONGEST)))
+    return found
+
+
+def _holds(branch: Branch, value: float, orbit: Orbit) -> bool:
+    """Whether a branch passes through an orbit."""
+    try:
+        return any(abs(other.period / orbit.period - 1.0) < 1e-6 for other in branch.at(value))
+    except NoOrbit:
+        return False
+
+
+def _born(point: HopfPoint | CellHopf, analysis: Analysis) -> list[Branch]:
+    """The branch of a Hopf point; none where the first orbit cannot be found."""
+    low, high = analysis.span
+    try:
+        if isinstance(point, HopfPoint):
+            return [from_hopf(point.network, point.mode, point.omega, analysis.along, low, high,
+                              most=POINTS, longest_step=LONGEST)]
+        vector = np.concatenate([entry * point.block.vector for entry in point.vector])
+        return [from_hopf(point.network, point.block.symmetry, point.omega, analysis.along, low,
+                          high, stand=everywhere(point.network, point.stand), vector=vector,
+                          most=POINTS, longest_step=LONGEST)]
+    except NoOrbit:
+        return []
+
+
+def _draw_branch(axes: Axes, branch: Branch, kinds: list[int], colour: str) -> None:
+    """Draw amplitudes, the line's style by the stability at the points: 0, 1 or 2."""
+    values, amplitudes = branch.values, branch.amplitudes
+    starts = [0, *(k for k in range(1, len(kinds)) if kinds[k] != kinds[k - 1]), len(kinds)]
+    for begin, end in pairwise(starts):
+        part = slice(max(begin - 1, 0), end)
+        axes.plot(values[part], amplitudes[part], color=colour,
+                  linestyle=STYLES[kinds[begin]][0], linewidth=1.6)
+    for k in branch.turns:
+        axes.plot(values[k], amplitudes[k], marker='s', color=colour, markersize=5)
+
+
+def _draw_branches(axes: Axes, analysis: Analysis) -> None:
+    shown, found = set(), branches(analysis)
+    total = sum(len(branch.points) for _, branch in found)
+    done = 0
+    with progress_bar('stability along the branches', total) as bar:
+        for gait, branch in found:
+            kinds = []
+            for place in branch.points:
+                judged = multipliers(place.orbit)
+                kinds.append(0 if judged.leading < 1.0 else
+                             1 if judged.leading_within < 1.0 else 2)
+                done += 1
+                bar(done)
+            _draw_branch(axes, branch, kinds, COLOURS[gait])
+            shown.add(gait)
+    for point in analysis.hopf:
+        where = point.tau if isinstance(point, HopfPoint) else point.value
+        axes.plot(where, 0.0, marker='o', color=COLOURS[point.gait], markersize=5, clip_on=False)
+        shown.add(point.gait)
+    here = analysis.along.value(analysis.network)
+    axes.axvline(here, color='#a0aec0', linewidth=1.0, zorder=0)
+    for verdict in analysis.existing:
+        axes.plot(here, verdict.amplitude, marker='D', color=COLOURS[verdict.gait], markersize=6)
+        shown.add(verdict.gait)
+    handles = [Line2D([], [], color=COLOURS[gait], label=gait.replace('_', ' '))
+               for gait in COLOURS if gait in shown]
+    handles += [Line2D([], [], color='black', linestyle=style, label=label)
+                for style, label in STYLES]
+    handles += [Line2D([], [], color='black', marker=marker, linestyle='', label=label)
+                for marker, label in (('o', 'Hopf point'), ('s', 'fold'), ('D', 'this set'))]
+    axes.legend(handles=handles, fontsize=7, ncols=2, frameon=False)
+    axes.set_ylim(bottom=0.0)
+    axes.set_xlabel(f'{analysis.along} [model time]' if isinstance(analysis.network, Delayed)
+                    else str(analysis.along))
+    axes.set_ylabel('amplitude of cell 1')
+    axes.set_title('Branches of gaits', loc='left', fontsize=10)
+
+
+def _draw_roots(axes: Axes, analysis: Analysis) -> None:
+    if isinstance(analysis, CellAnalysis):
+        for block in analysis.blocks:
+            axes.plot(block.eigenvalues.real, block.eigenvalues.imag, 'o', alpha=0.8,
+                      color=COLOURS[block.gait], markersize=5)
+        title = "Eigenvalues of the stand"
+    else:
+        assert isinstance(analysis.network, Delayed)
+        names = {mode: gait for gait in analysis.gaits for mode in MODES
+                 if mode.k == (own := analysis.network.symmetry(gait)).k
+                 and mode.j in (own.j, -own.j % 4)}
+        for mode in MODES:
+            roots = characteristic_roots(analysis.network, mode, 7)
+            axes.plot(roots.real, roots.imag, 'o', color=COLOURS[names[mode]], alpha=0.8,
+                      markersize=5)
+        title = 'Characteristic roots of rest'
+    axes.axvline(0.0, color='#718096', linewidth=1.0, zorder=0)
+    axes.set_xlabel('real part [1/model time]')
+    axes.set_ylabel('imaginary part [rad/model time]')
+    axes.set_title(title, loc='left', fontsize=10)
+
+
+def _draw_trajectories(axes: Axes, analysis: Analysis) -> None:
+    for row, verdict in enumerate(analysis.existing):
+        orbit = verdict.orbit
+        assert orbit is not None
+        times = np.linspace(0.0, footfall.STRIDES * orbit.period, 601)
+        cells = orbit(times)[:, :4]
+        height = 2.3 * (len(analysis.existing) - 1 - row)
+        size = np.ptp(cells) / 2.0
+        middle = cells.max() - size
+        for cell, style in enumerate(('-', '--', '-.', ':')):
+            axes.plot(times / orbit.period, height + (cells[:, cell] - middle) / size, style,
+                      color=COLOURS[verdict.gait], linewidth=1.1,
+                      label=f'x{cell + 1}' if row == 0 else None)
+        axes.text(0.01, height + 1.03, f'{verdict.gait.replace("_", " ")}: period '
+                  f'{orbit.period:.4f}, swing {2.0 * size:.3f}', fontsize=7)
+    if analysis.existing:
+        axes.legend(fontsize=7, ncols=4, frameon=False, loc='lower right')
+        axes.set_ylim(-1.4, 2.3 * len(analysis.existing) - 0.9)
+    axes.set_yticks([])
+    axes.set_xlabel('time [strides]')
+    axes.set_ylabel('cells 1 to 4, over their range')
+    axes.set_title('Trajectories', loc='left', fontsize=10)
+
+
+def picture(analysis: Analysis, suffix: str) -> bytes:
+    """Draw an analysis.
+
+    Args:
+        analysis: of a parameter set.
+        suffix: of the file, such as '.png'.
+
+    Raises:
+        ValueError: matplotlib does not write such files.
+
+    """
+    matplotlib.use('Agg')
+    if suffix.lstrip('.') not in Figure().canvas.get_supported_filetypes():
+        raise ValueError(f"--plot: '{suffix}' is not a kind of picture that can be written, such "
+                         "as .png, .pdf or .svg")
+    from matplotlib import pyplot
+    count = max(1, len(analysis.existing))
+    figure = pyplot.figure(figsize=(12.0, 7.4 + 1.7 * max(0, count - 3)), layout='constrained')
+    outer = figure.add_gridspec(2, 2)
+    _draw_branches(figure.add_subplot(outer[0, 0]), analysis)
+    _draw_roots(figure.add_subplot(outer[0, 1]), analysis)
+    _draw_trajectories(figure.add_subplot(outer[1, 0]), analysis)
+    inner = outer[1, 1].subgridspec(count, 1)
+    for row, verdict in enumerate(analysis.existing):
+        axes = figure.add_subplot(inner[row])
+        assert verdict.orbit is not None
+        footfall.draw(axes, verdict.orbit, f'Footfalls: {verdict.gait.replace("_", " ")}')
+        if row == count - 1:
+            axes.set_xlabel('time [strides]')
+    figure.suptitle(f'{analysis.network.name}: {analysis.parameters}', fontsize=11)
+    out = io.BytesIO()
+    figure.savefig(out, format=suffix.lstrip('.'), dpi=130)
+    pyplot.close(figure)
+    return out.getvalue()

@@ -1,0 +1,145 @@
+"""Executable ``analyze``: what a parameter set does, before it runs on a robot.
+
+``analyze --network delayed --set a=-4.5 b=1 c=6.5 d=-2 tau=0.4`` tells whether the set oscillates,
+in which gaits, from which delay on, how large and how fast, and how stable each gait is: on the
+centre manifold, in the full network, and with the symmetry lock.
+"""
+
+import sys
+from argparse import RawDescriptionHelpFormatter
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from cpg_ros.dynamics.progress import progress_bar
+from cpg_ros.dynamics.verdict import verdicts
+from cpg_ros.networks.along import Along
+from cpg_ros.networks.network import Network
+from cpg_ros.networks.registry import NETWORKS, PRESETS, USUAL
+from cpg_ros.tools.analysis import CellAnalysis, DelayAnalysis, analysed
+from cpg_ros.tools.arguments import (
+    Parser,
+    as_json,
+    assignment,
+    interval,
+    number,
+    say,
+    twice,
+    write,
+)
+
+DESCRIPTION = '''\
+Tell what a parameter set does before it runs on a robot: the rest state and its Hopf points, the
+gaits as exact periodic orbits, and whether each attracts in the full network and with the
+symmetry lock. Works without a ROS graph.'''
+EPILOG = '''\
+examples:
+  analyze --network delayed --set a=-4.5 b=1 c=6.5 d=-2 tau=0.4 --plot branches.png
+  analyze --network quadruped --preset pace --along gamma=delta --range -0.6:0.2
+  analyze --network biped --set w_a=0.2 current=0.25 --json
+
+exit codes: 0 analysed (also where no gait was found), 2 wrong arguments.'''
+#: Parameters that are moved to look for Hopf points, and how far, where --along is not given.
+ALONG = {'quadruped': ('alpha=beta', (-1.0, 1.0)), 'biped': ('current', (0.0, 1.0))}
+
+
+def _parser() -> Parser:
+    parser = Parser(prog='analyze', description=DESCRIPTION, epilog=EPILOG,
+                    formatter_class=RawDescriptionHelpFormatter)
+    parser.add_argument('--network', default='delayed', metavar='NAME',
+                        help=f'{", ".join(NETWORKS)} (default: %(default)s)')
+    parser.add_argument('--preset', metavar='NAME', help='shipped set that parameters not set '
+                        'are taken from (default: ' + ', '.join(
+                            f'{network} {gait}' for network, gait in USUAL.items()) + ')')
+    parser.add_argument('--set', nargs='+', action='extend', default=[], type=assignment,
+                        metavar='PARAMETER=VALUE', help='such as c=6.5 tau=0.4; w_a sets all '
+                        'four weights of the biped')
+    parser.add_argument('--longest-delay', type=number, metavar='TAU', help='Hopf points of the '
+                        'delayed network up to this delay, model time (default: twice tau)')
+    parser.add_argument('--along', metavar='PARAMETERS', help='what moves for the Hopf points of '
+                        'the networks without delay, and for the branches of --plot: gamma, or '
+                        'alpha=beta together, or alpha=-beta (default: tau; ' + '; '.join(
+                            f'{name}: {along}' for name, (along, _) in ALONG.items()) + ')')
+    parser.add_argument('--range', type=interval, metavar='LOW:HIGH', help='how far it moves '
+                        '(default: ' + ', '.join(f'{name} {low:g}:{high:g}' for name, (
+                            _, (low, high)) in ALONG.items()) + ')')
+    parser.add_argument('--json', action='store_true', help='print JSON instead of tables')
+    parser.add_argument('--plot', type=Path, metavar='FILE', help='draw the branches, the roots, '
+                        'trajectories and footfalls (.png, .pdf or .svg)')
+    return parser
+
+
+def parameters(name: str, preset: str | None, changes: list[tuple[str, float]]) -> Network:
+    """Return a network with a preset's parameters, some of them changed.
+
+    Raises:
+        ValueError: an unknown name, or a value that makes no sense; the message says which.
+
+    """
+    if name not in NETWORKS:
+        raise ValueError(f"--network: '{name}' is not one of {', '.join(NETWORKS)}")
+    kind, presets = NETWORKS[name], PRESETS[name]
+    chosen = USUAL[name] if preset is None else preset
+    if chosen not in presets:
+        raise ValueError(f"--preset: '{chosen}' is not one of {', '.join(presets)}")
+    network = presets[chosen].network
+    given = [member for key, _ in changes for member in kind.groups.get(key, (key,))]
+    if twice(given):
+        raise ValueError(f'--set: {twice(given)} is given twice')
+    for key, value in changes:
+        if key not in (*kind.parameters(), *kind.groups):
+            known = ', '.join((*kind.groups, *kind.parameters()))
+            raise ValueError(f"--set: '{key}' is not a parameter of the {name} network: {known}")
+        if not np.isfinite(value):
+            raise ValueError(f'--set: {key} is {value:g}, it must be finite')
+        members = kind.groups.get(key, (key,))
+        network = replace(network, **dict.fromkeys(members, value))  # type: ignore[type-var]
+    if network.as_dict().get('tau', 1.0) <= 0.0:
+        raise ValueError(f'--set: tau is {network.delay:g}, a delay must be positive')
+    if network.as_dict().get('c', 1.0) == 0.0:
+        raise ValueError('--set: c is 0: left and right legs would not be coupled, and no delay '
+                         'would matter')
+    return network
+
+
+def _analysed(chosen) -> DelayAnalysis | CellAnalysis:
+    network = parameters(chosen.network, chosen.preset, chosen.set)
+    text, span = ALONG.get(network.name, ('tau', (0.0, 0.0)))
+    span = span if chosen.range is None else chosen.range
+    longest = 2.0 * network.delay if chosen.longest_delay is None else chosen.longest_delay
+    if not np.isfinite(longest) or longest < 0.0:
+        raise ValueError(f'--longest-delay: {longest:g} must be finite and not negative')
+    if not np.isfinite(span).all() or span[0] > span[1]:
+        raise ValueError(f'--range: {span[0]:g}:{span[1]:g} is not from low to high')
+    try:
+        along = Along.parse(chosen.along or text, type(network))
+    except ValueError as error:
+        raise ValueError(f'--along: {error}') from error
+    with progress_bar('gaits', len(network.gaits())) as bar:
+        found = verdicts(network, bar)
+    return analysed(network, found, along, span, longest)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Analyse a parameter set; return the exit code."""
+    chosen = _parser().parse_args(sys.argv[1:] if arguments is None else arguments)
+    try:
+        found = _analysed(chosen)
+        if chosen.plot is not None:
+            # matplotlib takes half a second, and only pictures need it.
+            from cpg_ros.tools.analysis_plot import picture
+            write(chosen.plot, picture(found, chosen.plot.suffix))
+    except (ValueError, OSError) as error:
+        print(f'analyze: {error}', file=sys.stderr)
+        return 2
+    except KeyboardInterrupt:
+        print('analyze: stopped', file=sys.stderr)
+        return 130
+    say(as_json(found.as_dict()) if chosen.json else found.text())
+    return 0
+
+
+if __name__ == '__main__':
+    sys.exit(main())
