@@ -24,5 +24,6 @@ setup(
     license='Apache-2.0',
     entry_points={'console_scripts': [
         'generator = cpg_ros.nodes.generator:main',
-        'optimize = cpg_ros.tools.optimize:main']},
+        'optimize = cpg_ros.tools.optimize:main',
+        'reproduce = cpg_ros.tools.reproduce:main']},
 )

@@ -1,4 +1,4 @@
-"""Parameters of a network from one recorded cycle, by a trust-region method with exact derivatives.
+"""Parameters of a network from one recorded cycle, by a trust region and exact derivatives.
 
 The objective is that of Liu & Zhang (2024), section 4: ``f = 1/2 sum_il (xhat_i(t_l) -
 x_i(t_l, p))^2`` over the cells i and the samples l of one cycle. Time is normalised to the

@@ -51,7 +51,7 @@ class Sample:
     def __init__(self, network: Quadruped, state: np.ndarray) -> None:
         self.network, self.state = network, state
         self.blocks: dict[str, Block] = {one.name: one for one in blocks(network, state)}
-        self.tables = Tables.at(network, np.reshape(CELL.slopes(*state, PHI), (2, 2)))
+        self.tables = Tables.at(network, CELL.jacobian(state[:1], state[1:], PHI))
 
     def trace(self, name: str) -> complex:
         """Trace of a block."""

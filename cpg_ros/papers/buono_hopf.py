@@ -8,6 +8,7 @@ from scipy.optimize import brentq
 from cpg_ros.dynamics.cell_hopf import CellHopf, hopf_at
 from cpg_ros.dynamics.stand import stand
 from cpg_ros.networks.along import Along
+from cpg_ros.networks.biped import Biped
 from cpg_ros.networks.quadruped import GAITS, Quadruped
 from cpg_ros.papers.buono_blocks import Sample
 from cpg_ros.papers.buono_gaits import AUTHORS
@@ -37,7 +38,8 @@ THEOREM = (
 FAILING = ('walk', 0.05)
 
 
-def _sample(network: Quadruped) -> Sample:
+def _sample(network: Quadruped | Biped) -> Sample:
+    assert isinstance(network, Quadruped)
     return Sample(network, stand(network))
 
 
@@ -108,7 +110,8 @@ def existence() -> Iterator[Row | Picture]:
         point.normal_form.k1.real, note='2 is E_xi at fixed alpha + gamma; along the line E '
         'grows by 4, the real part by 2')
     walk = hopf(UNCOUPLED, 'gamma=delta=-alpha=-beta', 'walk', nu / 2.0 - 0.1, nu / 2.0 + 0.1)
-    sample, alpha = _sample(walk.network), walk.network.alpha
+    sample = _sample(walk.network)
+    alpha = sample.network.alpha
     at = Place(AUTHORS, 'Proposition 5.6')
     zero = [name for name in ('L_10', 'L_11') if abs(sample.trace(name).real) < 1e-9]
     yield at.word('block whose trace vanishes (real part) where nu = 2 gamma', 'L_10',
@@ -156,7 +159,7 @@ def table_12() -> Iterator[Row | Picture]:
 
 def theorem_4_2() -> Iterator[Row | Picture]:
     """Theorem 4.2 at computed Hopf points, and the numbers of its proofs."""
-    found = {}
+    found: dict[str, CellHopf] = {}
     for clause, gait, alpha, sign, (low, high), stable in THEOREM:
         point = hopf(Quadruped(alpha, sign * alpha, 0.0, 0.0), 'gamma=delta', gait, low, high)
         found.setdefault(gait, point)
@@ -167,7 +170,8 @@ def theorem_4_2() -> Iterator[Row | Picture]:
             erratum=23 if (gait, alpha) == FAILING else None,
             note=f'{point.unstable_roots} other eigenvalues with positive real part')
     trot = found['trot']
-    sample, n = _sample(trot.network), trot.network
+    sample = _sample(trot.network)
+    n = sample.network
     at = Place(AUTHORS, 'Proposition 5.5')
     for name, text, value in (
             ('L_00', '4(alpha + gamma)', 4.0 * (n.alpha + n.gamma)),
@@ -178,7 +182,8 @@ def theorem_4_2() -> Iterator[Row | Picture]:
                          value, sample.trace(name).real)
     at = Place(AUTHORS, 'Proposition 5.7')
     for gait, other, sign in (('jump', 'L_11', -1.0), ('walk', 'L_10', 1.0)):
-        sample, gamma = _sample(found[gait].network), found[gait].network.gamma
+        sample = _sample(found[gait].network)
+        gamma = sample.network.gamma
         phi, psi = (part(1, 0) for part in (sample.tables.phi, sample.tables.psi))
         root = np.sqrt((phi + np.hypot(phi, psi)) / 2.0)
         four = f'{"-" if sign < 0.0 else ""}4 gamma'

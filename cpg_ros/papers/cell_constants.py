@@ -15,7 +15,7 @@ FAR, NEAR = np.array([6.0, 8.0]), np.array([-0.05, 0.0, 0.05, 0.1, 0.2])
 
 
 def _rates(network: Quadruped | Biped, v: np.ndarray, w: float) -> np.ndarray:
-    """v' and w' of a cell at states (v, w) with all cells alike, shape (m, 2)."""
+    """V' and w' of a cell at states (v, w) with all cells alike, shape (m, 2)."""
     cells = network.cells
     states = np.concatenate([np.repeat(v[:, None], cells, 1), np.full((v.size, cells), w)], 1)
     run = simulate(network, states, network.step, network.step, progress=False)

@@ -111,18 +111,19 @@ def _example(example: Example) -> Iterator[Row | Picture]:
             yield at.number(f'{symbol} of the {gait}', example.numbers[name], value,
                             erratum=example.errata.get(name))
     yield from _coefficients(example, point)
+    k1, k2 = point.normal_form.k1.real, point.normal_form.k2.real
     yield at.word(f'direction of the bifurcation to the {gait}', 'supercritical',
-                  'supercritical' if point.supercritical else 'subcritical')
-    yield at.holds(f'k1 > 0 for the {gait}', point.normal_form.k1.real > 0.0)
+                  'supercritical' if k1 * k2 < 0.0 else 'subcritical', note='theorem 2.1')
+    yield at.holds(f'k1 > 0 for the {gait}', k1 > 0.0)
     yield at.holds(f'tau {network.tau:g} is above the critical delay of the {gait}',
                    network.tau > point.tau)
     yield at.word(f'{gait} near its onset, on the centre manifold', 'stable',
-                  'stable' if point.stable_on_centre_manifold else 'unstable')
+                  'stable' if k2 < 0.0 else 'unstable', note='theorem 2.1')
+    roots = point.unstable_transverse_roots
     yield at.word(
         f'{gait} near its onset, in the full network', 'stable',
-        'unstable' if point.unstable_transverse_roots else 'stable', erratum=3,
-        note=f'{point.unstable_transverse_roots} root(s) of the rest state with positive real '
-             f'part outside the class of the gait')
+        'unstable' if roots else 'stable', erratum=3, note=f'roots of the rest state with '
+        f'positive real part outside the class of the gait: {roots}')
     orbit = delayed_orbit.solve(network, gait)
     found = multipliers(orbit)
     yield at.word(
