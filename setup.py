@@ -24,6 +24,7 @@ setup(
     license='Apache-2.0',
     entry_points={'console_scripts': [
         'generator = cpg_ros.nodes.generator:main',
+        'analyze = cpg_ros.tools.analyze:main',
         'optimize = cpg_ros.tools.optimize:main',
         'reproduce = cpg_ros.tools.reproduce:main']},
 )

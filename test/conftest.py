@@ -1,3 +1,8 @@
+import os
+
+# As nodes and tools run: before numpy loads.
+os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
+
 import pytest
 from graph import Process, Watcher
 

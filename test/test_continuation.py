@@ -305,6 +305,26 @@ def test_a_branch_ends_at_an_orbit_of_more_symmetry():
     check_in_order(branch)
 
 
+def test_a_start_at_a_lower_extreme_is_moved_to_the_peak():
+    # The same orbits from a trough, and from the lower one of two peaks.
+    orbit = solve_orbit(EXAMPLE, 'trot')
+    trough = follow(replace(orbit, values=-orbit.values), TAU, 0.39, 0.41)
+    line = Along.parse('w_a', Biped)
+    (two_peaks,) = follow(solve_preset(PRESETS['biped']['walk']), line, -0.3, 0.4).at(-0.2)
+    theta = np.linspace(0.4, 0.6, 2001)
+    late = theta[two_peaks.waveform(theta).argmax()]
+    lower = collocate(two_peaks.network, two_peaks.symmetry, lambda theta: two_peaks(
+        (theta + late) * two_peaks.period), two_peaks.period)
+    assert lower.waveform(np.array(0.0)) < two_peaks.peak - 1e-3
+    peak = follow(lower, line, -0.21, -0.19)
+    for branch, known in ((trough, orbit), (peak, two_peaks)):
+        check_in_order(branch)
+        again = next(point.orbit for point in branch.points if point.orbit.network
+                     == known.network)
+        theta = np.linspace(0.0, 1.0, 40)
+        assert np.allclose(again.waveform(theta), known.waveform(theta), 0.0, 1e-8)
+
+
 def test_a_branch_ends_where_its_period_has_grown():
     preset = PRESETS['quadruped']['pronk']
     line = Along.parse('alpha=beta', Quadruped)

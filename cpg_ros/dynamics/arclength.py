@@ -254,7 +254,10 @@ def follow(start: Place, low: float, high: float, visit: Callable[[Place], str],
         for station in stations:
             if not low <= station.value <= high:
                 edge = pinned(station, low if station.value < low else high)
-                return folds, ('' if edge is None else visit(edge)) or 'bound'
+                # A start on the bound is no second point of the branch.
+                if edge is None or edge.value == here.value:
+                    return folds, 'bound'
+                return folds, visit(edge) or 'bound'
             why = visit(station)
             if why:
                 return folds, why

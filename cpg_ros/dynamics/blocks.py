@@ -55,12 +55,13 @@ class Block:
     @property
     def vector(self) -> np.ndarray:
         """The character's value for every cell, shape (cells,)."""
-        return np.exp(2j * np.pi * self.symmetry.phases)
+        return _values(self.symmetry)
 
     @cached_property
     def eigenvalues(self) -> np.ndarray:
         """Both eigenvalues, rightmost first, in 1/model time, shape (2,)."""
-        return rightmost_first(np.linalg.eigvals(self.matrix))
+        matrix = self.matrix.real if self.real else self.matrix
+        return rightmost_first(np.linalg.eigvals(matrix).astype(complex))
 
     @property
     def leading(self) -> complex:
@@ -89,7 +90,7 @@ def blocks(network: Quadruped | Biped, state: np.ndarray) -> tuple[Block, ...]:
         raise ValueError(f'{unequal} differ: the network has not the symmetry of its gaits')
     whole = network.jacobian(everywhere(network, np.asarray(state, dtype=float)))
     row = whole.reshape(2, network.cells, 2, network.cells)[:, 0]
-    return tuple(Block(gait, mode, symmetry, row @ np.exp(2j * np.pi * symmetry.phases))
+    return tuple(Block(gait, mode, symmetry, row @ _values(symmetry))
                  for gait, mode, symmetry in known)
 
 
@@ -109,6 +110,11 @@ def characters(network: type[Quadruped] | type[Biped]
         name: Fraction(power, order)
         for (name, order), power in zip(orders.items(), mode, strict=True)}))
         for mode in sorted(gaits))
+
+
+def _values(symmetry: Symmetry) -> np.ndarray:
+    """Values of a character for the cells: powers of i, without error of rounding."""
+    return np.round(np.exp(2j * np.pi * symmetry.phases))
 
 
 def rightmost_first(values: np.ndarray) -> np.ndarray:

@@ -259,7 +259,7 @@ def hopf_at(network: Quadruped | Biped, along: Along, mode: tuple[int, int], ome
         for critical, owner in ((1j * omega, block), (-1j * omega, split[block.power(-1)])):
             if other is owner:
                 rest.pop(int(np.abs(np.array(rest) - critical).argmin()))
-        growing = sum(value.real > ON_AXIS for value in rest)
+        growing = int(sum(value.real > ON_AXIS for value in rest))
         others.extend(rest)
         unstable += growing
         transverse += 0 if other.within(block) else growing

@@ -34,11 +34,9 @@ def richer(orbit: MeshOrbit) -> str:
     symmetry, points = orbit.symmetry, 64
     x = orbit(np.arange(points) / points * orbit.period)[:, :orbit.network.cells]
     size = np.ptp(x)
-    own, identity = dict(symmetry.shifts), tuple(range(orbit.network.cells))
+    own = dict(symmetry.shifts)
     for name, element in symmetry.group.elements.items():
-        order, power = 1, element
-        while power != identity:
-            order, power = order + 1, tuple(element[i] for i in power)
+        order = symmetry.group.order(name)
         for k in range(order):
             if own.get(name) == k / order:
                 continue
@@ -177,8 +175,8 @@ def solve(network: Network, gait: str, near: MeshOrbit | None = None) -> MeshOrb
             f'{name} {known + reached * (value - known):.4g}' for (name, value), known
             in zip(network.as_dict().items(), near.network.as_dict().values(), strict=True)
             if value != known)
-        raise NoOrbit(f'no {gait} at these parameters: from its preset on the way there it was '
-                      f'followed to {changed}, no further')
+        raise NoOrbit(f'no {gait} at these parameters: from its preset it was followed '
+                      f'{reached:.0%} of the way, to {changed}, no further')
     raise NoOrbit(f'no {gait} at these parameters')
 
 

@@ -124,7 +124,7 @@ class Branch:
                          arclength.crossing(right.place, -1.0, value))
                 if place is None:
                     raise NoOrbit(f'no orbit was found at {self.along} {value:g}')
-                found.append(place.curve.orbit(place.z))  # type: ignore[attr-defined]
+                found.append(_point(place).orbit)
         if self.points[-1].value == value:
             found.append(self.points[-1].orbit)
         return tuple(found)
@@ -178,7 +178,7 @@ def follow(orbit: DelayedOrbit | MeshOrbit, along: Along, low: float, high: floa
     begin = End('start', value, orbit.period)
     if both:
         before, back, begin = _run(start.reversed(), limits, steps)
-    here = BranchPoint(value, start.curve.orbit(start.z), start)  # type: ignore[attr-defined]
+    here = _point(start)
     n = len(before)
     earlier = [replace(point, place=point.place.reversed()) for point in reversed(before)]
     return Branch(along, (*earlier, here, *points),
@@ -218,7 +218,7 @@ def from_hopf(network: Network, symmetry: Mode | Symmetry, omega: float, along: 
 
     """
     _check(network, symmetry, along, low, high)
-    value, period = along.value(network), 2.0 * np.pi / omega
+    value, period = along.value(network), float(2.0 * np.pi / omega)
     scales = (period, high - low)
     curve: FourierCurve | MeshCurve
     if isinstance(network, Delayed):
@@ -237,8 +237,7 @@ def from_hopf(network: Network, symmetry: Mode | Symmetry, omega: float, along: 
         raise NoOrbit(f'no orbit of amplitude {amplitude:g} was found near {along} {value:g}')
     points, turns, end = _run(start, (low, high, longest * period), {
         'first_step': first_step, 'longest_step': longest_step, 'most': most})
-    orbit = start.curve.orbit(start.z)  # type: ignore[attr-defined]
-    here = BranchPoint(start.value, orbit, start)
+    here = _point(start)
     return Branch(along, (here, *points), tuple(1 + k for k in turns),
                   (End('rest', value, period), end))
 
@@ -271,6 +270,10 @@ def _harmonic(curve: MeshCurve, stand: np.ndarray, vector: np.ndarray, period: f
             curve.pack(sampled(wave, curve.mesh, 1.0), 0.0, 0.0))
 
 
+def _point(place: Place) -> BranchPoint:
+    return BranchPoint(place.value, place.curve.orbit(place.z), place)  # type: ignore[attr-defined]
+
+
 def _run(start: Place, limits: tuple[float, float, float], steps: dict
          ) -> tuple[list[BranchPoint], list[int], End]:
     """Follow in one direction: the points after start, which are folds, and the end."""
@@ -278,8 +281,8 @@ def _run(start: Place, limits: tuple[float, float, float], steps: dict
     points: list[BranchPoint] = []
 
     def visit(place: Place) -> str:
-        orbit = place.curve.orbit(place.z)  # type: ignore[attr-defined]
-        points.append(BranchPoint(place.value, orbit, place))
+        points.append(_point(place))
+        orbit = points[-1].orbit
         if place.amplitude < REST:
             return 'rest'
         if orbit.period > longest:
@@ -287,15 +290,15 @@ def _run(start: Place, limits: tuple[float, float, float], steps: dict
         return 'symmetry' if isinstance(orbit, MeshOrbit) and richer(orbit) else ''
 
     turns, why = arclength.follow(start, low, high, visit, **steps)
-    last = points[-1].place if points else start
-    value, period = last.value, last.curve.orbit(last.z).period  # type: ignore[attr-defined]
+    last = points[-1] if points else _point(start)
+    value, period = last.value, last.orbit.period
     if why == 'rest':
         # Near a Hopf point value and period are linear in the square of the amplitude.
-        before = points[-2] if len(points) > 1 else None
-        if before is not None:
-            one, other = before.place.amplitude**2, last.amplitude**2
-            value += (value - before.value) * other / (one - other)
-            period += (period - before.orbit.period) * other / (one - other)
+        before = points[-2] if len(points) > 1 else _point(start)
+        size = last.place.amplitude**2
+        share = size / (before.place.amplitude**2 - size)
+        value += share * (value - before.value)
+        period += share * (period - before.orbit.period)
     return points, turns, End(why, value, period)
 
 

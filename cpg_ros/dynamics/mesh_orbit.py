@@ -33,7 +33,7 @@ class MeshOrbit(Orbit):
     def _columns(self, wave: int, variable: int) -> list[int]:
         """Where u_wave is found in the reduced state, in each m-th of the cycle."""
         symmetry, columns = self.symmetry, []
-        cell = int(np.flatnonzero((symmetry.waves == wave) & (symmetry.phases == 0.0))[0])
+        cell = int(symmetry.first[wave])
         for _ in range(symmetry.order):
             columns.append(int(symmetry.classes[cell]
                                + variable * (symmetry.classes.max() + 1)))

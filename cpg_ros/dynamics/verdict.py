@@ -161,12 +161,12 @@ def nearest_threshold(network: Delayed) -> str:
              if point is not None and point.tau >= network.tau}
     if ahead:
         gait = min(ahead, key=lambda name: ahead[name])
-        return (f"the nearest threshold is the {gait}'s critical delay {ahead[gait]:.4f}: tau "
-                f'{network.tau:g} is below it')
+        return (f"the nearest threshold is the {gait}'s critical delay {ahead[gait]:.4f} (tau is "
+                f'{network.tau:g})')
     needed = {gait: abs(network.symmetry(gait).eigenvalue_terms(network)[0].real)
               for gait, point in points.items() if point is None}
     if needed:
         gait = min(needed, key=lambda name: needed[name])
-        return (f'the nearest threshold is |c| {needed[gait]:.4f}, above which there is a delay '
-                f'for the {gait}: |c| is {abs(network.c):g}')
+        return (f'the nearest threshold is |c| {needed[gait]:.4f}, above which the {gait} has a '
+                f'critical delay (|c| is {abs(network.c):g})')
     return 'every critical delay is below tau, but no orbit was found this far from onset'

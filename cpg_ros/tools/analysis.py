@@ -10,10 +10,13 @@ from cpg_ros.dynamics.cell_hopf import CellHopf, cell_hopf_points
 from cpg_ros.dynamics.characteristic import leading_roots, unstable_roots
 from cpg_ros.dynamics.hopf import HopfPoint, hopf_points
 from cpg_ros.dynamics.stand import NoStand, stand
+from cpg_ros.dynamics.theorem_4_2 import Verdict as Theorem
+from cpg_ros.dynamics.theorem_4_2 import theorem_4_2
 from cpg_ros.dynamics.verdict import Verdict, nearest_threshold
 from cpg_ros.networks.along import Along
 from cpg_ros.networks.delayed import MODES, Delayed
 from cpg_ros.networks.network import Network
+from cpg_ros.networks.quadruped import Quadruped
 from cpg_ros.tools.arguments import table
 
 
@@ -91,7 +94,10 @@ class Analysis:
 
     @staticmethod
     def _reason(verdict: Verdict) -> str:
-        return verdict.why.removeprefix(f'no {verdict.gait} ')
+        """Why there is no such gait, without the list of all parameters."""
+        said = verdict.why.removeprefix(f'no {verdict.gait} ')
+        head, way, _ = said.partition(' of the way, to ')
+        return f'{head} of the way, no further' if way else said
 
     def _conclusion(self) -> str:
         """The whole in a sentence or two."""
@@ -165,9 +171,9 @@ class DelayAnalysis(Analysis):
 
     def _conclusion(self) -> str:
         assert isinstance(self.network, Delayed)
-        said = super()._conclusion()
-        return said if self.existing else f'{said} {nearest_threshold(self.network)}.'.replace(
-            'gait. the', 'gait: the').replace('gait. every', 'gait: every')
+        if self.existing:
+            return super()._conclusion()
+        return f'This set gives no gait; {nearest_threshold(self.network)}.'
 
     def as_dict(self) -> dict[str, Any]:
         """Everything in plain types."""
@@ -241,7 +247,15 @@ class CellAnalysis(Analysis):
         lines += [f'Hopf points with {where} (omega in rad per model time; others: further '
                   'eigenvalues with positive', 'real part, transverse: of them outside the '
                   'class):', *(f'  {line}' for line in table(rows, '<<>>>>>><<>>'))]
-        return lines
+        said = [f'  {self.along} {point.value:.4f}: {verdict}' for point in points
+                if (verdict := self._theorem(point)) is not None]
+        return [*lines, '', 'Buono & Golubitsky at these points:', *said] if said else lines
+
+    @staticmethod
+    def _theorem(point: CellHopf) -> Theorem | None:
+        """What theorem 4.2 says of a Hopf point, which is one on the quadruped."""
+        network = point.network
+        return theorem_4_2(network, point.gait) if isinstance(network, Quadruped) else None
 
     def as_dict(self) -> dict[str, Any]:
         """Everything in plain types."""
@@ -255,7 +269,10 @@ class CellAnalysis(Analysis):
             'supercritical': point.supercritical,
             'stable_on_centre_manifold': point.supercritical,
             'unstable_roots': point.unstable_roots,
-            'unstable_transverse_roots': point.unstable_transverse_roots} for point in points]
+            'unstable_transverse_roots': point.unstable_transverse_roots,
+            **({} if (theorem := self._theorem(point)) is None else {
+                'theorem_4_2': {'applies': theorem.applies, 'stable': theorem.stable,
+                                'says': str(theorem)}})} for point in points]
         said['rest'] = {'why': why} if why else {
             'stand': {'v': float(state[0]), 'w': float(state[1])},
             'leading_roots': [{'mode': list(block.mode), 'gait': block.gait,

@@ -105,6 +105,8 @@ def parameters(name: str, preset: str | None, changes: list[tuple[str, float]]) 
 
 
 def _analysed(chosen) -> DelayAnalysis | CellAnalysis:
+    if chosen.plot is not None and not chosen.plot.absolute().parent.is_dir():
+        raise ValueError(f'--plot: there is no folder {chosen.plot.parent}')
     network = parameters(chosen.network, chosen.preset, chosen.set)
     text, span = ALONG.get(network.name, ('tau', (0.0, 0.0)))
     span = span if chosen.range is None else chosen.range

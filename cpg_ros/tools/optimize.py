@@ -5,17 +5,16 @@ Pareto front (``front.csv``, ``front.png``) and a preset file that ``generator``
 """
 
 import argparse
-import os
 import re
 import shlex
 import sys
 from collections.abc import Sequence
 from pathlib import Path
-from typing import NoReturn
 
 from cpg_ros.fitting.search_space import NETWORKS
 from cpg_ros.fitting.weights import Front, NothingFound, NotInstalled, optimise
 from cpg_ros.networks.presets import write_presets
+from cpg_ros.tools.arguments import Parser, assignment, interval, say, twice
 from cpg_ros.tools.front import draw_front, write_front
 
 DESCRIPTION = '''\
@@ -34,34 +33,11 @@ files: front.csv, front.png and preset.yaml, for
 exit codes: 0 found, 1 nothing found, 2 wrong arguments.'''
 
 
-class _Parser(argparse.ArgumentParser):
-    """Says what is wrong in one line."""
-
-    def error(self, message: str) -> NoReturn:
-        print(f'{self.prog}: {message}', file=sys.stderr)
-        sys.exit(2)
-
-
-def _number(text: str) -> float:
-    try:
-        return float(text)
-    except ValueError:
-        raise argparse.ArgumentTypeError(f"'{text}' is not a number") from None
-
-
-def _fixed(text: str) -> tuple[str, float]:
-    name, sign, value = text.partition('=')
-    if not (name and sign):
-        raise argparse.ArgumentTypeError(f"'{text}' is not of the form name=value")
-    return name, _number(value)
-
-
 def _bounds(text: str) -> tuple[str, tuple[float, float]]:
     name, sign, limits = text.partition('=')
-    low, colon, high = limits.partition(':')
-    if not (name and sign and colon):
+    if not (name and sign and ':' in limits):
         raise argparse.ArgumentTypeError(f"'{text}' is not of the form name=low:high")
-    return name, (_number(low), _number(high))
+    return name, interval(limits)
 
 
 def _name(text: str) -> str:
@@ -70,8 +46,8 @@ def _name(text: str) -> str:
     return text
 
 
-def _parser() -> argparse.ArgumentParser:
-    parser = _Parser(prog='optimize', description=DESCRIPTION, epilog=EPILOG,
+def _parser() -> Parser:
+    parser = Parser(prog='optimize', description=DESCRIPTION, epilog=EPILOG,
                      formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument('--network', default='biped', metavar='NAME',
                         help=f'{" or ".join(NETWORKS)} (default: %(default)s)')
@@ -83,7 +59,7 @@ def _parser() -> argparse.ArgumentParser:
                         help='how many (default: %(default)s)')
     parser.add_argument('--seed', type=int, default=0, metavar='N',
                         help='the same seed finds the same (default: %(default)s)')
-    parser.add_argument('--fix', nargs='+', action='extend', default=[], type=_fixed,
+    parser.add_argument('--fix', nargs='+', action='extend', default=[], type=assignment,
                         metavar='VARIABLE=VALUE', help='keep variables at a value, such as '
                         'current=0.229 phi=0.254')
     parser.add_argument('--bounds', nargs='+', action='extend', default=[], type=_bounds,
@@ -123,10 +99,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser = _parser()
     chosen = parser.parse_args(arguments)
     for option in ('fix', 'bounds'):
-        names = [name for name, _ in getattr(chosen, option)]
-        twice = [name for name in names if names.count(name) > 1]
-        if twice:
-            parser.error(f'argument --{option}: {twice[0]} is given twice')
+        if name := twice([name for name, _ in getattr(chosen, option)]):
+            parser.error(f'argument --{option}: {name} is given twice')
     name = chosen.name or f'{chosen.gait}_optimised'
     try:
         # Now, and not when the work is done.
@@ -148,13 +122,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt:
         print('optimize: stopped', file=sys.stderr)
         return 130
-    said = (f'{table(front)}\n'
-            f'written: front.csv, front.png and preset.yaml (preset {name}) in {chosen.out}')
-    try:
-        print(said, flush=True)
-    except BrokenPipeError:
-        # As in `optimize ... | head -1`. Python flushes once more at its end: into nothing.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    say(f'{table(front)}\n'
+        f'written: front.csv, front.png and preset.yaml (preset {name}) in {chosen.out}')
     return 0
 
 

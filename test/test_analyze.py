@@ -1,0 +1,178 @@
+"""The executable analyze: what it says, as text, JSON and pictures, and what it refuses."""
+
+import json
+import re
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from cpg_ros.networks.quadruped import Quadruped
+from cpg_ros.tools.analyze import main
+
+EXAMPLE_1 = ('--network', 'delayed', '--set', 'a=-4.5', 'b=1', 'c=6.5', 'd=-2', 'tau=0.4')
+#: Keys that the interface promises.
+HOPF = {'gait', 'omega', 'tau', 'k1', 'k2', 'k1_published', 'k2_published', 'supercritical',
+        'stable_on_centre_manifold', 'unstable_transverse_roots'}
+GAIT = {'exists', 'period', 'amplitude', 'phases', 'floquet_leading',
+        'floquet_leading_transverse', 'stable', 'min_symmetry_gain', 'stable_with_default_gain'}
+
+
+def as_json(capsys, *arguments):
+    assert main([*arguments, '--json']) == 0
+    return json.loads(capsys.readouterr().out)
+
+
+def test_example_1_as_json(capsys):
+    # DESIGN 2.1.
+    said = as_json(capsys, *EXAMPLE_1)
+    assert said['network'] == 'delayed'
+    assert said['params'] == {'a': -4.5, 'b': 1.0, 'c': 6.5, 'd': -2.0, 'tau': 0.4}
+    trot, walk = said['hopf'][:2]
+    assert all(set(point) >= HOPF for point in said['hopf'])
+    assert (trot['gait'], walk['gait']) == ('trot', 'walk')
+    for point, figures in ((trot, (6.3246, 0.2852, 2.1557, -0.9610, 0.6486, -0.2544)),
+                           (walk, (7.4772, 0.2861, 1.8135, -0.9177, 0.4179, -0.2349))):
+        found = [point[key] for key in ('omega', 'tau', 'k1', 'k2', 'k1_published',
+                                        'k2_published')]
+        assert found == pytest.approx(figures, abs=6e-5)
+        assert point['supercritical'] and point['stable_on_centre_manifold']
+        assert point['unstable_transverse_roots'] > 0
+    gaits = said['gaits']
+    assert set(gaits) == {'pronk', 'pace', 'bound', 'trot', 'jump', 'walk'}
+    assert {gait for gait in gaits if gaits[gait]['exists']} == {'trot', 'walk'}
+    assert gaits['trot']['period'] == pytest.approx(1.27827056, abs=1e-8)
+    assert gaits['trot']['amplitude'] == pytest.approx(0.981144, abs=1e-6)
+    assert gaits['walk']['period'] == pytest.approx(1.09048163, abs=1e-8)
+    assert gaits['trot']['phases'] == {'lh': 0.0, 'rh': 0.5, 'lf': 0.5, 'rf': 0.0}
+    assert gaits['walk']['phases'] == {'lh': 0.0, 'rh': 0.5, 'lf': 0.25, 'rf': 0.75}
+    for gait in ('trot', 'walk'):
+        one = gaits[gait]
+        assert set(one) >= GAIT
+        assert not one['stable'] and one['stable_with_default_gain']
+        assert one['floquet_leading'] < 1.0 < one['floquet_leading_transverse']
+        assert 0.0 < one['min_symmetry_gain'] < one['default_symmetry_gain']
+
+
+def test_example_1_as_text(capsys):
+    assert main(EXAMPLE_1) == 0
+    said = capsys.readouterr().out
+    for words in ('delayed: a -4.5, b 1, c 6.5, d -2, tau 0.4', 'Hopf points up to a delay of 0.8',
+                  '0.2852', '7.4772', '1.278271', 'supercritical',
+                  'trot, walk: stable with the symmetry lock only'):
+        assert words in said
+    assert max(map(len, said.splitlines())) <= 160
+
+
+@pytest.mark.parametrize(('changes', 'name', 'gait'), [
+    (('tau=0.2',), 'tau', 'trot'), (('tau=0.05', 'd=2'), 'tau', 'pace'),
+    (('a=-3', 'b=0.1', 'c=4', 'd=1', 'tau=0.3'), 'tau', None), (('c=1',), 'c', None)])
+def test_a_set_without_gait_is_told_its_nearest_threshold(capsys, changes, name, gait):
+    said = as_json(capsys, '--set', *changes)
+    assert not any(one['exists'] for one in said['gaits'].values())
+    assert main(['--set', *changes]) == 0
+    text = capsys.readouterr().out
+    assert f'This set gives no gait; {said["nearest_threshold"]}.' in text
+    # What it names is a threshold: just below still nothing, just above a gait (with a delay).
+    threshold = float(re.search(r'(?:delay|c\|) (\d+\.\d{4})', said['nearest_threshold'])[1])
+    rest = [change for change in changes if not change.startswith(f'{name}=')]
+    if name == 'tau':
+        below, above = (as_json(capsys, '--set', *rest, f'tau={factor * threshold}')['gaits']
+                        for factor in (0.99, 1.01))
+        assert not any(one['exists'] for one in below.values())
+        there = {one for one in above if above[one]['exists']}
+        assert there and (gait is None or gait in there)
+    else:
+        below, above = (as_json(capsys, '--set', *rest, f'c={factor * threshold}',
+                                '--longest-delay', '1e3') for factor in (0.99, 1.01))
+        assert not below['hopf'] and above['hopf']
+
+
+def test_gaits_that_are_born_unstable_are_found_and_judged(capsys):
+    # A bound with c > 0 exists beyond its critical delay, but no lock can make it attract.
+    said = as_json(capsys, '--set', 'a=-4.5', 'b=1', 'c=6.5', 'd=-2', 'tau=0.9')
+    bound = said['gaits']['bound']
+    assert bound['exists'] and bound['floquet_leading'] > 1.0
+    assert not bound['stable'] and not bound['stable_with_default_gain']
+    (point,) = (point for point in said['hopf']
+                if point['gait'] == 'bound' and point['tau'] < 0.9)
+    # Its class has an unstable root at onset, before any nonlinearity.
+    assert point['unstable_roots'] > point['unstable_transverse_roots']
+    assert not said['gaits']['pronk']['exists']
+    assert 'critical delay 1.6515' in said['gaits']['pronk']['why']
+
+
+def test_a_quadruped_set(capsys):
+    said = as_json(capsys, '--network', 'quadruped', '--preset', 'pace', '--along', 'gamma=delta',
+                   '--range=-0.4:0.4')
+    pace = said['gaits']['pace']
+    assert pace['period'] == pytest.approx(10.388, abs=1e-3) and pace['stable']
+    assert pace['phases'] == {'lh': 0.0, 'rh': 0.5, 'lf': 0.0, 'rf': 0.5}
+    stand = said['rest']['stand']
+    assert (stand['v'], stand['w']) == pytest.approx((0.3096, 0.5240), abs=1e-4)
+    assert {point['gait'] for point in said['hopf']} >= {'pace', 'pronk'}
+    for point in said['hopf']:
+        # The whole Jacobian has the pair there, wherever the stand has moved to.
+        network = Quadruped(0.2, 0.2, point['value'], point['value'])
+        state = np.repeat([0.31, 0.52], 8)
+        for _ in range(30):
+            state = state - np.linalg.solve(network.jacobian(state), network.rates(state))
+        assert np.ptp(state[:8]) < 1e-9
+        roots = np.linalg.eigvals(network.jacobian(state))
+        assert np.abs(roots - 1j * point['omega']).min() < 1e-6
+
+
+def test_a_biped_set_with_weights_of_its_own(capsys):
+    said = as_json(capsys, '--network', 'biped', '--preset', 'skip')
+    assert said['gaits']['skip']['exists'] and said['gaits']['skip']['waveforms'] == 2
+    assert 'to be equal' in said['gaits']['walk']['why']
+    assert said['hopf'] == [] and said['rest']['why']
+
+
+@pytest.mark.parametrize(('arguments', 'words'), [
+    (('--set', 'tau=nan'), 'tau is nan, it must be finite'),
+    (('--set', 'c=inf'), 'c is inf, it must be finite'),
+    (('--set', 'tau=-0.1'), 'tau is -0.1, a delay must be positive'),
+    (('--set', 'tau=0'), 'tau is 0, a delay must be positive'),
+    (('--set', 'c=0'), 'c is 0'),
+    (('--set', 'e=1'), "'e' is not a parameter of the delayed network: a, b, c, d, tau"),
+    (('--set', 'tau=1', 'tau=2'), 'tau is given twice'),
+    (('--set', 'tau=fast'), "'fast' is not a number"),
+    (('--set', 'tau'), 'name=value'),
+    (('--network', 'hexapod'), "'hexapod' is not one of delayed, quadruped, biped"),
+    (('--preset', 'canter'), "'canter' is not one of walk, trot"),
+    (('--network', 'biped', '--set', 'w_a=1', 'w_21=2'), 'w_21 is given twice'),
+    (('--along', 'speed'), "'speed' is not one of a, b, c, d, tau"),
+    (('--network', 'quadruped', '--along', 'alpha=alpha'), 'alpha twice'),
+    (('--network', 'quadruped', '--range', '1:0'), '1:0 is not from low to high'),
+    (('--longest-delay', 'nan'), '--longest-delay'),
+    (('--plot', 'nowhere/a.png'), 'there is no folder nowhere'),
+    (('--plot', 'a.xyz'), "'.xyz' is not a kind of picture"),
+    (('--quietly',), '--quietly')])
+def test_nonsense_ends_in_one_line(capsys, arguments, words):
+    try:
+        code = main(list(arguments))
+    except SystemExit as ended:
+        code = ended.code
+    said = capsys.readouterr()
+    assert code == 2 and said.out == ''
+    assert words in said.err and said.err.startswith('analyze: ') and said.err.count('\n') == 1
+
+
+def test_as_a_process():
+    command = [sys.executable, '-m', 'cpg_ros.tools.analyze']
+    bad = subprocess.run([*command, '--set', 'c=0'], capture_output=True, text=True, timeout=120)
+    assert bad.returncode == 2 and 'Traceback' not in bad.stderr and bad.stderr.count('\n') == 1
+    with subprocess.Popen([*command], stdout=subprocess.PIPE, stderr=subprocess.PIPE) as left:
+        left.stdout.close()
+        assert left.stderr.read() == b'' and left.wait(120) == 0
+
+
+@pytest.mark.parametrize(('name', 'head'), [
+    ('a.png', b'\x89PNG'), ('a.pdf', b'%PDF'), ('a.svg', b'<?xml')])
+def test_pictures(capsys, tmp_path, name, head):
+    # A short range of delays, so that few branches are followed.
+    path = tmp_path / name
+    assert main(['--plot', str(path), '--longest-delay', '0.42']) == 0
+    assert path.read_bytes().startswith(head) and list(tmp_path.iterdir()) == [path]
