@@ -67,11 +67,11 @@ def fit_cycle(samples: np.ndarray, theta: np.ndarray, start: Delayed, gait: str,
         theta: when they were taken, in cycles from where cell 1 peaks, shape (samples,).
         start: parameters to start from.
         gait: that was recorded.
-        names: of the parameters to fit; the others keep their values.
+        names: of the parameters to fit, each within its range; the others keep their values.
 
     Raises:
         ValueError: shapes do not fit, a value is not finite, a name is unknown or given twice,
-            or there are fewer values than parameters.
+            there are fewer values than parameters, or the start is out of a parameter's range.
         NoOrbit: the start has no such gait.
 
     """
@@ -88,6 +88,12 @@ def fit_cycle(samples: np.ndarray, theta: np.ndarray, start: Delayed, gait: str,
     if samples.size < len(names):
         raise ValueError(f'{samples.size} values do not determine {len(names)} parameters')
     columns = [known.index(name) for name in names]
+    begin = np.array([getattr(start, name) for name in names], dtype=float)
+    low, high = np.array([(start.ranges[name].low, start.ranges[name].high) for name in names]).T
+    for name, value in zip(names, begin, strict=True):
+        if not start.ranges[name].low < value < start.ranges[name].high:
+            raise ValueError(f'{name} {value:g} to start from is not between '
+                             f'{start.ranges[name].low:g} and {start.ranges[name].high:g}')
     solved: dict[bytes, DelayedOrbit] = {}
 
     def orbit_at(values: np.ndarray) -> DelayedOrbit:
@@ -107,9 +113,8 @@ def fit_cycle(samples: np.ndarray, theta: np.ndarray, start: Delayed, gait: str,
     def jacobian(values: np.ndarray) -> np.ndarray:
         return cycle_samples(orbit_at(values), theta)[1][..., columns].reshape(-1, len(columns))
 
-    begin = np.array([getattr(start, name) for name in names], dtype=float)
     orbit_at(begin)
-    found = least_squares(residual, begin, jacobian, method='trf', x_scale='jac',
+    found = least_squares(residual, begin, jacobian, (low, high), 'trf', x_scale='jac',
                           xtol=TOLERANCE, ftol=TOLERANCE, gtol=TOLERANCE)
     return CycleFit(orbit_at(found.x), found.x, float(found.cost), found.grad, int(found.nfev),
                     found.status > 0)
