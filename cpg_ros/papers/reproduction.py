@@ -41,13 +41,13 @@ class Reproduction:
 
     @property
     def failed(self) -> tuple[Row, ...]:
-        """Rows that differ and name no erratum."""
-        return tuple(row for row in self.rows if not row.agrees and row.erratum is None)
+        """Rows that differ, but not as an erratum says."""
+        return tuple(row for row in self.rows if not row.agrees and not row.explained)
 
     @property
     def explained(self) -> tuple[Row, ...]:
         """Rows that differ as an erratum says."""
-        return tuple(row for row in self.rows if not row.agrees and row.erratum is not None)
+        return tuple(row for row in self.rows if not row.agrees and row.explained)
 
     @property
     def errata(self) -> dict[int, tuple[str, str]]:
