@@ -1,6 +1,7 @@
 """All rows and figures of the papers, their parts computed side by side."""
 
 import multiprocessing
+import signal
 from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass
@@ -107,7 +108,9 @@ def reproduce(names: Sequence[str], jobs: int = 1, draw: bool = True,
     else:
         # Spawned: a process with threads, as numba's, must not be forked.
         context = multiprocessing.get_context('spawn')
-        with ProcessPoolExecutor(min(jobs, len(tasks)), context) as pool:
+        # Ctrl-C reaches all processes: this one ends the others.
+        with ProcessPoolExecutor(min(jobs, len(tasks)), context, signal.signal,
+                                 (signal.SIGINT, signal.SIG_IGN)) as pool:
             waiting = {pool.submit(_section, *task): place for place, task in enumerate(tasks)}
             try:
                 for future in as_completed(waiting):
