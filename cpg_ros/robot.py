@@ -15,6 +15,7 @@ import yaml
 
 from cpg_ros.checked import Reader, shown
 from cpg_ros.networks.registry import NETWORKS
+from cpg_ros.share import share
 from cpg_ros.whole import write_whole
 
 #: No angle (rad) or speed (rad/s) of a joint is larger.
@@ -195,6 +196,22 @@ def load_robot(path: str | Path) -> Robot:
             if name not in order:
                 raise reader.fail('joint_order', f"joint '{name}' of {place} is missing")
     return Robot(path.stem, networks, assignment, harmonics, legs, tuple(order))
+
+
+def find_robot(name: str) -> Robot:
+    """Load a robot file, or a shipped one by its bare name.
+
+    Raises:
+        RobotError: there is no such file, or it cannot be used.
+
+    """
+    if name.endswith(('.yaml', '.yml')) or '/' in name:
+        return load_robot(Path(name).expanduser())
+    path = share() / 'config' / f'{name}.yaml'
+    if not path.is_file():
+        shipped = ', '.join(sorted(file.stem for file in path.parent.glob('*.yaml')))
+        raise RobotError(f"robot '{name}' is neither a .yaml file nor one of: {shipped}")
+    return load_robot(path)
 
 
 def write_robot(path: str | Path, robot: Robot, comment: str = '') -> None:
