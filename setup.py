@@ -25,5 +25,6 @@ setup(
     entry_points={'console_scripts': [
         'generator = cpg_ros.nodes.generator:main',
         'analyze = cpg_ros.tools.analyze:main',
-        'optimize = cpg_ros.tools.optimize:main']},
+        'optimize = cpg_ros.tools.optimize:main',
+        'reproduce = cpg_ros.tools.reproduce:main']},
 )
