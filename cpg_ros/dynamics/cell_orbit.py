@@ -132,6 +132,19 @@ def _followed(known: MeshOrbit, network: Network) -> tuple[MeshOrbit | None, flo
     return (orbit if reached >= 1.0 else None), reached
 
 
+def beside(network: Network, near: MeshOrbit) -> MeshOrbit:
+    """Solve for the orbit next to a known one of the same symmetry, by Newton's method alone.
+
+    Raises:
+        NoOrbit: the method leads elsewhere; a shorter way may do.
+
+    """
+    found = _accepted(collocate(network, near.symmetry, _on_cycles(near), near.period))
+    if found is None or not 0.5 < found.period / near.period < 2.0:
+        raise NoOrbit('no orbit next to the known one')
+    return found
+
+
 def solve(network: Network, gait: str, near: MeshOrbit | None = None) -> MeshOrbit:
     """Solve for the gait's orbit, with exact derivatives by every parameter.
 
