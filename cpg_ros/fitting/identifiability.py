@@ -144,13 +144,15 @@ class Optimum:
     def estimate(self, k: int) -> Estimate:
         """Estimate number k with its interval."""
         value, error = float(self.values[k]), float(self.spread.errors[k])
+        if not np.isfinite(error):
+            return Estimate(value, error, float(self.low[k]), float(self.high[k]), False)
         ends = [self._end(k, error, side) for side in (-1.0, 1.0)]
         return Estimate(value, error, ends[0][0], ends[1][0], ends[0][1] and ends[1][1])
 
     def _end(self, k: int, error: float, side: float) -> tuple[float, bool]:
         """One end of the interval, and whether the data set it."""
         limit = float(self.low[k] if side < 0.0 else self.high[k])
-        if np.isfinite(error) and error > 0.0:
+        if error > 0.0:
             along = self.spread.covariance[:, k] / self.spread.covariance[k, k]
             there = self.values + side * QUANTILE * error * along
             if (self.low <= there).all() and (there <= self.high).all():
@@ -168,10 +170,9 @@ class Optimum:
         """Follow the least cost for given values of number k to where it has risen enough."""
         best = float(self.values[k])
         others = np.arange(self.values.size) != k
-        step = QUANTILE * error if np.isfinite(error) else 0.1 * max(abs(best), 1e-3)
         inside, inside_rise, at = best, 0.0, self.values
         outside, outside_rise = None, np.inf
-        place = best + side * step
+        place = best + side * QUANTILE * error
         for _ in range(STEPS):
             if side * (place - limit) >= 0.0:
                 place = limit

@@ -23,7 +23,7 @@ from cpg_ros.networks.network import Network
 from cpg_ros.robot import HARMONICS
 
 #: What is usually fitted.
-USUAL = {'delayed': ('c', 'tau'), 'quadruped': ('alpha', 'gamma'), 'biped': ('w_a', 'phi')}
+USUAL = {'delayed': ('c', 'tau'), 'quadruped': ('alpha', 'beta'), 'biped': ('current', 'phi')}
 #: A frequency is never known better than to this share.
 KNOWN_FREQUENCY = 1e-4
 #: Relative change at which a trust region stops, and at which the last one does.

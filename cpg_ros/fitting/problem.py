@@ -6,7 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from cpg_ros.dynamics import cell_orbit, delayed_orbit
+from cpg_ros.dynamics.delayed_orbit import DelayedOrbit
 from cpg_ros.dynamics.mesh_orbit import MeshOrbit
+from cpg_ros.dynamics.orbit import solve_orbit
 from cpg_ros.dynamics.periodic import NoOrbit, Orbit
 from cpg_ros.fitting.free import Free, with_values
 from cpg_ros.fitting.joints import Joints
@@ -95,17 +97,21 @@ class Problem:
             network = with_values(self.network, self.free, values[:len(self.free)])
             if network.symmetry(self.gait) != self._symmetry:
                 raise NoOrbit(f'the wave of the {self.gait} would run the other way')
-            if isinstance(network, Delayed):
-                found: Orbit = delayed_orbit.solve(network, self.gait)
-            elif isinstance(self._near, MeshOrbit):
-                # A step too long for Newton's method is one too long for the trust region.
-                found = cell_orbit.beside(network, self._near)
-            else:
-                found = cell_orbit.solve(network, self.gait)
+            found = self._beside(network)
             while len(self._solved) >= KEPT:
                 del self._solved[next(iter(self._solved))]
             self._solved[key] = found, signals(found, self.harmonics)
         return self._solved[key]
+
+    def _beside(self, network: Network) -> Orbit:
+        """Solve from the orbit that is near."""
+        if isinstance(network, Delayed):
+            return delayed_orbit.solve(network, self.gait, self._near if isinstance(
+                self._near, DelayedOrbit) else None)
+        if isinstance(self._near, MeshOrbit):
+            # A step too long for Newton's method is one too long for the trust region.
+            return cell_orbit.beside(network, self._near)
+        return solve_orbit(network, self.gait)
 
     def start_near(self, orbit: Orbit) -> None:
         """Take the next orbits from this one."""
@@ -124,10 +130,11 @@ class Problem:
         weights = np.empty((self.weights, joints))
         residual, jacobian = np.empty((m, joints)), np.empty((m, joints, len(self.free) + 1))
         for (wave, place), columns in self._places.items():
-            theta = self.joints.theta + place + phase
-            x, y, z = seen.values(theta, wave)
+            theta, shift = self.joints.theta, place + phase
+            x, y, z = seen.values(theta, shift, wave)
             psi, by_phase = basis(self.order, x, y, z)
-            moved = basis_moved(self.order, x, y, seen.derivatives(theta, wave, self._members))
+            moved = basis_moved(self.order, x, y, seen.derivatives(theta, shift, wave,
+                                                                          self._members))
             part = project(psi, np.concatenate([moved, by_phase[..., None]], axis=-1),
                            self.joints.data[:, columns])
             weights[:, columns] = part.weights
@@ -157,7 +164,7 @@ class Problem:
             total = 0.0
             for (wave, place), columns in self._places.items():
                 q = np.linalg.qr(basis(self.order, *seen.values(
-                    self.joints.theta + place + phase, wave))[0])[0]
+                    self.joints.theta, place + phase, wave))[0])[0]
                 total += float(np.sum((q.T @ (self.joints.data / self.sizes)[:, columns])**2))
             return total
 

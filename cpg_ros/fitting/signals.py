@@ -7,6 +7,7 @@ short Fourier series, ``x(theta) = Re sum_k terms_k exp(2 pi i k theta)``.
 """
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -33,18 +34,33 @@ class Signals:
     terms: np.ndarray
     slopes: np.ndarray
 
-    def values(self, theta: np.ndarray, wave: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """x, y and the derivative of y by phase in radians at theta in cycles, shape (m,)."""
-        k = np.arange(self.terms.shape[1])
-        terms = self.terms[wave]
-        found = _turns(theta, k) @ np.stack([terms, 1j * k * terms, -k * k * terms], axis=1)
-        return tuple(found.real.T)
+    def values(self, theta: np.ndarray, shift: float, wave: int
+               ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """x, y and the derivative of y by phase in radians.
 
-    def derivatives(self, theta: np.ndarray, wave: int, members: np.ndarray) -> np.ndarray:
+        Args:
+            theta: cycles, shape (m,); few different ones, since what they give is kept.
+            shift: added to them, cycles.
+            wave: number of the waveform.
+
+        Returns:
+            Three arrays of shape (m,).
+
+        """
+        k = np.arange(self.terms.shape[1])
+        terms = self.terms[wave] * np.exp(TURN * 1j * k * shift)
+        found = _turns(theta.tobytes(), k.size) @ np.stack(
+            [terms, 1j * k * terms, -k * k * terms], axis=1)
+        x, y, z = found.real.T
+        return x, y, z
+
+    def derivatives(self, theta: np.ndarray, shift: float, wave: int, members: np.ndarray
+                    ) -> np.ndarray:
         """Derivatives of x and y by numbers that move the parameters.
 
         Args:
-            theta: cycles, shape (m,).
+            theta: as above.
+            shift: as above.
             wave: number of the waveform.
             members: how much each parameter moves with each number, (parameters, numbers).
 
@@ -53,12 +69,15 @@ class Signals:
 
         """
         k = np.arange(self.terms.shape[1])
-        slopes = self.slopes[wave] @ members
-        return (_turns(theta, k) @ np.stack([slopes, 1j * k[:, None] * slopes])).real
+        slopes = (self.slopes[wave] @ members) * np.exp(TURN * 1j * k * shift)[:, None]
+        return (_turns(theta.tobytes(), k.size)
+                @ np.stack([slopes, 1j * k[:, None] * slopes])).real
 
 
-def _turns(theta: np.ndarray, k: np.ndarray) -> np.ndarray:
-    return np.exp(TURN * 1j * np.multiply.outer(theta, k))
+@lru_cache(maxsize=16)
+def _turns(theta: bytes, count: int) -> np.ndarray:
+    """``exp(2 pi i k theta)``, shape (m, count)."""
+    return np.exp(TURN * 1j * np.multiply.outer(np.frombuffer(theta), np.arange(count)))
 
 
 def signals(orbit: Orbit, harmonics: int) -> Signals:

@@ -84,6 +84,6 @@ def descend(evaluate: Evaluate, start: np.ndarray, low: np.ndarray, high: np.nda
         return slopes
 
     found = least_squares(residual, start, jacobian, (low, high), 'trf', x_scale='jac',
-                          ftol=tolerance, xtol=tolerance, gtol=tolerance**2, max_nfev=most)
+                          ftol=tolerance, xtol=tolerance, gtol=1e-15, max_nfev=most)
     return Trial(start, found.x, float(found.cost), np.array(path), count[0],
                  count[1], found.status > 0)
