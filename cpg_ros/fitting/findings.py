@@ -4,27 +4,21 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from cpg_ros.dynamics.periodic import Orbit
-from cpg_ros.dynamics.readout import lead_table
-from cpg_ros.dynamics.stability import stability
 from cpg_ros.fitting.free import Free
 from cpg_ros.fitting.identifiability import SHARE, Estimate, Spread
 from cpg_ros.fitting.trials import Trial
 
-TURN = 2.0 * np.pi
 #: A 95 % interval wider than this share of the value on either side is named.
 WIDE = 0.1
 #: So are correlations beyond this, and ends this near a bound, over the bounds' distance.
 TOGETHER, AT_BOUND = 0.95, 1e-6
 
 
-def findings(orbit: Orbit, gait: str, free: Sequence[Free], estimates: Mapping[str, Estimate],
-             known: Spread, low: np.ndarray, high: np.ndarray, best: Trial) -> list[str]:
+def findings(free: Sequence[Free], estimates: Mapping[str, Estimate], known: Spread,
+             low: np.ndarray, high: np.ndarray, best: Trial) -> list[str]:
     """List what the user of a fit must know.
 
     Args:
-        orbit: the fitted one.
-        gait: its name.
         free: the free numbers.
         estimates: of them.
         known: their covariance, and that of the phase.
@@ -55,7 +49,7 @@ def findings(orbit: Orbit, gait: str, free: Sequence[Free], estimates: Mapping[s
                 one.high - one.value, one.value - one.low) > WIDE * abs(one.value)):
             found.append(
                 f'{name} is badly determined: anything from {one.low:.4g} to {one.high:.4g} fits '
-                'as well' + ('' if one.bounded else ', and further the fit did not look')
+                'as well' + ('' if one.bounded else ', and there is no orbit or a bound beyond')
                 + '; with a free readout it shows only in the shape of the waveform')
     errors = known.correlation
     for k in range(len(free)):
@@ -66,15 +60,6 @@ def findings(orbit: Orbit, gait: str, free: Sequence[Free], estimates: Mapping[s
     if not best.converged:
         found.append(f'the trust region was stopped after {best.evaluations} evaluations, '
                      'before it had converged')
-    flaw = stability(orbit).flaw
-    if flaw:
-        found.append(f'the generator will refuse this {gait}: {flaw}')
-    elif orbit.network.variables == 1:
-        theta = np.arange(512) / 512
-        try:
-            lead_table(orbit.waveform(theta), orbit.waveform(theta, 1) / TURN)
-        except ValueError as error:
-            found.append(f'the generator will refuse this {gait}: {error}')
     return found
 
 

@@ -22,7 +22,7 @@ ZERO, SHARE = 1e-7, 1e-3
 #: The cost rises by what the quadratic says, within these factors, or its profile is followed.
 QUADRATIC = (0.85, 1.18)
 #: Steps of a profile on either side, and its tolerance in standard errors.
-STEPS, CLOSE = 12, 0.03
+STEPS, CLOSE = 10, 0.03
 TOLERANCE = 1e-5
 
 
@@ -220,7 +220,7 @@ class Optimum:
             return left, slopes[:, others]
 
         trial = descend(evaluate, begin[others], self.low[others], self.high[others], TOLERANCE,
-                        most=30)
+                        most=15)
         return None if trial.why else (trial.cost, filled(trial.values))
 
 

@@ -7,10 +7,11 @@ counts only where a time scale is given.
 """
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
-from cpg_ros.dynamics.periodic import NoOrbit
+from cpg_ros.dynamics.periodic import NoOrbit, Orbit
 from cpg_ros.fitting.findings import findings
 from cpg_ros.fitting.fit import Fit
 from cpg_ros.fitting.free import Free, free_numbers, with_values, within_hopf_set
@@ -18,6 +19,7 @@ from cpg_ros.fitting.identifiability import Optimum, correlation_length, spread
 from cpg_ros.fitting.joints import MeanCycle, joints_of
 from cpg_ros.fitting.problem import Period, Problem
 from cpg_ros.fitting.readout_fit import WEIGHTS
+from cpg_ros.fitting.runnable import refusal
 from cpg_ros.fitting.trials import Trial, descend
 from cpg_ros.networks.network import Network
 from cpg_ros.robot import HARMONICS
@@ -73,17 +75,32 @@ def invert(cycle: MeanCycle, cells: Mapping[str, int], network: Network, gait: s
         value = 1.0 / (cycle.frequency * time_scale)
         share = max(cycle.frequency_error / cycle.frequency, KNOWN_FREQUENCY)
         period = Period(value, value * share)
-    problem = Problem(joints, joints.stated, network, gait, numbers, order, harmonics, period)
     begins = [_begin(network, numbers, start) for start in starts]
-    trials: list[Trial] = []
-    for begin in begins:
+
+    def attempt(refuses: Callable[[Orbit], str]) -> Fit:
+        problem = Problem(joints, joints.stated, network, gait, numbers, order, harmonics, period,
+                          refuses)
+        trials: list[Trial] = []
+        for begin in begins:
+            done(len(trials))
+            trials.append(_trial(problem, begin, weigh=all(other.why for other in trials)))
         done(len(trials))
-        trials.append(_trial(problem, begin, weigh=not any(not other.why for other in trials)))
-    done(len(trials))
-    best = min(trials, key=lambda trial: trial.cost)
-    if best.why:
-        raise NoOrbit(trials[0].why)
-    return _completed(problem, best, trials)
+        best = min(trials, key=lambda trial: trial.cost)
+        if best.why:
+            raise NoOrbit(trials[0].why)
+        return _completed(problem, best, trials)
+
+    fit = attempt(lambda orbit: '')
+    flaw = refusal(fit.orbit, harmonics)
+    if not flaw:
+        return fit
+    said = f'the generator would refuse the {gait} that fits best: {flaw}'
+    try:
+        second = attempt(lambda orbit: refusal(orbit, harmonics))
+    except NoOrbit:
+        return replace(fit, warnings=(*fit.warnings, said))
+    return replace(second, warnings=(*second.warnings,
+                                     f'{said}; this is the best one that it runs'))
 
 
 def _begin(network: Network, numbers: Sequence[Free], start: Mapping[str, float]) -> np.ndarray:
@@ -120,13 +137,13 @@ def _trial(problem: Problem, begin: np.ndarray, weigh: bool) -> Trial:
     """Go down from one start; the first one that has an orbit sets the joints' weights."""
     values = np.append(begin, 0.0)
     try:
+        problem.begin(values)
         values[-1] = problem.first_phase(values)
     except NoOrbit as error:
         return Trial(values, values, float('inf'), np.empty((0, 1 + values.size)), 1, 1, False,
                      str(error))
     if weigh:
         problem.sizes = np.maximum(problem.joints.stated, _left(problem, values))
-    problem.start_near(problem.orbit(values))
     return descend(problem, values, *_limits(problem, values), TOLERANCE)
 
 
@@ -134,7 +151,6 @@ def _completed(problem: Problem, best: Trial, trials: Sequence[Trial]) -> Fit:
     """Weigh the joints by what is left of each, fit again, and judge."""
     joints, values = problem.joints, best.values
     low, high = _limits(problem, values)
-    problem.start_near(problem.orbit(values))
     for last in range(WEIGHINGS):
         sizes = np.maximum(joints.stated, _left(problem, values))
         if last and np.abs(sizes / problem.sizes - 1.0).max() < SAME:
@@ -161,5 +177,4 @@ def _completed(problem: Problem, best: Trial, trials: Sequence[Trial]) -> Fit:
         cost=cost, sizes=dict(zip(joints.names, problem.sizes.tolist(), strict=True)),
         misfit=dict(zip(joints.names, misfit.tolist(), strict=True)), sharing=sharing,
         starts=tuple(trials),
-        warnings=tuple(findings(placed.orbit, problem.gait, problem.free, estimates, known,
-                                optimum.low, optimum.high, best)))
+        warnings=tuple(findings(problem.free, estimates, known, low, high, best)))

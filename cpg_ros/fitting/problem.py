@@ -1,12 +1,11 @@
 """The fit of a gait to a mean cycle as a least-squares problem in its free numbers alone."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from cpg_ros.dynamics import cell_orbit, delayed_orbit
-from cpg_ros.dynamics.delayed_orbit import DelayedOrbit
+from cpg_ros.dynamics import cell_orbit
 from cpg_ros.dynamics.mesh_orbit import MeshOrbit
 from cpg_ros.dynamics.orbit import solve_orbit
 from cpg_ros.dynamics.periodic import NoOrbit, Orbit
@@ -14,7 +13,6 @@ from cpg_ros.fitting.free import Free, with_values
 from cpg_ros.fitting.joints import Joints
 from cpg_ros.fitting.readout_fit import WEIGHTS, basis, basis_moved, project
 from cpg_ros.fitting.signals import Signals, signals
-from cpg_ros.networks.delayed import Delayed
 from cpg_ros.networks.network import Network
 
 #: Phases among which the first guess of the one between recording and orbit is chosen.
@@ -54,17 +52,18 @@ class Problem:
 
     Attributes:
         joints, network, gait, free, order, harmonics: what is fitted to what.
+        refuses: why an orbit shall not count, or ''.
         sizes: standard error of each joint's mean cycle as far as it counts, rad, (joints,).
 
     """
 
     def __init__(self, joints: Joints, sizes: np.ndarray, network: Network, gait: str,
-                 free: Sequence[Free], order: int, harmonics: int, period: Period | None = None
-                 ) -> None:
+                 free: Sequence[Free], order: int, harmonics: int, period: Period | None = None,
+                 refuses: Callable[[Orbit], str] = lambda orbit: '') -> None:
         self.joints, self.sizes, self.free = joints, sizes, tuple(free)
         self.network, self.gait, self._period = network, gait, period
         self._symmetry = network.symmetry(gait)
-        self.order, self.harmonics = order, harmonics
+        self.order, self.harmonics, self.refuses = order, harmonics, refuses
         names = network.parameters()
         self._members = np.array([[float(name in one.members) for one in free]
                                   for name in names])
@@ -72,7 +71,6 @@ class Problem:
                 for cell in joints.cells]
         self._places = {key: [j for j, other in enumerate(keys) if other == key]
                         for key in dict.fromkeys(keys)}
-        self._near: Orbit | None = None
         self._solved: dict[bytes, tuple[Orbit, Signals]] = {}
         self._placed: tuple[bytes, Placed] | None = None
 
@@ -81,41 +79,55 @@ class Problem:
         """Numbers that each joint's readout takes, with its offset."""
         return 1 + WEIGHTS[self.order]
 
-    def orbit(self, values: np.ndarray) -> Orbit:
-        """Solve for the orbit at values; NoOrbit where Newton's method reaches none."""
-        return self._solve(values)[0]
-
-    def _solve(self, values: np.ndarray) -> tuple[Orbit, Signals]:
-        """Solve for an orbit and what joints see of it; those last solved for are kept.
+    def begin(self, values: np.ndarray) -> None:
+        """Solve for an orbit from nothing, to start near.
 
         Raises:
-            NoOrbit: there is none that Newton's method reaches.
+            NoOrbit: there is none, or none was found.
 
         """
-        key = np.asarray(values[:len(self.free)]).tobytes()
+        self._keep(values, solve_orbit(self._network(values), self.gait))
+
+    def _network(self, values: np.ndarray) -> Network:
+        network = with_values(self.network, self.free, values[:len(self.free)])
+        if network.symmetry(self.gait) != self._symmetry:
+            raise NoOrbit(f'the wave of the {self.gait} would run the other way')
+        return network
+
+    def _keep(self, values: np.ndarray, orbit: Orbit) -> tuple[Orbit, Signals]:
+        flaw = self.refuses(orbit)
+        if flaw:
+            raise NoOrbit(flaw)
+        while len(self._solved) >= KEPT:
+            del self._solved[next(iter(self._solved))]
+        numbers = np.array(values[:len(self.free)])
+        self._solved[numbers.tobytes()] = orbit, signals(orbit, self.harmonics)
+        return self._solved[numbers.tobytes()]
+
+    def _solve(self, values: np.ndarray) -> tuple[Orbit, Signals]:
+        """Solve for an orbit, and what joints see of it, from the nearest one solved for.
+
+        Raises:
+            NoOrbit: there is none that Newton's method reaches from there.
+
+        """
+        key = values[:len(self.free)].tobytes()
         if key not in self._solved:
-            network = with_values(self.network, self.free, values[:len(self.free)])
-            if network.symmetry(self.gait) != self._symmetry:
-                raise NoOrbit(f'the wave of the {self.gait} would run the other way')
-            found = self._beside(network)
-            while len(self._solved) >= KEPT:
-                del self._solved[next(iter(self._solved))]
-            self._solved[key] = found, signals(found, self.harmonics)
+            network = self._network(values)
+            near = self._nearest(values)
+            if isinstance(near, MeshOrbit):
+                # A step too long for Newton's method is one too long for the trust region.
+                return self._keep(values, cell_orbit.beside(network, near))
+            return self._keep(values, solve_orbit(network, self.gait, near))
         return self._solved[key]
 
-    def _beside(self, network: Network) -> Orbit:
-        """Solve from the orbit that is near."""
-        if isinstance(network, Delayed):
-            return delayed_orbit.solve(network, self.gait, self._near if isinstance(
-                self._near, DelayedOrbit) else None)
-        if isinstance(self._near, MeshOrbit):
-            # A step too long for Newton's method is one too long for the trust region.
-            return cell_orbit.beside(network, self._near)
-        return solve_orbit(network, self.gait)
-
-    def start_near(self, orbit: Orbit) -> None:
-        """Take the next orbits from this one."""
-        self._near = orbit
+    def _nearest(self, values: np.ndarray) -> Orbit | None:
+        if not self._solved:
+            return None
+        known = np.array([np.frombuffer(key) for key in self._solved])
+        size = np.abs(known).max(axis=0) + 1e-12
+        gaps = np.sum(((known - values[:len(self.free)]) / size)**2, axis=1)
+        return list(self._solved.values())[int(gaps.argmin())][0]
 
     def placed(self, values: np.ndarray) -> Placed:
         """Return the best readouts; NoOrbit as in orbit."""
