@@ -25,6 +25,7 @@ setup(
     license='Apache-2.0',
     entry_points={'console_scripts': [
         'generator = cpg_ros.nodes.generator:main',
+        'inversion = cpg_ros.nodes.inversion:main',
         'analyze = cpg_ros.tools.analyze:main',
         'optimize = cpg_ros.tools.optimize:main',
         'reproduce = cpg_ros.tools.reproduce:main']},
