@@ -306,6 +306,15 @@ def test_a_bag_of_anything_is_read_as_the_library_reads_it_or_refused(batch, tmp
         assert table[row, column] in [value for values in near for value in values]
 
 
+def test_progress_is_shown_on_long_reads_and_can_be_silenced(tmp_path, monkeypatch, capsys):
+    path = write_bag(tmp_path / 'walk', walk(9000, JOINTS[:2])[0])
+    monkeypatch.setattr('cpg_ros.dynamics.progress.PATIENCE', -1.0)
+    read_bag(path)
+    assert capsys.readouterr().err.startswith('reading walk [')
+    read_bag(path, progress=False)
+    assert capsys.readouterr().err == ''
+
+
 def test_memory_grows_by_less_than_half_of_what_the_bag_grows(tmp_path):
     sizes, peaks = [], []
     for count in (9_000, 18_000):

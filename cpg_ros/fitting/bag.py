@@ -52,7 +52,8 @@ def read_bag(path: str | Path, topics: Sequence[str] = (), joints: Sequence[str]
             done = 0
             for topic, received, message in bag.messages(list(streams)):
                 stream = streams[topic]
-                stream.add(received, message)
+                stream.received.append(received)
+                stream.messages.append(message)
                 if len(stream.messages) == BATCH:
                     stream.decode(path)
                     done += BATCH
@@ -89,6 +90,7 @@ class _Stream:
         self.topic = topic
         self.wanted = set(joints)
         self.taken: set[str] = set()
+        #: What is not decoded yet, and the times of receipt in ns.
         self.messages: list[bytes] = []
         self.received: list[int] = []
         #: Header stamps and receive times in ns, names, positions.
@@ -101,11 +103,6 @@ class _Stream:
     def stamped(self) -> bool:
         """Whether any message has a header stamp."""
         return self.unstamped < self.count - self.mute - self.odd
-
-    def add(self, received: int, message: bytes) -> None:
-        """Keep a message for decoding."""
-        self.received.append(received)
-        self.messages.append(message)
 
     def decode(self, path: Path) -> None:
         """Decode the messages at hand."""
