@@ -90,16 +90,21 @@ def require(names: Sequence[str], there: Sequence[str], source: str) -> None:
     """Refuse names of joints that are not there, or are given twice."""
     unknown = [name for name in names if name not in there]
     if unknown:
-        raise RecordingError(f'{source}: no joint {few(unknown)}; there are {few(there, 40)}')
+        raise RecordingError(f'{source}: no {named(unknown)}; there are {few(there, 40)}')
     again = [name for k, name in enumerate(names) if name in names[:k]]
     if again:
-        raise RecordingError(f'{source}: joint {few(again)} is named twice')
+        raise RecordingError(f'{source}: {named(again[:1])} is named twice')
 
 
 def few(names: Sequence[str], most: int = 6) -> str:
     """Return names in quotes, the first ones where they are many."""
     shown = ', '.join(repr(name) for name in names[:most])
     return shown + (f' and {len(names) - most} more' if len(names) > most else '')
+
+
+def named(joints: Sequence[str]) -> str:
+    """Return 'joint' and its name, or 'joints' and their names."""
+    return f'joint{"" if len(joints) == 1 else "s"} {few(joints)}'
 
 
 def merged(chunks: Iterable[Chunk], source: str, joints: Sequence[str] = ()) -> Recording:
@@ -122,7 +127,7 @@ def merged(chunks: Iterable[Chunk], source: str, joints: Sequence[str] = ()) -> 
     groups = _groups(chunks, source)
     names = list(dict.fromkeys(name for group in groups for name in group))
     if not names:
-        raise RecordingError(f'{source}: no positions')
+        raise RecordingError(f'{source}: no samples')
     require(joints, names, source)
     wanted = tuple(joints) or tuple(names)
     notes: list[str] = []
@@ -163,7 +168,7 @@ def merged(chunks: Iterable[Chunk], source: str, joints: Sequence[str] = ()) -> 
     silent = [name for name, any_there in zip(wanted, there.any(axis=0), strict=True)
               if not any_there]
     if silent:
-        raise RecordingError(f'{source}: no finite position of joint {few(silent)} in '
+        raise RecordingError(f'{source}: no finite position of {named(silent)} in '
                              f'{_counted(received, "sample")}; name the joints to take to do '
                              'without')
     heard = there.any(axis=1)
@@ -236,7 +241,7 @@ def _missing(joints: tuple[str, ...], there: np.ndarray) -> list[str]:
     """Say which joints have fewer samples than others."""
     counts = there.sum(axis=0)
     most = counts.max()
-    return [f'joint {few([joints[k] for k in np.flatnonzero(counts == count)])}: '
+    return [f'{named([joints[k] for k in np.flatnonzero(counts == count)])}: '
             f'{_counted(int(count), "sample")} where others have {most}'
             for count in np.unique(counts[counts < most])]
 
@@ -257,7 +262,7 @@ def _intervals(joints: tuple[str, ...], times: np.ndarray, there: np.ndarray) ->
         steps = np.diff(own)
         usual = float(np.median(steps))
         long = steps > DROPOUT * usual
-        who = '' if len(together) == 1 else f'joint {few([joints[k] for k in columns])}: '
+        who = '' if len(together) == 1 else f'{named([joints[k] for k in columns])}: '
         if long.any():
             lost = int((np.rint(steps[long] / usual) - 1).sum())
             worst = int(np.argmax(steps))
