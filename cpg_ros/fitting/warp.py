@@ -39,12 +39,14 @@ class Warp:
     Attributes:
         knots: s, rising, shape (k,); the first and last are where the motion begins and ends.
         phases: in cycles, shape (k,).
-        frequency_error: standard error of the mean frequency, Hz.
+        frequency: mean, Hz: the slope of the straight line nearest to the phases.
+        frequency_error: its standard error, Hz.
 
     """
 
     knots: np.ndarray
     phases: np.ndarray
+    frequency: float
     frequency_error: float
 
     def __call__(self, times: np.ndarray) -> np.ndarray:
@@ -55,11 +57,6 @@ class Warp:
     def cycles(self) -> float:
         """How many cycles it holds."""
         return float(self.phases[-1] - self.phases[0])
-
-    @property
-    def frequency(self) -> float:
-        """Mean frequency, Hz."""
-        return self.cycles / float(self.knots[-1] - self.knots[0])
 
 
 @dataclass(frozen=True)
@@ -142,7 +139,8 @@ def followed(times: np.ndarray, positions: np.ndarray, rough: Rough) -> Warp:
     grid, x = grid[inside] - rough.begin, np.ascontiguousarray(y[inside].T)
     if span * slope < FEW:
         phases, error = _straight(grid, x, np.array([level, level + slope * span]), span)
-        return Warp(np.array([rough.begin, rough.end]), phases, error)
+        return Warp(np.array([rough.begin, rough.end]), phases,
+                    float(phases[1] - phases[0]) / span, error)
     knots = np.linspace(0.0, span, round(span * slope) + 1)
     phases = _extended(knots + rough.begin, rough.times, rough.phases, slope)
     while True:
@@ -154,12 +152,27 @@ def followed(times: np.ndarray, positions: np.ndarray, rough: Rough) -> Warp:
         knots, phases = knots[first:last + 2], phases[first:last + 2]
         inside = (grid >= knots[0]) & (grid <= knots[-1])
         grid, x = grid[inside], x[:, inside]
-    rates = np.diff(phases) / np.diff(knots)
-    off, n = rates - rates.mean(), rates.size
-    own, next_ = float(off @ off) / (n - 1), float(off[1:] @ off[:-1]) / (n - 1)
-    # Errors of single phases go into two rates each, with opposite signs.
-    error = np.sqrt(max(own, n * own + 2.0 * (n - 1) * next_)) / n
-    return Warp(knots + rough.begin, phases, float(error))
+    frequency, error = _mean_rate(knots, phases)
+    return Warp(knots + rough.begin, phases, frequency, error)
+
+
+def _mean_rate(knots: np.ndarray, phases: np.ndarray) -> tuple[float, float]:
+    """Return the slope of the straight line through the phases and its standard error.
+
+    Phases at the knots are taken to wander, as no stride is like the last, and to be in error
+    besides. That makes rates between knots vary by q + 2 s and with their neighbours by -s, s
+    the variance of the errors, q that of the wander.
+    """
+    rates, centred = np.diff(phases) / np.diff(knots), knots - knots.mean()
+    frequency = float(centred @ phases) / float(centred @ centred)
+    # The slope is this weighted mean of the rates.
+    weights = -np.cumsum(centred)[:-1] * np.diff(knots) / (centred @ centred)
+    off = rates - rates.mean()
+    own = float(off @ off) / max(rates.size - 1, 1)
+    next_ = float(off[1:] @ off[:-1]) / max(rates.size - 1, 1)
+    next_ = min(max(next_, -0.5 * own), 0.5 * own)
+    return frequency, float(np.sqrt(own * (weights @ weights)
+                                    + 2.0 * next_ * (weights[1:] @ weights[:-1])))
 
 
 def _extended(at: np.ndarray, times: np.ndarray, phases: np.ndarray, slope: float) -> np.ndarray:

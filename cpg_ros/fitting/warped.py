@@ -71,8 +71,11 @@ def warped(phases: np.ndarray, positions: np.ndarray, theta: np.ndarray) -> Warp
     spread, error = np.empty((joints, theta.size)), np.empty((joints, theta.size))
     spikes, left = np.zeros(joints, dtype=int), np.zeros(joints)
     # Joints that come in the same messages have the same samples.
-    for mask in np.unique(there, axis=1).T:
-        alike = np.flatnonzero((there == mask[:, None]).all(axis=0))
+    groups: dict[bytes, list[int]] = {}
+    for joint, column in enumerate(np.packbits(there, axis=0).T):
+        groups.setdefault(column.tobytes(), []).append(joint)
+    for alike in groups.values():
+        mask = there[:, alike[0]]
         at, x = phases[mask], np.ascontiguousarray(positions[np.ix_(mask, alike)].T)
         weights[:, alike], rest, bins = _fitted(at, x)
         far = np.abs(rest)
