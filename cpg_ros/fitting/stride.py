@@ -157,10 +157,7 @@ def find_stride(recording: Recorded, legs: Legs | Mapping[str, Sequence[str]],
         chosen = _kept(chosen, names, source)
         x = x[:, full]
     try:
-        first = [names.index(name) for name in next(iter(chosen.values()))]
-        lead = warped(phases, x[:, first], theta).coefficients[1]
-        zero = -np.angle(lead[np.argmax(np.abs(lead))]) / (2.0 * np.pi)
-        found = warped(phases - zero, x, theta)
+        found = warped(phases, x, theta, [names.index(name) for name in chosen[next(iter(own))]])
     except ValueError as error:
         raise NoSteadyGait(f'{source}: {error}') from error
     power = np.nanvar(x, axis=0)
@@ -186,7 +183,7 @@ def find_stride(recording: Recorded, legs: Legs | Mapping[str, Sequence[str]],
                   found.mean(theta), found.spread, found.error, found.counts, ahead, gait.gait,
                   gait.nearest, gait.distance, gait.margin,
                   tuple(notes) + by_legs + gait.notes,
-                  replace(warp, phases=warp.phases - zero))
+                  replace(warp, phases=warp.phases - found.zero))
 
 
 def _kept(legs: Mapping[str, Sequence[str]], names: Sequence[str], source: str
@@ -246,11 +243,9 @@ def _regions(times: np.ndarray, x: np.ndarray, source: str) -> tuple[Rough, list
         # Two strides may be alike by chance, if not in all joints.
         if seed.cycles >= SURE or seed.difference <= ALIKE:
             regions.append((grown(times, x, seed), seed.period))
-        begin, end = ((regions[-1][0].begin, regions[-1][0].end)
-                      if regions and seed.overlaps(regions[-1][0].begin, regions[-1][0].end)
-                      else (seed.begin, seed.end))
-        found = [one for one in found
-                 if not one.overlaps(min(begin, seed.begin), max(end, seed.end))
+            found = [one for one in found if one.outside(regions[-1][0].begin,
+                                                         regions[-1][0].end)]
+        found = [one for one in found if one.outside(seed.begin, seed.end)
                  and one.cycles >= OTHERS and one.size >= 0.5 * largest]
     if not regions:
         raise NoSteadyGait(f'{source}: no steady gait: the joints come back to where they were '
