@@ -41,6 +41,7 @@ class Named:
         nearest: the nearest one.
         distance: of that, in cycles: RMS over the legs after the best common shift.
         margin: how much further the next gait is that is told apart, cycles.
+        alike: gaits that the nearest cannot be told from, itself among them.
         notes: one line each.
 
     """
@@ -49,6 +50,7 @@ class Named:
     nearest: str
     distance: float
     margin: float
+    alike: tuple[str, ...]
     notes: tuple[str, ...]
 
 
@@ -205,7 +207,7 @@ def named(phases: Mapping[str, float], network: type[Network]) -> Named:
         kind = 'lateral' if order[1] == order[0][0] + 'f' else 'diagonal'
         notes.append(f'{kind} sequence: {", ".join(order).upper()}')
     return Named(nearest if apart[nearest] <= TOLERANCE else None, nearest, apart[nearest],
-                 margin, tuple(notes))
+                 margin, tuple(same), tuple(notes))
 
 
 def named_by_cells(c: np.ndarray, network: type[Network]) -> Named:
@@ -225,4 +227,4 @@ def named_by_cells(c: np.ndarray, network: type[Network]) -> Named:
     # What a wave is off from itself that is early by the distance.
     distance, second = (float(np.arcsin(min(0.5 * size, 1.0)) / np.pi)
                         for size in (found.distance, found.distance + found.margin))
-    return Named(found.name, found.nearest, distance, second - distance, ())
+    return Named(found.name, found.nearest, distance, second - distance, (found.nearest,), ())

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 #: Fastest stride that is looked for (Hz).
-FASTEST = 16.0
+FASTEST = 12.5
 #: Points of a lag on its grid: from this many to twice as many.
 FEWEST = 12
 #: Points of the even grid per sample where those are few.
@@ -58,9 +58,9 @@ class Stretch:
         """How many periods it holds."""
         return (self.end - self.begin) / self.period
 
-    def overlaps(self, begin: float, end: float) -> bool:
-        """Tell whether any of it is between two times."""
-        return self.begin < end and begin < self.end
+    def outside(self, begin: float, end: float) -> bool:
+        """Tell whether most of it is not between two times."""
+        return min(self.end, end) - max(self.begin, begin) < 0.5 * (self.end - self.begin)
 
 
 def even(times: np.ndarray, positions: np.ndarray, rate: float
@@ -139,13 +139,26 @@ def longest(mask: np.ndarray) -> tuple[int, int] | None:
     return int(first), int(last)
 
 
-def _best_lag(lags: np.ndarray, means: np.ndarray) -> tuple[float, float]:
-    """Return where the mean difference is least, between lags, and that difference."""
-    k = int(np.argmin(means))
-    if not 0 < k < lags.size - 1 or not np.isfinite(means[k - 1:k + 2]).all():
+def _best_lag(lags: np.ndarray, differences: np.ndarray, near: np.ndarray
+              ) -> tuple[float, float] | None:
+    """Return the lag among the near ones with the least mean difference, and that difference.
+
+    Between lags, by a parabola; None if a lag that is not near has less still.
+    """
+    known = np.isfinite(differences)
+    means = np.where(known, differences, 0.0).sum(axis=1) / np.maximum(known.sum(axis=1), 1)
+    means[~known.any(axis=1)] = np.inf
+    k = near[np.argmin(means[near])]
+    if not 0 < k < lags.size - 1 or not np.isfinite(means[k + 1]):
         return float(lags[k]), float(means[k])
-    before, here, after = means[k - 1:k + 2]
-    return lags[k] + 0.5 * (before - after) / (before - 2.0 * here + after), float(here)
+    both = known[k - 1:k + 2].all(axis=0)
+    before, here, after = differences[k - 1:k + 2, both].mean(axis=1) if both.any() else means[
+        k - 1:k + 2]
+    if min(before, after) < here:
+        return None
+    bend = max(before - 2.0 * here + after, 1e-300)
+    return (lags[k] + 0.5 * (before - after) / bend,
+            max(here - 0.125 * (before - after)**2 / bend, 0.0))
 
 
 def stretches(times: np.ndarray, y: np.ndarray) -> list[Stretch]:
@@ -161,15 +174,14 @@ def stretches(times: np.ndarray, y: np.ndarray) -> list[Stretch]:
     while len(y) >= CYCLES * FEWEST:
         lags, differences, variance = _differences(y)
         for lag in lags[(lags >= FEWEST) & (lags < 2 * FEWEST)]:
-            near = np.abs(lags - lag) <= NEAR * lag
+            near = np.flatnonzero(np.abs(lags - lag) <= NEAR * lag)
             for first, last in _runs(differences[near].min(axis=0) < REPEATS):
-                inside = differences[near, first:last + 1]
-                period, difference = _best_lag(lags[near], inside.mean(axis=1))
+                found_lag = _best_lag(lags, differences[:, first:last + 1], near)
                 half = 0.5 * min(2 * lag, len(y))
                 begin, end = max(first - half, 0.0), min(last + half, len(y) - 1.0)
-                if end - begin >= CYCLES * period:
+                if found_lag is not None and end - begin >= CYCLES * found_lag[0]:
                     found.append(Stretch(start + begin * step, start + end * step,
-                                         period * step, difference,
+                                         found_lag[0] * step, found_lag[1],
                                          float(np.sqrt(variance[first:last + 1].mean()))))
         half = len(y) // 2
         y = 0.5 * (y[:2 * half:2] + y[1:2 * half:2])
@@ -186,7 +198,7 @@ def best(found: list[Stretch]) -> Stretch:
     for times in (2, 3):
         for one in found:
             if (abs(one.period / chosen.period / times - 1.0) < NEAR / 2
-                    and one.overlaps(chosen.begin, chosen.end)
+                    and not one.outside(chosen.begin, chosen.end)
                     and one.end - one.begin >= LASTING * (chosen.end - chosen.begin)
                     and one.difference < BETTER * (chosen.difference - LESS)):
                 return one

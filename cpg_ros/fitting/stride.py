@@ -5,7 +5,7 @@ real stride is quite as long as the last (warp), and averaged over that phase (w
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
@@ -30,7 +30,8 @@ SURE, ALIKE = 3.0, 0.1
 LEFT = 0.5
 #: Stretches that are followed, and how much other motion, in cycles, is worth a note.
 SEEDS, OTHERS = 4, 3.0
-#: A sample this many standard deviations off both neighbours is no motion.
+#: A sample is no motion if it is off both neighbours by this many standard deviations and times
+#: as much as they differ.
 SPIKE = 3.0
 #: A change of frequency over the stretch that is worth a note.
 DRIFT = 0.04
@@ -119,10 +120,11 @@ def find_stride(recording: Recorded, legs: Legs | Mapping[str, Sequence[str]],
         recording: of the joints.
         legs: leg -> its joints; the legs must be those of the network.
         network: whose gaits it may be.
-        cells: joint -> the cell that drives it, from 1. Tells gaits apart that move the legs
-            alike (walk and run of the biped), where every cell has a joint.
-        gains: joint -> w_x + i w_y of its readout, rad, by which a cell's signal is its joint's;
-            by default all are positive, and of unknown size.
+        cells: joint -> the cell that drives it, from 1. A leg's phase is then that of its first
+            cell.
+        gains: joint -> w_x + i w_y, rad, the first two weights of its readout. With these gaits
+            that move the legs alike (walk and run of the biped) are told apart, if every cell
+            has a joint.
 
     Raises:
         NoSteadyGait: there is none, or none of a leg's joints has angles.
@@ -155,23 +157,25 @@ def find_stride(recording: Recorded, legs: Legs | Mapping[str, Sequence[str]],
         chosen = _kept(chosen, names, source)
         x = x[:, full]
     try:
-        first = [names.index(name) for name in next(iter(chosen.values()))]
-        lead = warped(phases, x[:, first], theta).coefficients[1]
-        zero = -np.angle(lead[np.argmax(np.abs(lead))]) / (2.0 * np.pi)
-        found = warped(phases - zero, x, theta)
+        found = warped(phases, x, theta, [names.index(name) for name in chosen[next(iter(own))]])
     except ValueError as error:
         raise NoSteadyGait(f'{source}: {error}') from error
     power = np.nanvar(x, axis=0)
     left = float(np.sum(found.left * power) / np.sum(power))
     if left > LEFT:
-        raise NoSteadyGait(f'{source}: no steady gait: the mean cycle of {1.0 / warp.frequency:.3g}'
-                           f' s leaves {100.0 * left:.0f} % of the variance')
+        raise NoSteadyGait(f'{source}: no steady gait: the mean cycle, of '
+                           f'{1.0 / warp.frequency:.3g} s, leaves {100.0 * left:.0f} % of the '
+                           'variance')
     notes += _told(warp, found, names)
     c = dict(zip(names, found.coefficients.T, strict=True))
-    ahead, by_legs = leg_phases(chosen, c)
+    # A leg's phase is that of its first cell.
+    leading = {leg: tuple(name for name in listed
+                          if cells is None or cells.get(name) == own[leg][0]) or listed
+               for leg, listed in chosen.items()}
+    ahead, by_legs = leg_phases(leading, c)
     gait = named(ahead, kind)
-    if cells is not None and len(kind.legs) and kind.cells == 2 * len(own):
-        by_cells = _cell_signals(c, chosen, cells, gains, kind)
+    if cells is not None and gains is not None and len(gait.alike) > 1:
+        by_cells = _cell_signals(c, cells, gains, kind)
         if by_cells is not None:
             gait = named_by_cells(by_cells, kind)
     return Stride(float(warp.knots[0]), float(warp.knots[-1]), warp.frequency,
@@ -179,7 +183,7 @@ def find_stride(recording: Recorded, legs: Legs | Mapping[str, Sequence[str]],
                   found.mean(theta), found.spread, found.error, found.counts, ahead, gait.gait,
                   gait.nearest, gait.distance, gait.margin,
                   tuple(notes) + by_legs + gait.notes,
-                  Warp(warp.knots, warp.phases - zero, warp.frequency_error))
+                  replace(warp, phases=warp.phases - found.zero))
 
 
 def _kept(legs: Mapping[str, Sequence[str]], names: Sequence[str], source: str
@@ -210,8 +214,8 @@ def _usable(recording: Recorded, legs: Mapping[str, Sequence[str]]
     x = x[:, enough]
     before, here, after = x[:-2], x[1:-1], x[2:]
     with np.errstate(invalid='ignore'):
-        off = np.minimum(np.abs(here - before), np.abs(here - after))
-        wild = off > SPIKE * np.nanstd(x, axis=0)
+        off = np.abs(here - 0.5 * (before + after))
+        wild = (off > SPIKE * np.nanstd(x, axis=0)) & (off > SPIKE * np.abs(after - before))
     if wild.any():
         x[1:-1][wild] = np.nan
         notes.append(f'left out, far off both neighbours: {np.count_nonzero(wild)} samples')
@@ -239,11 +243,9 @@ def _regions(times: np.ndarray, x: np.ndarray, source: str) -> tuple[Rough, list
         # Two strides may be alike by chance, if not in all joints.
         if seed.cycles >= SURE or seed.difference <= ALIKE:
             regions.append((grown(times, x, seed), seed.period))
-        begin, end = ((regions[-1][0].begin, regions[-1][0].end)
-                      if regions and seed.overlaps(regions[-1][0].begin, regions[-1][0].end)
-                      else (seed.begin, seed.end))
-        found = [one for one in found
-                 if not one.overlaps(min(begin, seed.begin), max(end, seed.end))
+            found = [one for one in found if one.outside(regions[-1][0].begin,
+                                                         regions[-1][0].end)]
+        found = [one for one in found if one.outside(seed.begin, seed.end)
                  and one.cycles >= OTHERS and one.size >= 0.5 * largest]
     if not regions:
         raise NoSteadyGait(f'{source}: no steady gait: the joints come back to where they were '
@@ -276,30 +278,21 @@ def _told(warp: Warp, found: Warped, names: Sequence[str]) -> list[str]:
     return notes
 
 
-def _cell_signals(c: Mapping[str, np.ndarray], legs: Mapping[str, Sequence[str]],
-                  cells: Mapping[str, int], gains: Mapping[str, complex] | None,
-                  network: type[Network]) -> np.ndarray | None:
+def _cell_signals(c: Mapping[str, np.ndarray], cells: Mapping[str, int],
+                  gains: Mapping[str, complex], network: type[Network]) -> np.ndarray | None:
     """Return the coefficients of every cell's signal, None unless every cell has a joint.
 
-    Of several joints the one that moves most stands for the cell. Without gains sizes can be
-    compared between legs only: the n-th cell of every leg has one scale.
+    Of several joints the one that moves most stands for the cell.
     """
-    known = {name: cell for name, cell in cells.items() if name in c
-             and (gains is None or abs(gains.get(name, 0.0)) > 0.0)}
-    signals: dict[int, np.ndarray] = {}
+    known = {name: cell for name, cell in cells.items()
+             if name in c and abs(gains.get(name, 0.0)) > 0.0}
+    signals = []
     for cell in range(1, network.cells + 1):
         names = [name for name, one in known.items() if one == cell]
         if not names:
             return None
         name = max(names, key=lambda one: float(np.abs(c[one][1])))
-        signals[cell] = c[name]
-        if gains is not None:
-            turn = np.angle(gains[name]) * np.arange(c[name].size)
-            signals[cell] = c[name] * np.exp(-1j * turn) / abs(gains[name])
-    if gains is None:
-        listed = next(iter(network.legs.values()))
-        for alike in zip(*listed.values(), strict=True):
-            scale = np.sqrt(sum(np.sum(np.abs(signals[cell][1:])**2) for cell in alike))
-            for cell in alike:
-                signals[cell] = signals[cell] / scale
-    return np.stack([signals[cell] for cell in range(1, network.cells + 1)], axis=1)
+        gain, n = complex(gains[name]), np.arange(c[name].size)
+        signals.append(np.where(n > 0, c[name], 0.0)
+                       / np.where(n > 0, gain.real + 1j * n * gain.imag, 1.0))
+    return np.stack(signals, axis=1)

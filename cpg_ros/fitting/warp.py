@@ -15,15 +15,20 @@ from cpg_ros.fitting.cycle import rows_of, series, weights_for
 from cpg_ros.fitting.steady import Stretch, even, longest
 
 #: Blocks in a period, a window begins at each of them, and points in a block.
-BLOCKS, POINTS = 8, 8
+BLOCKS, POINTS = 8, 4
 #: Steady is what has at least this share of the typical amplitude,
 WEAKEST = 0.4
 #: at most this many times it,
 STRONGEST = 2.5
 #: a stride duration within this share of the median,
-TOLERANCE = 0.1
+TOLERANCE = 0.15
 #: and this share of the motion in the typical direction, 1/4 for a walk against a trot.
 ALIKE = 0.5
+#: At its ends a stretch has no stride that leaves more than this many times the median RMS that
+#: strides leave of the mean one, if it is this share of the motion at all.
+ODD, MARKED = 3.0, 0.05
+#: or whose rate is this many times the median deviation off the median, if it is this share of it.
+ODD_RATE, MARKED_RATE = 4.5, 0.03
 #: Harmonics that fix the phase, and most of its cycles without own knots.
 HARMONICS, FEW = 8, 4.0
 #: Steps of Gauss-Newton, the most that one may move the phase, in cycles.
@@ -39,12 +44,14 @@ class Warp:
     Attributes:
         knots: s, rising, shape (k,); the first and last are where the motion begins and ends.
         phases: in cycles, shape (k,).
-        frequency_error: standard error of the mean frequency, Hz.
+        frequency: mean, Hz.
+        frequency_error: its standard error, Hz.
 
     """
 
     knots: np.ndarray
     phases: np.ndarray
+    frequency: float
     frequency_error: float
 
     def __call__(self, times: np.ndarray) -> np.ndarray:
@@ -55,11 +62,6 @@ class Warp:
     def cycles(self) -> float:
         """How many cycles it holds."""
         return float(self.phases[-1] - self.phases[0])
-
-    @property
-    def frequency(self) -> float:
-        """Mean frequency, Hz."""
-        return self.cycles / float(self.knots[-1] - self.knots[0])
 
 
 @dataclass(frozen=True)
@@ -142,24 +144,42 @@ def followed(times: np.ndarray, positions: np.ndarray, rough: Rough) -> Warp:
     grid, x = grid[inside] - rough.begin, np.ascontiguousarray(y[inside].T)
     if span * slope < FEW:
         phases, error = _straight(grid, x, np.array([level, level + slope * span]), span)
-        return Warp(np.array([rough.begin, rough.end]), phases, error)
+        return Warp(np.array([rough.begin, rough.end]), phases,
+                    float(phases[1] - phases[0]) / span, error)
     knots = np.linspace(0.0, span, round(span * slope) + 1)
     phases = _extended(knots + rough.begin, rough.times, rough.phases, slope)
     while True:
         phases = _bent(grid, x, knots, phases)
-        # A stride is steady only as a whole.
-        first, last = longest(_steady(grid, x, knots, phases)) or (0, knots.size - 2)
+        first, last = _steady(grid, x, knots, phases)
         if last - first == knots.size - 2 or phases[last + 1] - phases[first] < FEW:
             break
         knots, phases = knots[first:last + 2], phases[first:last + 2]
         inside = (grid >= knots[0]) & (grid <= knots[-1])
         grid, x = grid[inside], x[:, inside]
+    frequency, error = _mean_rate(knots, phases)
+    return Warp(knots + rough.begin, phases, frequency, error)
+
+
+def _mean_rate(knots: np.ndarray, phases: np.ndarray) -> tuple[float, float]:
+    """Return the mean rate and its standard error.
+
+    Phases at the knots wander, as no stride is like the last, and are in error besides. So rates
+    between knots vary by q + 2 s and with their neighbours by -s, s the variance of the errors, q
+    that of the wander, apart from a drift; and the mean of least variance gives all rates the
+    same weight where they only wander, and is the slope of a straight line where they do not.
+    """
     rates = np.diff(phases) / np.diff(knots)
-    off, n = rates - rates.mean(), rates.size
-    own, next_ = float(off @ off) / (n - 1), float(off[1:] @ off[:-1]) / (n - 1)
-    # Errors of single phases go into two rates each, with opposite signs.
-    error = np.sqrt(max(own, n * own + 2.0 * (n - 1) * next_)) / n
-    return Warp(knots + rough.begin, phases, float(error))
+    n = rates.size
+    place = np.arange(n) - 0.5 * (n - 1)
+    off = rates - rates.mean() - place * (place @ rates) / (place @ place)
+    own = float(off @ off) / max(n - 2, 1)
+    next_ = float(off[1:] @ off[:-1]) / max(n - 3, 1)
+    errors = min(max(-next_, 0.0), 0.5 * own)
+    if own <= 0.0:
+        return float(rates.mean()), 0.0
+    bands = np.stack([np.full(n, -errors), np.full(n, own)])
+    weights = solveh_banded(bands, np.ones(n))
+    return (float(weights @ rates / weights.sum()), float(1.0 / np.sqrt(weights.sum())))
 
 
 def _extended(at: np.ndarray, times: np.ndarray, phases: np.ndarray, slope: float) -> np.ndarray:
@@ -202,8 +222,8 @@ def _straight(grid: np.ndarray, x: np.ndarray, phases: np.ndarray, span: float
 
 
 def _steady(grid: np.ndarray, x: np.ndarray, knots: np.ndarray, phases: np.ndarray
-            ) -> np.ndarray:
-    """Tell for every stride between knots whether it is like the mean one, shape (k - 1,)."""
+            ) -> tuple[int, int]:
+    """Return first and last stride between knots of the longest run that are like the mean."""
     left, _, _ = _model(x, np.interp(grid, knots, phases))
     starts = np.searchsorted(grid, knots[:-1])
     counts = np.diff(np.append(starts, grid.size))
@@ -218,9 +238,19 @@ def _steady(grid: np.ndarray, x: np.ndarray, knots: np.ndarray, phases: np.ndarr
     mean = x - left
     alike, power, typical = products(x, mean), products(x, x), products(mean, mean)
     rates = np.diff(phases) / np.diff(knots)
-    return ((np.abs(rates / np.median(rates) - 1.0) <= TOLERANCE)
-            & (alike >= WEAKEST * typical) & (alike <= STRONGEST * typical)
-            & (alike * np.abs(alike) >= ALIKE * power * typical))
+    first, last = longest((np.abs(rates / np.median(rates) - 1.0) <= TOLERANCE)
+                          & (alike >= WEAKEST * typical) & (alike <= STRONGEST * typical)
+                          & (alike * np.abs(alike) >= ALIKE * power * typical)
+                          ) or (0, rates.size - 1)
+    apart = products(left, left)
+    off = np.abs(rates - np.median(rates))
+    odd = ((apart > np.maximum(ODD**2 * np.median(apart), MARKED**2 * typical))
+           | (off > max(ODD_RATE * np.median(off), MARKED_RATE * np.median(rates))))
+    while last - first > 2 and odd[first]:
+        first += 1
+    while last - first > 2 and odd[last]:
+        last -= 1
+    return first, last
 
 
 def _bent(grid: np.ndarray, x: np.ndarray, knots: np.ndarray, phases: np.ndarray) -> np.ndarray:

@@ -5,6 +5,7 @@ interpolated across dropouts, and times may be as uneven as they like. Scatter i
 it leaves, averaged in as many bins of a cycle as the series has terms.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,8 +14,9 @@ from cpg_ros.fitting.cycle import determined, rows_of, series, weights_for
 
 #: Most harmonics of a mean cycle.
 HARMONICS = 24
-#: Samples further off, over the median distance, are none of the motion (spikes).
-SPIKE = 30.0
+#: Samples further off than this many times the median distance, and than this many standard
+#: deviations of the joint, are none of the motion (spikes).
+FAR, WILD = 30.0, 3.0
 #: Fewest cycles for the scatter to be told for every phase by itself.
 ENOUGH = 4
 
@@ -24,8 +26,9 @@ class Warped:
     """Mean cycles.
 
     Attributes:
-        weights: of 1, cos and sin for each joint, rad, shape (2 n + 1, joints); n differs, and
-            higher ones are zero.
+        zero: the phase that is 0 in the following, cycles.
+        coefficients: c_n of ``x = Re(c_0 + 2 sum c_n exp(2 pi i n theta))`` for each joint, rad,
+            complex, shape (n + 1, joints).
         spread: standard deviation of a cycle about the mean, rad, (joints, m).
         error: standard error of the mean, rad, (joints, m).
         counts: samples used, (joints,).
@@ -34,32 +37,30 @@ class Warped:
 
     """
 
-    weights: np.ndarray
+    zero: float
+    coefficients: np.ndarray
     spread: np.ndarray
     error: np.ndarray
     counts: np.ndarray
     spikes: np.ndarray
     left: np.ndarray
 
-    def mean(self, phases: np.ndarray) -> np.ndarray:
-        """Return the mean cycles at phases in cycles, shape (joints, m)."""
-        return series(self.weights, rows_of(phases, len(self.weights) // 2))
-
-    @property
-    def coefficients(self) -> np.ndarray:
-        """c_n of ``x = Re(c_0 + 2 sum c_n exp(2 pi i n phase))``, shape (n + 1, joints)."""
-        n = len(self.weights) // 2
-        upper = 0.5 * (self.weights[1:1 + n] - 1j * self.weights[1 + n:])
-        return np.vstack([self.weights[:1], upper])
+    def mean(self, theta: np.ndarray) -> np.ndarray:
+        """Return the mean cycles at theta in cycles, shape (joints, m)."""
+        c = self.coefficients
+        weights = np.vstack([c.real[:1], 2.0 * c.real[1:], -2.0 * c.imag[1:]])
+        return series(weights, rows_of(theta, len(c) - 1))
 
 
-def warped(phases: np.ndarray, positions: np.ndarray, theta: np.ndarray) -> Warped:
+def warped(phases: np.ndarray, positions: np.ndarray, theta: np.ndarray, first: Sequence[int]
+           ) -> Warped:
     """Average cycles.
 
     Args:
         phases: of the samples in cycles, rising, shape (n,).
         positions: shape (n, joints), nan where missing.
         theta: even points of a cycle for spread and error, shape (m,).
+        first: joints of which the one with the largest first harmonic gives phase 0.
 
     Raises:
         ValueError: a joint has too few samples.
@@ -68,25 +69,39 @@ def warped(phases: np.ndarray, positions: np.ndarray, theta: np.ndarray) -> Warp
     there = np.isfinite(positions)
     joints = positions.shape[1]
     weights = np.zeros((2 * HARMONICS + 1, joints))
-    spread, error = np.empty((joints, theta.size)), np.empty((joints, theta.size))
+    rests: list[tuple[np.ndarray, np.ndarray, int]] = [None] * joints  # type: ignore[list-item]
     spikes, left = np.zeros(joints, dtype=int), np.zeros(joints)
     # Joints that come in the same messages have the same samples.
-    for mask in np.unique(there, axis=1).T:
-        alike = np.flatnonzero((there == mask[:, None]).all(axis=0))
+    groups: dict[bytes, list[int]] = {}
+    for joint, column in enumerate(np.packbits(there, axis=0).T):
+        groups.setdefault(column.tobytes(), []).append(joint)
+    for alike in groups.values():
+        mask = there[:, alike[0]]
         at, x = phases[mask], np.ascontiguousarray(positions[np.ix_(mask, alike)].T)
         weights[:, alike], rest, bins = _fitted(at, x)
-        far = np.abs(rest)
-        wild = far > SPIKE * np.median(far, axis=1, keepdims=True) + 1e-9
+        far, variance = np.abs(rest), x.var(axis=1)
+        wild = ((far > FAR * np.median(far, axis=1, keepdims=True))
+                & (far > WILD * np.sqrt(variance)[:, None]))
         for row, joint in enumerate(alike):
-            keep, own = ~wild[row], rest[row]
+            keep = ~wild[row]
+            rests[joint] = at, rest[row], bins
             if not keep.all():
-                one, own, bins = _fitted(at[keep], x[row:row + 1, keep])
-                weights[:, joint], own = one[:, 0], own[0]
+                some, own, fewer = _fitted(at[keep], x[row:row + 1, keep])
+                weights[:, joint], rests[joint] = some[:, 0], (at[keep], own[0], fewer)
             spikes[joint] = wild[row].sum()
-            used = x[row, keep]
-            left[joint] = own.var() / max(used.var(), 1e-300)
-            spread[joint], error[joint] = _scatter(at[keep], own, bins, theta)
-    return Warped(weights, spread, error, there.sum(axis=0) - spikes, spikes, left)
+            left[joint] = rests[joint][1].var() / max(variance[row], 1e-300)
+    c = _coefficients(weights)
+    lead = c[1, list(first)]
+    zero = -float(np.angle(lead[np.argmax(np.abs(lead))])) / (2.0 * np.pi)
+    turned = c * np.exp(2j * np.pi * zero * np.arange(len(c)))[:, None]
+    scatter = [_scatter(at - zero, rest, bins, theta) for at, rest, bins in rests]
+    spread, error = (np.array(one) for one in zip(*scatter, strict=True))
+    return Warped(zero, turned, spread, error, there.sum(axis=0) - spikes, spikes, left)
+
+
+def _coefficients(weights: np.ndarray) -> np.ndarray:
+    n = len(weights) // 2
+    return np.vstack([weights[:1], 0.5 * (weights[1:1 + n] - 1j * weights[1 + n:])])
 
 
 def _fitted(phases: np.ndarray, x: np.ndarray) -> tuple[np.ndarray, np.ndarray, int]:
