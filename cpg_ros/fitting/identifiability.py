@@ -23,7 +23,7 @@ ZERO, SHARE = 1e-7, 1e-3
 QUADRATIC = (0.85, 1.18)
 #: Steps of a profile on either side, and its tolerance in standard errors.
 STEPS, CLOSE = 10, 0.03
-TOLERANCE = 1e-5
+TOLERANCE = 1e-4
 
 
 @dataclass(frozen=True)

@@ -170,14 +170,12 @@ class Problem:
 
     def first_phase(self, values: np.ndarray) -> float:
         """Guess the phase: of an even grid, the one whose readouts explain most."""
-        seen = self._solve(values)[1]
-
-        def explained(phase: float) -> float:
-            total = 0.0
-            for (wave, place), columns in self._places.items():
-                q = np.linalg.qr(basis(self.order, *seen.values(
-                    self.joints.theta, place + phase, wave))[0])[0]
-                total += float(np.sum((q.T @ (self.joints.data / self.sizes)[:, columns])**2))
-            return total
-
-        return max((k / SHIFTS for k in range(SHIFTS)), key=explained)
+        seen, shifts = self._solve(values)[1], np.arange(SHIFTS) / SHIFTS
+        explained = np.zeros(SHIFTS)
+        for (wave, place), columns in self._places.items():
+            psi = basis(self.order, *seen.values(self.joints.theta, place + shifts, wave))[0]
+            data = (self.joints.data / self.sizes)[:, columns]
+            sums = np.einsum('msn,mj->snj', psi, data)
+            gram = np.einsum('msn,msk->snk', psi, psi)
+            explained += np.sum(sums * np.linalg.solve(gram, sums), axis=(1, 2))
+        return float(shifts[explained.argmax()])

@@ -22,18 +22,18 @@ def basis(order: int, x: np.ndarray, y: np.ndarray, z: np.ndarray
 
     Args:
         order: 1 to 3.
-        x: signal, shape (m,).
+        x: signal, any shape.
         y: its derivative by phase in radians.
         z: the second one.
 
     Returns:
-        Two arrays of shape (m, 1 + weights).
+        Two arrays of shape (..., 1 + weights).
 
     """
     values, by_phase = monomials(x, y, z)
     count = WEIGHTS[order]
-    return (np.vstack([np.ones_like(x), values[:count]]).T,
-            np.vstack([np.zeros_like(x), by_phase[:count]]).T)
+    return (np.stack([np.ones_like(x), *values[:count]], axis=-1),
+            np.stack([np.zeros_like(x), *by_phase[:count]], axis=-1))
 
 
 def basis_moved(order: int, x: np.ndarray, y: np.ndarray, slopes: np.ndarray) -> np.ndarray:

@@ -34,25 +34,25 @@ class Signals:
     terms: np.ndarray
     slopes: np.ndarray
 
-    def values(self, theta: np.ndarray, shift: float, wave: int
+    def values(self, theta: np.ndarray, shift: float | np.ndarray, wave: int
                ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """x, y and the derivative of y by phase in radians.
 
         Args:
             theta: cycles, shape (m,); few different ones, since what they give is kept.
-            shift: added to them, cycles.
+            shift: added to them, cycles, a number or several.
             wave: number of the waveform.
 
         Returns:
-            Three arrays of shape (m,).
+            Three arrays of shape (m,), or (m, shifts).
 
         """
         k = np.arange(self.terms.shape[1])
-        terms = self.terms[wave] * np.exp(TURN * 1j * k * shift)
-        found = _turns(theta.tobytes(), k.size) @ np.stack(
-            [terms, 1j * k * terms, -k * k * terms], axis=1)
-        x, y, z = found.real.T
-        return x, y, z
+        terms = (self.terms[wave] * np.exp(TURN * 1j * np.multiply.outer(shift, k))).T
+        k = k.reshape(-1, *[1] * (terms.ndim - 1))
+        turns = _turns(theta.tobytes(), k.size)
+        return ((turns @ terms).real, (turns @ (1j * k * terms)).real,
+                (turns @ (-k * k * terms)).real)
 
     def derivatives(self, theta: np.ndarray, shift: float, wave: int, members: np.ndarray
                     ) -> np.ndarray:
