@@ -147,8 +147,9 @@ class Inversion(Node):
         """Fit and write; the outcome is what to say, and what was found or None."""
         try:
             free = self.get_parameter_or('free').value or ()
-            names = () if self._robot is None else [joint.name for joint in self._robot.joints]
-            found = inverted(heard.recording(names, some=True), self._robot, self._value('network'),
+            robot = self._robot
+            names = () if robot is None else [joint.name for joint in robot.joints]
+            found = inverted(heard.recording(names, some=True), robot, self._value('network'),
                              self._value('gait'), tuple(free), self._value('order'))
             work.set_result(('; '.join([_summary(found), *self._written(found)]), found))
         except (ValueError, OSError) as error:

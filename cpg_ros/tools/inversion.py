@@ -51,8 +51,8 @@ def _parser() -> Parser:
                         "'JointPos*')")
     parser.add_argument('--unit', choices=('rad', 'deg'), help='of the angles in the CSV file '
                         '(default: what its head says, or rad)')
-    parser.add_argument('--time', metavar='COLUMN', help='column of the CSV file with the time '
-                        '(default: told from its name)')
+    parser.add_argument('--time', choices=('s', 'ms', 'us', 'ns'), help='unit of the time in the '
+                        'CSV file (default: what its head says, or s)')
     parser.add_argument('--robot', metavar='FILE', help='robot file, or the name of a shipped '
                         'one: which joints belong to which legs and cells, and their limits '
                         '(default: told from the names of the joints)')
