@@ -110,11 +110,12 @@ def tables() -> Iterator[Row | Picture]:
         yield Place(AUTHORS, 'Table 6').formula(name, text, printed.block(*parts[name].mode),
                                                 parts[name].matrix)
     for name, signs in SIGNS.items():
-        wrong = name == 'L_21'
+        wrong, n = name == 'L_21', sample.network
         text = '(a + d) ' + _signed(signs if not wrong else '---', '+')
         yield Place(AUTHORS, 'Table 7').formula(
-            f'trace of {name}', text, printed.trace(*parts[name].mode),
-            sample.trace(name).real, erratum=12 if wrong else None)
+            f'trace of {name}', text, (trace := printed.trace(*parts[name].mode)),
+            sample.trace(name).real,
+            erratum=(12, trace + 2.0 * (n.xi + n.eta)) if wrong else None)
     for name, signs in SIGNS.items():
         yield Place(AUTHORS, 'Table 8').formula(
             f'D of {name}', f'((a - d) {_signed(signs, "-")})^2 + 4bc',
@@ -128,13 +129,15 @@ def tables() -> Iterator[Row | Picture]:
         root = square_root(whole.real, whole.imag)
         yield Place(AUTHORS, 'eq. 5.3').formula(
             f'square of the root of Phi + i Psi, {name}', 'Phi + i Psi', whole, root**2,
-            erratum=24, note=f'Psi is {"positive" if whole.imag > 0.0 else "negative"}')
+            erratum=(24, whole.conjugate()),
+            note=f'Psi is {"positive" if whole.imag > 0.0 else "negative"}')
     for k in (0, 1):
         real = sorted((value.real for value in parts[f'L_1{k}'].eigenvalues), reverse=True)
         for text, theirs, ours in zip(('eq. 5.4', 'eq. 5.5'), printed.real_parts(k), real,
                                       strict=True):
             yield Place(AUTHORS, 'Proposition 5.2').formula(
-                f'real part of an eigenvalue in U_1{k}', text, theirs, ours, erratum=13)
+                f'real part of an eigenvalue in U_1{k}', text, theirs, ours,
+                erratum=(13, theirs / 2.0))
             yield Place(AUTHORS, 'Proposition 5.2').formula(
                 f'twice the real part of an eigenvalue in U_1{k}', text, theirs, 2.0 * ours)
         yield Place(AUTHORS, 'Corollary 5.4').holds(
@@ -151,7 +154,7 @@ def coupled_variable() -> Iterator[Row | Picture]:
     yield at.formula('trace of L_00 if delta multiplies y', 'Table 7', theirs,
                      sample.trace('L_00').real)
     yield at.formula('trace of L_00 if delta multiplies x, as printed', 'Table 7', theirs,
-                     float(np.trace(printed).real), erratum=19)
+                     float(np.trace(printed).real), erratum=(19, theirs - network.delta))
 
 
 def equal_couplings() -> Iterator[Row | Picture]:
@@ -162,17 +165,19 @@ def equal_couplings() -> Iterator[Row | Picture]:
     for name, text in TABLE_11.items():
         value = printed.sigma(*parts[name].mode)
         yield at.formula(f'real part of the eigenvalues of {name}', text, value,
-                         sample.largest(name), erratum=13)
+                         sample.largest(name), erratum=(13, value / 2.0))
         yield at.formula(f'twice the real part of the eigenvalues of {name}', text, value,
                          2.0 * sample.largest(name))
     at, n = Place(AUTHORS, 'Lemma 5.8'), sample.network
     # nu enters each trace once: take it for which tr L_21 vanishes.
     critical = printed.nu - sample.trace('L_21').real
     yield at.formula('nu at which the trace of L_21 vanishes', '2 alpha + 2 gamma - xi',
-                     2.0 * n.alpha + 2.0 * n.gamma - n.xi, critical, erratum=20)
+                     2.0 * n.alpha + 2.0 * n.gamma - n.xi, critical,
+                     erratum=(20, 2.0 * (n.alpha + n.gamma - n.xi)))
     for name, text, value, wrong in (
             ('L_00', '4(alpha + gamma)', 4.0 * (n.alpha + n.gamma), None),
-            ('L_10', '4 alpha', 4.0 * n.alpha, 20),
+            ('L_10', '4 alpha', 4.0 * n.alpha,
+             (20, 2.0 * n.alpha + 4.0 * n.gamma - 4.0 * n.xi)),
             ('L_01', '4 alpha, printed of L_10', 4.0 * n.alpha, None),
             ('L_20', '4 gamma', 4.0 * n.gamma, None),
             ('L_11', '2 alpha - 4 xi', 2.0 * n.alpha - 4.0 * n.xi, None),

@@ -108,7 +108,7 @@ def dihedral() -> Iterator[Row | Picture]:
     half = [(k, h) for k, h in solutions()
             if KAPPA in h - k and len(k) > 1 and after(KAPPA, KAPPA) in k]
     yield at.number('types with kappa as a half-period shift and a spatial symmetry', '3',
-                    len(half), erratum=15,
+                    len(half), erratum=(15, '4'),
                     note='K in H: ' + ', '.join(sorted(f'{_name(k)} in {_name(h)}'
                                                        for k, h in half)))
     for k, h, phase in ((NAMES['D2p'], D4, '0'), (NAMES['Z2'], NAMES['D2s'], '0'),
@@ -181,7 +181,7 @@ def legs() -> Iterator[Row | Picture]:
     at = Place(AUTHORS, 'Theorem 3.3')
     allowed = assignments()
     yield at.number('assignments with F(1) = LH and eq. 3.2, no more asked', '2', len(allowed),
-                    erratum=16)
+                    erratum=(16, '18'))
     proven = [' '.join(F) for F in allowed if F[1:4] == LEGS[1:]]
     yield at.number('assignments if also F(2) = RH, F(3) = LF, F(4) = RF, as in the proof', '2',
                     len(proven))

@@ -101,7 +101,8 @@ def existence() -> Iterator[Row | Picture]:
                          point.value)
         if speed:
             yield at.formula(f'{gait}: speed at which the eigenvalues cross', speed,
-                             float(speed), point.normal_form.k1.real, erratum=13)
+                             float(speed), point.normal_form.k1.real,
+                             erratum=(13, float(speed) / 2.0))
     # On xi = -(alpha + gamma) with gamma fixed, nu - 2 (alpha + gamma) + 2 xi by xi is 4, of
     # which the proof takes the part by xi alone.
     point = hopf(UNCOUPLED, 'xi=eta=-alpha=-beta', 'trot', 0.2, 0.4)
@@ -115,7 +116,7 @@ def existence() -> Iterator[Row | Picture]:
     at = Place(AUTHORS, 'Proposition 5.6')
     zero = [name for name in ('L_10', 'L_11') if abs(sample.trace(name).real) < 1e-9]
     yield at.word('block whose trace vanishes (real part) where nu = 2 gamma', 'L_10',
-                  ', '.join(zero), erratum=21)
+                  ', '.join(zero), erratum=(21, 'L_11'))
     yield at.formula('trace of L_01 there', '2 alpha', 2.0 * alpha, sample.trace('L_01').real)
     yield at.formula('trace of L_21 there', '-2 alpha', -2.0 * alpha, sample.trace('L_21').real)
     yield at.holds('an eigenvalue has a positive real part there', walk.unstable_roots > 0)
@@ -137,7 +138,7 @@ def table_12() -> Iterator[Row | Picture]:
     sample = _sample(Quadruped(alpha, alpha, gamma, gamma, xi, xi))
     leading = max(sample.largest(name) for name in sample.blocks)
     yield at.number('trot: leading real part of the stand at the couplings printed', '0.00',
-                    leading, within=0.1, erratum=6)
+                    leading, within=0.1, erratum=(6, '-0.449'))
     alpha, gamma, xi = TROT
     for n, (name, line) in enumerate((('alpha = beta', 'alpha=beta'),
                                       ('gamma = delta', 'gamma=delta'), ('xi = eta', 'xi=eta'))):
@@ -145,7 +146,7 @@ def table_12() -> Iterator[Row | Picture]:
         point = hopf(Quadruped(alpha, alpha, gamma, gamma, xi, xi), line, 'trot', near - 0.05,
                      near + 0.05)
         yield at.number(f'trot: {name} at the Hopf point', TABLE_12['trot'][n], point.value,
-                        erratum=6, note=f'the others at {alpha}, {gamma}, {xi}')
+                        erratum=(6, f'{near:g}'), note=f'the others at {alpha}, {gamma}, {xi}')
         points['trot'] = point
     for gait, point in points.items():
         yield at.word(f'{gait}: Hopf bifurcation, by the other eigenvalues', 'stable',
@@ -153,7 +154,8 @@ def table_12() -> Iterator[Row | Picture]:
                       note=f'leading one {point.others[0]:.4f}')
         yield Place(AUTHORS, 'Proposition 5.5' if gait != 'trot' else 'Lemma 5.8').word(
             f'{gait}: the solution that branches off at Table 12', 'stable',
-            'stable' if point.stable and point.supercritical else 'unstable', erratum=22,
+            'stable' if point.stable and point.supercritical else 'unstable',
+            erratum=(22, 'unstable'),
             note=f'first Lyapunov coefficient {point.lyapunov:.3f}')
 
 
@@ -167,7 +169,7 @@ def theorem_4_2() -> Iterator[Row | Picture]:
             f'Hopf bifurcation to the {gait}, alpha {alpha:g}, beta {sign * alpha:g}, gamma '
             f'{point.value:.4f}', 'stable' if stable else 'unstable',
             'stable' if point.stable else 'unstable',
-            erratum=23 if (gait, alpha) == FAILING else None,
+            erratum=(23, 'unstable') if (gait, alpha) == FAILING else None,
             note=f'{point.unstable_roots} other eigenvalues with positive real part')
     trot = found['trot']
     sample = _sample(trot.network)

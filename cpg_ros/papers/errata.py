@@ -10,7 +10,8 @@ ERRATA: dict[int, tuple[str, str]] = {
     1: (LIU,
         'D lacks the factor tau and takes the eigenvector of the pace for every gait, so k1 '
         'and k2 are wrong for all of them. Their signs, hence the verdicts on the centre '
-        'manifold, survive. Correct: q = 1 + tau B exp(-i omega tau), k1 = Re(i omega/q), k2 '
+        'manifold, survive in the sets of the paper, not in all. Correct: '
+        'q = 1 + tau B exp(-i omega tau), k1 = Re(i omega/q), k2 '
         '= -Re(tau (b + d i^(-j) + B exp(-i omega tau))/q).'),
     2: (LIU,
         "Example 2's omega is 3.5199, not 3.5119."),

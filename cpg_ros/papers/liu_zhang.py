@@ -35,8 +35,8 @@ class Example:
         figure: number.
         numbers: omega, tau, k1, k2, k1 k2; a number that is not printed is missing.
         names: of omega and tau there.
-        errata: of numbers, by their name.
-        wrong_start: erratum of the start values, or None.
+        corrected: numbers that are right where those are not, by their name.
+        wrong_start: erratum of the start values and the gait they lead to, or None.
 
     """
 
@@ -47,31 +47,37 @@ class Example:
     figure: int
     numbers: dict[str, str]
     names: tuple[str, str]
-    errata: dict[str, int]
-    wrong_start: int | None = None
+    corrected: dict[str, tuple[int, str]]
+    wrong_start: tuple[int, str] | None = None
 
 
 EXAMPLES = {
     'walk': Example(
         'Example 1', 'walk', Delayed(-4.5, 1.0, 6.5, -2.0, 0.4), QUARTERS, 2,
         {'omega': '7.4772', 'tau': '0.2861', 'k1': '0.4179', 'k2': '-0.2349',
-         'k1 k2': '-0.0982'}, ('omega_2', 'tau_4^0'), {}),
+         'k1 k2': '-0.0982'}, ('omega_2', 'tau_4^0'),
+        {'k1': (1, '1.8135'), 'k2': (1, '-0.9177'), 'k1 k2': (1, '-1.664')}),
     'trot': Example(
         'Example 1', 'trot', Delayed(-4.5, 1.0, 6.5, -2.0, 0.4), HALVES, 3,
         {'omega': '6.325', 'tau': '0.2852', 'k1': '0.6486', 'k2': '-0.2544',
-         'k1 k2': '-0.1650'}, ('omega_3', 'tau_6^0'), {}),
+         'k1 k2': '-0.1650'}, ('omega_3', 'tau_6^0'),
+        {'k1': (1, '2.1557'), 'k2': (1, '-0.9610'), 'k1 k2': (1, '-2.072')}),
     'pace': Example(
         'Example 2', 'pace', Delayed(-3.0, 0.1, 4.0, 1.0, 0.7), HALVES, 4,
         {'omega': '3.5119', 'tau': '0.5869', 'k1': '0.5957', 'k2': '-0.5951',
-         'k1 k2': '-0.3545'}, ('omega_1', 'tau_2^0'), {'omega': 2}),
+         'k1 k2': '-0.3545'}, ('omega_1', 'tau_2^0'),
+        {'omega': (2, '3.5199'), 'k1': (1, '0.8319'), 'k2': (1, '-0.9142'),
+         'k1 k2': (1, '-0.7605')}),
     'goat_trot': Example(
         'section 4.1', 'trot', Delayed(-2.0, 1.0, 6.43, -2.0, 0.25), QUARTERS, 7,
         {'tau': '0.2227', 'k1': '1', 'k2': '-0.2227', 'k1 k2': '-0.2227'},
-        ('omega_3', 'tau_6^0'), {}, wrong_start=4),
+        ('omega_3', 'tau_6^0'),
+        {'k1': (1, '3.4488'), 'k2': (1, '-0.9010'), 'k1 k2': (1, '-3.107')}, (4, 'walk')),
     'goat_walk': Example(
         'section 4.2', 'walk', Delayed(-2.0, 1.0, 6.5, -2.0, 0.245), QUARTERS, 10,
         {'tau': '0.2048', 'k1': '0.8232', 'k2': '-0.1867', 'k1 k2': '-0.1537'},
-        ('omega_2', 'tau_4^0'), {})}
+        ('omega_2', 'tau_4^0'),
+        {'k1': (1, '3.4819'), 'k2': (1, '-0.8683'), 'k1 k2': (1, '-3.023')})}
 
 #: Table 1: start of c, iterations; Table 2: start of tau, iterations; and what all of them reach.
 TABLE_1 = {'6.1': '11', '6.3': '9', '6.5': '5', '7.2': '9'}
@@ -95,7 +101,8 @@ def _coefficients(example: Example, point: HopfPoint) -> Iterator[Row]:
         within = 5e-5 if '.' not in number else None
         yield at.number(f'{name} of the {example.gait}, by the printed formula', number,
                         wrong_value, within=within, note='D = 1/(8 (-1 + c e)) as in section 2')
-        yield at.number(f'{name} of the {example.gait}', number, value, within=within, erratum=1,
+        yield at.number(f'{name} of the {example.gait}', number, value, within=within,
+                        erratum=example.corrected[name],
                         note='with q = 1 + tau B exp(-i omega tau) and the mode of the gait')
 
 
@@ -109,7 +116,7 @@ def _example(example: Example) -> Iterator[Row | Picture]:
                                 ('tau', example.names[1], point.tau)):
         if name in example.numbers:
             yield at.number(f'{symbol} of the {gait}', example.numbers[name], value,
-                            erratum=example.errata.get(name))
+                            erratum=example.corrected.get(name))
     yield from _coefficients(example, point)
     k1, k2 = point.normal_form.k1.real, point.normal_form.k2.real
     yield at.word(f'direction of the bifurcation to the {gait}', 'supercritical',
@@ -122,8 +129,9 @@ def _example(example: Example) -> Iterator[Row | Picture]:
     roots = point.unstable_transverse_roots
     yield at.word(
         f'{gait} near its onset, in the full network', 'stable',
-        'unstable' if roots else 'stable', erratum=3, note=f'roots of the rest state with '
-        f'positive real part outside the class of the gait: {roots}')
+        'unstable' if roots else 'stable', erratum=(3, 'unstable'),
+        note=f'roots of the rest state with positive real part outside the class of the gait: '
+             f'{roots}')
     orbit = delayed_orbit.solve(network, gait)
     found = multipliers(orbit)
     yield at.word(
@@ -132,7 +140,7 @@ def _example(example: Example) -> Iterator[Row | Picture]:
         note=f'leading Floquet multiplier {found.leading_within:.3g} a cycle')
     yield at.word(
         f'{gait} at tau {network.tau:g}, in the full network', 'stable',
-        'stable' if found.leading_transverse < 1.0 else 'unstable', erratum=3,
+        'stable' if found.leading_transverse < 1.0 else 'unstable', erratum=(3, 'unstable'),
         note=f'leading transverse Floquet multiplier {found.leading_transverse:.3g} a cycle')
     yield from _simulated(example)
 
@@ -152,12 +160,12 @@ def _simulated(example: Example) -> Iterator[Row | Picture]:
         yield at.word('gait that the start values of Figures 3 and 4 lead to', gait, seen.kind,
                       note='0.1, -0.1, 0.2, -0.2, 0.1, -0.1, 0.2, -0.2')
         caption = (f'From the start values of Figure 3, as those printed lead to another gait '
-                   f'(erratum {example.wrong_start}): {seen.kind}.')
+                   f'(erratum {example.wrong_start[0]}): {seen.kind}.')
     if example.gait == 'walk':
         # + : cell 3, of LF, leads cell 1, of LH, by a quarter.
         sense = {'walk-': 'walk', 'walk+': 'diagonal-sequence walk'}.get(seen.gait, seen.gait)
-        yield at.word('walk as quadrupeds walk: LH, LF, RH, RF', 'walk', sense, erratum=7,
-                      note=phases)
+        yield at.word('walk as quadrupeds walk: LH, LF, RH, RF', 'walk', sense,
+                      erratum=(7, 'diagonal-sequence walk'), note=phases)
     drawn = seen.run.t <= DRAWN
     yield Picture(AUTHORS, place, caption, trajectories(
         f'{AUTHORS}, {place}: {seen.kind}, tau {example.network.tau:g}', seen.run.t[drawn],

@@ -192,7 +192,8 @@ def primary() -> Iterator[Row | Picture]:
             off = abs((360.0 * phase - degrees + 180.0) % 360.0 - 180.0)
             yield Place(AUTHORS, place).number(
                 f'objective z_{n} of the {name} [degrees], which is to vanish', '0.00', off,
-                within=CLOSE, erratum=8, note=f'phase of cell {n + 1} {360.0 * phase:.2f}')
+                within=CLOSE, erratum=(8, '180'),
+                note=f'phase of cell {n + 1} {360.0 * phase:.2f}')
         yield from _table_5(gait, seen)
         start = simulated(printed(gait), tuple(np.ravel(TABLE_3[gait]).tolist()))
         yield Place(AUTHORS, 'Table 3').word(
@@ -234,7 +235,7 @@ def secondary() -> Iterator[Row | Picture]:
             reached = seen.gait == gait and found.leading < 1.0
             yield Place(AUTHORS, 'section 5').word(
                 f'the {name} in this network', 'not reached',
-                'reached' if reached else 'not reached', erratum=18,
+                'reached' if reached else 'not reached', erratum=(18, 'reached'),
                 note=f'leading Floquet multiplier {found.leading:.3g} a cycle')
     for number, (before, gait) in TRANSITIONS.items():
         network = PRESETS[gait].network
@@ -257,17 +258,18 @@ def kinds() -> Iterator[Row | Picture]:
         yield at.number(f'of these with {what}', count, waveforms.count(number))
     gaits = [gait for gait in GAITS if settled(gait).gait == gait]
     yield Place(AUTHORS, 'Table 5').number('gaits of the paper with their H and K',
-                                           str(len(TABLE_5)), len(gaits), erratum=11)
+                                           str(len(TABLE_5)), len(gaits), erratum=(11, '9'))
     in_phase = [gait for gait in gaits if gait not in PRIMARY and len(settled(gait).found.k) > 1]
     yield at.holds('cells are equal at all times in primary gaits only', not in_phase,
                    erratum=11, note='they are in: ' + ', '.join(map(named, in_phase)))
-    walk, h = settled('walk').found, 0.0
-    for letter, elements, wrong in (('K', walk.k, 'spatio-temporal'), ('H', walk.h, 'spatial')):
+    walk = settled('walk').found
+    for letter, elements, wrong, right in (('K', walk.k, 'spatio-temporal', 'spatial'),
+                                           ('H', walk.h, 'spatial', 'spatio-temporal')):
         # On the elements the walk's best shifts: all of them 0, or not.
         h = max(abs((walk.distances[name][0] + 0.5) % 1.0 - 0.5) for name in elements)
         yield Place(AUTHORS, 'Table 5').word(
             f'the symmetries in {letter} are', wrong,
-            'spatio-temporal' if h > PHASE else 'spatial', erratum=17)
+            'spatio-temporal' if h > PHASE else 'spatial', erratum=(17, right))
 
 
 PAPER = Paper('rashidi', AUTHORS,

@@ -1,6 +1,7 @@
 """All rows and figures of the papers, their parts computed side by side."""
 
 import multiprocessing
+import signal
 from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass
@@ -41,13 +42,13 @@ class Reproduction:
 
     @property
     def failed(self) -> tuple[Row, ...]:
-        """Rows that differ and name no erratum."""
-        return tuple(row for row in self.rows if not row.agrees and row.erratum is None)
+        """Rows that differ, but not as an erratum says."""
+        return tuple(row for row in self.rows if not row.agrees and not row.explained)
 
     @property
     def explained(self) -> tuple[Row, ...]:
         """Rows that differ as an erratum says."""
-        return tuple(row for row in self.rows if not row.agrees and row.erratum is not None)
+        return tuple(row for row in self.rows if not row.agrees and row.explained)
 
     @property
     def errata(self) -> dict[int, tuple[str, str]]:
@@ -107,7 +108,9 @@ def reproduce(names: Sequence[str], jobs: int = 1, draw: bool = True,
     else:
         # Spawned: a process with threads, as numba's, must not be forked.
         context = multiprocessing.get_context('spawn')
-        with ProcessPoolExecutor(min(jobs, len(tasks)), context) as pool:
+        # Ctrl-C reaches all processes: this one ends the others.
+        with ProcessPoolExecutor(min(jobs, len(tasks)), context, signal.signal,
+                                 (signal.SIGINT, signal.SIG_IGN)) as pool:
             waiting = {pool.submit(_section, *task): place for place, task in enumerate(tasks)}
             try:
                 for future in as_completed(waiting):

@@ -28,6 +28,8 @@ class Row:
         compared: how, in words.
         value: the computed number; None where it is a word or has several numbers.
         erratum: number of the one that covers this row (see ``errata``), or None.
+        corrected: what is right according to the erratum, or ''.
+        explained: whether the computed one is that.
         note: what else a reader should know, or ''.
 
     """
@@ -41,14 +43,16 @@ class Row:
     compared: str
     value: float | None = None
     erratum: int | None = None
+    corrected: str = ''
+    explained: bool = False
     note: str = ''
 
     @property
     def verdict(self) -> str:
-        """'agrees', 'erratum N', or 'FAILS' where they differ and no erratum is named."""
+        """'agrees', 'erratum N', or 'FAILS' where they differ and no erratum says how."""
         if self.agrees:
             return 'agrees'
-        return 'FAILS' if self.erratum is None else f'erratum {self.erratum}'
+        return f'erratum {self.erratum}' if self.explained else 'FAILS'
 
 
 @dataclass(frozen=True)
@@ -69,6 +73,8 @@ class Picture:
     figure: Figure
 
 
+#: What a formula gives.
+Value = float | complex | np.ndarray
 #: A part of a paper: computes some of its rows and pictures.
 Section = Callable[[], Iterable[Row | Picture]]
 
@@ -85,13 +91,24 @@ class Paper:
 
 @dataclass(frozen=True)
 class Place:
-    """A place in a paper, from where rows are quoted."""
+    """A place in a paper, from where rows are quoted.
+
+    An erratum is given with what it says is right: a computed value that is neither that nor the
+    published one fails.
+    """
 
     paper: str
     place: str
 
+    def _row(self, quantity: str, published: str, shown: str, same: Callable[[str], bool],
+             how: str, value: float | None, erratum: tuple[int, str] | None, note: str) -> Row:
+        number, corrected = (None, '') if erratum is None else erratum
+        return Row(self.paper, self.place, quantity, published, shown, same(published), how, value,
+                   number, corrected, erratum is not None and same(corrected), note)
+
     def number(self, quantity: str, published: str, computed: float, *,
-               within: float | None = None, erratum: int | None = None, note: str = '') -> Row:
+               within: float | None = None, erratum: tuple[int, str] | None = None,
+               note: str = '') -> Row:
         """Quote a number with the digits printed.
 
         Args:
@@ -99,60 +116,76 @@ class Place:
             published: as printed; its last digit tells how exact it is.
             computed: ours.
             within: largest difference; by default half a unit of the last digit printed.
-            erratum: that covers a difference.
+            erratum: that covers a difference, and the right number; its last digit tells, too.
             note: for the reader.
 
         """
-        exponent = Decimal(published).as_tuple().exponent
-        assert isinstance(exponent, int)
-        # The last part is for rounding of binary numbers that lie on the limit.
-        limit = (0.5 * 10.0**exponent if within is None else within) * (1.0 + 1e-9)
-        how = 'to the last digit printed' if within is None else f'within {within:g}'
-        digits = max(0, -exponent if within is None else int(np.ceil(-np.log10(within)))) + MORE
+        def same(text: str) -> bool:
+            own = 0.5 * 10.0**_exponent(text)
+            limit = own if within is None or text != published else within
+            # A little more, for the rounding of binary numbers that lie on the limit.
+            return bool(abs(computed - float(text)) <= limit * (1.0 + 1e-9))
+
+        exponent = _exponent(published) if within is None else int(np.floor(np.log10(within)))
+        digits = max(0, -exponent) + MORE
         # A count has no more digits than it has.
         shown = str(computed) if isinstance(computed, int) else f'{computed:.{digits}f}'
-        return Row(self.paper, self.place, quantity, published, shown,
-                   bool(abs(computed - float(published)) <= limit), how, float(computed),
-                   erratum, note)
+        how = 'to the last digit printed' if within is None else f'within {within:g}'
+        return self._row(quantity, published, shown, same, how, float(computed), erratum, note)
 
     def phases(self, quantity: str, published: str, computed: Sequence[float] | np.ndarray, *,
-               within: float = PHASE, erratum: int | None = None, note: str = '') -> Row:
+               within: float = PHASE, erratum: tuple[int, str] | None = None,
+               note: str = '') -> Row:
         """Quote phases in cycles, printed as fractions with blanks between; compared modulo 1."""
-        printed = np.array([float(Fraction(part)) for part in published.split()])
         ours = np.asarray(computed, dtype=float)
-        off = (ours - printed + 0.5) % 1.0 - 0.5
+
+        def same(text: str) -> bool:
+            printed = np.array([float(Fraction(part)) for part in text.split()])
+            return bool((np.abs((ours - printed + 0.5) % 1.0 - 0.5) <= within).all())
+
         # A rounding error below 0 is 0, not 1.
         shown = ' '.join(f'{round(phase % 1.0, 4) % 1.0:.4f}' for phase in ours)
-        return Row(self.paper, self.place, quantity, published, shown,
-                   bool((np.abs(off) <= within).all()), f'within {within:g} cycles',
-                   float(ours[0] % 1.0) if ours.size == 1 else None, erratum, note)
+        return self._row(quantity, published, shown, same, f'within {within:g} cycles',
+                         float(ours[0] % 1.0) if ours.size == 1 else None, erratum, note)
 
-    def word(self, quantity: str, published: str, computed: str, *, erratum: int | None = None,
-             note: str = '') -> Row:
+    def word(self, quantity: str, published: str, computed: str, *,
+             erratum: tuple[int, str] | None = None, note: str = '') -> Row:
         """Quote a name or a list of names."""
-        return Row(self.paper, self.place, quantity, published, computed, published == computed,
-                   'equal', None, erratum, note)
+        return self._row(quantity, published, computed, lambda text: text == computed, 'equal',
+                         None, erratum, note)
 
     def holds(self, quantity: str, computed: bool, *, erratum: int | None = None,
               note: str = '') -> Row:
-        """Quote a statement that the paper makes."""
-        return self.word(quantity, 'true', str(bool(computed)).lower(), erratum=erratum,
-                         note=note)
+        """Quote a statement that the paper makes; an erratum says that it is false."""
+        return self.word(quantity, 'true', str(bool(computed)).lower(), note=note,
+                         erratum=None if erratum is None else (erratum, 'false'))
 
-    def formula(self, quantity: str, published: str, value: float | complex | np.ndarray,
-                computed: float | complex | np.ndarray, *, erratum: int | None = None,
-                note: str = '') -> Row:
+    def formula(self, quantity: str, published: str, value: Value, computed: Value, *,
+                erratum: tuple[int, Value] | None = None, note: str = '') -> Row:
         """Quote a formula by its value at some arguments, compared with ours at the same."""
-        theirs, ours = np.ravel(value), np.ravel(computed)
+        ours = np.ravel(computed)
         limit = FORMULA * max(1.0, float(np.abs(ours).max()))
-        agrees = theirs.shape == ours.shape and bool((np.abs(theirs - ours) <= limit).all())
+
+        def same(other: Value) -> bool:
+            theirs = np.ravel(other)
+            return theirs.shape == ours.shape and bool((np.abs(theirs - ours) <= limit).all())
+
         single = float(ours[0].real) if ours.size == 1 and not np.iscomplexobj(ours) else None
-        return Row(self.paper, self.place, quantity, f'{published} = {_shown(theirs)}',
-                   _shown(ours), agrees, f'at one set of couplings, to {FORMULA:g}', single,
-                   erratum, note)
+        number, corrected = (None, '') if erratum is None else (erratum[0], _shown(erratum[1]))
+        return Row(self.paper, self.place, quantity, f'{published} = {_shown(value)}',
+                   _shown(ours), same(value), f'at one set of couplings, to {FORMULA:g}', single,
+                   number, corrected, erratum is not None and same(erratum[1]), note)
 
 
-def _shown(values: np.ndarray) -> str:
+def _exponent(text: str) -> int:
+    """Decimal exponent of the last digit of a number."""
+    exponent = Decimal(text).as_tuple().exponent
+    assert isinstance(exponent, int)
+    return exponent
+
+
+def _shown(value: Value) -> str:
+    values = np.ravel(value)
     if np.iscomplexobj(values) and np.abs(values.imag).max() > 1e-12:
         return ', '.join(f'{one.real:.4f}{one.imag:+.4f}i' for one in values)
     return ', '.join(f'{one.real + 0.0:.4f}' for one in values)

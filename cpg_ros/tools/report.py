@@ -80,10 +80,11 @@ def as_json(found: Reproduction) -> str:
 
 
 def _line(row: Row) -> str:
-    kind = 'agrees' if row.agrees else 'fails' if row.erratum is None else 'erratum'
+    kind = 'agrees' if row.agrees else 'erratum' if row.explained else 'fails'
     verdict = (f'<a href="#erratum-{row.erratum}">{row.verdict}</a>' if kind == 'erratum'
                else row.verdict)
-    note = '; '.join(part for part in (row.note, row.compared) if part)
+    right = f'right: {row.corrected}' if kind == 'erratum' else ''
+    note = '; '.join(part for part in (row.note, row.compared, right) if part)
     return (f'<tr class="{kind}"><td>{escape(row.place)}</td><td>{escape(row.quantity)}</td>'
             f'<td class="value">{escape(row.published)}</td>'
             f'<td class="value">{escape(row.computed)}</td>'

@@ -9,25 +9,18 @@ import os
 import sys
 from collections.abc import Sequence
 from pathlib import Path
-from typing import NoReturn
 
 from cpg_ros.dynamics.progress import progress_bar
 from cpg_ros.papers.registry import PAPERS
 from cpg_ros.papers.reproduction import parts, reproduce
+from cpg_ros.tools.arguments import Parser, say
 from cpg_ros.tools.report import as_html, as_json, table
+from cpg_ros.whole import write_whole
 
 DESCRIPTION = '''\
 Compute every quantity that the three papers print, and hold it against the printed one. What
 differs names the erratum that explains it, or fails.'''
 EPILOG = 'exit codes: 0 nothing fails, 1 a row fails, 2 wrong arguments.'
-
-
-class _Parser(argparse.ArgumentParser):
-    """Says what is wrong in one line."""
-
-    def error(self, message: str) -> NoReturn:
-        print(f'{self.prog}: {message}', file=sys.stderr)
-        sys.exit(2)
 
 
 def _jobs(text: str) -> int:
@@ -36,9 +29,9 @@ def _jobs(text: str) -> int:
     return int(text)
 
 
-def _parser() -> argparse.ArgumentParser:
-    parser = _Parser(prog='reproduce', description=DESCRIPTION, epilog=EPILOG,
-                     formatter_class=argparse.RawDescriptionHelpFormatter)
+def _parser() -> Parser:
+    parser = Parser(prog='reproduce', description=DESCRIPTION, epilog=EPILOG,
+                    formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument('--paper', metavar='NAME', choices=tuple(PAPERS),
                         help=f'one of {", ".join(PAPERS)} (default: all)')
     parser.add_argument('--json', metavar='FILE', help='write the rows as JSON; - writes them to '
@@ -66,16 +59,6 @@ def _ready(path: Path) -> None:
         raise PermissionError(f'{path.parent} cannot be written to')
 
 
-def _write(path: Path, text: str) -> None:
-    """Write beside, then rename: no file is ever half written."""
-    part = path.with_name(f'.{path.name}.part')
-    try:
-        part.write_text(text, encoding='utf-8')
-        part.replace(path)
-    finally:
-        part.unlink(missing_ok=True)
-
-
 def main(arguments: Sequence[str] | None = None) -> int:
     """Reproduce the papers; return the exit code."""
     chosen = _parser().parse_args(arguments)
@@ -89,9 +72,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         with progress_bar('reproducing', parts(names)) as progress:
             found = reproduce(names, chosen.jobs, chosen.html is not None, progress)
         if json is not None:
-            _write(json, as_json(found))
+            write_whole(json, as_json(found))
         if chosen.html is not None:
-            _write(chosen.html, as_html(found))
+            write_whole(chosen.html, as_html(found))
     except OSError as error:
         print(f'reproduce: {error}', file=sys.stderr)
         return 2
@@ -99,13 +82,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print('reproduce: stopped', file=sys.stderr)
         return 130
     written = [str(path) for path in (json, chosen.html) if path is not None]
-    said = as_json(found).rstrip() if chosen.json == '-' else '\n'.join(
-        [table(found), *([f'written: {", ".join(written)}'] if written else [])])
-    try:
-        print(said, flush=True)
-    except BrokenPipeError:
-        # As in `reproduce ... | head -1`. Python flushes once more at its end: into nothing.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    say(as_json(found).rstrip() if chosen.json == '-' else '\n'.join(
+        [table(found), *([f'written: {", ".join(written)}'] if written else [])]))
     return 1 if found.failed else 0
 
 

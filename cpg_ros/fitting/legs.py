@@ -1,0 +1,159 @@
+"""Which joint is of which leg, guessed from the usual names.
+
+Quadrupeds: a code of two letters (LF or FL, RF or FR; hind LH, HL, RL, BL, LR and RH, HR, RR,
+BR), or the words left or right with front or fore, hind, rear or back, anywhere in the name and
+in any case: FL_hip_joint, lf_haa, JointPosRR_calf, front_left_knee, hip_hind_right. Bipeds: left,
+right, L or R alone: left_knee, L_hip, hip_r, LHipPitch.
+"""
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+#: Letters and words of left and right, fore and hind.
+SIDES = {'left': 'l', 'l': 'l', 'right': 'r', 'r': 'r'}
+ENDS = {'front': 'f', 'fore': 'f', 'hind': 'h', 'rear': 'h', 'back': 'h'}
+#: Codes of legs; in RL and RR the first letter is that of the rear.
+CODES = {'lf': 'lf', 'fl': 'lf', 'rf': 'rf', 'fr': 'rf',
+         'lh': 'lh', 'hl': 'lh', 'rl': 'lh', 'lr': 'lh', 'bl': 'lh', 'lb': 'lh',
+         'rh': 'rh', 'hr': 'rh', 'rr': 'rh', 'br': 'rh', 'rb': 'rh'}
+#: Of legs between fore and hind ones, which no network has.
+MIDDLE = {'lm', 'ml', 'rm', 'mr', 'middle', 'mid'}
+#: What is not of a leg, whatever its side; a quadruped's fore leg has a shoulder and an elbow.
+OTHER = {'arm', 'neck', 'head', 'torso', 'waist', 'trunk', 'spine', 'tail', 'gripper', 'finger',
+         'thumb', 'hand', 'wheel', 'eye', 'ear', 'camera'}
+UPPER = {'shoulder', 'elbow', 'wrist', 'forearm', 'sh', 'el', 'wr'}
+#: Names of joints, which tell a code that is written without a gap: flhip, RRcalf, lknee.
+JOINTS = ('hip', 'thigh', 'calf', 'knee', 'ankle', 'abd', 'haa', 'hfe', 'kfe', 'upper', 'lower',
+          'shoulder', 'elbow', 'coxa', 'femur', 'tibia', 'foot', 'leg', 'joint', 'hx', 'hy', 'kn')
+#: In the networks' order.
+QUADRUPED, BIPED = ('lh', 'rh', 'lf', 'rf'), ('left', 'right')
+
+_WORD = re.compile(r'[A-Z]+(?=[A-Z][a-z])|[A-Z]?[a-z]+|[A-Z]+|\d+')
+_STUCK = re.compile(rf'(?<![a-z])({"|".join((*CODES, *SIDES, *ENDS))})(?=({"|".join(JOINTS)}))',
+                    re.IGNORECASE)
+
+
+class LegsError(ValueError):
+    """No legs can be told from the names; the message says which are there or missing."""
+
+
+@dataclass(frozen=True)
+class Legs:
+    """Joints by leg.
+
+    Attributes:
+        joints: leg -> its joints' names, in the order in which they were given; legs in the
+            order of the networks.
+        says: how they were read, one line.
+        unassigned: joints of no leg.
+
+    """
+
+    joints: Mapping[str, tuple[str, ...]]
+    says: str = ''
+    unassigned: tuple[str, ...] = ()
+
+    def __getitem__(self, leg: str) -> tuple[str, ...]:
+        """Names of a leg's joints."""
+        return self.joints[leg]
+
+    def __iter__(self):
+        """Names of the legs."""
+        return iter(self.joints)
+
+    def __len__(self) -> int:
+        """How many legs."""
+        return len(self.joints)
+
+
+def words_of(name: str) -> list[str]:
+    """Split a name into lower-case words: at signs, digits and capitals, and after a code."""
+    return [word.lower() for word in _WORD.findall(_STUCK.sub(r'\1_', name))]
+
+
+def _read(words: Sequence[str]) -> tuple[str, str, frozenset[str]]:
+    """Return leg of four, leg of two ('' for none), and the words that told it."""
+    codes = {CODES[word] for word in words if word in CODES}
+    sides = {SIDES[word] for word in words if word in SIDES}
+    ends = {ENDS[word] for word in words if word in ENDS}
+    if len(codes) == 1:
+        return codes.pop(), '', frozenset(word for word in words if word in CODES)
+    if codes or len(sides) != 1:
+        return '', '', frozenset()
+    side, told = sides.pop(), frozenset(word for word in words if word in SIDES)
+    two = BIPED[side == 'r']
+    if len(ends) == 1:
+        return side + ends.pop(), two, told | {word for word in words if word in ENDS}
+    return '', two, told
+
+
+def role_of(name: str) -> str:
+    """Return a joint's name without what tells its leg: equal for the same joint of each leg."""
+    words = words_of(name)
+    told = _read(words)[2]
+    return ' '.join(word for word in words if word not in told)
+
+
+def legs_of(joints: Sequence[str]) -> Legs:
+    """Guess the legs of joints from their names.
+
+    Args:
+        joints: names.
+
+    Raises:
+        LegsError: no leg, not all of two or four legs, or more than four can be told.
+
+    """
+    words = {name: words_of(name) for name in joints}
+    read = {name: _read(words[name]) for name in joints}
+    if any(MIDDLE & set(listed) for listed in words.values()):
+        middle = next(name for name in joints if MIDDLE & set(words[name]))
+        raise LegsError(f"'{middle}' is of a middle leg; the networks have two legs or four")
+    # A code is a name's own, an L a hint: first four legs are looked for.
+    for known, column, others in ((QUADRUPED, 0, OTHER), (BIPED, 1, OTHER | UPPER)):
+        found = {leg: tuple(name for name in joints if read[name][column] == leg
+                            and not others & set(words[name])) for leg in known}
+        there = [leg for leg in known if found[leg]]
+        if len(there) == len(known):
+            break
+        # Two codes may be left and right of a biped by chance, three are a quadruped's.
+        if column == 0 and len(there) >= 2:
+            raise LegsError(_missing(there, known, read, joints))
+    else:
+        if there:
+            raise LegsError(_missing(there, known, read, joints))
+        raise LegsError(f'no legs can be told from the joint names {_listed(list(joints))}; usual '
+                        'ones have LF, RF, LH, RH, front_left ... or left, right in them')
+    return Legs(found, _says(found, read, joints), _rest(found, joints))
+
+
+def _rest(found: Mapping[str, tuple[str, ...]], joints: Sequence[str]) -> tuple[str, ...]:
+    return tuple(name for name in joints if not any(name in listed for listed in found.values()))
+
+
+def _listed(names: list[str]) -> str:
+    shown = ', '.join(names[:6])
+    return f'{shown} and {len(names) - 6} more' if len(names) > 6 else shown or '(none)'
+
+
+def _missing(there: list[str], known: tuple[str, ...], read: Mapping, joints: Sequence[str]
+             ) -> str:
+    lacking = ', '.join(leg for leg in known if leg not in there)
+    column = 0 if known == QUADRUPED else 1
+    example = next(name for name in joints if read[name][column] in there)
+    return (f"joints of the legs {', '.join(there)} are there (such as '{example}'), but none of "
+            f'{lacking}')
+
+
+def _says(found: Mapping[str, tuple[str, ...]], read: Mapping, joints: Sequence[str]) -> str:
+    parts = []
+    for leg, names in found.items():
+        told = sorted({'_'.join(word for word in words_of(name) if word in read[name][2])
+                       for name in names})
+        shown = f'{names[0]} ... {names[-1]}' if len(names) > 2 else ', '.join(names)
+        parts.append(f"{leg} by '{' or '.join(told)}' ({len(names)} joint"
+                     f"{'s' if len(names) > 1 else ''}: {shown})")
+    rest = _rest(found, joints)
+    return ('legs read from the names: ' + '; '.join(parts)
+            + (f'; of no leg: {_listed(list(rest))}' if rest else ''))

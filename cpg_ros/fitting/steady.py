@@ -1,0 +1,205 @@
+"""Where a recording repeats, and how fast: stretches of steady motion among starts and stops.
+
+Signals repeat with a lag L around a place if they differ there from themselves L later by much
+less than unrelated signals would: the square difference over the local variance (that of
+McLeod & Wyvill 2005, "A smarter way to find pitch", in windows of one lag). Lags of 12 to 23
+points are tried on grids that are each half as fine as the last one, so that all octaves cost
+little more than the first.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+#: Fastest stride that is looked for (Hz).
+FASTEST = 12.5
+#: Points of a lag on its grid: from this many to twice as many.
+FEWEST = 12
+#: Points of the even grid per sample where those are few.
+FINER = 4.0
+#: Most points of the finest grid.
+GRID = 1 << 18
+#: Mean square difference over twice the variance: 0 if it repeats exactly, 1 if unrelated.
+REPEATS = 0.25
+#: Fewest cycles that can be told to repeat.
+CYCLES = 1.4
+#: A multiple of the lag is the period if it repeats so much better: less than this share of the
+#: difference, and so much less.
+BETTER, LESS = 0.5, 0.02
+#: and for at least this share of the time.
+LASTING = 0.7
+#: Lags this near to one another, as a share, are of one gait.
+NEAR = 0.1
+#: Lags tried on a grid, and windows of the local variance, in points.
+LAGS = range(FEWEST - 1, 27)
+WIDTHS = (11, 14, 18, 22)
+
+
+@dataclass(frozen=True)
+class Stretch:
+    """Where signals repeat.
+
+    Attributes:
+        begin, end: s.
+        period: the lag, s, to about 2 %.
+        difference: mean square difference after one lag over twice the variance.
+        size: RMS of the signals there about their means, rad.
+
+    """
+
+    begin: float
+    end: float
+    period: float
+    difference: float
+    size: float
+
+    @property
+    def cycles(self) -> float:
+        """How many periods it holds."""
+        return (self.end - self.begin) / self.period
+
+    def outside(self, begin: float, end: float) -> bool:
+        """Tell whether most of it is not between two times."""
+        return min(self.end, end) - max(self.begin, begin) < 0.5 * (self.end - self.begin)
+
+
+def even(times: np.ndarray, positions: np.ndarray, rate: float
+         ) -> tuple[np.ndarray, np.ndarray]:
+    """Put signals on an even grid, linearly, each over its own finite samples.
+
+    Args:
+        times: rising, s, shape (n,).
+        positions: shape (n, joints), nan where missing; no column all nan.
+        rate: of the grid, Hz; lower if it had too many points.
+
+    Returns:
+        Times (m,) and signals (m, joints).
+
+    """
+    span = times[-1] - times[0]
+    grid = times[0] + np.arange(int(min(span * rate, GRID)) + 1) / min(rate, GRID / span)
+    there = np.isfinite(positions)
+    columns = [np.interp(grid, times[have], column[have])
+               for column, have in zip(positions.T, there.T, strict=True)]
+    return grid, np.stack(columns, axis=1)
+
+
+def _differences(y: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Measure how much signals differ after a lag, for the lags of one grid.
+
+    Returns:
+        Lags in points, shape (lags,); the difference about every point, (lags, n), inf where
+        the recording does not reach; and the variance about every point.
+
+    """
+    n = len(y)
+    y = y - y.mean(axis=0)
+    sums = np.concatenate([np.zeros((1, y.shape[1])), np.cumsum(y, axis=0)])
+    squares = np.concatenate([[0.0], np.cumsum(np.einsum('nj,nj->n', y, y))])
+    # What rounding leaves of a constant is no motion.
+    least = 1e-12 * squares[-1] / n + 1e-300
+    lags = np.array([lag for lag in LAGS if lag + min(lag, n - lag) >= CYCLES * lag], dtype=int)
+    variances: dict[int, np.ndarray] = {}
+    found = np.full((lags.size, n), np.inf)
+    for row, lag in zip(found, lags, strict=True):
+        window = min(lag, n - lag)
+        width = min(max(k for k in WIDTHS if k <= lag), window)
+        if width not in variances:
+            means = (sums[width:] - sums[:-width]) / width
+            variances[width] = np.maximum((squares[width:] - squares[:-width]) / width
+                                          - np.einsum('nj,nj->n', means, means), least)
+        apart = y[lag:] - y[:-lag]
+        total = np.concatenate([[0.0], np.cumsum(np.einsum('nj,nj->n', apart, apart))])
+        places = total.size - window
+        inside = np.arange(places) + (window - width) // 2
+        # The smaller of both: standing before a step is not like the step.
+        both = np.minimum(variances[width][inside], variances[width][inside + lag])
+        middle = (lag + window) // 2
+        row[middle:middle + places] = (total[window:] - total[:-window]) / window / (2.0 * both)
+    variance = np.zeros(n)
+    if lags.size:
+        width = max(variances)
+        offset = width // 2
+        variance[offset:offset + variances[width].size] = variances[width]
+    return lags, found, variance
+
+
+def _runs(mask: np.ndarray) -> np.ndarray:
+    """Return first and last index of every run of true values, shape (runs, 2)."""
+    edges = np.diff(np.concatenate([[0], mask.astype(np.int8), [0]]))
+    return np.stack([np.flatnonzero(edges > 0), np.flatnonzero(edges < 0) - 1], axis=1)
+
+
+def longest(mask: np.ndarray) -> tuple[int, int] | None:
+    """Return first and last index of the longest run of true values, None without any."""
+    runs = _runs(mask)
+    if not runs.size:
+        return None
+    first, last = runs[np.argmax(runs[:, 1] - runs[:, 0])]
+    return int(first), int(last)
+
+
+def _best_lag(lags: np.ndarray, differences: np.ndarray, near: np.ndarray
+              ) -> tuple[float, float] | None:
+    """Return the lag among the near ones with the least mean difference, and that difference.
+
+    Between lags, by a parabola; None if a lag that is not near has less still.
+    """
+    known = np.isfinite(differences)
+    means = np.where(known, differences, 0.0).sum(axis=1) / np.maximum(known.sum(axis=1), 1)
+    means[~known.any(axis=1)] = np.inf
+    k = near[np.argmin(means[near])]
+    if not 0 < k < lags.size - 1 or not np.isfinite(means[k + 1]):
+        return float(lags[k]), float(means[k])
+    both = known[k - 1:k + 2].all(axis=0)
+    before, here, after = differences[k - 1:k + 2, both].mean(axis=1) if both.any() else means[
+        k - 1:k + 2]
+    if min(before, after) < here:
+        return None
+    bend = max(before - 2.0 * here + after, 1e-300)
+    return (lags[k] + 0.5 * (before - after) / bend,
+            max(here - 0.125 * (before - after)**2 / bend, 0.0))
+
+
+def stretches(times: np.ndarray, y: np.ndarray) -> list[Stretch]:
+    """Find all stretches that repeat, for all lags; those of near lags overlap.
+
+    Args:
+        times: even, s, shape (n,).
+        y: signals, shape (n, joints).
+
+    """
+    step, start = times[1] - times[0], times[0]
+    found = []
+    while len(y) >= CYCLES * FEWEST:
+        lags, differences, variance = _differences(y)
+        for lag in lags[(lags >= FEWEST) & (lags < 2 * FEWEST)]:
+            near = np.flatnonzero(np.abs(lags - lag) <= NEAR * lag)
+            for first, last in _runs(differences[near].min(axis=0) < REPEATS):
+                found_lag = _best_lag(lags, differences[:, first:last + 1], near)
+                half = 0.5 * min(2 * lag, len(y))
+                begin, end = max(first - half, 0.0), min(last + half, len(y) - 1.0)
+                if found_lag is not None and end - begin >= CYCLES * found_lag[0]:
+                    found.append(Stretch(start + begin * step, start + end * step,
+                                         found_lag[0] * step, found_lag[1],
+                                         float(np.sqrt(variance[first:last + 1].mean()))))
+        half = len(y) // 2
+        y = 0.5 * (y[:2 * half:2] + y[1:2 * half:2])
+        start, step = start + 0.5 * step, 2.0 * step
+    return found
+
+
+def best(found: list[Stretch]) -> Stretch:
+    """Choose the stretch with most cycles of most motion, at its true period.
+
+    Of half a period cycles are more, but they differ; the multiple is then taken.
+    """
+    chosen = max(found, key=lambda one: one.cycles * one.size * (1.0 - one.difference))
+    for times in (2, 3):
+        for one in found:
+            if (abs(one.period / chosen.period / times - 1.0) < NEAR / 2
+                    and not one.outside(chosen.begin, chosen.end)
+                    and one.end - one.begin >= LASTING * (chosen.end - chosen.begin)
+                    and one.difference < BETTER * (chosen.difference - LESS)):
+                return one
+    return chosen
