@@ -55,6 +55,10 @@ class DelayedOrbit(Orbit):
         """x_1, or its derivative in theta of the given order, at theta in cycles."""
         return collocation.evaluate(self.values, theta, order)
 
+    def d_waveform(self, theta: np.ndarray, wave: int = 0, variable: int = 0) -> np.ndarray:
+        """Derivatives of x_1 by the parameters, shape theta.shape + (parameters,)."""
+        return np.stack([collocation.evaluate(column, theta) for column in self.d_values.T], -1)
+
     def _states(self, times: np.ndarray, order: int) -> np.ndarray:
         theta = np.asarray(times, dtype=float) / self.period
         return collocation.evaluate(self.values, theta, order, self.phases)

@@ -6,14 +6,14 @@ cycle, so it is the shape, size and phases of the waveforms that are fitted, not
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import least_squares
 
-from cpg_ros.dynamics import collocation
 from cpg_ros.dynamics.delayed_orbit import DelayedOrbit, solve
 from cpg_ros.dynamics.periodic import NoOrbit
+from cpg_ros.fitting.free import free_numbers, with_values
+from cpg_ros.fitting.trials import Trial, descend
 from cpg_ros.networks.delayed import Delayed
 
 #: Relative change of parameters and objective at which the method stops.
@@ -29,8 +29,8 @@ class CycleFit:
         values: of the parameters fitted, shape (parameters,).
         cost: the objective there, half the sum of squares.
         gradient: of the objective by the parameters, shape (parameters,).
-        evaluations: how many orbits were solved.
-        converged: whether a tolerance was met, not only the limit of evaluations.
+        errors: fitted minus recorded, shape (samples, cells).
+        trial: how it went, iteration by iteration.
 
     """
 
@@ -38,8 +38,18 @@ class CycleFit:
     values: np.ndarray
     cost: float
     gradient: np.ndarray
-    evaluations: int
-    converged: bool
+    errors: np.ndarray
+    trial: Trial
+
+    @property
+    def evaluations(self) -> int:
+        """How many orbits were asked for."""
+        return self.trial.evaluations
+
+    @property
+    def converged(self) -> bool:
+        """Whether a tolerance was met, not only the limit of evaluations."""
+        return self.trial.converged
 
 
 def cycle_samples(orbit: DelayedOrbit, theta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -54,8 +64,7 @@ def cycle_samples(orbit: DelayedOrbit, theta: np.ndarray) -> tuple[np.ndarray, n
 
     """
     places = np.asarray(theta, dtype=float)[:, None] + orbit.phases
-    slopes = np.stack([collocation.evaluate(column, places) for column in orbit.d_values.T], -1)
-    return orbit.waveform(places), slopes
+    return orbit.waveform(places), orbit.d_waveform(places)
 
 
 def fit_cycle(samples: np.ndarray, theta: np.ndarray, start: Delayed, gait: str,
@@ -81,40 +90,33 @@ def fit_cycle(samples: np.ndarray, theta: np.ndarray, start: Delayed, gait: str,
                          f'{start.cells} cells need (m, {start.cells}) and (m,)')
     if not (np.isfinite(samples).all() and np.isfinite(theta).all()):
         raise ValueError('samples or theta hold a value that is not finite')
-    known = start.parameters()
-    if not names or len(set(names)) < len(names) or not set(names) <= set(known):
-        raise ValueError(f"names are '{', '.join(names)}'; they must be different ones of "
-                         f'{", ".join(known)}')
-    if samples.size < len(names):
-        raise ValueError(f'{samples.size} values do not determine {len(names)} parameters')
-    columns = [known.index(name) for name in names]
-    begin = np.array([getattr(start, name) for name in names], dtype=float)
-    low, high = np.array([(start.ranges[name].low, start.ranges[name].high) for name in names]).T
-    for name, value in zip(names, begin, strict=True):
-        if not start.ranges[name].low < value < start.ranges[name].high:
-            raise ValueError(f'{name} {value:g} to start from is not between '
-                             f'{start.ranges[name].low:g} and {start.ranges[name].high:g}')
+    free = free_numbers(start, gait, names)
+    if samples.size < len(free):
+        raise ValueError(f'{samples.size} values do not determine {len(free)} parameters')
+    columns = [start.parameters().index(one.name) for one in free]
+    begin = np.array([one.value(start) for one in free])
+    for one, value in zip(free, begin, strict=True):
+        if not one.low < value < one.high:
+            raise ValueError(f'{one.name} {value:g} to start from is not between {one.low:g} '
+                             f'and {one.high:g}')
     solved: dict[bytes, DelayedOrbit] = {}
 
     def orbit_at(values: np.ndarray) -> DelayedOrbit:
         key = values.tobytes()
         if key not in solved:
-            there = replace(start, **dict(zip(names, values.tolist(), strict=True)))
-            solved[key] = solve(there, gait)
+            found = solve(with_values(start, free, values), gait)
+            solved.clear()
+            solved[key] = found
         return solved[key]
 
-    def residual(values: np.ndarray) -> np.ndarray:
-        try:
-            return (cycle_samples(orbit_at(values), theta)[0] - samples).ravel()
-        except NoOrbit:
-            # The method answers what is not finite with a shorter step.
-            return np.full(samples.size, np.nan)
+    def evaluate(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        states, slopes = cycle_samples(orbit_at(values), theta)
+        return (states - samples).ravel(), slopes[..., columns].reshape(-1, len(columns))
 
-    def jacobian(values: np.ndarray) -> np.ndarray:
-        return cycle_samples(orbit_at(values), theta)[1][..., columns].reshape(-1, len(columns))
-
-    orbit_at(begin)
-    found = least_squares(residual, begin, jacobian, (low, high), 'trf', x_scale='jac',
-                          xtol=TOLERANCE, ftol=TOLERANCE, gtol=TOLERANCE)
-    return CycleFit(orbit_at(found.x), found.x, float(found.cost), found.grad, int(found.nfev),
-                    found.status > 0)
+    trial = descend(evaluate, begin, np.array([one.low for one in free]),
+                    np.array([one.high for one in free]), TOLERANCE)
+    if trial.why:
+        raise NoOrbit(trial.why)
+    left, slopes = evaluate(trial.values)
+    return CycleFit(orbit_at(trial.values), trial.values, trial.cost, slopes.T @ left,
+                    left.reshape(samples.shape), trial)

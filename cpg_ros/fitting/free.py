@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import TypeVar
 
 import numpy as np
 
@@ -9,6 +10,7 @@ from cpg_ros.dynamics.hopf import hopf_point
 from cpg_ros.networks.delayed import Delayed
 from cpg_ros.networks.network import Network
 
+N = TypeVar('N', bound=Network)
 #: Places at which the edge of the Hopf set is looked for between a value and a bound, and
 #: halvings that then find it.
 PLACES, HALVINGS = 64, 40
@@ -55,6 +57,8 @@ def free_numbers(network: Network, gait: str, names: Sequence[str],
     found: list[Free] = []
     if not names or isinstance(names, str):
         raise ValueError(f'no names of parameters to fit; there are {", ".join(known)}')
+    if len(set(names)) < len(names):
+        raise ValueError(f"names are '{', '.join(names)}'; they must be different ones")
     for name in names:
         if name not in known:
             raise ValueError(f"'{name}' is not one of the parameters of {network.name}: "
@@ -79,8 +83,7 @@ def free_numbers(network: Network, gait: str, names: Sequence[str],
     return tuple(found)
 
 
-def with_values(network: Network, free: Sequence[Free], values: Sequence[float] | np.ndarray
-                ) -> Network:
+def with_values(network: N, free: Sequence[Free], values: Sequence[float] | np.ndarray) -> N:
     """Return the network with values for its free numbers, in their order."""
     return replace(network, **{  # type: ignore[type-var]
         member: float(value) for one, value in zip(free, values, strict=True)
@@ -97,7 +100,6 @@ def within_hopf_set(network: Network, gait: str, one: Free) -> Free:
 
     def excess(value: float) -> float:
         there = with_values(network, (one,), (value,))
-        assert isinstance(there, Delayed)
         if there.tau <= 0.0 or there.symmetry(gait) != network.symmetry(gait):
             return -1.0
         b = there.symmetry(gait).eigenvalue_terms(there)[1]
