@@ -14,7 +14,8 @@ setup(
         ('share/cpg_ros/launch', glob('launch/*.launch.py')),
     ],
     python_requires='>=3.10',
-    install_requires=['setuptools', 'numpy', 'scipy', 'numba', 'matplotlib', 'PyYAML'],
+    install_requires=['setuptools', 'numpy', 'scipy', 'numba', 'matplotlib', 'PyYAML',
+                      'rosbags>=0.11.9,<0.12'],
     extras_require={'optimize': ['pymoo>=0.6.2,<0.7'],
                     'test': ['pytest', 'hypothesis', 'jitcdde']},
     zip_safe=False,
@@ -24,6 +25,8 @@ setup(
     license='Apache-2.0',
     entry_points={'console_scripts': [
         'generator = cpg_ros.nodes.generator:main',
+        'inversion = cpg_ros.nodes.inversion:main',
         'analyze = cpg_ros.tools.analyze:main',
-        'optimize = cpg_ros.tools.optimize:main']},
+        'optimize = cpg_ros.tools.optimize:main',
+        'reproduce = cpg_ros.tools.reproduce:main']},
 )

@@ -11,9 +11,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import yaml
 
 from cpg_ros.checked import Reader, shown
 from cpg_ros.networks.registry import NETWORKS
+from cpg_ros.share import share
+from cpg_ros.whole import write_whole
 
 #: No angle (rad) or speed (rad/s) of a joint is larger.
 LARGEST = 1e6
@@ -193,3 +196,34 @@ def load_robot(path: str | Path) -> Robot:
             if name not in order:
                 raise reader.fail('joint_order', f"joint '{name}' of {place} is missing")
     return Robot(path.stem, networks, assignment, harmonics, legs, tuple(order))
+
+
+def find_robot(name: str) -> Robot:
+    """Load a robot file, or a shipped one by its bare name.
+
+    Raises:
+        RobotError: there is no such file, or it cannot be used.
+
+    """
+    if name.endswith(('.yaml', '.yml')) or '/' in name:
+        return load_robot(Path(name).expanduser())
+    path = share() / 'config' / f'{name}.yaml'
+    if not path.is_file():
+        shipped = ', '.join(sorted(file.stem for file in path.parent.glob('*.yaml')))
+        raise RobotError(f"robot '{name}' is neither a .yaml file nor one of: {shipped}")
+    return load_robot(path)
+
+
+def write_robot(path: str | Path, robot: Robot, comment: str = '') -> None:
+    """Write a robot file that load_robot reads back; the name is that of the file."""
+    tree: dict[str, Any] = {'network': list(robot.networks), 'assignment': robot.assignment,
+                            'harmonics': robot.harmonics, 'joint_order': list(robot.order),
+                            'legs': {}}
+    for leg, joints in robot.legs.items():
+        tree['legs'][leg] = {'joints': [
+            {'name': joint.name, 'cell': joint.cell, 'offset': joint.offset,
+             'weights': list(joint.weights), 'lower': joint.lower, 'upper': joint.upper,
+             'velocity': joint.velocity} for joint in joints]}
+    lines = ''.join(f'# {line}\n' for line in comment.splitlines())
+    write_whole(path, lines + yaml.safe_dump(tree, sort_keys=False, default_flow_style=None,
+                                             width=96))

@@ -9,7 +9,7 @@ import yaml
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from cpg_ros.robot import RobotError, load_robot
+from cpg_ros.robot import RobotError, load_robot, write_robot
 
 CONFIG = Path(__file__).resolve().parent.parent / 'config'
 GOAT = yaml.safe_load((CONFIG / 'goat.yaml').read_text())
@@ -148,3 +148,13 @@ def test_whatever_stands_there_it_loads_or_says_why_not(tmp_path, path, value):
         assert str(file) in str(error) and len(str(error).splitlines()) == 1
     else:
         assert robot.cells.dtype.kind == 'i' and np.isfinite(robot.weights).all()
+
+
+@pytest.mark.parametrize('file', sorted(CONFIG.glob('*.yaml')), ids=lambda path: path.stem)
+def test_what_is_written_is_what_is_read(tmp_path, file):
+    robot = load_robot(file)
+    write_robot(tmp_path / file.name, robot, 'two lines\nof comment')
+    assert load_robot(tmp_path / file.name) == robot
+    assert [path.name for path in tmp_path.iterdir()] == [file.name]
+    with pytest.raises(OSError, match='nowhere'):
+        write_robot(tmp_path / 'nowhere' / 'robot.yaml', robot)

@@ -11,7 +11,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from cpg_ros.dynamics.mesh_newton import collocate
+from cpg_ros.dynamics.mesh_newton import collocate, predicted
 from cpg_ros.dynamics.mesh_orbit import MeshOrbit
 from cpg_ros.dynamics.periodic import NoOrbit
 from cpg_ros.dynamics.simulate import simulate
@@ -130,6 +130,21 @@ def _followed(known: MeshOrbit, network: Network) -> tuple[MeshOrbit | None, flo
             continue
         orbit, reached, step = found, share, 1.5 * step
     return (orbit if reached >= 1.0 else None), reached
+
+
+def beside(network: Network, near: MeshOrbit) -> MeshOrbit:
+    """Solve for the orbit next to a known one of the same symmetry, by Newton's method alone.
+
+    Raises:
+        NoOrbit: the method leads elsewhere; a shorter way may do.
+
+    """
+    found = _accepted(predicted(network, near))
+    if found is None:
+        found = _accepted(collocate(network, near.symmetry, _on_cycles(near), near.period))
+    if found is None or not 0.5 < found.period / near.period < 2.0:
+        raise NoOrbit('no orbit next to the known one')
+    return found
 
 
 def solve(network: Network, gait: str, near: MeshOrbit | None = None) -> MeshOrbit:

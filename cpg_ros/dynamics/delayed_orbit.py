@@ -6,7 +6,7 @@ collapse to one periodic problem (DESIGN 3): with theta = t / T in cycles,
 solved by Fourier collocation with the period as unknown. Phase zero is where x_1 peaks.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import astuple, dataclass, replace
 
 import numpy as np
 from scipy.optimize import brentq
@@ -172,12 +172,19 @@ def _guess(network: Delayed, mode: Mode) -> tuple[np.ndarray, float] | None:
     return amplitude * np.cos(2.0 * np.pi * np.arange(NODES) / NODES), 2.0 * np.pi / point.omega
 
 
-def solve(network: Delayed, gait: str) -> DelayedOrbit:
+def _predicted(network: Delayed, near: DelayedOrbit) -> tuple[np.ndarray, float]:
+    """Waveform and period that the derivatives of a known orbit predict for a near network."""
+    change = np.subtract(astuple(network), astuple(near.network))
+    return near.values + near.d_values @ change, near.period + float(near.d_period @ change)
+
+
+def solve(network: Delayed, gait: str, near: DelayedOrbit | None = None) -> DelayedOrbit:
     """Solve for the gait's orbit, with exact derivatives by every parameter.
 
     Args:
         network: parameters.
         gait: one of the six primary gaits.
+        near: an orbit of that gait to start from; where it leads nowhere it does not matter.
 
     Raises:
         ValueError: an unknown gait, or parameters that are not finite or a delay not positive.
@@ -200,6 +207,14 @@ def solve(network: Delayed, gait: str) -> DelayedOrbit:
                       f'{abs(a.real):.4f}')
     if network.tau <= point.tau:
         raise NoOrbit(f"tau {network.tau:g} is below the {gait}'s critical delay {point.tau:.4f}")
+    if near is not None and near.symmetry == mode:
+        try:
+            orbit = _newton(network, mode, *_predicted(network, near))
+        except NoOrbit:
+            orbit = None
+        if (orbit is not None and orbit.values.argmax() == 0
+                and 0.5 < orbit.period / near.period < 2.0):
+            return orbit
     reason = 'no orbit was found'
     try:
         guess = _guess(network, mode)

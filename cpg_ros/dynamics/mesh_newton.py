@@ -232,6 +232,31 @@ def collocate(network, symmetry: Symmetry, path: Callable[[np.ndarray], np.ndarr
     bend = np.abs(np.diff(reduced.rates(guess(coarse)), axis=0)).max(axis=1)
     now = sampled(guess, gauss.spread(coarse, np.sqrt(bend + 1e-3 * bend.max() + 1e-12), 30),
                   period / symmetry.order)
+    return _refined(reduced, now)
+
+
+def predicted(network, near: MeshOrbit) -> MeshOrbit | None:
+    """Solve for an orbit from what the derivatives of a known one predict; None as in collocate.
+
+    The mesh of the known one is taken over, so that little is left to do.
+
+    Args:
+        network: parameters.
+        near: an orbit of the same gait at near parameters.
+
+    """
+    change = np.subtract([*network.as_dict().values()], [*near.network.as_dict().values()])
+    coefficients = near.coefficients + near.d_coefficients @ change
+    points = np.vstack([coefficients[0], coefficients[:, -1].sum(axis=0)])
+    stages = polynomial.polyval(gauss.NODES, coefficients).transpose(0, 2, 1)
+    length = (near.period + float(near.d_period @ change)) / near.symmetry.order
+    if not length > 0.0:
+        return None
+    return _refined(Reduced(network, near.symmetry), Solution(near.mesh, points, stages, length))
+
+
+def _refined(reduced: Reduced, now: Solution) -> MeshOrbit | None:
+    """Solve, remesh and solve again until the mesh is fine enough; None as in collocate."""
     fewest = FEWEST
     while True:
         with np.errstate(all='ignore'):

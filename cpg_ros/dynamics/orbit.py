@@ -1,6 +1,7 @@
 """Gaits as exact periodic orbits, for every network."""
 
 from cpg_ros.dynamics import cell_orbit, delayed_orbit
+from cpg_ros.dynamics.delayed_orbit import DelayedOrbit
 from cpg_ros.dynamics.mesh_orbit import MeshOrbit
 from cpg_ros.dynamics.periodic import NoOrbit, Orbit
 from cpg_ros.networks.delayed import Delayed
@@ -15,7 +16,7 @@ def solve_orbit(network: Network, gait: str, near: Orbit | None = None) -> Orbit
     Args:
         network: parameters.
         gait: one of the network's gaits.
-        near: an orbit of that gait to start from, where the network has no delay; by default
+        near: an orbit of that gait to start from; by default, where the network has no delay,
             that of the shipped preset.
 
     Raises:
@@ -25,7 +26,8 @@ def solve_orbit(network: Network, gait: str, near: Orbit | None = None) -> Orbit
 
     """
     if isinstance(network, Delayed):
-        return delayed_orbit.solve(network, gait)
+        return delayed_orbit.solve(network, gait,
+                                   near if isinstance(near, DelayedOrbit) else None)
     return cell_orbit.solve(network, gait, near if isinstance(near, MeshOrbit) else None)
 
 

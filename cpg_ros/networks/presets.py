@@ -8,6 +8,7 @@ import yaml
 from cpg_ros.checked import Reader
 from cpg_ros.networks.network import Network, Preset
 from cpg_ros.share import share
+from cpg_ros.whole import write_whole
 
 #: No number in a preset is larger.
 LARGEST = 1e3
@@ -75,18 +76,12 @@ def shipped(network: type[Network]) -> dict[str, Preset]:
 
 def write_presets(path: str | Path, network: type[Network], presets: dict[str, Preset],
                   comment: str = '') -> None:
-    """Write a preset file, beside and then renamed, so that none is ever half written."""
+    """Write a preset file."""
     tree: dict[str, Any] = {'network': network.name, 'presets': {}}
     for name, preset in presets.items():
         tree['presets'][name] = {
             'gait': preset.gait, 'parameters': preset.network.as_dict(),
             **({'start': list(preset.start), 'period': preset.period} if preset.start else {})}
-    path = Path(path)
     lines = ''.join(f'# {line}\n' for line in comment.splitlines())
-    beside = path.with_name(f'.{path.name}.part')
-    try:
-        beside.write_text(lines + yaml.safe_dump(tree, sort_keys=False, default_flow_style=None,
-                                                 width=96), encoding='utf-8')
-        beside.replace(path)
-    finally:
-        beside.unlink(missing_ok=True)
+    write_whole(path, lines + yaml.safe_dump(tree, sort_keys=False, default_flow_style=None,
+                                             width=96))

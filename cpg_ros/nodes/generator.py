@@ -32,8 +32,7 @@ from cpg_ros.nodes.outputs import Outputs
 from cpg_ros.nodes.parameter_services import StrictParameterService
 from cpg_ros.nodes.settings import COMMANDS, NETWORK, Planner, Spec, as_doubles, specs
 from cpg_ros.nodes.ticker import Ticker
-from cpg_ros.robot import Robot, RobotError, load_robot
-from cpg_ros.share import share
+from cpg_ros.robot import RobotError, find_robot
 
 NAME = 'cpg_generator'
 #: On SIGINT or SIGTERM the ramp takes this long, and the node ends by the later time, s.
@@ -42,26 +41,6 @@ LAST_RAMP, LAST_DEADLINE = 0.5, 0.8
 
 class StartError(RuntimeError):
     """The node cannot start; the message is one line for the user."""
-
-
-def find_robot(name: str) -> Robot:
-    """Load a robot file, or a shipped one by its bare name.
-
-    Raises:
-        StartError: there is no such file, or it cannot be used.
-
-    """
-    try:
-        if name.endswith(('.yaml', '.yml')) or '/' in name:
-            return load_robot(Path(name).expanduser())
-        config = share() / 'config'
-        path = config / f'{name}.yaml'
-        if not path.is_file():
-            shipped = ', '.join(sorted(file.stem for file in config.glob('*.yaml')))
-            raise StartError(f"robot '{name}' is neither a .yaml file nor one of: {shipped}")
-        return load_robot(path)
-    except RobotError as error:
-        raise StartError(str(error)) from error
 
 
 class Generator(Node):
@@ -87,7 +66,10 @@ class Generator(Node):
         presets = PRESETS[network] | self._further_presets(NETWORKS[network])
         self._one_of('gait', tuple(presets))
         self._one_of('command', COMMANDS)
-        robot = find_robot(self._value('robot'))
+        try:
+            robot = find_robot(self._value('robot'))
+        except RobotError as error:
+            raise StartError(str(error)) from error
         if network not in robot.networks:
             raise StartError(f"robot file '{robot.name}' is for the network "
                              f"{' or '.join(robot.networks)}, not '{network}'")

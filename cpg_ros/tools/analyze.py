@@ -27,8 +27,8 @@ from cpg_ros.tools.arguments import (
     number,
     say,
     twice,
-    write,
 )
+from cpg_ros.whole import write_whole
 
 DESCRIPTION = '''\
 Tell what a parameter set does before it runs on a robot: the rest state and its Hopf points, the
@@ -132,7 +132,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if chosen.plot is not None:
             # matplotlib takes half a second, and only pictures need it.
             from cpg_ros.tools.analysis_plot import picture
-            write(chosen.plot, picture(found, chosen.plot.suffix))
+            write_whole(chosen.plot, picture(found, chosen.plot.suffix))
     except (ValueError, OSError) as error:
         print(f'analyze: {error}', file=sys.stderr)
         return 2

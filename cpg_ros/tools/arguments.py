@@ -5,7 +5,6 @@ import json
 import math
 import os
 import sys
-from pathlib import Path
 from typing import Any, NoReturn
 
 
@@ -74,16 +73,6 @@ def finite(tree: Any) -> Any:
 def as_json(tree: Any) -> str:
     """Return a tree of plain types as JSON."""
     return json.dumps(finite(tree), indent=2)
-
-
-def write(path: Path, content: str | bytes) -> None:
-    """Write a file whole or not at all."""
-    beside = path.with_name(f'.{path.name}.{os.getpid()}')
-    try:
-        beside.write_bytes(content.encode() if isinstance(content, str) else content)
-        beside.replace(path)
-    finally:
-        beside.unlink(missing_ok=True)
 
 
 def say(text: str) -> None:

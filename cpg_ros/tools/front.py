@@ -1,8 +1,7 @@
 """The Pareto front of a search for weights, as a table in a file and as a picture."""
 
 import csv
-from collections.abc import Iterator
-from contextlib import contextmanager
+import io
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +12,7 @@ from matplotlib.axes import Axes
 from cpg_ros.fitting.objectives import APERIODIC, RESOLUTION
 from cpg_ros.fitting.polish import orbit_signals
 from cpg_ros.fitting.weights import Front, objective_names
+from cpg_ros.whole import write_whole
 
 #: Colours of the waveforms, of sets that were tried or solved, and of the front.
 WAVES, TRIED, SOLVED, BEST = ('#2b6cb0', '#c05621'), '#cbd5e0', '#718096', '#2f855a'
@@ -20,35 +20,25 @@ WAVES, TRIED, SOLVED, BEST = ('#2b6cb0', '#c05621'), '#cbd5e0', '#718096', '#2f8
 FLOOR = 1e-6
 
 
-@contextmanager
-def _beside(path: Path) -> Iterator[Path]:
-    """Yield a name to write to; it becomes the file's when all went well, and else nothing."""
-    part = path.with_name(f'.{path.name}.part')
-    try:
-        yield part
-        part.replace(path)
-    finally:
-        part.unlink(missing_ok=True)
-
-
 def write_front(path: Path, front: Front) -> None:
     """Write the front, best set first: variables, objectives and periods, units in the names."""
     names = [variable.name for variable in front.space.variables]
     two = front.scores[0].difference is not None
     errors = [name for name in objective_names(front.space) if name.startswith('phase')]
-    with _beside(path) as part, part.open('w', newline='', encoding='utf-8') as file:
-        rows = csv.writer(file)
-        rows.writerow([*(f'{name} [1]' for name in names), *errors, 'leading multiplier [1]',
-                       *(['difference of waveforms [1]'] if two else []),
-                       'period [model time]', 'chosen'])
-        for score in front.scores:
-            parameters = score.network.as_dict()
-            values = [parameters[variable.members[0]] for variable in front.space.variables]
-            rows.writerow([*values, *(f'{error:.4g}' for error in score.errors),
-                           f'{score.stability:.6g}',
-                           *([f'{score.difference:.6g}'] if two else []),
-                           f'{score.period:.6f}',
-                           int(score.network == front.chosen.preset.network)])
+    text = io.StringIO(newline='')
+    rows = csv.writer(text)
+    rows.writerow([*(f'{name} [1]' for name in names), *errors, 'leading multiplier [1]',
+                   *(['difference of waveforms [1]'] if two else []),
+                   'period [model time]', 'chosen'])
+    for score in front.scores:
+        parameters = score.network.as_dict()
+        values = [parameters[variable.members[0]] for variable in front.space.variables]
+        rows.writerow([*values, *(f'{error:.4g}' for error in score.errors),
+                       f'{score.stability:.6g}',
+                       *([f'{score.difference:.6g}'] if two else []),
+                       f'{score.period:.6f}',
+                       int(score.network == front.chosen.preset.network)])
+    write_whole(path, text.getvalue())
 
 
 def _scatter(axes: Axes, front: Front, x: str, y: str, values: dict[str, np.ndarray]) -> None:
@@ -146,6 +136,7 @@ def draw_front(path: Path, front: Front) -> None:
                     f'{len(front.tried)} sets tried, {len(front.scores)} on the Pareto front; '
                     f'chosen: period {orbit.period:.3f} model time, leading multiplier '
                     f'{front.chosen.leading:.2g} a cycle', fontsize=11)
-    with _beside(path) as part:
-        figure.savefig(part, dpi=120, format='png')
+    image = io.BytesIO()
+    figure.savefig(image, dpi=120, format='png')
     pyplot.close(figure)
+    write_whole(path, image.getvalue())

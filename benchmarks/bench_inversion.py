@@ -1,0 +1,164 @@
+"""A fit of two parameters with order-3 readouts of 12 joints, against simulation and differences.
+
+The peer fits the same recording with scipy's least_squares as it is mostly done: jitcdde
+integrates the eight cells from an orbit's history until two successive periods agree, the last
+cycle is sampled, the readouts are fitted to it by linear least squares, and what is left is
+differenced. The joints' weights, the start, the bounds and the tolerance are ours. Our fit alone
+is compared with it; the whole inversion also weighs the joints anew, gives intervals and judges
+whether the generator can run the result.
+"""
+
+import sys
+import time
+
+import numpy as np
+import symengine
+from common import ROOT, by_turns, emit, log
+from jitcdde import jitcdde, t, y
+from scipy.interpolate import CubicHermiteSpline
+from scipy.optimize import least_squares
+
+sys.path.append(str(ROOT / 'test'))
+
+from made_up import record, weights_of
+
+from cpg_ros.dynamics.orbit import solve_orbit
+from cpg_ros.dynamics.readout import TURN, monomials
+from cpg_ros.fitting.free import free_numbers
+from cpg_ros.fitting.inversion import TOLERANCE, invert
+from cpg_ros.fitting.joints import joints_of
+from cpg_ros.fitting.problem import Problem
+from cpg_ros.fitting.trials import descend
+from cpg_ros.networks.delayed import PRESETS, Delayed
+from cpg_ros.robot import HARMONICS
+
+CELLS = (1, 1, 7, 2, 2, 8, 3, 3, 5, 4, 4, 6)
+TRUTH, GAIT, FREE = PRESETS['trot'].network, PRESETS['trot'].gait, ('c', 'tau')
+START = {'c': 6.0, 'tau': 0.5}
+ROUNDS, REPEATS = 5, 5
+TARGETS = {'inversion_ms': 100.0, 'speedup': 100.0}
+#: Of the peer: model time kept, tolerance, when periods agree, relative step of differences.
+KEPT, RTOL, AGREE, STEP = 4.0, 1e-8, 1e-6, 1e-4
+
+
+class Simulated:
+    """The residual by jitcdde."""
+
+    def __init__(self, problem: Problem, history: Delayed) -> None:
+        self._problem, self._orbit = problem, solve_orbit(history, GAIT)
+        a, b, _, d, _ = history.as_dict().values()
+        c, tau = symengine.symbols('c tau')
+        squashed = [symengine.Symbol(f'squashed{i}') for i in range(8)]
+        self._dde = jitcdde([a * y(i) + b * squashed[i] + d * squashed[i - 2]
+                             + c * symengine.tanh(y(i ^ 1, t - tau)) for i in range(8)],
+                            helpers=[(s, symengine.tanh(y(i))) for i, s in enumerate(squashed)],
+                            delays=[0.0, tau], max_delay=KEPT, control_pars=[c, tau],
+                            verbose=False)
+        self._dde.compile_C(simplify=False, verbose=False)
+        self.evaluations = 0
+
+    def cycle(self, c: float, tau: float) -> tuple[CubicHermiteSpline, float, float]:
+        """Cell 1 over the last of the time, where it crosses 0 upwards, and the period."""
+        dde = self._dde
+        dde.purge_past()
+        for when in np.linspace(-KEPT, 0.0, 150):
+            dde.add_past_point(when, self._orbit(np.array(when)),
+                               self._orbit.derivative(np.array(when)))
+        dde.set_parameters(c, tau)
+        dde.set_integration_parameters(rtol=RTOL, atol=RTOL, first_step=0.01)
+        dde.initial_discontinuities_handled = True
+        end, before = 0.0, 0.0
+        while True:
+            end += KEPT
+            dde.integrate(end)
+            past = dde.get_state()
+            cell = CubicHermiteSpline(*zip(*(
+                (anchor.time, anchor.state[0], anchor.diff[0]) for anchor in past), strict=True))
+            zeros = cell.roots(extrapolate=False)
+            first, second = zeros[cell(zeros, 1) > 0.0][-2:]
+            if abs(second - first - before) < AGREE:
+                return cell, first, second - first
+            before = second - first
+
+    def __call__(self, values: np.ndarray) -> np.ndarray:
+        self.evaluations += 1
+        cell_1, begin, period = self.cycle(*values[:2])
+        joints = self._problem.joints
+        left = np.empty_like(joints.data)
+        theta = np.arange(64) / 64
+        terms = np.fft.rfft(cell_1(begin + period * theta)) / 64
+        terms[1:] *= 2.0
+        k = np.arange(terms.size)
+        grid = np.arange(512) / 512
+        crest = grid[(np.exp(TURN * 1j * np.outer(grid, k)) @ terms).real.argmax()]
+        for _ in range(4):
+            turned = terms * np.exp(TURN * 1j * k * crest)
+            crest -= np.sum((1j * k * turned).real) / np.sum((-k * k * turned).real) / TURN
+        peak = np.sum((terms * np.exp(TURN * 1j * k * crest)).real)
+        for joint, cell in enumerate(joints.cells):
+            turns = np.exp(TURN * 1j * np.outer(
+                joints.theta + self._orbit.phases[cell] + crest + values[2], k))
+            x = (turns @ terms).real / peak
+            slope = (turns @ (1j * k * terms)).real / peak
+            psi = np.vstack([np.ones_like(x), monomials(x, slope, slope)[0]]).T
+            weights = np.linalg.lstsq(psi, joints.data[:, joint], rcond=None)[0]
+            left[:, joint] = psi @ weights - joints.data[:, joint]
+        return (left / self._problem.sizes).ravel()
+
+
+def main() -> None:
+    orbit = solve_orbit(TRUTH, GAIT)
+    recording, assigned = record(orbit, CELLS, weights_of(len(CELLS)), np.random.default_rng(0))
+    start = Delayed(**{**TRUTH.as_dict(), **START})
+    joints = joints_of(recording, assigned, start)
+    numbers = free_numbers(start, GAIT, FREE)
+    low = np.array([*(one.low for one in numbers), -np.inf])
+    high = np.array([*(one.high for one in numbers), np.inf])
+
+    def posed() -> Problem:
+        return Problem(joints, joints.stated, start, GAIT, numbers, 3, HARMONICS)
+
+    def begun(problem: Problem) -> np.ndarray:
+        values = np.array([*START.values(), 0.0])
+        problem.begin(values)
+        values[-1] = problem.first_phase(values)
+        return values
+
+    def ours() -> object:
+        problem = posed()
+        return descend(problem, begun(problem), low, high, TOLERANCE)
+
+    peer = Simulated(posed(), start)
+    begin = begun(posed())
+
+    def theirs() -> object:
+        return least_squares(peer, begin, '2-point', (low, high), 'trf', x_scale='jac',
+                             ftol=TOLERANCE, xtol=TOLERANCE, gtol=1e-15, diff_step=STEP)
+
+    mine, found = ours(), theirs()
+    gap = float(np.abs(peer(mine.values) - posed()(mine.values)[0]).max())
+    log(f'ours {mine.values} in {mine.evaluations} evaluations, peer {found.x} in '
+        f'{peer.evaluations}; residuals differ by {gap:.2g} standard errors')
+    peer.evaluations = 0
+    began = time.perf_counter()
+    theirs()
+    per_evaluation = 1e3 * (time.perf_counter() - began) / peer.evaluations
+    evaluations = peer.evaluations
+
+    spent = by_turns({
+        'inversion': (lambda: invert(recording, assigned, start, GAIT, FREE, 3), REPEATS),
+        'fit': (ours, REPEATS), 'peer': (theirs, 1)}, ROUNDS)
+    worst = {'inversion_ms': spent['inversion']['median'],
+             'speedup': spent['peer']['median'] / spent['fit']['median']}
+    emit(benchmark='inversion', ms=spent, inversion_median_ms=worst['inversion_ms'],
+         speedup=worst['speedup'],
+         speedup_of_the_whole_inversion=spent['peer']['median'] / worst['inversion_ms'],
+         evaluations=mine.evaluations, peer_evaluations=evaluations,
+         peer_ms_per_evaluation=per_evaluation, values=mine.values[:2].tolist(),
+         peer_values=found.x[:2].tolist(), residuals_differ=gap, targets=TARGETS,
+         passed=worst['inversion_ms'] <= TARGETS['inversion_ms']
+         and worst['speedup'] >= TARGETS['speedup'])
+
+
+if __name__ == '__main__':
+    main()

@@ -1,0 +1,121 @@
+"""Which numbers of a network a fit may move, and within what bounds."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from cpg_ros.dynamics.hopf import hopf_point
+from cpg_ros.networks.delayed import Delayed
+from cpg_ros.networks.network import Network
+
+#: Places at which the edge of the Hopf set is looked for between a value and a bound, and
+#: halvings that then find it.
+PLACES, HALVINGS = 64, 40
+
+
+@dataclass(frozen=True)
+class Free:
+    """A free number of a network in a gait.
+
+    Attributes:
+        name: of a parameter, or of a group of them.
+        members: parameters that take its value: those that the gait's symmetry needs equal.
+        low, high: bounds.
+
+    """
+
+    name: str
+    members: tuple[str, ...]
+    low: float
+    high: float
+
+    def value(self, network: Network) -> float:
+        """Its value in a network."""
+        return float(getattr(network, self.members[0]))
+
+
+def free_numbers(network: Network, gait: str, names: Sequence[str],
+                 bounds: Mapping[str, tuple[float, float]] | None = None) -> tuple[Free, ...]:
+    """Return the free numbers of a fit.
+
+    Args:
+        network: parameters.
+        gait: one of its gaits.
+        names: of parameters, or of groups that the network sets together.
+        bounds: name -> lower and upper bound, where they are to be narrower than the range.
+
+    Raises:
+        ValueError: a name is unknown or given twice, or bounds cannot be used.
+
+    """
+    bounds = dict(bounds or {})
+    families = network.families(network.symmetry(gait))
+    known = (*network.parameters(), *network.groups)
+    found: list[Free] = []
+    if not names or isinstance(names, str):
+        raise ValueError(f'no names of parameters to fit; there are {", ".join(known)}')
+    for name in names:
+        if name not in known:
+            raise ValueError(f"'{name}' is not one of the parameters of {network.name}: "
+                             f'{", ".join(known)}')
+        asked = network.groups.get(name, (name,))
+        members = tuple(dict.fromkeys(
+            member for family in families if set(family) & set(asked) for member in family))
+        taken = [other.name for other in found if set(other.members) & set(members)]
+        if taken:
+            raise ValueError(f'{name} is the same as {taken[0]}, which is free already')
+        low = max(network.ranges[member].low for member in members)
+        high = min(network.ranges[member].high for member in members)
+        if name in bounds:
+            least, most = bounds.pop(name)
+            if not low <= least < most <= high:
+                raise ValueError(f'{name}: bounds {least:g} to {most:g} are not in order within '
+                                 f'{low:g} to {high:g}')
+            low, high = least, most
+        found.append(Free(name, members, low, high))
+    if bounds:
+        raise ValueError(f"'{next(iter(bounds))}' has bounds but is not free")
+    return tuple(found)
+
+
+def with_values(network: Network, free: Sequence[Free], values: Sequence[float] | np.ndarray
+                ) -> Network:
+    """Return the network with values for its free numbers, in their order."""
+    return replace(network, **{  # type: ignore[type-var]
+        member: float(value) for one, value in zip(free, values, strict=True)
+        for member in one.members})
+
+
+def within_hopf_set(network: Network, gait: str, one: Free) -> Free:
+    """Narrow the bounds of a single free number to where its gait is born before the delay.
+
+    Only the delayed network tells that in closed form; the others' bounds stay.
+    """
+    if not isinstance(network, Delayed):
+        return one
+
+    def excess(value: float) -> float:
+        there = with_values(network, (one,), (value,))
+        assert isinstance(there, Delayed)
+        if there.tau <= 0.0 or there.symmetry(gait) != network.symmetry(gait):
+            return -1.0
+        b = there.symmetry(gait).eigenvalue_terms(there)[1]
+        if there.symmetry(gait).j % 2 == 0 and b >= 0.0:
+            return -1.0
+        point = hopf_point(there, there.symmetry(gait))
+        return -1.0 if point is None else there.tau - point.tau
+
+    here, ends = one.value(network), []
+    for end in (one.low, one.high):
+        inside = here
+        for outside in np.linspace(here, end, PLACES)[1:]:
+            if excess(float(outside)) <= 0.0:
+                for _ in range(HALVINGS):
+                    middle = 0.5 * (inside + outside)
+                    inside, outside = ((middle, outside) if excess(middle) > 0.0
+                                       else (inside, middle))
+                break
+            inside = float(outside)
+        ends.append(inside)
+    return Free(one.name, one.members, *ends)

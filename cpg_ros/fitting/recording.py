@@ -1,0 +1,280 @@
+"""Joint angles over time, wherever they were recorded, and what had to be mended in them.
+
+Bags, tables and live topics all deliver chunks of samples; `merged` makes one recording of them.
+"""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+#: Stamps, shape (n,), int64, ns; the joints' names; positions, shape (n, names), rad.
+Chunk = tuple[np.ndarray, Sequence[str], np.ndarray]
+
+#: An interval longer than so many usual ones is a dropout, and one that is off by such a share
+#: of the usual one is jitter.
+DROPOUT, JITTER = 1.5, 0.1
+#: Stamps lie within +- this (s): what ROS can stamp, and what keeps differences in int64.
+LATEST = 2**32
+
+
+class RecordingError(ValueError):
+    """A recording cannot be used; the message is one line with the file, topic and place."""
+
+
+@dataclass(frozen=True, eq=False)
+class Recording:
+    """Joint angles over time.
+
+    Attributes:
+        joints: their names.
+        times: s, shape (n,), strictly rising, the first is 0.
+        positions: rad, shape (n, joints); nan where a joint has no sample.
+        source: what to call it in messages, such as 'walk_bag, /joint_states'.
+        start: stamp at times = 0, s.
+        notes: what had to be mended or left out, one line each.
+
+    Raises:
+        RecordingError: fewer than two samples, times that do not rise from 0, or shapes that
+            do not belong together.
+
+    """
+
+    joints: tuple[str, ...]
+    times: np.ndarray
+    positions: np.ndarray
+    source: str
+    start: float = 0.0
+    notes: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        if self.positions.shape != (len(self.times), len(self.joints)):
+            raise RecordingError(
+                f'{self.source}: positions of shape {self.positions.shape} for '
+                f'{len(self.times)} times and {len(self.joints)} joints')
+        if len(self.times) < 2:
+            raise RecordingError(f'{self.source}: {_counted(len(self.times), "sample")}; '
+                                 'a movement takes two at least')
+        if self.times[0] != 0.0 or not (np.diff(self.times) > 0.0).all():
+            raise RecordingError(f'{self.source}: times do not rise strictly from 0')
+
+    def select(self, names: Sequence[str]) -> 'Recording':
+        """Return the recording of these joints, in this order.
+
+        Raises:
+            RecordingError: a joint is not there; the message names those that are.
+
+        """
+        require(names, self.joints, self.source)
+        columns = [self.joints.index(name) for name in names]
+        return replace(self, joints=tuple(names), positions=self.positions[:, columns])
+
+    def between(self, begin: float, end: float) -> 'Recording':
+        """Return the samples with begin <= times <= end (s), their times from 0 again.
+
+        Raises:
+            RecordingError: fewer than two samples are there.
+
+        """
+        first = int(np.searchsorted(self.times, begin))
+        last = int(np.searchsorted(self.times, end, 'right'))
+        if last - first < 2:
+            raise RecordingError(f'{self.source}: {_counted(max(0, last - first), "sample")} '
+                                 f'between {begin:.6g} and {end:.6g} s')
+        times = self.times[first:last]
+        return replace(self, times=times - times[0], positions=self.positions[first:last],
+                       start=self.start + float(times[0]))
+
+
+def require(names: Sequence[str], there: Sequence[str], source: str) -> None:
+    """Refuse names of joints that are not there, or are given twice."""
+    unknown = [name for name in names if name not in there]
+    if unknown:
+        raise RecordingError(f'{source}: no {named(unknown)}; there are {few(there, 40)}')
+    again = [name for k, name in enumerate(names) if name in names[:k]]
+    if again:
+        raise RecordingError(f'{source}: {named(again[:1])} is named twice')
+
+
+def few(names: Sequence[str], most: int = 6) -> str:
+    """Return names in quotes, the first ones where they are many."""
+    shown = ', '.join(repr(name) for name in names[:most])
+    return shown + (f' and {len(names) - most} more' if len(names) > most else '')
+
+
+def named(joints: Sequence[str]) -> str:
+    """Return 'joint' and its name, or 'joints' and their names."""
+    return f'joint{"" if len(joints) == 1 else "s"} {few(joints)}'
+
+
+def merged(chunks: Iterable[Chunk], source: str, joints: Sequence[str] = ()) -> Recording:
+    """Join samples, each of all joints or of some, into one recording.
+
+    Samples of different joints with the same stamp become one; a joint without a sample at a
+    stamp is nan there. Of samples of a joint with the same stamp the first is kept. Values that
+    are not finite count as missing.
+
+    Args:
+        chunks: in the order of arrival, for each set of names; see `Chunk`.
+        source: what to call the recording in messages.
+        joints: which joints to take, in this order; all of them, if empty.
+
+    Raises:
+        RecordingError: no sample, a joint that is not there or has no finite position, or no
+            time passes.
+
+    """
+    groups = _groups(chunks, source)
+    names = list(dict.fromkeys(name for group in groups for name in group))
+    if not names:
+        raise RecordingError(f'{source}: no samples')
+    require(joints, names, source)
+    wanted = tuple(joints) or tuple(names)
+    notes: list[str] = []
+    found = []
+    for group in list(groups):
+        columns = [k for k, name in enumerate(group) if name in wanted]
+        if columns:
+            stamps, positions = _joined(groups.pop(group), columns, len(group))
+            found.append((stamps, [wanted.index(group[k]) for k in columns], positions))
+    origin = min(int(stamps.min()) for stamps, _, _ in found)
+    ordered = []
+    late = again = received = 0
+    for stamps, columns, positions in found:
+        received += len(stamps)
+        # Duplicates are told in float64, where two stamps can be one a week into a recording.
+        times = (stamps - origin) / 1e9
+        steps = np.diff(times)
+        if (steps < 0.0).any():
+            late += int((times < np.maximum.accumulate(times)).sum())
+            order = np.argsort(times, kind='stable')
+            times, positions = times[order], positions[order]
+            steps = np.diff(times)
+        if (steps == 0.0).any():
+            fresh = np.append(True, steps > 0.0)
+            again += int((~fresh).sum())
+            times, positions = times[fresh], positions[fresh]
+        ordered.append((times, columns, positions))
+    del found
+    times, positions, odd, twice = _one_table(ordered, len(wanted))
+    del ordered
+    if late:
+        notes.append(f'{_counted(late, "sample")} out of order, sorted by stamp')
+    if again + twice:
+        notes.append(f'{_counted(again + twice, "duplicate")} of a stamp, the first is kept')
+    notes += [f'joint {wanted[k]!r}: {_counted(int(odd[k]), "position")} not a finite number'
+              for k in np.flatnonzero(odd)]
+    there = ~np.isnan(positions)
+    silent = [name for name, any_there in zip(wanted, there.any(axis=0), strict=True)
+              if not any_there]
+    if silent:
+        raise RecordingError(f'{source}: no finite position of {named(silent)} in '
+                             f'{_counted(received, "sample")}; name the joints to take to do '
+                             'without')
+    heard = there.any(axis=1)
+    if not heard.all():
+        times, positions, there = times[heard], positions[heard], there[heard]
+    if len(times) < 2:
+        raise RecordingError(f'{source}: {_counted(received, "sample")}, all at stamp '
+                             f'{origin / 1e9:.9f} s: no time passes')
+    notes += _missing(wanted, there)
+    notes += _intervals(wanted, times, there)
+    return Recording(wanted, times - times[0], positions, source,
+                     origin / 1e9 + float(times[0]), tuple(notes))
+
+
+def _groups(chunks: Iterable[Chunk], source: str
+            ) -> dict[tuple[str, ...], list[tuple[np.ndarray, np.ndarray]]]:
+    """Sort chunks by the joints they hold."""
+    groups: dict[tuple[str, ...], list[tuple[np.ndarray, np.ndarray]]] = {}
+    for stamps, names, positions in chunks:
+        stamps, positions = np.asarray(stamps), np.asarray(positions, float)
+        if stamps.ndim != 1 or positions.shape != (len(stamps), len(names)):
+            raise RecordingError(f'{source}: {len(names)} names and positions of shape '
+                                 f'{positions.shape} for stamps of shape {stamps.shape}')
+        if not stamps.size or not len(names):
+            continue
+        if not np.issubdtype(stamps.dtype, np.integer):
+            raise RecordingError(f'{source}: stamps are whole nanoseconds, not {stamps.dtype}')
+        far = np.abs(stamps.astype(float)) > LATEST * 1e9
+        if far.any():
+            raise RecordingError(f'{source}: stamp of {float(stamps[far][0]) / 1e9:.6g} s')
+        if len(set(names)) < len(names):
+            require(names, names, source)
+        groups.setdefault(tuple(names), []).append((stamps.astype(np.int64), positions))
+    return groups
+
+
+def _joined(parts: list[tuple[np.ndarray, np.ndarray]], columns: list[int], width: int
+            ) -> tuple[np.ndarray, np.ndarray]:
+    """Join the chunks of a group, as to the columns wanted."""
+    stamps = np.concatenate([stamps for stamps, _ in parts])
+    if len(columns) < width:
+        return stamps, np.concatenate([positions[:, columns] for _, positions in parts])
+    return stamps, np.concatenate([positions for _, positions in parts])
+
+
+def _one_table(parts: list[tuple[np.ndarray, list[int], np.ndarray]], width: int
+               ) -> tuple[np.ndarray, np.ndarray, np.ndarray, int]:
+    """Return times, positions, the number of odd values by joint, and of what came twice."""
+    odd, twice = np.zeros(width, int), 0
+    for _, columns, positions in parts:
+        strange = ~np.isfinite(positions)
+        if strange.any():
+            odd[columns] += strange.sum(axis=0)
+            positions[strange] = np.nan
+    times, columns, positions = parts[0]
+    if len(parts) == 1 and columns == list(range(width)):
+        return times, positions, odd, twice
+    times = np.unique(np.concatenate([times for times, _, _ in parts]))
+    table = np.full((len(times), width), np.nan)
+    for own, columns, positions in parts:
+        cells = np.searchsorted(times, own)[:, None], np.array(columns)
+        before = table[cells]
+        first = np.isnan(before)
+        twice += int((~first & ~np.isnan(positions)).any(axis=1).sum())
+        table[cells] = np.where(first, positions, before)
+    return times, table, odd, twice
+
+
+def _missing(joints: tuple[str, ...], there: np.ndarray) -> list[str]:
+    """Say which joints have fewer samples than others."""
+    counts = there.sum(axis=0)
+    most = counts.max()
+    return [f'{named([joints[k] for k in np.flatnonzero(counts == count)])}: '
+            f'{_counted(int(count), "sample")} where others have {most}'
+            for count in np.unique(counts[counts < most])]
+
+
+def _intervals(joints: tuple[str, ...], times: np.ndarray, there: np.ndarray) -> list[str]:
+    """Say where samples drop out and how many intervals jitter, for joints that go together."""
+    together: dict[bytes, list[int]] = {}
+    if there.all():
+        together[b''] = list(range(len(joints)))
+    else:
+        for k in range(len(joints)):
+            together.setdefault(there[:, k].tobytes(), []).append(k)
+    notes = []
+    for columns in together.values():
+        own = times if there.all() else times[there[:, columns[0]]]
+        if len(own) < 3:
+            continue
+        steps = np.diff(own)
+        usual = float(np.median(steps))
+        long = steps > DROPOUT * usual
+        who = '' if len(together) == 1 else f'{named([joints[k] for k in columns])}: '
+        if long.any():
+            lost = int((np.rint(steps[long] / usual) - 1).sum())
+            worst = int(np.argmax(steps))
+            notes.append(f'{who}{_counted(int(long.sum()), "dropout")}, about '
+                         f'{_counted(lost, "sample")} of {len(own) + lost}, the longest '
+                         f'{steps[worst]:.4g} s at {own[worst]:.4g} s')
+        off = int((np.abs(steps - usual)[~long] > JITTER * usual).sum())
+        if off:
+            notes.append(f'{who}{off} of {len(steps)} intervals jitter by more than '
+                         f'{JITTER:.0%} of the usual {usual:.4g} s')
+    return notes
+
+
+def _counted(count: int, what: str) -> str:
+    return f'{count} {what}{"" if count == 1 else "s"}'

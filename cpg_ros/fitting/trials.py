@@ -1,0 +1,89 @@
+"""A trust region from one start, with a record of its way.
+
+Values without an orbit are infeasible: the region shrinks until it holds a step that has one.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import least_squares
+
+from cpg_ros.dynamics.periodic import NoOrbit
+
+#: Values -> residual (n,) and its derivative (n, values); NoOrbit where there is none.
+Evaluate = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
+
+
+@dataclass(frozen=True)
+class Trial:
+    """What came of one start.
+
+    Attributes:
+        start: values it started from.
+        values: where it ended.
+        cost: half the sum of squares there; infinite where the start had no orbit.
+        path: cost and values at the start and after every accepted step, shape
+            (iterations + 1, 1 + values).
+        evaluations: orbits that were asked for.
+        infeasible: how many of them there were not.
+        converged: whether a tolerance was met.
+        why: the reason where there was nothing to start from, or ''.
+
+    """
+
+    start: np.ndarray
+    values: np.ndarray
+    cost: float
+    path: np.ndarray
+    evaluations: int
+    infeasible: int
+    converged: bool
+    why: str = ''
+
+    @property
+    def iterations(self) -> int:
+        """Accepted steps."""
+        return max(0, len(self.path) - 1)
+
+
+def descend(evaluate: Evaluate, start: np.ndarray, low: np.ndarray, high: np.ndarray,
+            tolerance: float, most: int = 100) -> Trial:
+    """Minimise half the sum of squares within bounds, by scipy's 'trf' and exact derivatives.
+
+    Args:
+        evaluate: the problem; asked again for values it has just been asked for.
+        start: values, shape (n,).
+        low: lower bounds, shape (n,).
+        high: upper bounds.
+        tolerance: relative change of values, and of the cost, at which to stop.
+        most: evaluations at most.
+
+    """
+    start = np.asarray(start, dtype=float)
+    path: list[np.ndarray] = []
+    count = [0, 0]
+    try:
+        size = evaluate(start)[0].size
+    except NoOrbit as error:
+        return Trial(start, start, float('inf'), np.empty((0, 1 + start.size)), 1, 1, False,
+                     str(error))
+
+    def residual(values: np.ndarray) -> np.ndarray:
+        count[0] += 1
+        try:
+            return evaluate(values)[0]
+        except NoOrbit:
+            # The method answers what is not finite with a shorter step.
+            count[1] += 1
+            return np.full(size, np.nan)
+
+    def jacobian(values: np.ndarray) -> np.ndarray:
+        left, slopes = evaluate(values)
+        path.append(np.append(0.5 * left @ left, values))
+        return slopes
+
+    found = least_squares(residual, start, jacobian, (low, high), 'trf', x_scale='jac',
+                          ftol=tolerance, xtol=tolerance, gtol=1e-15, max_nfev=most)
+    return Trial(start, found.x, float(found.cost), np.array(path), count[0],
+                 count[1], found.status > 0)

@@ -1,0 +1,220 @@
+"""The node ``cpg_inversion``: listens to joint states, and fits them when it is asked to.
+
+One thread listens and answers; a fit runs in a thread of its own, while more comes in.
+"""
+
+import json
+import threading
+from functools import partial
+from pathlib import Path
+
+import rclpy
+from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
+from rcl_interfaces.srv import SetParametersAtomically
+from rclpy.callback_groups import ReentrantCallbackGroup
+from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.qos_overriding_options import QoSOverridingOptions
+from rclpy.task import Future
+from rclpy.timer import Timer
+from sensor_msgs.msg import JointState
+from std_msgs.msg import String
+from std_srvs.srv import Trigger
+
+from cpg_ros.fitting.fitted import write_fitted
+from cpg_ros.fitting.inverted import Inverted, inverted
+from cpg_ros.fitting.live import Live
+from cpg_ros.robot import Robot, find_robot
+from cpg_ros.tools.arguments import finite
+from cpg_ros.whole import write_whole
+
+NAME = 'cpg_inversion'
+#: Seconds that a generator gets to answer.
+PATIENCE = 3.0
+
+
+class Inversion(Node):
+    """Joint states in; on ~/fit parameters, files, and a running generator set."""
+
+    def __init__(self) -> None:
+        super().__init__(NAME)
+        text = ParameterDescriptor
+
+        def range_of(low: float, high: float, what: str) -> ParameterDescriptor:
+            return ParameterDescriptor(description=what, floating_point_range=[
+                FloatingPointRange(from_value=low, to_value=high)])
+
+        self.declare_parameter('topics', ['joint_states'], text(
+            description='topics of type sensor_msgs/JointState to listen to', read_only=True))
+        self.declare_parameter('robot', '', text(
+            description='robot file or the name of a shipped one; empty: legs are told from the '
+            'names of the joints', read_only=True))
+        self.declare_parameter('window', 60.0, range_of(
+            0.0, 3600.0, 'how much of the last joint states is kept and fitted [s]; 0 for all'))
+        self.declare_parameter('every', 0.0, range_of(
+            0.0, 3600.0, 'time between fits without being asked [s]; 0 for none'))
+        self.declare_parameter('network', '', text(
+            description="network to fit; empty: the robot's, or by the number of legs"))
+        self.declare_parameter('gait', '', text(description='gait to fit; empty: as recognised'))
+        self.declare_parameter('free', Parameter.Type.STRING_ARRAY, text(
+            description="parameters to fit; not set: the network's usual ones"))
+        self.declare_parameter('order', 3, ParameterDescriptor(
+            description='order of the readout', integer_range=[
+                IntegerRange(from_value=1, to_value=3, step=1)]))
+        self.declare_parameter('out', '', text(
+            description='parameter file to write; empty for none'))
+        self.declare_parameter('report', '', text(description='page to write; empty for none'))
+        self.declare_parameter('apply_to', '', text(
+            description='generator to set after a fit, such as /cpg_generator; empty for none'))
+
+        name = self._value('robot')
+        self._robot: Robot | None = find_robot(name) if name else None
+        topics = tuple(self.resolve_topic_name(topic) for topic in self._value('topics'))
+        self._live = Live(topics, self._value('window'))
+        # Best effort goes with every publisher; a reader may fall behind while it fits.
+        quality = QoSProfile(depth=2000, reliability=ReliabilityPolicy.BEST_EFFORT)
+        for topic in topics:
+            self.create_subscription(
+                JointState, topic, partial(self._hear, topic), quality, raw=True,
+                qos_overriding_options=QoSOverridingOptions.with_default_policies())
+        self._result = self.create_publisher(String, '~/result', QoSProfile(
+            depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL))
+        # Answers of others come in while a request waits for its fit.
+        self._group = ReentrantCallbackGroup()
+        self.create_service(Trigger, '~/fit', self._fit, callback_group=self._group)
+        self._timer: Timer | None = None
+        self._busy = False
+        self._often(self._value('every'))
+        self.add_post_set_parameters_callback(self._changed)
+        self.get_logger().info(f'listening to {", ".join(topics)}; call ~/fit')
+
+    def _value(self, name: str):
+        return self.get_parameter(name).value
+
+    def _changed(self, parameters: list[Parameter]) -> None:
+        for parameter in parameters:
+            if parameter.name == 'window':
+                self._live.window = parameter.value
+            elif parameter.name == 'every':
+                self._often(parameter.value)
+
+    def _often(self, every: float) -> None:
+        if self._timer is not None:
+            self.destroy_timer(self._timer)
+            self._timer = None
+        if every > 0.0:
+            self._timer = self.create_timer(every, self._again, callback_group=self._group)
+
+    def _hear(self, topic: str, message: bytes) -> None:
+        self._live.add(topic, self.get_clock().now().nanoseconds, message)
+
+    async def _again(self) -> None:
+        if not self._busy:
+            await self._done()
+
+    async def _fit(self, request: Trigger.Request, response: Trigger.Response
+                   ) -> Trigger.Response:
+        if self._busy:
+            response.success, response.message = False, 'a fit is under way'
+        else:
+            response.success, response.message = await self._done()
+        return response
+
+    async def _done(self) -> tuple[bool, str]:
+        """Fit in a thread, publish and apply; tell whether it went well, and what."""
+        self._busy = True
+        try:
+            heard, work = self._live.copy(), Future(executor=self.executor)
+            threading.Thread(target=self._work, args=(heard, work), daemon=True).start()
+            said, found = await work
+            if found is not None:
+                self._result.publish(String(data=json.dumps(finite(found.as_dict()))))
+                target = self._value('apply_to')
+                why = await self._applied(target, found) if target else ''
+                if why:
+                    said, found = f'{said}; not applied to {target}: {why}', None
+                elif target:
+                    said = f'{said}; applied to {target}'
+        finally:
+            self._busy = False
+        log = self.get_logger()
+        (log.warning if found is None else log.info)(said)
+        return found is not None, said
+
+    def _work(self, heard: Live, work: Future) -> None:
+        """Fit and write; the outcome is what to say, and what was found or None."""
+        try:
+            free = self.get_parameter_or('free').value or ()
+            names = () if self._robot is None else [joint.name for joint in self._robot.joints]
+            found = inverted(heard.recording(names, some=True), self._robot, self._value('network'),
+                             self._value('gait'), tuple(free), self._value('order'))
+            work.set_result(('; '.join([_summary(found), *self._written(found)]), found))
+        except (ValueError, OSError) as error:
+            work.set_result((str(error), None))
+        except BaseException as error:
+            work.set_exception(error)
+
+    def _written(self, found: Inverted) -> list[str]:
+        written = []
+        if self._value('report'):
+            # matplotlib takes half a second, and only pages need it.
+            from cpg_ros.tools.inversion_report import as_html
+            path = Path(self._value('report')).expanduser()
+            write_whole(path, as_html(found))
+            written.append(path)
+        if self._value('out'):
+            written += write_fitted(Path(self._value('out')).expanduser(), found, self._robot)
+        return [f'written: {", ".join(map(str, written))}'] if written else []
+
+    async def _applied(self, target: str, found: Inverted) -> str:
+        """Set a running generator; return why that failed, or ''."""
+        name = f'{target}/set_parameters_atomically'
+        client = self.create_client(SetParametersAtomically, name, callback_group=self._group)
+        try:
+            network = found.fit.network
+            values = {'gait': found.fit.gait, 'frequency': found.stride.frequency,
+                      **{f'{network.name}.{key}': value
+                         for key, value in network.as_dict().items()}}
+            if not client.wait_for_service(PATIENCE):
+                return f'there is no service {name}'
+            answer = client.call_async(SetParametersAtomically.Request(parameters=[
+                Parameter(key, value=value).to_parameter_msg() for key, value in values.items()]))
+            late = self.create_timer(PATIENCE, answer.cancel, callback_group=self._group)
+            result = await answer
+            self.destroy_timer(late)
+            if result is None:
+                return f'{name} does not answer'
+            return '' if result.result.successful else result.result.reason
+        finally:
+            self.destroy_client(client)
+
+
+def _summary(found: Inverted) -> str:
+    fit = found.fit
+    values = ', '.join(f'{name} {one.value:.4g} +- {one.stderr:.2g}'
+                       for name, one in fit.parameters.items())
+    return (f'{fit.gait} at {found.stride.frequency:.4f} Hz, {values}, mean RMS error '
+            f'{100 * fit.mean_rms_share:.1f} % of range')
+
+
+def run(args: list[str] | None = None) -> int:
+    """Run the node until it is interrupted; return the exit code."""
+    rclpy.init(args=args)
+    try:
+        node = Inversion()
+    except ValueError as error:
+        rclpy.logging.get_logger(NAME).fatal(str(error))
+        rclpy.try_shutdown()
+        return 1
+    executor = SingleThreadedExecutor()
+    executor.add_node(node)
+    try:
+        executor.spin()
+    except (KeyboardInterrupt, ExternalShutdownException):
+        pass
+    finally:
+        executor.shutdown(timeout_sec=1.0)
+        rclpy.try_shutdown()
+    return 0

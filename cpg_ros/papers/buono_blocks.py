@@ -1,0 +1,188 @@
+"""Buono & Golubitsky (2001), section 5.2: Tables 5 to 11, formulas against the linearisation.
+
+The formulas stand in ``dynamics.buono_tables`` as printed. They are held against the blocks of the
+network's own Jacobian, at one state in which all cells are alike and one set of couplings, both
+drawn at random, so that no formula holds by chance.
+"""
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from cpg_ros.dynamics.blocks import Block, blocks
+from cpg_ros.dynamics.buono_tables import Tables, square_root
+from cpg_ros.dynamics.stand import everywhere
+from cpg_ros.networks.quadruped import CELL, PHI, Quadruped
+from cpg_ros.papers.buono_gaits import AUTHORS
+from cpg_ros.papers.row import Picture, Place, Row
+
+#: Table 5: phases of cells 1 to 8, upper and lower signs, by (j, k).
+TABLE_5 = {(0, 0): ('pronk', '0 0 0 0 0 0 0 0'), (0, 1): ('pace', '0 1/2 0 1/2 0 1/2 0 1/2'),
+           (1, 0): ('jump+', '0 0 1/4 1/4 1/2 1/2 3/4 3/4'),
+           (3, 0): ('jump-', '0 0 -1/4 -1/4 1/2 1/2 -3/4 -3/4'),
+           (1, 1): ('walk+', '0 1/2 1/4 3/4 1/2 0 3/4 1/4'),
+           (3, 1): ('walk-', '0 1/2 -1/4 -3/4 1/2 0 -3/4 -1/4'),
+           (2, 0): ('bound', '0 0 1/2 1/2 0 0 1/2 1/2'),
+           (2, 1): ('trot', '0 1/2 1/2 0 0 1/2 1/2 0')}
+#: Tables 6 to 8, 11: how the entries read; the formulas themselves are in ``buono_tables``.
+TABLE_6 = {'L_00': 'A + (B + C + D)', 'L_01': 'A + (B - C + D)', 'L_20': 'A - (B - C - D)',
+           'L_21': 'A - (B + C - D)', 'L_10': 'A - Bi + C - D', 'L_11': 'A - Bi - C - D',
+           'L_30': 'A + Bi + C - D', 'L_31': 'A + Bi - C - D'}
+SIGNS = {'L_00': '+++', 'L_01': '+-+', 'L_20': '-++', 'L_21': '--+'}
+TABLE_11 = {'L_00': 'nu + 2(alpha + gamma + xi)', 'L_01': 'nu + 2(alpha - gamma + xi)',
+            'L_20': 'nu + 2(-alpha + gamma + xi)', 'L_21': 'nu - 2(alpha + gamma - xi)',
+            'L_10': 'nu + 2 gamma - 2 xi', 'L_11': 'nu - 2 gamma - 2 xi'}
+#: About the stand of section 6.
+STAND = np.array([0.31, 0.52])
+
+
+class Sample:
+    """Couplings, a state of all cells, the blocks of the linearisation, and the tables there.
+
+    Attributes:
+        network: the couplings.
+        state: (v, w) of every cell.
+        blocks: by their name.
+        tables: the printed formulas.
+
+    """
+
+    def __init__(self, network: Quadruped, state: np.ndarray) -> None:
+        self.network, self.state = network, state
+        self.blocks: dict[str, Block] = {one.name: one for one in blocks(network, state)}
+        self.tables = Tables.at(network, CELL.jacobian(state[:1], state[1:], PHI))
+
+    def trace(self, name: str) -> complex:
+        """Trace of a block."""
+        return complex(np.trace(self.blocks[name].matrix))
+
+    def discriminant(self, name: str) -> complex:
+        """``(tr L)^2 - 4 det L`` of a block."""
+        return complex(self.trace(name)**2 - 4.0 * np.linalg.det(self.blocks[name].matrix))
+
+    def largest(self, name: str) -> float:
+        """Largest real part of a block's eigenvalues."""
+        return float(self.blocks[name].eigenvalues.real.max())
+
+
+def drawn(equal: bool = False) -> Sample:
+    """Draw a sample; with alpha = beta, gamma = delta and xi = eta if asked."""
+    rng = np.random.default_rng(2001)
+    network = Quadruped(*rng.uniform(-0.5, 0.5, 6))
+    if equal:
+        network = replace(network, beta=network.alpha, delta=network.gamma, eta=network.xi)
+    # Near the stand, where nu^2 < 4 Delta as section 5 assumes.
+    return Sample(network, STAND + rng.uniform(-0.05, 0.05, 2))
+
+
+def phases() -> Iterator[Row | Picture]:
+    """Table 5: eigenvectors of the whole linearisation."""
+    sample = drawn()
+    whole = sample.network.jacobian(everywhere(sample.network, sample.state))
+    values, vectors = np.linalg.eig(whole)
+    found = np.concatenate([one.eigenvalues for one in sample.blocks.values()])
+    gap = max(np.abs(values - one).min() for one in found)
+    yield Place(AUTHORS, 'section 5.2').holds(
+        'the eight blocks hold all eigenvalues of L',
+        gap < 1e-9 and max(np.abs(found - one).min() for one in values) < 1e-9,
+        note=f'largest difference {gap:.1e}')
+    at = Place(AUTHORS, 'Table 5')
+    for (j, k), (gait, printed) in TABLE_5.items():
+        eigenvalue = sample.blocks[f'L_{j}{k}'].eigenvalues[0]
+        vector = vectors[:8, np.abs(values - eigenvalue).argmin()]
+        yield at.phases(f'U_{j % 2 or j}{k}: phases of cells 1 to 8, {gait}', printed,
+                        np.angle(vector / vector[0]) / (2.0 * np.pi),
+                        note='from the eigenvector of the 16 x 16 matrix')
+
+
+def _signed(signs: str, operator: str) -> str:
+    pairs = (('alpha', 'beta'), ('gamma', 'delta'), ('xi', 'eta'))
+    return ' '.join(f'{sign} ({a} {operator} {b})' for sign, (a, b) in zip(signs, pairs,
+                                                                          strict=True))
+
+
+def tables() -> Iterator[Row | Picture]:
+    """Tables 6 to 10, and what is said of eigenvalues with them."""
+    sample = drawn()
+    printed, parts = sample.tables, sample.blocks
+    for name, text in TABLE_6.items():
+        yield Place(AUTHORS, 'Table 6').formula(name, text, printed.block(*parts[name].mode),
+                                                parts[name].matrix)
+    for name, signs in SIGNS.items():
+        wrong, n = name == 'L_21', sample.network
+        text = '(a + d) ' + _signed(signs if not wrong else '---', '+')
+        yield Place(AUTHORS, 'Table 7').formula(
+            f'trace of {name}', text, (trace := printed.trace(*parts[name].mode)),
+            sample.trace(name).real,
+            erratum=(12, trace + 2.0 * (n.xi + n.eta)) if wrong else None)
+    for name, signs in SIGNS.items():
+        yield Place(AUTHORS, 'Table 8').formula(
+            f'D of {name}', f'((a - d) {_signed(signs, "-")})^2 + 4bc',
+            printed.discriminant(*parts[name].mode), sample.discriminant(name).real)
+    for name in ('L_10', 'L_30', 'L_11', 'L_31'):
+        mode, whole = parts[name].mode, sample.discriminant(name)
+        yield Place(AUTHORS, 'Table 9').formula(f'Phi of {name}', 'as printed',
+                                                printed.phi(*mode), whole.real)
+        yield Place(AUTHORS, 'Table 10').formula(f'Psi of {name}', 'as printed',
+                                                 printed.psi(*mode), whole.imag)
+        root = square_root(whole.real, whole.imag)
+        yield Place(AUTHORS, 'eq. 5.3').formula(
+            f'square of the root of Phi + i Psi, {name}', 'Phi + i Psi', whole, root**2,
+            erratum=(24, whole.conjugate()),
+            note=f'Psi is {"positive" if whole.imag > 0.0 else "negative"}')
+    for k in (0, 1):
+        real = sorted((value.real for value in parts[f'L_1{k}'].eigenvalues), reverse=True)
+        for text, theirs, ours in zip(('eq. 5.4', 'eq. 5.5'), printed.real_parts(k), real,
+                                      strict=True):
+            yield Place(AUTHORS, 'Proposition 5.2').formula(
+                f'real part of an eigenvalue in U_1{k}', text, theirs, ours,
+                erratum=(13, theirs / 2.0))
+            yield Place(AUTHORS, 'Proposition 5.2').formula(
+                f'twice the real part of an eigenvalue in U_1{k}', text, theirs, 2.0 * ours)
+        yield Place(AUTHORS, 'Corollary 5.4').holds(
+            f'in U_1{k} one pair lies to the right of the other', real[0] > real[1])
+
+
+def coupled_variable() -> Iterator[Row | Picture]:
+    """Equation 4.4: what delta multiplies."""
+    sample = drawn()
+    network, at = sample.network, Place(AUTHORS, 'eq. 4.4')
+    theirs = sample.tables.trace(0, 0)
+    # Seen by all cells alike, delta acts on w by way of w; or, as printed, by way of v.
+    printed = sample.blocks['L_00'].matrix + network.delta * np.array([[0, 0], [1, -1]])
+    yield at.formula('trace of L_00 if delta multiplies y', 'Table 7', theirs,
+                     sample.trace('L_00').real)
+    yield at.formula('trace of L_00 if delta multiplies x, as printed', 'Table 7', theirs,
+                     float(np.trace(printed).real), erratum=(19, theirs - network.delta))
+
+
+def equal_couplings() -> Iterator[Row | Picture]:
+    """Table 11 and Lemma 5.8: alpha = beta, gamma = delta, xi = eta."""
+    sample = drawn(equal=True)
+    printed, parts = sample.tables, sample.blocks
+    at = Place(AUTHORS, 'Table 11')
+    for name, text in TABLE_11.items():
+        value = printed.sigma(*parts[name].mode)
+        yield at.formula(f'real part of the eigenvalues of {name}', text, value,
+                         sample.largest(name), erratum=(13, value / 2.0))
+        yield at.formula(f'twice the real part of the eigenvalues of {name}', text, value,
+                         2.0 * sample.largest(name))
+    at, n = Place(AUTHORS, 'Lemma 5.8'), sample.network
+    # nu enters each trace once: take it for which tr L_21 vanishes.
+    critical = printed.nu - sample.trace('L_21').real
+    yield at.formula('nu at which the trace of L_21 vanishes', '2 alpha + 2 gamma - xi',
+                     2.0 * n.alpha + 2.0 * n.gamma - n.xi, critical,
+                     erratum=(20, 2.0 * (n.alpha + n.gamma - n.xi)))
+    for name, text, value, wrong in (
+            ('L_00', '4(alpha + gamma)', 4.0 * (n.alpha + n.gamma), None),
+            ('L_10', '4 alpha', 4.0 * n.alpha,
+             (20, 2.0 * n.alpha + 4.0 * n.gamma - 4.0 * n.xi)),
+            ('L_01', '4 alpha, printed of L_10', 4.0 * n.alpha, None),
+            ('L_20', '4 gamma', 4.0 * n.gamma, None),
+            ('L_11', '2 alpha - 4 xi', 2.0 * n.alpha - 4.0 * n.xi, None),
+            ('L_10', '2 alpha + 4 gamma - 4 xi', 2.0 * n.alpha + 4.0 * n.gamma - 4.0 * n.xi,
+             None)):
+        there = sample.trace(name).real - printed.nu + critical
+        yield at.formula(f'trace of {name} (real part) with that nu', text, value, there,
+                         erratum=wrong)

@@ -1,0 +1,197 @@
+"""Buono & Golubitsky (2001), sections 2.3 and 3: D4, four cells, and which leg each cell moves.
+
+All of it is found by going through all cases.
+"""
+
+from collections.abc import Iterator
+from functools import cache
+from itertools import permutations
+
+from cpg_ros.networks.symmetry import Z4_Z2, Permutation
+from cpg_ros.papers.buono_gaits import AUTHORS, LEGS
+from cpg_ros.papers.row import Picture, Place, Row
+
+Subgroup = frozenset[Permutation]
+
+
+def cycles(text: str, cells: int) -> Permutation:
+    """Read a permutation written in cycles of cells from 1, such as '(1 2)(3 8)'."""
+    image = list(range(cells))
+    for cycle in text.strip('()').split(')('):
+        members = [int(part) - 1 for part in cycle.split()]
+        for here, there in zip(members, members[1:] + members[:1], strict=True):
+            image[here] = there
+    return tuple(image)
+
+
+def after(outer: Permutation, inner: Permutation) -> Permutation:
+    """The product: first the inner one."""
+    return tuple(outer[i] for i in inner)
+
+
+def inverse(element: Permutation) -> Permutation:
+    """The inverse."""
+    return tuple(sorted(range(len(element)), key=element.__getitem__))
+
+
+def generated(*generators: Permutation) -> Subgroup:
+    """The subgroup that permutations generate."""
+    found = {tuple(range(len(generators[0])))}
+    waiting = list(found)
+    while waiting:
+        element = waiting.pop()
+        for generator in generators:
+            image = after(generator, element)
+            if image not in found:
+                found.add(image)
+                waiting.append(image)
+    return frozenset(found)
+
+
+def conjugate(by: Permutation, subgroup: Subgroup) -> Subgroup:
+    """``g S g^-1``."""
+    return frozenset(after(after(by, one), inverse(by)) for one in subgroup)
+
+
+@cache
+def all_subgroups(group: Subgroup) -> frozenset[Subgroup]:
+    """Every subgroup; those of D4 need two generators at most, and no others are asked for."""
+    return frozenset(generated(a, b) for a in group for b in group)
+
+
+def cyclic(h: Subgroup, k: Subgroup) -> bool:
+    """Whether k is normal in h with a cyclic quotient."""
+    return k <= h and all(conjugate(g, k) == k for g in h) and any(
+        generated(g, *k) == h for g in h)
+
+
+#: Section 3's D4, and the names of section 2.3.
+OMEGA, KAPPA = cycles('(1 3 5 7)(2 4 6 8)', 8), cycles('(1 2)(3 8)(5 6)(7 4)', 8)
+HALF = after(OMEGA, OMEGA)
+D4 = generated(OMEGA, KAPPA)
+ONE = tuple(range(8))
+NAMES = {'D4': D4, 'D2s': generated(KAPPA, HALF), 'D2p': generated(after(KAPPA, OMEGA), HALF),
+         'Z4': generated(OMEGA), '1': generated(ONE), 'Z2s': generated(KAPPA),
+         'Z2p': generated(after(KAPPA, OMEGA)), 'Z2': generated(HALF)}
+TYPES = ('Z4 in D4', 'D2p in D4', 'D2s in D4', 'Z2 in Z4', 'Z2 in D2p', 'Z2p in D2p',
+         'Z2 in D2s', 'Z2s in D2s', '1 in Z4', '1 in Z2', '1 in Z2p', '1 in Z2s')
+
+
+def _name(subgroup: Subgroup) -> str:
+    return next(name for name, one in NAMES.items()
+                if any(conjugate(g, one) == subgroup for g in D4))
+
+
+def solutions() -> list[tuple[Subgroup, Subgroup]]:
+    """All pairs (K, H) of D4 that Theorem 2.2 admits with H larger than K."""
+    every = all_subgroups(D4)
+    return [(k, h) for h in every for k in every if k < h and cyclic(h, k)]
+
+
+def dihedral() -> Iterator[Row | Picture]:
+    """Section 2.3, and what the proof of Theorem 3.2 takes from it."""
+    at = Place(AUTHORS, 'section 2.3')
+    classes = {frozenset(conjugate(g, one) for g in D4) for one in all_subgroups(D4)}
+    yield at.number('conjugacy classes of subgroups of D4', '8', len(classes))
+    types = {frozenset((conjugate(g, k), conjugate(g, h)) for g in D4)
+             for k, h in solutions()}
+    yield at.number('types of periodic solutions with H larger than K', '12', len(types))
+    found = {f'{_name(k)} in {_name(h)}' for k, h in solutions()}
+    yield at.word('those types', ', '.join(TYPES), ', '.join(
+        [name for name in TYPES if name in found] + sorted(found - set(TYPES))))
+    quarter = {f'{_name(k)} in {_name(h)}' for k, h in solutions() if len(h) == 4 * len(k)}
+    yield at.word('those with a quarter-period phase shift', '1 in Z4',
+                  ', '.join(sorted(quarter)))
+    at = Place(AUTHORS, 'Theorem 3.2')
+    yield at.holds('kappa omega = omega^3 kappa',
+                   after(KAPPA, OMEGA) == after(after(HALF, OMEGA), KAPPA))
+    half = [(k, h) for k, h in solutions()
+            if KAPPA in h - k and len(k) > 1 and after(KAPPA, KAPPA) in k]
+    yield at.number('types with kappa as a half-period shift and a spatial symmetry', '3',
+                    len(half), erratum=(15, '4'),
+                    note='K in H: ' + ', '.join(sorted(f'{_name(k)} in {_name(h)}'
+                                                       for k, h in half)))
+    for k, h, phase in ((NAMES['D2p'], D4, '0'), (NAMES['Z2'], NAMES['D2s'], '0'),
+                        (generated(after(KAPPA, HALF)), NAMES['D2s'], '1/2')):
+        yield at.phases(f'{_name(k)} in {_name(h)}: phase of RH (cell 5) against LH (cell 1)',
+                        phase, [0.0 if HALF in k else 0.5 * (HALF in h)],
+                        note='H/K is Z2: what is in H but not in K shifts by half a period')
+
+
+def four_cells() -> Iterator[Row | Picture]:
+    """Theorem 3.1: conjugation by the walk's four-cycle."""
+    at = Place(AUTHORS, 'Theorem 3.1')
+    turn = cycles('(1 3 2 4)', 4)
+    for one, other in (('(1 4)(2 3)', '(1 3)(2 4)'), ('(1 3)(2 4)', '(1 4)(2 3)'),
+                       ('(1 2)(3 4)', '(1 2)(3 4)')):
+        image = after(after(turn, cycles(one, 4)), inverse(turn))
+        yield at.word(f'(1 3 2 4) {one} (1 3 2 4)^-1', other, _written(image))
+
+
+def _written(element: Permutation) -> str:
+    """A permutation in cycles from 1, without the cells it leaves in place."""
+    left, text = [i for i in range(len(element)) if element[i] != i], ''
+    while left:
+        cycle = [left[0]]
+        while element[cycle[-1]] != cycle[0]:
+            cycle.append(element[cycle[-1]])
+        text += f'({" ".join(str(i + 1) for i in cycle)})'
+        left = [i for i in left if i not in cycle]
+    return text
+
+
+@cache
+def assignments() -> tuple[tuple[str, ...], ...]:
+    """All assignments F of two cells to each leg with F(1) = LH that satisfy eq. 3.2.
+
+    Cells that share a leg are carried by every symmetry to cells that share one.
+    """
+    symmetries = list(Z4_Z2.elements.values())
+    found = []
+    for partition in _pairings(tuple(range(8))):
+        pairs = {frozenset(pair) for pair in partition}
+        if all(frozenset(g[i] for i in pair) in pairs for g in symmetries for pair in pairs):
+            own = next(pair for pair in partition if 0 in pair)
+            others = [pair for pair in partition if pair != own]
+            for legs in permutations(LEGS[1:]):
+                leg = {i: name for pair, name in zip((own, *others), (LEGS[0], *legs),
+                                                     strict=True) for i in pair}
+                found.append(tuple(leg[i] for i in range(8)))
+    return tuple(found)
+
+
+def _pairings(cells: tuple[int, ...]) -> Iterator[list[tuple[int, int]]]:
+    if not cells:
+        yield []
+        return
+    first, rest = cells[0], cells[1:]
+    for other in rest:
+        for more in _pairings(tuple(i for i in rest if i != other)):
+            yield [(first, other), *more]
+
+
+#: Table 4: legs of cells 1 to 8.
+TABLE_4 = {'zig-zag': 'LH RH LF RF LH RH LF RF', 'criss-cross': 'LH RH LF RF RH LH RF LF'}
+#: Table 3.
+TABLE_3 = 'LH RH LF RF LF RF LH RH'
+
+
+def legs() -> Iterator[Row | Picture]:
+    """Theorem 3.3, Tables 3 and 4."""
+    at = Place(AUTHORS, 'Theorem 3.3')
+    allowed = assignments()
+    yield at.number('assignments with F(1) = LH and eq. 3.2, no more asked', '2', len(allowed),
+                    erratum=(16, '18'))
+    proven = [' '.join(F) for F in allowed if F[1:4] == LEGS[1:]]
+    yield at.number('assignments if also F(2) = RH, F(3) = LF, F(4) = RF, as in the proof', '2',
+                    len(proven))
+    at = Place(AUTHORS, 'Table 4')
+    names = dict(zip(TABLE_4, sorted(proven, key=lambda F: F.split()[4] != 'LH'), strict=True))
+    for name, printed in TABLE_4.items():
+        yield at.word(f'legs of cells 1 to 8, {name} network', printed, names[name])
+    shared = TABLE_3.split()
+    pairs = {frozenset(i for i in range(8) if shared[i] == leg) for leg in LEGS}
+    kept = all(frozenset(g[i] for i in pair) in pairs
+               for g in Z4_Z2.elements.values() for pair in pairs)
+    yield Place(AUTHORS, 'Table 3').holds('the assignment of Table 3 is none that eq. 3.2 allows',
+                                          not kept)

@@ -1,0 +1,199 @@
+"""Buono & Golubitsky (2001), sections 4 to 6: Table 12, the stand, Theorems 4.1 to 4.3."""
+
+from collections.abc import Iterator
+
+import numpy as np
+from scipy.optimize import brentq
+
+from cpg_ros.dynamics.cell_hopf import CellHopf, hopf_at
+from cpg_ros.dynamics.stand import stand
+from cpg_ros.networks.along import Along
+from cpg_ros.networks.biped import Biped
+from cpg_ros.networks.quadruped import GAITS, Quadruped
+from cpg_ros.papers.buono_blocks import Sample
+from cpg_ros.papers.buono_gaits import AUTHORS
+from cpg_ros.papers.row import Picture, Place, Row
+
+UNCOUPLED = Quadruped(0.0, 0.0, 0.0, 0.0)
+#: Section 6.
+STAND, NU_0 = ('0.31', '0.52'), '-1.24'
+#: Table 12: alpha = beta, gamma = delta, xi = eta.
+TABLE_12 = {'pace': ('0.3', '-0.32', '0'), 'bound': ('-0.32', '0.3', '0'),
+            'trot': ('0.15', '-0.16', '-0.31')}
+#: 'Approximate values': this much of them.
+APPROXIMATE = 0.1
+#: Erratum 6: the signs with which the trot's Hopf point is there.
+TROT = (-0.15, -0.16, 0.31)
+
+#: Theorem 4.2: clause, gait, alpha, sign of beta, between which values of gamma the point lies,
+#: whether the clause calls it stable.
+THEOREM = (
+    ('a', 'pronk', 0.05, 1.0, (0.05, 0.08), True), ('a', 'pronk', -0.05, 1.0, (0.14, 0.2), False),
+    ('b', 'pace', 0.3, 1.0, (-0.35, -0.2), True), ('b', 'pace', 0.3, 1.0, (0.1, 0.16), False),
+    ('c', 'bound', -0.3, 1.0, (0.25, 0.35), True), ('c', 'bound', 0.05, 1.0, (0.08, 0.1), False),
+    ('d', 'trot', -0.6, 1.0, (-0.6, -0.5), True),
+    ('e', 'jump', 0.05, -1.0, (0.1, 0.2), True), ('f', 'walk', 0.01, -1.0, (-1.2, -1.05), True),
+    ('f', 'walk', 0.05, -1.0, (-1.1, -0.9), True))
+#: Of these the one where the clause does not hold, by its gait and alpha.
+FAILING = ('walk', 0.05)
+
+
+def _sample(network: Quadruped | Biped) -> Sample:
+    assert isinstance(network, Quadruped)
+    return Sample(network, stand(network))
+
+
+def hopf(network: Quadruped, line: str, gait: str, low: float, high: float) -> CellHopf:
+    """Find the Hopf point of a gait between two values of parameters.
+
+    Args:
+        network: the other parameters.
+        line: the parameters that move, as in ``Along``.
+        gait: one of the six.
+        low: value on one side of the point.
+        high: value on the other side.
+
+    """
+    along, (j, k) = Along.parse(line, Quadruped), GAITS[gait]
+
+    def largest(value: float) -> float:
+        return _sample(along.at(network, value)).largest(f'L_{j}{k}')
+
+    there = along.at(network, float(brentq(largest, low, high, xtol=1e-13)))
+    # Of the two senses of a wave the one whose critical eigenvalue turns forward.
+    mode, rank = min((((way, k), rank) for way in {j, -j % 4} for rank in (0, 1)
+                      if _turns(there, (way, k), rank) > 0.0),
+                     key=lambda one: abs(_eigenvalue(there, *one).real))
+    return hopf_at(there, along, mode, rank)
+
+
+def _eigenvalue(network: Quadruped, mode: tuple[int, int], rank: int) -> complex:
+    return complex(_sample(network).blocks[f'L_{mode[0]}{mode[1]}'].eigenvalues[rank])
+
+
+def _turns(network: Quadruped, mode: tuple[int, int], rank: int) -> float:
+    return _eigenvalue(network, mode, rank).imag
+
+
+def the_stand() -> Iterator[Row | Picture]:
+    """Section 6: the stand of the uncoupled cells, and hypothesis 4.6."""
+    at = Place(AUTHORS, 'section 6')
+    sample = _sample(UNCOUPLED)
+    for name, printed, value in zip(('v_0', 'w_0'), STAND, sample.state, strict=True):
+        yield at.number(f'{name} of the stand', printed, float(value))
+    yield at.number('nu_0, the trace of a cell there', NU_0, sample.trace('L_00').real)
+    roots = sample.blocks['L_00'].eigenvalues
+    yield at.holds('the stand is a spiral sink, hypothesis 4.6',
+                   bool((roots.real < 0.0).all() and (roots.imag != 0.0).all()))
+
+
+def existence() -> Iterator[Row | Picture]:
+    """Theorems 4.1 and 4.3: the points of the proofs, where the stand stays in place."""
+    nu = _sample(UNCOUPLED).trace('L_00').real
+    for place, gait, line, text, value, speed in (
+            ('Theorem 4.1', 'walk', 'gamma=delta=-alpha=-beta', 'nu_0/2', nu / 2.0, '-2'),
+            ('Theorem 4.1', 'trot', 'xi=eta=-alpha=-beta', '-nu_0/4', -nu / 4.0, None),
+            ('Theorem 4.3', 'pace', 'alpha=beta=-gamma=-delta', '-nu_0/4', -nu / 4.0, None),
+            ('Theorem 4.3', 'bound', 'alpha=beta=-gamma=-delta', 'nu_0/4', nu / 4.0, None)):
+        point = hopf(UNCOUPLED, line, gait, value - 0.1, value + 0.1)
+        at = Place(AUTHORS, place)
+        yield at.formula(f'{gait}: {line.split("=")[0]} at the Hopf point, {line}', text, value,
+                         point.value)
+        if speed:
+            yield at.formula(f'{gait}: speed at which the eigenvalues cross', speed,
+                             float(speed), point.normal_form.k1.real,
+                             erratum=(13, float(speed) / 2.0))
+    # On xi = -(alpha + gamma) with gamma fixed, nu - 2 (alpha + gamma) + 2 xi by xi is 4, of
+    # which the proof takes the part by xi alone.
+    point = hopf(UNCOUPLED, 'xi=eta=-alpha=-beta', 'trot', 0.2, 0.4)
+    yield Place(AUTHORS, 'Theorem 4.1').formula(
+        'trot: speed at which the eigenvalues cross, xi = -(alpha + gamma)', '2', 2.0,
+        point.normal_form.k1.real, note='2 is E_xi at fixed alpha + gamma; along the line E '
+        'grows by 4, the real part by 2')
+    walk = hopf(UNCOUPLED, 'gamma=delta=-alpha=-beta', 'walk', nu / 2.0 - 0.1, nu / 2.0 + 0.1)
+    sample = _sample(walk.network)
+    alpha = sample.network.alpha
+    at = Place(AUTHORS, 'Proposition 5.6')
+    zero = [name for name in ('L_10', 'L_11') if abs(sample.trace(name).real) < 1e-9]
+    yield at.word('block whose trace vanishes (real part) where nu = 2 gamma', 'L_10',
+                  ', '.join(zero), erratum=(21, 'L_11'))
+    yield at.formula('trace of L_01 there', '2 alpha', 2.0 * alpha, sample.trace('L_01').real)
+    yield at.formula('trace of L_21 there', '-2 alpha', -2.0 * alpha, sample.trace('L_21').real)
+    yield at.holds('an eigenvalue has a positive real part there', walk.unstable_roots > 0)
+
+
+def table_12() -> Iterator[Row | Picture]:
+    """Table 12: Hopf points to pace, bound and trot, and what branches off."""
+    at = Place(AUTHORS, 'Table 12')
+    points = {}
+    for gait, name, line, (alpha, gamma) in (
+            ('pace', 'gamma = delta', 'gamma=delta', (0.3, 0.0)),
+            ('bound', 'alpha = beta', 'alpha=beta', (0.0, 0.3))):
+        printed = TABLE_12[gait][1 if name.startswith('gamma') else 0]
+        points[gait] = hopf(Quadruped(alpha, alpha, gamma, gamma), line, gait, -0.35, -0.2)
+        yield at.number(f'{gait}: {name} at the Hopf point', printed, points[gait].value,
+                        within=APPROXIMATE * abs(float(printed)),
+                        note='the table says approximate; the other coupling as printed')
+    alpha, gamma, xi = (float(one) for one in TABLE_12['trot'])
+    sample = _sample(Quadruped(alpha, alpha, gamma, gamma, xi, xi))
+    leading = max(sample.largest(name) for name in sample.blocks)
+    yield at.number('trot: leading real part of the stand at the couplings printed', '0.00',
+                    leading, within=0.1, erratum=(6, '-0.449'))
+    alpha, gamma, xi = TROT
+    for n, (name, line) in enumerate((('alpha = beta', 'alpha=beta'),
+                                      ('gamma = delta', 'gamma=delta'), ('xi = eta', 'xi=eta'))):
+        near = TROT[n]
+        point = hopf(Quadruped(alpha, alpha, gamma, gamma, xi, xi), line, 'trot', near - 0.05,
+                     near + 0.05)
+        yield at.number(f'trot: {name} at the Hopf point', TABLE_12['trot'][n], point.value,
+                        erratum=(6, f'{near:g}'), note=f'the others at {alpha}, {gamma}, {xi}')
+        points['trot'] = point
+    for gait, point in points.items():
+        yield at.word(f'{gait}: Hopf bifurcation, by the other eigenvalues', 'stable',
+                      'stable' if point.stable else 'unstable',
+                      note=f'leading one {point.others[0]:.4f}')
+        yield Place(AUTHORS, 'Proposition 5.5' if gait != 'trot' else 'Lemma 5.8').word(
+            f'{gait}: the solution that branches off at Table 12', 'stable',
+            'stable' if point.stable and point.supercritical else 'unstable',
+            erratum=(22, 'unstable'),
+            note=f'first Lyapunov coefficient {point.lyapunov:.3f}')
+
+
+def theorem_4_2() -> Iterator[Row | Picture]:
+    """Theorem 4.2 at computed Hopf points, and the numbers of its proofs."""
+    found: dict[str, CellHopf] = {}
+    for clause, gait, alpha, sign, (low, high), stable in THEOREM:
+        point = hopf(Quadruped(alpha, sign * alpha, 0.0, 0.0), 'gamma=delta', gait, low, high)
+        found.setdefault(gait, point)
+        yield Place(AUTHORS, f'Theorem 4.2 ({clause})').word(
+            f'Hopf bifurcation to the {gait}, alpha {alpha:g}, beta {sign * alpha:g}, gamma '
+            f'{point.value:.4f}', 'stable' if stable else 'unstable',
+            'stable' if point.stable else 'unstable',
+            erratum=(23, 'unstable') if (gait, alpha) == FAILING else None,
+            note=f'{point.unstable_roots} other eigenvalues with positive real part')
+    trot = found['trot']
+    sample = _sample(trot.network)
+    n = sample.network
+    at = Place(AUTHORS, 'Proposition 5.5')
+    for name, text, value in (
+            ('L_00', '4(alpha + gamma)', 4.0 * (n.alpha + n.gamma)),
+            ('L_01', '4 alpha', 4.0 * n.alpha), ('L_20', '4 gamma', 4.0 * n.gamma),
+            ('L_10', '2 alpha + 4 gamma', 2.0 * n.alpha + 4.0 * n.gamma),
+            ('L_11', '2 alpha', 2.0 * n.alpha)):
+        yield at.formula(f'trace of {name} (real part) at the Hopf point to the trot', text,
+                         value, sample.trace(name).real)
+    at = Place(AUTHORS, 'Proposition 5.7')
+    for gait, other, sign in (('jump', 'L_11', -1.0), ('walk', 'L_10', 1.0)):
+        sample = _sample(found[gait].network)
+        gamma = sample.network.gamma
+        phi, psi = (part(1, 0) for part in (sample.tables.phi, sample.tables.psi))
+        root = np.sqrt((phi + np.hypot(phi, psi)) / 2.0)
+        four = f'{"-" if sign < 0.0 else ""}4 gamma'
+        with_it = {'jump': ('L_01', 'L_00'), 'walk': ('L_00', 'L_01')}[gait]
+        for name, text, value, ours in (
+                (other, four, sign * 4.0 * gamma, 2.0 * sample.largest(other)),
+                (with_it[0], f'{four} - X', sign * 4.0 * gamma - root,
+                 sample.trace(with_it[0]).real),
+                (with_it[1], '-X', -root, sample.trace(with_it[1]).real)):
+            yield at.formula(f'sigma of {name} at the Hopf point to the {gait}', text, value,
+                             ours, note='X = sqrt((Phi + sqrt(Phi^2 + Psi^2))/2)')

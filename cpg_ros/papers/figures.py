@@ -1,0 +1,43 @@
+"""Figures of the papers: what the cells do over time."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.figure import Figure
+
+#: Colours of the waveforms, as in the other pictures.
+WAVES = ('#2b6cb0', '#c05621', '#2f855a', '#6b46c1')
+
+
+def trajectories(title: str, t: np.ndarray, x: np.ndarray, names: Sequence[str],
+                 waves: Sequence[int] | None = None, variable: str = 'x') -> Figure:
+    """Draw cells over time, one under the other.
+
+    Args:
+        title: paper and number of the figure.
+        t: model time, shape (m,).
+        x: one cell per column, shape (m, cells).
+        names: of the cells.
+        waves: number of each cell's waveform, from 0, which gives the colour; one each by
+            default.
+        variable: what is drawn, for the axis.
+
+    """
+    waves = range(len(names)) if waves is None else waves
+    figure = Figure(figsize=(6.4, 0.9 + 0.75 * len(names)), layout='constrained')
+    low, high = float(x.min()), float(x.max())
+    margin = 0.08 * (high - low)
+    grid = figure.subplots(len(names), 1, sharex=True, squeeze=False)[:, 0]
+    for cell, axes in enumerate(grid):
+        axes.plot(t, x[:, cell], color=WAVES[waves[cell]], linewidth=1.1)
+        axes.set_ylim(low - margin, high + margin)
+        axes.set_ylabel(names[cell], rotation=0, ha='right', va='center', fontsize=9)
+        axes.tick_params(labelsize=8)
+        axes.grid(linewidth=0.3)
+        for side in ('top', 'right'):
+            axes.spines[side].set_visible(False)
+    grid[-1].set_xlim(float(t[0]), float(t[-1]))
+    grid[-1].set_xlabel('time [model time]', fontsize=9)
+    figure.supylabel(f'{variable} [1]', fontsize=9)
+    figure.suptitle(title, fontsize=10)
+    return figure

@@ -1,0 +1,129 @@
+"""All rows and figures of the papers, their parts computed side by side."""
+
+import multiprocessing
+import signal
+from collections.abc import Callable, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from dataclasses import dataclass
+from io import BytesIO
+
+from cpg_ros.papers.errata import ERRATA
+from cpg_ros.papers.registry import PAPERS
+from cpg_ros.papers.row import Paper, Picture, Row
+
+#: Dots per inch of a figure.
+RESOLUTION = 100
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """A figure as a picture: paper, number, caption, and PNG."""
+
+    paper: str
+    place: str
+    caption: str
+    png: bytes
+
+
+@dataclass(frozen=True)
+class Reproduction:
+    """What came out.
+
+    Attributes:
+        papers: that were asked for.
+        rows: in the order of the papers.
+        figures: likewise; none if they were not asked for.
+
+    """
+
+    papers: tuple[Paper, ...]
+    rows: tuple[Row, ...]
+    figures: tuple[Drawn, ...]
+
+    @property
+    def failed(self) -> tuple[Row, ...]:
+        """Rows that differ, but not as an erratum says."""
+        return tuple(row for row in self.rows if not row.agrees and not row.explained)
+
+    @property
+    def explained(self) -> tuple[Row, ...]:
+        """Rows that differ as an erratum says."""
+        return tuple(row for row in self.rows if not row.agrees and row.explained)
+
+    @property
+    def errata(self) -> dict[int, tuple[str, str]]:
+        """Errata of these papers, by number: paper and text."""
+        authors = {paper.authors for paper in self.papers}
+        return {number: one for number, one in ERRATA.items() if one[0] in authors}
+
+    @property
+    def summary(self) -> str:
+        """How many rows agree, in one line."""
+        agree = sum(row.agrees for row in self.rows)
+        return (f'{len(self.rows)} published quantities: {agree} agree, {len(self.explained)} '
+                f'explained by errata, {len(self.failed)} fail')
+
+
+def _section(paper: Paper, number: int, draw: bool) -> tuple[list[Row], list[Drawn]]:
+    """Compute a part of a paper; one that breaks off leaves a row that fails."""
+    rows: list[Row] = []
+    figures: list[Drawn] = []
+    section = paper.sections[number]
+    try:
+        for one in section():
+            if isinstance(one, Row):
+                rows.append(one)
+            elif draw:
+                figures.append(_drawn(one))
+    except (ValueError, ArithmeticError) as error:
+        rows.append(Row(paper.authors, section.__name__.replace('_', ' '), 'what is printed here',
+                        'a result', f'no result: {error}', False, 'computed at all'))
+    return rows, figures
+
+
+def _drawn(picture: Picture) -> Drawn:
+    file = BytesIO()
+    picture.figure.savefig(file, format='png', dpi=RESOLUTION)
+    return Drawn(picture.paper, picture.place, picture.caption, file.getvalue())
+
+
+def reproduce(names: Sequence[str], jobs: int = 1, draw: bool = True,
+              progress: Callable[[int], None] = lambda done: None) -> Reproduction:
+    """Compute all rows of some papers.
+
+    Args:
+        names: of the papers, from ``registry.PAPERS``.
+        jobs: processes to share the work; 1 does it in this one.
+        draw: whether to draw the figures.
+        progress: told how many parts are done, out of ``parts(names)``.
+
+    """
+    papers = tuple(PAPERS[name] for name in names)
+    tasks = [(paper, number, draw) for paper in papers for number in range(len(paper.sections))]
+    done: dict[int, tuple[list[Row], list[Drawn]]] = {}
+    if jobs == 1:
+        for place, task in enumerate(tasks):
+            done[place] = _section(*task)
+            progress(len(done))
+    else:
+        # Spawned: a process with threads, as numba's, must not be forked.
+        context = multiprocessing.get_context('spawn')
+        # Ctrl-C reaches all processes: this one ends the others.
+        with ProcessPoolExecutor(min(jobs, len(tasks)), context, signal.signal,
+                                 (signal.SIGINT, signal.SIG_IGN)) as pool:
+            waiting = {pool.submit(_section, *task): place for place, task in enumerate(tasks)}
+            try:
+                for future in as_completed(waiting):
+                    done[waiting[future]] = future.result()
+                    progress(len(done))
+            except BaseException:
+                pool.shutdown(wait=False, cancel_futures=True)
+                raise
+    parts = [done[place] for place in range(len(tasks))]
+    return Reproduction(papers, tuple(row for rows, _ in parts for row in rows),
+                        tuple(figure for _, figures in parts for figure in figures))
+
+
+def parts(names: Sequence[str]) -> int:
+    """How many parts the papers have."""
+    return sum(len(PAPERS[name].sections) for name in names)

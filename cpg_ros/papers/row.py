@@ -1,0 +1,191 @@
+"""A quantity as a paper prints it, what our numerics give for it, and whether the two agree."""
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from decimal import Decimal
+from fractions import Fraction
+
+import numpy as np
+from matplotlib.figure import Figure
+
+#: Phases agree to this part of a cycle; values of a formula to this part of their size.
+PHASE, FORMULA = 0.002, 1e-9
+#: Of a number printed with n decimals, this many more are shown.
+MORE = 2
+
+
+@dataclass(frozen=True)
+class Row:
+    """A published quantity and the computed one.
+
+    Attributes:
+        paper: authors and year.
+        place: section, table, equation or figure of it.
+        quantity: what is meant.
+        published: as the paper prints it.
+        computed: what our numerics give, written alike.
+        agrees: whether the two do.
+        compared: how, in words.
+        value: the computed number; None where it is a word or has several numbers.
+        erratum: number of the one that covers this row (see ``errata``), or None.
+        corrected: what is right according to the erratum, or ''.
+        explained: whether the computed one is that.
+        note: what else a reader should know, or ''.
+
+    """
+
+    paper: str
+    place: str
+    quantity: str
+    published: str
+    computed: str
+    agrees: bool
+    compared: str
+    value: float | None = None
+    erratum: int | None = None
+    corrected: str = ''
+    explained: bool = False
+    note: str = ''
+
+    @property
+    def verdict(self) -> str:
+        """'agrees', 'erratum N', or 'FAILS' where they differ and no erratum says how."""
+        if self.agrees:
+            return 'agrees'
+        return f'erratum {self.erratum}' if self.explained else 'FAILS'
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A figure of a paper, drawn anew.
+
+    Attributes:
+        paper: authors and year.
+        place: the figure's number.
+        caption: what is shown, and where it differs from the paper's.
+        figure: its title names paper and figure.
+
+    """
+
+    paper: str
+    place: str
+    caption: str
+    figure: Figure
+
+
+#: What a formula gives.
+Value = float | complex | np.ndarray
+#: A part of a paper: computes some of its rows and pictures.
+Section = Callable[[], Iterable[Row | Picture]]
+
+
+@dataclass(frozen=True)
+class Paper:
+    """A paper: a short name, authors and year, what it is, and its parts."""
+
+    name: str
+    authors: str
+    reference: str
+    sections: tuple[Section, ...]
+
+
+@dataclass(frozen=True)
+class Place:
+    """A place in a paper, from where rows are quoted.
+
+    An erratum is given with what it says is right: a computed value that is neither that nor the
+    published one fails.
+    """
+
+    paper: str
+    place: str
+
+    def _row(self, quantity: str, published: str, shown: str, same: Callable[[str], bool],
+             how: str, value: float | None, erratum: tuple[int, str] | None, note: str) -> Row:
+        number, corrected = (None, '') if erratum is None else erratum
+        return Row(self.paper, self.place, quantity, published, shown, same(published), how, value,
+                   number, corrected, erratum is not None and same(corrected), note)
+
+    def number(self, quantity: str, published: str, computed: float, *,
+               within: float | None = None, erratum: tuple[int, str] | None = None,
+               note: str = '') -> Row:
+        """Quote a number with the digits printed.
+
+        Args:
+            quantity: what is meant.
+            published: as printed; its last digit tells how exact it is.
+            computed: ours.
+            within: largest difference; by default half a unit of the last digit printed.
+            erratum: that covers a difference, and the right number; its last digit tells, too.
+            note: for the reader.
+
+        """
+        def same(text: str) -> bool:
+            own = 0.5 * 10.0**_exponent(text)
+            limit = own if within is None or text != published else within
+            # A little more, for the rounding of binary numbers that lie on the limit.
+            return bool(abs(computed - float(text)) <= limit * (1.0 + 1e-9))
+
+        exponent = _exponent(published) if within is None else int(np.floor(np.log10(within)))
+        digits = max(0, -exponent) + MORE
+        # A count has no more digits than it has.
+        shown = str(computed) if isinstance(computed, int) else f'{computed:.{digits}f}'
+        how = 'to the last digit printed' if within is None else f'within {within:g}'
+        return self._row(quantity, published, shown, same, how, float(computed), erratum, note)
+
+    def phases(self, quantity: str, published: str, computed: Sequence[float] | np.ndarray, *,
+               within: float = PHASE, erratum: tuple[int, str] | None = None,
+               note: str = '') -> Row:
+        """Quote phases in cycles, printed as fractions with blanks between; compared modulo 1."""
+        ours = np.asarray(computed, dtype=float)
+
+        def same(text: str) -> bool:
+            printed = np.array([float(Fraction(part)) for part in text.split()])
+            return bool((np.abs((ours - printed + 0.5) % 1.0 - 0.5) <= within).all())
+
+        # A rounding error below 0 is 0, not 1.
+        shown = ' '.join(f'{round(phase % 1.0, 4) % 1.0:.4f}' for phase in ours)
+        return self._row(quantity, published, shown, same, f'within {within:g} cycles',
+                         float(ours[0] % 1.0) if ours.size == 1 else None, erratum, note)
+
+    def word(self, quantity: str, published: str, computed: str, *,
+             erratum: tuple[int, str] | None = None, note: str = '') -> Row:
+        """Quote a name or a list of names."""
+        return self._row(quantity, published, computed, lambda text: text == computed, 'equal',
+                         None, erratum, note)
+
+    def holds(self, quantity: str, computed: bool, *, erratum: int | None = None,
+              note: str = '') -> Row:
+        """Quote a statement that the paper makes; an erratum says that it is false."""
+        return self.word(quantity, 'true', str(bool(computed)).lower(), note=note,
+                         erratum=None if erratum is None else (erratum, 'false'))
+
+    def formula(self, quantity: str, published: str, value: Value, computed: Value, *,
+                erratum: tuple[int, Value] | None = None, note: str = '') -> Row:
+        """Quote a formula by its value at some arguments, compared with ours at the same."""
+        ours = np.ravel(computed)
+        limit = FORMULA * max(1.0, float(np.abs(ours).max()))
+
+        def same(other: Value) -> bool:
+            theirs = np.ravel(other)
+            return theirs.shape == ours.shape and bool((np.abs(theirs - ours) <= limit).all())
+
+        single = float(ours[0].real) if ours.size == 1 and not np.iscomplexobj(ours) else None
+        number, corrected = (None, '') if erratum is None else (erratum[0], _shown(erratum[1]))
+        return Row(self.paper, self.place, quantity, f'{published} = {_shown(value)}',
+                   _shown(ours), same(value), f'at one set of couplings, to {FORMULA:g}', single,
+                   number, corrected, erratum is not None and same(erratum[1]), note)
+
+
+def _exponent(text: str) -> int:
+    """Decimal exponent of the last digit of a number."""
+    exponent = Decimal(text).as_tuple().exponent
+    assert isinstance(exponent, int)
+    return exponent
+
+
+def _shown(value: Value) -> str:
+    values = np.ravel(value)
+    if np.iscomplexobj(values) and np.abs(values.imag).max() > 1e-12:
+        return ', '.join(f'{one.real:.4f}{one.imag:+.4f}i' for one in values)
+    return ', '.join(f'{one.real + 0.0:.4f}' for one in values)

@@ -1,0 +1,152 @@
+"""Executable ``inversion``, given a bag or a CSV file: a recording in, a gait out.
+
+``inversion --bag walk_bag --robot go1.yaml --out fitted.yaml --report report.html`` finds the
+steady gait of a recording, fits a network's gait and the joints' readouts to it, and writes what
+the generator loads. Without a recording the executable is the node ``cpg_inversion``.
+"""
+
+import sys
+from argparse import RawDescriptionHelpFormatter
+from collections.abc import Sequence
+from pathlib import Path
+
+from cpg_ros.checked import shown
+from cpg_ros.dynamics.progress import progress_bar
+from cpg_ros.fitting.bag import read_bag
+from cpg_ros.fitting.fitted import write_fitted
+from cpg_ros.fitting.inverted import Inverted, inverted
+from cpg_ros.fitting.recording import Recording
+from cpg_ros.fitting.table import read_csv
+from cpg_ros.networks.registry import NETWORKS
+from cpg_ros.robot import Robot, find_robot
+from cpg_ros.tools.arguments import Parser, as_json, assignment, say, twice
+from cpg_ros.whole import write_whole
+
+DESCRIPTION = '''\
+Find the steady gait of a recording and the parameters of a network that move a robot like it.
+What is read: joint states of a rosbag2 bag, or a CSV file with a column for time and one for each
+joint. What is written: a parameter file and a robot file that the generator loads as they are.'''
+EPILOG = '''\
+examples:
+  inversion --bag walk_bag --robot go1.yaml --out fitted.yaml --report report.html
+  inversion --csv walk.csv --unit deg --free c tau --json
+  ros2 run cpg_ros generator --ros-args --params-file fitted.yaml
+
+Without --bag and --csv it is the node cpg_inversion, which listens to joint states and fits them
+when ~/fit is called.
+
+exit codes: 0 fitted, 1 no steady gait or none that fits, 2 wrong arguments or damaged input.'''
+
+
+def _parser() -> Parser:
+    parser = Parser(prog='inversion', description=DESCRIPTION, epilog=EPILOG,
+                    formatter_class=RawDescriptionHelpFormatter)
+    source = parser.add_mutually_exclusive_group(required=True)
+    source.add_argument('--bag', type=Path, metavar='DIR', help='a rosbag2 bag, sqlite3 or mcap')
+    source.add_argument('--csv', type=Path, metavar='FILE', help='a table with a head')
+    parser.add_argument('--topics', nargs='+', default=[], metavar='TOPIC', help='topics of the '
+                        'bag to read (default: all of type sensor_msgs/msg/JointState)')
+    parser.add_argument('--joints', nargs='+', default=[], metavar='NAME', help='joints to take '
+                        "(default: the robot's, or all; of a CSV file also patterns such as "
+                        "'JointPos*')")
+    parser.add_argument('--unit', choices=('rad', 'deg'), help='of the angles in the CSV file '
+                        '(default: what its head says, or rad)')
+    parser.add_argument('--time', metavar='COLUMN', help='column of the CSV file with the time '
+                        '(default: told from its name)')
+    parser.add_argument('--robot', metavar='FILE', help='robot file, or the name of a shipped '
+                        'one: which joints belong to which legs and cells, and their limits '
+                        '(default: told from the names of the joints)')
+    parser.add_argument('--network', metavar='NAME', help=f'{", ".join(NETWORKS)} (default: the '
+                        "robot's first; four legs: delayed, two legs: biped)")
+    parser.add_argument('--gait', metavar='NAME', help='gait to fit (default: as recognised)')
+    parser.add_argument('--free', nargs='+', default=[], metavar='PARAMETER',
+                        help='parameters to fit (default: delayed c tau, quadruped alpha gamma, '
+                        'biped w_a phi)')
+    parser.add_argument('--order', type=int, choices=(1, 2, 3), default=3, metavar='N',
+                        help='order of the readout, 1 to 3 (default: %(default)s)')
+    parser.add_argument('--start', nargs='+', action='append', default=[], type=assignment,
+                        metavar='PARAMETER=VALUE', help='values to start from; may be given '
+                        'several times, for several starts')
+    parser.add_argument('--out', type=Path, metavar='FILE', help='parameter file to write, such '
+                        'as fitted.yaml; the robot file goes beside it')
+    parser.add_argument('--report', type=Path, metavar='FILE', help='page to write, .html')
+    parser.add_argument('--json', action='store_true', help='print JSON instead of text')
+    return parser
+
+
+def _recording(chosen, robot: Robot | None) -> Recording:
+    if chosen.csv is not None:
+        return read_csv(chosen.csv, unit=chosen.unit, time=chosen.time, joints=chosen.joints)
+    if robot is None or chosen.joints:
+        return read_bag(chosen.bag, chosen.topics, chosen.joints)
+    names = [joint.name for joint in robot.joints]
+    return read_bag(chosen.bag, chosen.topics, names, some=True)
+
+
+def _checked(parser: Parser, chosen) -> None:
+    """Refuse what can be refused before any work."""
+    if chosen.csv is not None and chosen.topics:
+        parser.error('argument --topics: a CSV file has none')
+    if chosen.bag is not None and chosen.unit:
+        parser.error('argument --unit: joint states are in rad')
+    if chosen.bag is not None and chosen.time:
+        parser.error('argument --time: joint states have their stamps')
+    for option in ('out', 'report'):
+        path = getattr(chosen, option)
+        if path is not None and not path.absolute().parent.is_dir():
+            parser.error(f'argument --{option}: there is no folder {path.parent}')
+    if chosen.out is not None and chosen.out.suffix not in ('.yaml', '.yml'):
+        parser.error(f'argument --out: {shown(str(chosen.out))} does not end in .yaml')
+    for start in chosen.start:
+        if name := twice([name for name, _ in start]):
+            parser.error(f'argument --start: {name} is given twice')
+    if name := twice(chosen.free):
+        parser.error(f'argument --free: {name} is given twice')
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Invert a recording; return the exit code."""
+    from cpg_ros.fitting.stride import NoSteadyGait
+    parser = _parser()
+    chosen = parser.parse_args(sys.argv[1:] if arguments is None else arguments)
+    _checked(parser, chosen)
+    try:
+        robot = None if chosen.robot is None else find_robot(chosen.robot)
+        starts = [dict(start) for start in chosen.start] or [{}]
+        recording = _recording(chosen, robot)
+        with progress_bar('fitting', len(starts)) as bar:
+            found = inverted(recording, robot, chosen.network or '', chosen.gait or '',
+                             chosen.free, chosen.order, starts=starts, done=bar)
+        written = _written(chosen, found, robot)
+    except NoSteadyGait as error:
+        print(f'inversion: {error}', file=sys.stderr)
+        return 1
+    except (ValueError, OSError) as error:
+        print(f'inversion: {error}', file=sys.stderr)
+        return 2
+    except KeyboardInterrupt:
+        print('inversion: stopped', file=sys.stderr)
+        return 130
+    if chosen.json:
+        say(as_json(found.as_dict()))
+    else:
+        from cpg_ros.tools.inversion_report import as_text
+        said = as_text(found)
+        say(f'{said}\nwritten: {", ".join(map(str, written))}' if written else said)
+    return 0
+
+
+def _written(chosen, found: Inverted, robot) -> list[Path]:
+    written = []
+    if chosen.report is not None:
+        # matplotlib takes half a second, and only pages need it.
+        from cpg_ros.tools.inversion_report import as_html
+        write_whole(chosen.report, as_html(found))
+        written.append(chosen.report)
+    if chosen.out is not None:
+        written += write_fitted(chosen.out, found, robot)
+    return written
+
+
+if __name__ == '__main__':
+    sys.exit(main())

@@ -1,0 +1,136 @@
+"""An inverted recording in words, and as a page that needs no other file."""
+
+import base64
+import io
+from html import escape
+
+from matplotlib.figure import Figure
+
+from cpg_ros.fitting.inverted import Inverted
+from cpg_ros.tools import inversion_figures
+from cpg_ros.tools.arguments import table
+from cpg_ros.tools.report import STYLE
+
+FIGURES = (('Recorded and fitted', inversion_figures.joints),
+           ('Error over the cycle', inversion_figures.errors),
+           ('Phases', inversion_figures.phases),
+           ('Convergence', inversion_figures.convergence))
+
+
+def _stride(found: Inverted) -> list[str]:
+    stride, fit = found.stride, found.fit
+    named = (f'{stride.gait}' if stride.gait else f'none of the gaits; nearest {stride.nearest}')
+    return [
+        f'{found.recording.source}: {len(found.recording.times)} samples, '
+        f'{found.recording.times[-1]:.2f} s; {found.read}.',
+        f'Steady from {stride.begin:.2f} to {stride.end:.2f} s: {stride.cycles} strides at '
+        f'{stride.frequency:.4f} +- {stride.frequency_error:.4f} Hz.',
+        'Phases [cycles]: ' + ', '.join(f'{leg} {phase:.3f}'
+                                        for leg, phase in stride.phases.items())
+        + f': {named} ({stride.distance:.3f} of a cycle off, the next one '
+        f'{stride.margin:.3f} further).',
+        f'Fitted: {fit.gait} of the {fit.network.name} network, readout of order {fit.order}.']
+
+
+def parameters(found: Inverted) -> list[tuple[str, ...]]:
+    """Rows of the fitted parameters, with a head."""
+    rows: list[tuple[str, ...]] = [('parameter', 'value', 'standard error', '95 % interval')]
+    for name, one in found.fit.parameters.items():
+        rows.append((name, f'{one.value:.6g}', f'{one.stderr:.2g}',
+                     f'{one.low:.6g} to {one.high:.6g}'
+                     + ('' if one.bounded else ' (not bounded by the data)')))
+    return rows
+
+
+def joints(found: Inverted) -> list[tuple[str, ...]]:
+    """Rows of the joints' errors, with a head."""
+    fit = found.fit
+    rms, share = fit.rms, fit.rms_share
+    rows: list[tuple[str, ...]] = [('joint', 'cell', 'RMS error [rad]', 'share of range')]
+    return rows + [(name, str(fit.cells[name]), f'{rms[name]:.4f}', f'{100 * share[name]:.2f} %')
+                   for name in fit.joints]
+
+
+def starts(found: Inverted) -> list[tuple[str, ...]]:
+    """Rows of the starts as in Liu & Zhang's Tables 1 and 2, with a head."""
+    names = list(found.fit.parameters)
+    rows: list[tuple[str, ...]] = [('start', 'iterations', 'half the sum of squares', 'end')]
+    for trial in found.fit.starts:
+        begin, end = (', '.join(f'{name} {value:.4f}' for name, value
+                                in zip(names, values, strict=False))
+                      for values in (trial.start, trial.values))
+        rows.append((begin, str(trial.iterations), f'{trial.cost:.6g}', trial.why or end))
+    return rows
+
+
+def _judged(found: Inverted) -> list[str]:
+    fit = found.fit
+    said = []
+    if fit.hopf is not None:
+        said.append(f'The {fit.gait} is born at the critical delay {fit.hopf.tau:.4f}; tau is '
+                    f'{fit.network.delay:.4f}.')
+    verdict = fit.verdict
+    said.append(
+        f'It attracts by itself (largest multiplier {verdict.multipliers.leading:.3g} a stride).'
+        if verdict.stable else
+        f'It attracts with the symmetry lock (gain above {verdict.smallest_gain:.3g} per model '
+        f'time; the generator takes {verdict.default_gain:.3g}).'
+        if verdict.stable_with_default_gain else
+        'It does not attract, with or without the symmetry lock.')
+    return said
+
+
+def _shares(found: Inverted) -> str:
+    return 'Mean RMS error over range by order of the readout: ' + ', '.join(
+        f'{order}: {100 * share:.2f} %' for order, share in found.shares.items()) + '.'
+
+
+def as_text(found: Inverted) -> str:
+    """The report for a terminal."""
+    notes = [*found.recording.notes, *found.stride.notes]
+    lines = [*_stride(found), '', *table(parameters(found), '<>>'), '',
+             *table(joints(found), '<>>>'), _shares(found), '']
+    if len(found.fit.starts) > 1:
+        lines += [*table(starts(found), '<>>'), '']
+    lines += [*_judged(found), *(f'note: {note}' for note in notes),
+              *(f'warning: {warning}' for warning in found.warnings)]
+    return '\n'.join(lines)
+
+
+def _html_table(rows: list[tuple[str, ...]]) -> str:
+    head, *body = rows
+    lines = ['<table><thead><tr>' + ''.join(f'<th>{escape(cell)}</th>' for cell in head)
+             + '</tr></thead><tbody>']
+    lines += ['<tr>' + ''.join(f'<td class="value">{escape(cell)}</td>' for cell in row) + '</tr>'
+              for row in body]
+    return '\n'.join([*lines, '</tbody></table>'])
+
+
+def _image(figure: Figure, name: str) -> str:
+    from matplotlib import pyplot
+    out = io.BytesIO()
+    figure.savefig(out, format='png', dpi=110)
+    pyplot.close(figure)
+    return (f'<figure><img alt="{escape(name)}" src="data:image/png;base64,'
+            f'{base64.b64encode(out.getvalue()).decode("ascii")}"></figure>')
+
+
+def as_html(found: Inverted) -> str:
+    """The report as one page with its figures in it."""
+    def paragraphs(lines: list[str]) -> str:
+        return '\n'.join(f'<p>{escape(line)}</p>' for line in lines)
+
+    title = f'{found.fit.gait} at {found.stride.frequency:.3f} Hz: {found.recording.source}'
+    parts = ['<!DOCTYPE html>', '<html lang="en"><head><meta charset="utf-8">',
+             f'<title>{escape(title)}</title><style>{STYLE}</style></head><body>',
+             f'<h1>{escape(title)}</h1>', paragraphs(_stride(found)), '<h2>Parameters</h2>',
+             _html_table(parameters(found)), paragraphs(_judged(found)), '<h2>Joints</h2>',
+             paragraphs([_shares(found)]), _html_table(joints(found))]
+    for name, draw in FIGURES:
+        parts += [f'<h2>{escape(name)}</h2>', _image(draw(found), name)]
+    parts += ['<h2>Starts</h2>', _html_table(starts(found))]
+    notes = [*found.recording.notes, *found.stride.notes]
+    if notes or found.warnings:
+        parts += ['<h2>Notes</h2>', paragraphs([*notes, *(f'Warning: {text}'
+                                                          for text in found.warnings)])]
+    return '\n'.join([*parts, '</body></html>', ''])

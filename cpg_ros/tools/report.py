@@ -1,0 +1,115 @@
+"""The reproduction report as a table, as JSON and as a page that needs no other file."""
+
+import base64
+import json
+import math
+from dataclasses import asdict
+from html import escape
+from typing import Any
+
+from cpg_ros.papers.reproduction import Reproduction
+from cpg_ros.papers.row import Row
+
+#: Widest columns of the table on a terminal: quantity, published, computed.
+WIDEST = (58, 30, 30)
+
+STYLE = '''
+body { font: 15px/1.45 system-ui, sans-serif; margin: 2em auto; max-width: 78em; padding: 0 1em;
+       color: #1a202c; background: #fff; }
+h1 { font-size: 1.5em; } h2 { font-size: 1.2em; margin-top: 2em; }
+table { border-collapse: collapse; width: 100%; font-size: 0.9em; }
+th, td { text-align: left; vertical-align: top; padding: 0.25em 0.6em;
+         border-bottom: 1px solid #e2e8f0; overflow-wrap: anywhere; }
+th { position: sticky; top: 0; background: #f7fafc; }
+td.value { font-variant-numeric: tabular-nums; }
+td.note { color: #4a5568; font-size: 0.92em; }
+td.verdict { white-space: nowrap; font-weight: 600; }
+tr.agrees td.verdict { color: #276749; }
+tr.erratum { background: #fffaf0; } tr.erratum td.verdict a { color: #9c4221; }
+tr.fails { background: #fff5f5; } tr.fails td.verdict { color: #c53030; }
+figure { display: inline-block; margin: 0.5em 1em 1em 0; max-width: 100%; }
+figure img { max-width: 100%; border: 1px solid #e2e8f0; }
+figcaption { font-size: 0.9em; color: #4a5568; max-width: 40em; }
+'''
+
+
+def _cut(text: str, width: int) -> str:
+    return text if len(text) <= width else text[:width - 3] + '...'
+
+
+def table(found: Reproduction) -> str:
+    """Write the rows by paper in aligned columns, the errata that were used, and the summary."""
+    head = ('place', 'quantity', 'published', 'computed', 'verdict')
+    cells = [(row, (row.place, *(_cut(text, width) for text, width in zip(
+        (row.quantity, row.published, row.computed), WIDEST, strict=True)), row.verdict))
+        for row in found.rows]
+    widths = [max(len(line[k]) for line in [head, *(line for _, line in cells)])
+              for k in range(len(head))]
+
+    def aligned(line: tuple[str, ...]) -> str:
+        return '  '.join(f'{text:<{width}}'
+                         for text, width in zip(line, widths, strict=True)).rstrip()
+
+    lines: list[str] = []
+    for paper in found.papers:
+        lines += [paper.reference, aligned(head)]
+        lines += [aligned(line) for row, line in cells if row.paper == paper.authors]
+        lines.append('')
+    used = {row.erratum for row in found.explained}
+    lines += [f'erratum {number} ({paper}): {text}'
+              for number, (paper, text) in found.errata.items() if number in used]
+    return '\n'.join([*lines, *([''] if used else []), found.summary])
+
+
+def as_json(found: Reproduction) -> str:
+    """Write everything but the figures for machines."""
+    def plain(row: Row) -> dict[str, Any]:
+        # JSON has no word for what is not finite.
+        value = row.value if row.value is not None and math.isfinite(row.value) else None
+        return {**asdict(row), 'value': value, 'verdict': row.verdict}
+
+    tree = {
+        'papers': [{'name': paper.name, 'authors': paper.authors, 'reference': paper.reference}
+                   for paper in found.papers],
+        'summary': {'published': len(found.rows), 'agree': sum(row.agrees for row in found.rows),
+                    'explained': len(found.explained), 'failed': len(found.failed)},
+        'rows': [plain(row) for row in found.rows],
+        'errata': {str(number): {'paper': paper, 'text': text}
+                   for number, (paper, text) in found.errata.items()}}
+    return json.dumps(tree, indent=1, allow_nan=False) + '\n'
+
+
+def _line(row: Row) -> str:
+    kind = 'agrees' if row.agrees else 'erratum' if row.explained else 'fails'
+    verdict = (f'<a href="#erratum-{row.erratum}">{row.verdict}</a>' if kind == 'erratum'
+               else row.verdict)
+    right = f'right: {row.corrected}' if kind == 'erratum' else ''
+    note = '; '.join(part for part in (row.note, row.compared, right) if part)
+    return (f'<tr class="{kind}"><td>{escape(row.place)}</td><td>{escape(row.quantity)}</td>'
+            f'<td class="value">{escape(row.published)}</td>'
+            f'<td class="value">{escape(row.computed)}</td>'
+            f'<td class="verdict">{verdict}</td><td class="note">{escape(note)}</td></tr>')
+
+
+def as_html(found: Reproduction) -> str:
+    """Write one page with the rows, the errata and the figures."""
+    head = ''.join(f'<th>{name}</th>' for name in (
+        'place', 'quantity', 'published', 'computed', 'verdict', 'note; how compared'))
+    parts = ['<!DOCTYPE html>', '<html lang="en"><head><meta charset="utf-8">',
+             '<title>Three papers reproduced</title>', f'<style>{STYLE}</style></head><body>',
+             '<h1>Three papers reproduced</h1>', f'<p>{escape(found.summary)}.</p>']
+    for paper in found.papers:
+        parts += [f'<h2>{escape(paper.reference)}</h2>', f'<table><thead><tr>{head}</tr></thead>'
+                  '<tbody>', *(_line(row) for row in found.rows if row.paper == paper.authors),
+                  '</tbody></table>']
+        for figure in found.figures:
+            if figure.paper == paper.authors:
+                image = base64.b64encode(figure.png).decode('ascii')
+                name = escape(f'{figure.paper}, {figure.place}')
+                parts.append(
+                    f'<figure><img alt="{name}" src="data:image/png;base64,{image}">'
+                    f'<figcaption>{name}. {escape(figure.caption)}</figcaption></figure>')
+    parts += ['<h2>Errata</h2>', '<ol>']
+    parts += [f'<li id="erratum-{number}" value="{number}">{escape(paper)}: {escape(text)}</li>'
+              for number, (paper, text) in found.errata.items()]
+    return '\n'.join([*parts, '</ol>', '</body></html>', ''])

@@ -1,0 +1,91 @@
+"""Executable ``reproduce``: does every number that the three papers print come out?
+
+``reproduce`` prints a row for each: paper, place, quantity, published, computed, and whether they
+agree or which erratum says why not.
+"""
+
+import argparse
+import os
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from cpg_ros.dynamics.progress import progress_bar
+from cpg_ros.papers.registry import PAPERS
+from cpg_ros.papers.reproduction import parts, reproduce
+from cpg_ros.tools.arguments import Parser, say
+from cpg_ros.tools.report import as_html, as_json, table
+from cpg_ros.whole import write_whole
+
+DESCRIPTION = '''\
+Compute every quantity that the three papers print, and hold it against the printed one. What
+differs names the erratum that explains it, or fails.'''
+EPILOG = 'exit codes: 0 nothing fails, 1 a row fails, 2 wrong arguments.'
+
+
+def _jobs(text: str) -> int:
+    if not (text.isascii() and text.isdigit() and int(text) > 0):
+        raise argparse.ArgumentTypeError(f"'{text}' is not a number of processes, 1 or more")
+    return int(text)
+
+
+def _parser() -> Parser:
+    parser = Parser(prog='reproduce', description=DESCRIPTION, epilog=EPILOG,
+                    formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument('--paper', metavar='NAME', choices=tuple(PAPERS),
+                        help=f'one of {", ".join(PAPERS)} (default: all)')
+    parser.add_argument('--json', metavar='FILE', help='write the rows as JSON; - writes them to '
+                        'standard output in place of the table')
+    parser.add_argument('--html', metavar='FILE', type=Path, nargs='?',
+                        const=Path('out/reproduction.html'),
+                        help='write a page with the rows and figures (without a name: '
+                        '%(const)s)')
+    parser.add_argument('--jobs', type=_jobs, default=os.cpu_count() or 1, metavar='N',
+                        help='processes that share the work (default: %(default)s)')
+    return parser
+
+
+def _ready(path: Path) -> None:
+    """Make sure that a file can be written there.
+
+    Raises:
+        OSError: it cannot.
+
+    """
+    if path.is_dir():
+        raise IsADirectoryError(f'{path} is a directory')
+    path.parent.mkdir(parents=True, exist_ok=True)
+    if not os.access(path.parent, os.W_OK):
+        raise PermissionError(f'{path.parent} cannot be written to')
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Reproduce the papers; return the exit code."""
+    chosen = _parser().parse_args(arguments)
+    names = tuple(PAPERS) if chosen.paper is None else (chosen.paper,)
+    json = None if chosen.json in (None, '-') else Path(chosen.json)
+    try:
+        # Now, and not when the work is done.
+        for path in (json, chosen.html):
+            if path is not None:
+                _ready(path)
+        with progress_bar('reproducing', parts(names)) as progress:
+            found = reproduce(names, chosen.jobs, chosen.html is not None, progress)
+        if json is not None:
+            write_whole(json, as_json(found))
+        if chosen.html is not None:
+            write_whole(chosen.html, as_html(found))
+    except OSError as error:
+        print(f'reproduce: {error}', file=sys.stderr)
+        return 2
+    except KeyboardInterrupt:
+        print('reproduce: stopped', file=sys.stderr)
+        return 130
+    written = [str(path) for path in (json, chosen.html) if path is not None]
+    say(as_json(found).rstrip() if chosen.json == '-' else '\n'.join(
+        [table(found), *([f'written: {", ".join(written)}'] if written else [])]))
+    return 1 if found.failed else 0
+
+
+if __name__ == '__main__':
+    sys.exit(main())

@@ -1,0 +1,79 @@
+"""Made-up recordings: the generator's own readouts of an exact gait, with noise and dropouts."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from cpg_ros.dynamics.phase_readout import PhaseReadout
+from cpg_ros.dynamics.readout import WaveReadout
+from cpg_ros.robot import HARMONICS
+
+
+@dataclass(frozen=True)
+class MadeUp:
+    """A mean cycle, as a fit takes it; theta in cycles, mean and error in rad."""
+
+    joints: tuple[str, ...]
+    theta: np.ndarray
+    mean: np.ndarray
+    error: np.ndarray
+    frequency: float = 2.0
+    frequency_error: float = 1e-3
+
+
+def joint_angles(orbit, cells, weights, theta):
+    """The generator's angles at theta in cycles from where cell 1 peaks, (joints, *theta.shape).
+
+    cells from 1; weights (joints, 6), without offsets.
+    """
+    cells = np.asarray(cells) - 1
+    arguments = (orbit, cells, weights, cells[:1])
+    readout = (WaveReadout(*arguments) if orbit.network.variables == 1
+               else PhaseReadout(*arguments, HARMONICS))
+    terms = np.fft.rfft(readout.angles) / readout.angles.shape[1]
+    terms[:, 1:] *= 2.0
+    k = np.arange(64)
+    return np.array([(np.exp(2j * np.pi * np.multiply.outer(theta + orbit.phases[cell], k))
+                      @ row[:64]).real for cell, row in zip(cells, terms, strict=True)])
+
+
+def record(orbit, cells, weights, rng=None, *, offsets=0.1, noise=0.02, jitter=5e-4,
+           dropouts=0.01, cycles=24, points=64, phase=0.2, frequency=2.0):
+    """Mean of some cycles of a gait, and joint -> cell.
+
+    Args:
+        orbit: the gait.
+        cells: the cell behind each joint, from 1.
+        weights: of the readouts, rad, shape (joints, 6).
+        rng: of the noise; without it there is none.
+        offsets: of the joints, rad.
+        noise: of each sample, over the joint's range.
+        jitter: of the stamps, s.
+        dropouts: share of the samples that are missing.
+        cycles: how many are averaged.
+        points: of a cycle.
+        phase: of the orbit where the recording's cycle begins.
+        frequency: strides per second.
+
+    """
+    theta = np.arange(points) / points
+    names = tuple(f'joint_{k}' for k in range(len(cells)))
+    assigned = dict(zip(names, cells, strict=True))
+    if rng is None:
+        mean = offsets + joint_angles(orbit, cells, weights, theta + phase)
+        return MadeUp(names, theta, mean, np.zeros_like(mean), frequency), assigned
+    times = theta + phase + frequency * jitter * rng.standard_normal((cycles, points))
+    clean = joint_angles(orbit, cells, weights, times)
+    spans = np.ptp(clean, axis=(1, 2))[:, None, None]
+    seen = clean + offsets + noise * spans * rng.standard_normal(clean.shape)
+    seen[rng.random(seen.shape) < dropouts] = np.nan
+    count = np.isfinite(seen).sum(axis=1)
+    error = np.nanstd(seen, axis=1, ddof=1) / np.sqrt(count)
+    return MadeUp(names, theta, np.nanmean(seen, axis=1), error, frequency), assigned
+
+
+def weights_of(joints, order=3, seed=7):
+    """Readout weights of some joints, rad, shape (joints, 6); zero above the order."""
+    weights = 0.2 * np.random.default_rng(seed).standard_normal((joints, 6))
+    weights[:, 2 * order:] = 0.0
+    return weights
