@@ -31,6 +31,8 @@ ODD, MARKED = 3.0, 0.05
 ODD_RATE, MARKED_RATE = 4.5, 0.03
 #: Harmonics that fix the phase, and most of its cycles without own knots.
 HARMONICS, FEW = 8, 4.0
+#: Fewest rates of which a drift is told from wander.
+DRIFTS = 12
 #: Steps of Gauss-Newton, the most that one may move the phase, in cycles.
 STEPS, FARTHEST = 6, 0.1
 #: Weight of a knot's neighbours where there are no data around it.
@@ -164,20 +166,26 @@ def _mean_rate(knots: np.ndarray, phases: np.ndarray) -> tuple[float, float]:
     """Return the mean rate and its standard error.
 
     Phases at the knots wander, as no stride is like the last, and are in error besides. So rates
-    between knots vary by q + 2 s and with their neighbours by -s, s the variance of the errors, q
-    that of the wander, apart from a drift; and the mean of least variance gives all rates the
-    same weight where they only wander, and is the slope of a straight line where they do not.
+    between knots vary by 2 q/3 + 2 s and with their neighbours by q/6 - s: s is the variance of
+    the errors, q that of strides, as knots lie anywhere in these. A drift is set apart. The mean
+    of least variance gives all rates the same weight where they only wander, and is the slope of
+    a straight line where they do not.
     """
     rates = np.diff(phases) / np.diff(knots)
     n = rates.size
-    place = np.arange(n) - 0.5 * (n - 1)
-    off = rates - rates.mean() - place * (place @ rates) / (place @ place)
-    own = float(off @ off) / max(n - 2, 1)
-    next_ = float(off[1:] @ off[:-1]) / max(n - 3, 1)
-    errors = min(max(-next_, 0.0), 0.5 * own)
+    off, free = rates - rates.mean(), n - 1
+    if n >= DRIFTS:
+        place = np.arange(n) - 0.5 * (n - 1)
+        off, free = off - place * (place @ rates) / (place @ place), n - 2
+    own = float(off @ off) / max(free, 1)
+    next_ = float(off[1:] @ off[:-1]) / max(n - 1, 1)
+    # Of few rates a covariance as large comes by chance.
+    errors = (0.25 * own - next_ - 0.5 * own / np.sqrt(n)) / 1.5
+    errors = min(max(errors, 0.0), 0.499 * own)
+    wander = 1.5 * (own - 2.0 * errors)
     if own <= 0.0:
         return float(rates.mean()), 0.0
-    bands = np.stack([np.full(n, -errors), np.full(n, own)])
+    bands = np.stack([np.full(n, wander / 6.0 - errors), np.full(n, own)])
     weights = solveh_banded(bands, np.ones(n))
     return (float(weights @ rates / weights.sum()), float(1.0 / np.sqrt(weights.sum())))
 
