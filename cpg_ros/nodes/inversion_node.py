@@ -12,6 +12,7 @@ import rclpy
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
 from rcl_interfaces.srv import SetParametersAtomically
 from rclpy.callback_groups import ReentrantCallbackGroup
+from rclpy.exceptions import ParameterException
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
@@ -205,7 +206,7 @@ def run(args: list[str] | None = None) -> int:
     rclpy.init(args=args)
     try:
         node = Inversion()
-    except ValueError as error:
+    except (ValueError, ParameterException) as error:
         rclpy.logging.get_logger(NAME).fatal(str(error))
         rclpy.try_shutdown()
         return 1
