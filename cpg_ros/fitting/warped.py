@@ -20,8 +20,9 @@ HARMONICS = 24
 FAR, WILD = 30.0, 3.0
 #: Samples of a long recording that are fitted at once, and fewest cycles in them.
 BLOCK, CYCLES = 1 << 15, 20.0
-#: Fewest cycles for the scatter to be told for every phase by itself.
-ENOUGH = 4
+#: Fewest cycles for the scatter to be told for every phase by itself, and as how many cycles
+#: that of all phases together counts there: that of a few may be small by chance.
+ENOUGH, POOLED = 4, 4
 
 
 @dataclass(frozen=True)
@@ -149,12 +150,11 @@ def _scatter(phases: np.ndarray, rest: np.ndarray, bins: int, theta: np.ndarray
     number = have.sum(axis=0)
     middle = means.sum(axis=0) / np.maximum(number, 1)
     square = np.sum(np.where(have, means - middle, 0.0)**2, axis=0)
-    if np.median(number) < ENOUGH:
-        # Too few for each phase by itself; and what is there once only tells nothing.
-        twice = number > 1
-        square = np.full(bins, square[twice].sum() / max((number[twice] - 1).sum(), 1))
-    else:
-        square = square / np.maximum(number - 1, 1)
+    # What is there once tells nothing.
+    free = np.maximum(number - 1, 0)
+    pooled = square[free > 0].sum() / max(free.sum(), 1)
+    square = (np.full(bins, pooled) if np.median(number) < ENOUGH
+              else (square + POOLED * pooled) / (free + POOLED))
     spread = np.sqrt(square)
     error = np.sqrt(square / np.maximum(number, 1) + middle**2)
     centres = (np.arange(bins) + 0.5) / bins
