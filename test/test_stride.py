@@ -81,8 +81,9 @@ def test_the_stretch_leaves_standing_and_starts_out():
     size = np.clip((t - 4.0) / 1.0, 0.0, 1.0) * np.clip((20.0 - t) / 1.0, 0.0, 1.0)
     x = quadruped(2.0 * t) * size[:, None] + quadruped(0.0 * t, size=0.0) * (1.0 - size[:, None])
     stride = walked(noisy(rng, x), t)
-    assert 4.0 <= stride.begin <= 5.6
-    assert 18.4 <= stride.end <= 20.0
+    # Strides that are only half as large are no part of it.
+    assert 4.4 <= stride.begin <= 5.6
+    assert 18.4 <= stride.end <= 19.6
     assert stride.frequency == pytest.approx(2.0, rel=1e-3)
     assert stride.gait == 'trot'
 
@@ -307,5 +308,6 @@ def test_a_later_start_and_fewer_samples_change_little(later, every, seed):
     found = walked(x[kept], t[kept] - t[kept[0]])
     assert found.frequency == pytest.approx(2.0, rel=2e-3)
     assert around(np.array(list(found.phases.values())) - GAITS['walk']).max() < 0.01
-    assert (np.abs(found.mean - FOUND.mean) <= 5.0 * (found.error + FOUND.error)).all()
+    off = np.abs(found.mean - FOUND.mean) / np.hypot(found.error, FOUND.error)
+    assert np.mean(off <= 2.5) > 0.9
     assert found.gait == 'walk'

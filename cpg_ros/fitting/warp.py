@@ -13,6 +13,7 @@ from scipy.linalg import solveh_banded
 
 from cpg_ros.fitting.cycle import rows_of, series, weights_for
 from cpg_ros.fitting.steady import Stretch, even, longest
+from cpg_ros.fitting.warped import blocks, mean_weights
 
 #: Blocks in a period, a window begins at each of them, and points in a block.
 BLOCKS, POINTS = 8, 4
@@ -196,14 +197,18 @@ def _extended(at: np.ndarray, times: np.ndarray, phases: np.ndarray, slope: floa
     return inner + slope * (np.minimum(at - times[0], 0.0) + np.maximum(at - times[-1], 0.0))
 
 
-def _model(x: np.ndarray, phases: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Fit the mean cycle; return what it leaves, its slope by phase, and the rows."""
-    rows = rows_of(phases, HARMONICS)
-    weights = weights_for(x, rows)
+def _model(x: np.ndarray, phases: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Fit the mean cycle; return what it leaves, and its slope by phase."""
+    weights = mean_weights(x, phases, HARMONICS)
     n = 2.0 * np.pi * np.arange(1, HARMONICS + 1)[:, None]
     turned = np.vstack([0.0 * weights[:1], n * weights[1 + HARMONICS:],
                         -n * weights[1:1 + HARMONICS]])
-    return x - series(weights, rows), series(turned, rows), rows
+    left, slope = np.empty_like(x), np.empty_like(x)
+    for part in blocks(phases):
+        rows = rows_of(phases[part], HARMONICS)
+        left[:, part] = x[:, part] - series(weights, rows)
+        slope[:, part] = series(turned, rows)
+    return left, slope
 
 
 def _straight(grid: np.ndarray, x: np.ndarray, phases: np.ndarray, span: float
@@ -211,8 +216,9 @@ def _straight(grid: np.ndarray, x: np.ndarray, phases: np.ndarray, span: float
     """Fit a constant rate with the mean cycle projected out; return phases and error."""
     centred = grid - 0.5 * span
     for _ in range(2 * STEPS):
-        left, slope, rows = _model(x, np.interp(grid, [0.0, span], phases))
-        by_rate = centred * slope
+        at = np.interp(grid, [0.0, span], phases)
+        left, slope = _model(x, at)
+        by_rate, rows = centred * slope, rows_of(at, HARMONICS)
         by_rate -= series(weights_for(by_rate, rows), rows)
         power = float(np.sum(by_rate * by_rate))
         step = float(np.sum(by_rate * left)) / max(power, 1e-300)
@@ -232,7 +238,7 @@ def _straight(grid: np.ndarray, x: np.ndarray, phases: np.ndarray, span: float
 def _steady(grid: np.ndarray, x: np.ndarray, knots: np.ndarray, phases: np.ndarray
             ) -> tuple[int, int]:
     """Return first and last stride between knots of the longest run that are like the mean."""
-    left, _, _ = _model(x, np.interp(grid, knots, phases))
+    left, _ = _model(x, np.interp(grid, knots, phases))
     starts = np.searchsorted(grid, knots[:-1])
     counts = np.diff(np.append(starts, grid.size))
 
@@ -272,7 +278,7 @@ def _bent(grid: np.ndarray, x: np.ndarray, knots: np.ndarray, phases: np.ndarray
                 + np.bincount(place + 1, high, knots.size))
 
     for _ in range(STEPS):
-        left, slope, _ = _model(x, np.interp(grid, knots, phases))
+        left, slope = _model(x, np.interp(grid, knots, phases))
         stiff, pull = np.einsum('jn,jn->n', slope, slope), np.einsum('jn,jn->n', slope, left)
         bands = np.zeros((2, knots.size))
         bands[1] = gathered(stiff * before**2, stiff * after**2)
