@@ -140,8 +140,11 @@ class Inversion(Node):
                     said = f'{said}; applied to {target}'
         finally:
             self._busy = False
-        log = self.get_logger()
-        (log.warning if found is None else log.info)(said)
+        # The logger tells its callers by their lines, and wants one severity of each.
+        if found is None:
+            self.get_logger().warning(said)
+        else:
+            self.get_logger().info(said)
         return found is not None, said
 
     def _work(self, heard: Live, work: Future) -> None:
