@@ -141,13 +141,17 @@ class Optimum:
         """Distance in standard errors that a cost stands for."""
         return float(np.sqrt(max(0.0, 2.0 * (cost - self.cost) / self.inflation)))
 
-    def estimate(self, k: int) -> Estimate:
-        """Estimate number k with its interval."""
+    def estimate(self, k: int, profiles: bool = True) -> Estimate:
+        """Estimate number k with its interval, by its profile where the cost is not quadratic."""
         value, error = float(self.values[k]), float(self.spread.errors[k])
         if not np.isfinite(error):
             return Estimate(value, error, float(self.low[k]), float(self.high[k]), False)
-        ends = [self._end(k, error, side) for side in (-1.0, 1.0)]
-        return Estimate(value, error, ends[0][0], ends[1][0], ends[0][1] and ends[1][1])
+        if not profiles:
+            ends = [value - QUANTILE * error, value + QUANTILE * error]
+            low, high = np.clip(ends, self.low[k], self.high[k]).tolist()
+            return Estimate(value, error, low, high, [low, high] == ends)
+        low, high = (self._end(k, error, side) for side in (-1.0, 1.0))
+        return Estimate(value, error, low[0], high[0], low[1] and high[1])
 
     def _end(self, k: int, error: float, side: float) -> tuple[float, bool]:
         """One end of the interval, and whether the data set it."""

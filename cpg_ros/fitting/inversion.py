@@ -7,7 +7,6 @@ counts only where a time scale is given.
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
 
 import numpy as np
 
@@ -38,7 +37,8 @@ def invert(cycle: MeanCycle, cells: Mapping[str, int], network: Network, gait: s
            free: Sequence[str] = (), order: int = 3,
            starts: Sequence[Mapping[str, float]] = ({},),
            bounds: Mapping[str, tuple[float, float]] | None = None, harmonics: int = HARMONICS,
-           time_scale: float = 0.0, done: Callable[[int], None] = lambda count: None) -> Fit:
+           time_scale: float = 0.0, profiles: bool = True,
+           done: Callable[[int], None] = lambda count: None) -> Fit:
     """Fit free numbers of a network, and readouts, to the mean cycle of a recorded gait.
 
     Args:
@@ -53,6 +53,8 @@ def invert(cycle: MeanCycle, cells: Mapping[str, int], network: Network, gait: s
         harmonics: of a Morris-Lecar cell's waveform that joints follow.
         time_scale: seconds in a unit of model time, if the period is to be fitted, too; 0
             leaves it free, as the generator's frequency does.
+        profiles: whether intervals are those of the profile likelihood where the cost is not
+            quadratic; they take most of the time.
         done: told how many starts are done.
 
     Raises:
@@ -77,7 +79,7 @@ def invert(cycle: MeanCycle, cells: Mapping[str, int], network: Network, gait: s
         period = Period(value, value * share)
     begins = [_begin(network, numbers, start) for start in starts]
 
-    def attempt(refuses: Callable[[Orbit], str]) -> Fit:
+    def attempt(refuses: Callable[[Orbit], str]) -> tuple[Problem, list[Trial], np.ndarray]:
         problem = Problem(joints, joints.stated, network, gait, numbers, order, harmonics, period,
                           refuses)
         trials: list[Trial] = []
@@ -88,19 +90,19 @@ def invert(cycle: MeanCycle, cells: Mapping[str, int], network: Network, gait: s
         best = min(trials, key=lambda trial: trial.cost)
         if best.why:
             raise NoOrbit(trials[0].why)
-        return _completed(problem, best, trials)
+        return problem, trials, _weighed(problem, best.values)
 
-    fit = attempt(lambda orbit: '')
-    flaw = refusal(fit.orbit, harmonics)
-    if not flaw:
-        return fit
-    said = f'the generator would refuse the {gait} that fits best: {flaw}'
-    try:
-        second = attempt(lambda orbit: refusal(orbit, harmonics))
-    except NoOrbit:
-        return replace(fit, warnings=(*fit.warnings, said))
-    return replace(second, warnings=(*second.warnings,
-                                     f'{said}; this is the best one that it runs'))
+    problem, trials, values = attempt(lambda orbit: '')
+    flaw, warnings = refusal(problem.placed(values).orbit, harmonics), []
+    if flaw:
+        said = f'the generator would refuse the {gait} that fits best: {flaw}'
+        try:
+            problem, trials, values = attempt(lambda orbit: refusal(orbit, harmonics))
+            said += '; this is the best one that it runs'
+        except NoOrbit:
+            pass
+        warnings = [said]
+    return _judged(problem, trials, values, profiles, warnings)
 
 
 def _begin(network: Network, numbers: Sequence[Free], start: Mapping[str, float]) -> np.ndarray:
@@ -147,23 +149,30 @@ def _trial(problem: Problem, begin: np.ndarray, weigh: bool) -> Trial:
     return descend(problem, values, *_limits(problem, values), TOLERANCE)
 
 
-def _completed(problem: Problem, best: Trial, trials: Sequence[Trial]) -> Fit:
-    """Weigh the joints by what is left of each, fit again, and judge."""
-    joints, values = problem.joints, best.values
+def _weighed(problem: Problem, values: np.ndarray) -> np.ndarray:
+    """Weigh the joints by what is left of each, and fit again."""
     low, high = _limits(problem, values)
     for last in range(WEIGHINGS):
-        sizes = np.maximum(joints.stated, _left(problem, values))
+        sizes = np.maximum(problem.joints.stated, _left(problem, values))
         if last and np.abs(sizes / problem.sizes - 1.0).max() < SAME:
             break
         problem.sizes = sizes
         values = descend(problem, values, low, high, LAST).values
+    return values
+
+
+def _judged(problem: Problem, trials: Sequence[Trial], values: np.ndarray, profiles: bool,
+            warnings: Sequence[str]) -> Fit:
+    """Say what was found, and how sure it is."""
+    joints, best = problem.joints, min(trials, key=lambda trial: trial.cost)
+    low, high = _limits(problem, values)
     placed = problem.placed(values)
     left, slopes = problem(values)
     sharing = correlation_length(placed.residual / problem.sizes)
     known = spread(slopes, sharing)
     cost = 0.5 * float(left @ left)
     optimum = Optimum(problem, values, low, high, cost, sharing, known)
-    estimates = {one.name: optimum.estimate(k) for k, one in enumerate(problem.free)}
+    estimates = {one.name: optimum.estimate(k, profiles) for k, one in enumerate(problem.free)}
     rows = [(float(row[0]), tuple(row[1:].tolist())) for row in placed.weights.T]
     misfit = _left(problem, values) / joints.stated
     count = len(problem.free)
@@ -177,4 +186,4 @@ def _completed(problem: Problem, best: Trial, trials: Sequence[Trial]) -> Fit:
         cost=cost, sizes=dict(zip(joints.names, problem.sizes.tolist(), strict=True)),
         misfit=dict(zip(joints.names, misfit.tolist(), strict=True)), sharing=sharing,
         starts=tuple(trials),
-        warnings=tuple(findings(problem.free, estimates, known, low, high, best)))
+        warnings=(*findings(problem.free, estimates, known, low, high, best), *warnings))
