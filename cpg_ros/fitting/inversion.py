@@ -7,19 +7,20 @@ counts only where a time scale is given.
 """
 
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 
 import numpy as np
 
 from cpg_ros.dynamics.periodic import NoOrbit, Orbit
 from cpg_ros.fitting.findings import findings
 from cpg_ros.fitting.fit import Fit
-from cpg_ros.fitting.free import Free, free_numbers, with_values, within_hopf_set
+from cpg_ros.fitting.free import Free, free_numbers
 from cpg_ros.fitting.identifiability import Optimum, correlation_length, spread
 from cpg_ros.fitting.joints import MeanCycle, joints_of
 from cpg_ros.fitting.problem import Period, Problem
 from cpg_ros.fitting.readout_fit import WEIGHTS
 from cpg_ros.fitting.runnable import refusal
-from cpg_ros.fitting.trials import Trial, descend
+from cpg_ros.fitting.trials import Trial
 from cpg_ros.networks.network import Network
 from cpg_ros.robot import HARMONICS
 
@@ -102,7 +103,14 @@ def invert(cycle: MeanCycle, cells: Mapping[str, int], network: Network, gait: s
         except NoOrbit:
             pass
         warnings = [said]
-    return _judged(problem, trials, values, profiles, warnings)
+    others = _along_the_valley(problem, values) if profiles else []
+    if others:
+        better = min(others, key=lambda trial: trial.cost)
+        left = problem(values)[0]
+        if better.cost < 0.5 * float(left @ left):
+            values = _weighed(problem, better.values)
+    return _judged(problem, trials, [trial.values for trial in others], values, profiles,
+                   warnings)
 
 
 def _begin(network: Network, numbers: Sequence[Free], start: Mapping[str, float]) -> np.ndarray:
@@ -117,16 +125,6 @@ def _begin(network: Network, numbers: Sequence[Free], start: Mapping[str, float]
             raise ValueError(f'{one.name} {known[one.name]:g} to start from is not within '
                              f'{one.low:g} to {one.high:g}')
     return np.array(list(known.values()))
-
-
-def _limits(problem: Problem, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Bounds of all values: a single free number's are those of its Hopf set, too."""
-    free = problem.free
-    if len(free) == 1:
-        there = with_values(problem.network, free, values[:1])
-        free = (within_hopf_set(there, problem.gait, free[0]),)
-    return (np.array([*(one.low for one in free), -np.inf]),
-            np.array([*(one.high for one in free), np.inf]))
 
 
 def _left(problem: Problem, values: np.ndarray) -> np.ndarray:
@@ -146,32 +144,49 @@ def _trial(problem: Problem, begin: np.ndarray, weigh: bool) -> Trial:
                      str(error))
     if weigh:
         problem.sizes = np.maximum(problem.joints.stated, _left(problem, values))
-    return descend(problem, values, *_limits(problem, values), TOLERANCE)
+    return problem.coordinates.descend(problem, values, TOLERANCE)
 
 
 def _weighed(problem: Problem, values: np.ndarray) -> np.ndarray:
     """Weigh the joints by what is left of each, and fit again."""
-    low, high = _limits(problem, values)
     for last in range(WEIGHINGS):
         sizes = np.maximum(problem.joints.stated, _left(problem, values))
         if last and np.abs(sizes / problem.sizes - 1.0).max() < SAME:
             break
         problem.sizes = sizes
-        values = descend(problem, values, low, high, LAST).values
+        values = problem.coordinates.descend(problem, problem.rephased(values), LAST).values
     return values
 
 
-def _judged(problem: Problem, trials: Sequence[Trial], values: np.ndarray, profiles: bool,
-            warnings: Sequence[str]) -> Fit:
+def _optimum(problem: Problem, values: np.ndarray, elsewhere: Sequence[np.ndarray] = ()
+             ) -> Optimum:
+    left, slopes = problem(values)
+    sharing = correlation_length(problem.placed(values).residual / problem.sizes)
+    return Optimum(problem, values, problem.free, 0.5 * float(left @ left), sharing,
+                   spread(slopes, sharing), problem.coordinates.descend,
+                   problem.coordinates.moved, problem.rephased, elsewhere)
+
+
+def _along_the_valley(problem: Problem, values: np.ndarray) -> list[Trial]:
+    """Look for other least costs, if that at the values is not the whole story."""
+    optimum = _optimum(problem, values)
+    if all(optimum.quadratic(k) for k in range(len(problem.free))):
+        return []
+    found = []
+    for begin in problem.coordinates.valley(values):
+        with suppress(NoOrbit):
+            problem.begin(begin)
+            found.append(problem.coordinates.descend(problem, problem.rephased(begin), TOLERANCE))
+    return found
+
+
+def _judged(problem: Problem, trials: Sequence[Trial], elsewhere: Sequence[np.ndarray],
+            values: np.ndarray, profiles: bool, warnings: Sequence[str]) -> Fit:
     """Say what was found, and how sure it is."""
     joints, best = problem.joints, min(trials, key=lambda trial: trial.cost)
-    low, high = _limits(problem, values)
     placed = problem.placed(values)
-    left, slopes = problem(values)
-    sharing = correlation_length(placed.residual / problem.sizes)
-    known = spread(slopes, sharing)
-    cost = 0.5 * float(left @ left)
-    optimum = Optimum(problem, values, low, high, cost, sharing, known)
+    optimum = _optimum(problem, values, elsewhere)
+    known = optimum.spread
     estimates = {one.name: optimum.estimate(k, profiles) for k, one in enumerate(problem.free)}
     rows = [(float(row[0]), tuple(row[1:].tolist())) for row in placed.weights.T]
     misfit = _left(problem, values) / joints.stated
@@ -183,7 +198,7 @@ def _judged(problem: Problem, trials: Sequence[Trial], values: np.ndarray, profi
         cells=dict(zip(joints.names, (joints.cells + 1).tolist(), strict=True)),
         readouts=dict(zip(joints.names, rows, strict=True)), theta=joints.theta,
         recorded=joints.data.T, errors=placed.residual.T, phase=float(values[-1]) % 1.0,
-        cost=cost, sizes=dict(zip(joints.names, problem.sizes.tolist(), strict=True)),
-        misfit=dict(zip(joints.names, misfit.tolist(), strict=True)), sharing=sharing,
+        cost=optimum.cost, sizes=dict(zip(joints.names, problem.sizes.tolist(), strict=True)),
+        misfit=dict(zip(joints.names, misfit.tolist(), strict=True)), sharing=optimum.inflation,
         starts=tuple(trials),
-        warnings=(*findings(problem.free, estimates, known, low, high, best), *warnings))
+        warnings=(*findings(problem.free, estimates, known, best), *warnings))
