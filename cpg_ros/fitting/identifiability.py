@@ -21,8 +21,9 @@ QUANTILE = 1.959964
 #: Singular values of the scaled derivative below this share of the largest are exact zeros, and
 #: numbers with this share in such a direction cannot be told.
 ZERO, SHARE = 1e-7, 1e-3
-#: The cost rises by what the quadratic says, within these factors, or its profile is followed.
-QUADRATIC = (0.85, 1.18)
+#: The root of the rise of the cost is what the quadratic says, within these factors, or its
+#: profile is followed; steps that may mend the rest.
+REGULAR, STEPS_NEARBY = (0.7, 1.43), 3
 #: Steps of a profile on either side, and its tolerance in standard errors.
 STEPS, CLOSE = 10, 0.03
 #: A profile's descents: tolerance, evaluations, and how firmly its number is drawn.
@@ -178,24 +179,31 @@ class Optimum:
 
     def _end(self, k: int, error: float, side: float) -> tuple[float, bool]:
         """One end of the interval, and whether the data set it."""
-        end = self._quadratic(k, error, side)
+        end = self._nearby(k, error, side)
         return (end, True) if end is not None else self._profile(
             k, QUANTILE * error, side, self.values)
 
-    def quadratic(self, k: int) -> bool:
-        """Whether the cost is quadratic about number k as far as its interval goes."""
+    def regular(self, k: int) -> bool:
+        """Whether the cost rises about number k, as far as its interval goes, as it should."""
         error = float(self.spread.errors[k])
-        return not np.isfinite(error) or all(self._quadratic(k, error, side) is not None
+        return not np.isfinite(error) or all(self._nearby(k, error, side) is not None
                                              for side in (-1.0, 1.0))
 
-    def _quadratic(self, k: int, error: float, side: float) -> float | None:
-        """The end of the interval where the cost is quadratic as far as there, or None."""
-        try:
-            there = self._along(k, self.values, side * QUANTILE * error)
-            share = (self._rise(there) / QUANTILE)**2
-        except NoOrbit:
-            return None
-        return float(there[k]) if QUADRATIC[0] <= share <= QUADRATIC[1] else None
+    def _nearby(self, k: int, error: float, side: float) -> float | None:
+        """The end of the interval where the cost is about quadratic as far as there, or None."""
+        step = QUANTILE
+        for _ in range(STEPS_NEARBY):
+            try:
+                there = self._along(k, self.values, side * step * error)
+                rise = self._rise(there)
+            except NoOrbit:
+                return None
+            if abs(rise - QUANTILE) <= CLOSE * QUANTILE:
+                return float(there[k])
+            if not REGULAR[0] <= rise / QUANTILE <= REGULAR[1]:
+                return None
+            step *= QUANTILE / rise
+        return None
 
     def _along(self, k: int, values: np.ndarray, step: float) -> np.ndarray:
         """Move number k by a step, and the others as they go with it."""

@@ -170,7 +170,7 @@ def _optimum(problem: Problem, values: np.ndarray, elsewhere: Sequence[np.ndarra
 def _along_the_valley(problem: Problem, values: np.ndarray) -> list[Trial]:
     """Look for other least costs, if that at the values is not the whole story."""
     optimum = _optimum(problem, values)
-    if all(optimum.quadratic(k) for k in range(len(problem.free))):
+    if all(optimum.regular(k) for k in range(len(problem.free))):
         return []
     found = []
     for begin in problem.coordinates.valley(values):
