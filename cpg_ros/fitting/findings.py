@@ -11,19 +11,17 @@ from cpg_ros.fitting.trials import Trial
 #: A 95 % interval wider than this share of the value on either side is named.
 WIDE = 0.1
 #: So are correlations beyond this, and ends this near a bound, over the bounds' distance.
-TOGETHER, AT_BOUND = 0.95, 1e-6
+TOGETHER, AT_BOUND = 0.95, 1e-5
 
 
-def findings(free: Sequence[Free], estimates: Mapping[str, Estimate], known: Spread,
-             low: np.ndarray, high: np.ndarray, best: Trial) -> list[str]:
+def findings(free: Sequence[Free], estimates: Mapping[str, Estimate], known: Spread, best: Trial
+             ) -> list[str]:
     """List what the user of a fit must know.
 
     Args:
         free: the free numbers.
         estimates: of them.
         known: their covariance, and that of the phase.
-        low: bounds of all values.
-        high: upper bounds.
         best: the start that led to the fit.
 
     """
@@ -40,8 +38,8 @@ def findings(free: Sequence[Free], estimates: Mapping[str, Estimate], known: Spr
             found.append(f'{_listed(blind)} are not determined one by one: moving {ways} '
                          'changes nothing that was recorded')
     for k, (name, one) in enumerate(estimates.items()):
-        room = AT_BOUND * (high[k] - low[k])
-        for end, bound in (('lower', low[k]), ('upper', high[k])):
+        room = AT_BOUND * (free[k].high - free[k].low)
+        for end, bound in (('lower', free[k].low), ('upper', free[k].high)):
             if abs(one.value - bound) <= room:
                 found.append(f'{name} ends at its {end} bound {bound:g}: its interval is '
                              'one-sided')

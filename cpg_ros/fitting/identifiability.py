@@ -7,23 +7,30 @@ the cycle. Intervals are quadratic where the cost is, and those of the profile l
 is not.
 """
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from cpg_ros.dynamics.periodic import NoOrbit
-from cpg_ros.fitting.trials import Evaluate, descend
+from cpg_ros.fitting.free import Free
+from cpg_ros.fitting.trials import Evaluate, Trial
 
 #: Half the width of a 95 % interval, in standard errors.
 QUANTILE = 1.959964
 #: Singular values of the scaled derivative below this share of the largest are exact zeros, and
 #: numbers with this share in such a direction cannot be told.
 ZERO, SHARE = 1e-7, 1e-3
-#: The cost rises by what the quadratic says, within these factors, or its profile is followed.
-QUADRATIC = (0.85, 1.18)
+#: The root of the rise of the cost is what the quadratic says, within these factors, or its
+#: profile is followed; steps that may mend the rest.
+REGULAR, STEPS_NEARBY = (0.7, 1.43), 3
 #: Steps of a profile on either side, and its tolerance in standard errors.
 STEPS, CLOSE = 10, 0.03
-TOLERANCE = 1e-4
+#: A profile's descents: tolerance, evaluations, and how firmly its number is drawn.
+TOLERANCE, MOST, DRAWN = 1e-6, 30, 0.3
+
+#: Goes down: problem, start, tolerance, evaluations at most.
+Descend = Callable[[Evaluate, np.ndarray, float, int], Trial]
 
 
 @dataclass(frozen=True)
@@ -122,105 +129,132 @@ class Optimum:
     Attributes:
         evaluate: the problem.
         values: where the cost is least, shape (n,).
-        low, high: bounds.
+        free: the free numbers, which the values begin with.
         cost: half the sum of squares.
         inflation: factor on variances.
         spread: covariance.
+        descend: goes down from values that have an orbit.
+        moved: values after a step, along lines that follow the valleys of the cost.
+        rephased: values with a better phase, if there is one.
+        elsewhere: other values where the cost is least nearby.
 
     """
 
     evaluate: Evaluate
     values: np.ndarray
-    low: np.ndarray
-    high: np.ndarray
+    free: Sequence[Free]
     cost: float
     inflation: float
     spread: Spread
+    descend: Descend
+    moved: Callable[[np.ndarray, np.ndarray], np.ndarray]
+    rephased: Callable[[np.ndarray], np.ndarray]
+    elsewhere: Sequence[np.ndarray] = ()
 
-    def _rise(self, cost: float) -> float:
-        """Distance in standard errors that a cost stands for."""
-        return float(np.sqrt(max(0.0, 2.0 * (cost - self.cost) / self.inflation)))
-
-    def estimate(self, k: int) -> Estimate:
-        """Estimate number k with its interval."""
+    def estimate(self, k: int, profiles: bool = True) -> Estimate:
+        """Estimate number k with its interval, by its profile where the cost is not quadratic."""
         value, error = float(self.values[k]), float(self.spread.errors[k])
+        low, high = self.free[k].low, self.free[k].high
         if not np.isfinite(error):
-            return Estimate(value, error, float(self.low[k]), float(self.high[k]), False)
-        ends = [self._end(k, error, side) for side in (-1.0, 1.0)]
-        return Estimate(value, error, ends[0][0], ends[1][0], ends[0][1] and ends[1][1])
+            return Estimate(value, error, low, high, False)
+        ends = value - QUANTILE * error, value + QUANTILE * error
+        if profiles and error > 0.0:
+            (low, below), (high, above) = (self._end(k, error, side) for side in (-1.0, 1.0))
+            as_good = [at for at in self.elsewhere if self._rise(at) < QUANTILE]
+            for at in sorted(as_good, key=lambda at: float(at[k]))[:1]:
+                if at[k] < low:
+                    low, below = self._profile(k, 0.5 * abs(at[k] - value), -1.0, at)
+            for at in sorted(as_good, key=lambda at: float(at[k]))[-1:]:
+                if at[k] > high:
+                    high, above = self._profile(k, 0.5 * abs(at[k] - value), 1.0, at)
+            return Estimate(value, error, low, high, below and above)
+        return Estimate(value, error, max(low, ends[0]), min(high, ends[1]),
+                        low <= ends[0] and ends[1] <= high)
+
+    def _rise(self, values: np.ndarray) -> float:
+        """Distance in standard errors that the cost at values stands for."""
+        left = self.evaluate(values)[0]
+        rise = 0.5 * float(left @ left) - self.cost
+        return float(np.sqrt(max(0.0, 2.0 * rise / self.inflation)))
 
     def _end(self, k: int, error: float, side: float) -> tuple[float, bool]:
         """One end of the interval, and whether the data set it."""
-        limit = float(self.low[k] if side < 0.0 else self.high[k])
-        if error > 0.0:
-            along = self.spread.covariance[:, k] / self.spread.covariance[k, k]
-            there = self.values + side * QUANTILE * error * along
-            if (self.low <= there).all() and (there <= self.high).all():
-                try:
-                    left = self.evaluate(there)[0]
-                except NoOrbit:
-                    left = None
-                if left is not None:
-                    share = (self._rise(0.5 * float(left @ left)) / QUANTILE)**2
-                    if QUADRATIC[0] <= share <= QUADRATIC[1]:
-                        return float(there[k]), True
-        return self._profile(k, error, side, limit)
+        end = self._nearby(k, error, side)
+        return (end, True) if end is not None else self._profile(
+            k, QUANTILE * error, side, self.values)
 
-    def _profile(self, k: int, error: float, side: float, limit: float) -> tuple[float, bool]:
-        """Follow the least cost for given values of number k to where it has risen enough."""
-        best = float(self.values[k])
-        others = np.arange(self.values.size) != k
-        inside, inside_rise, at = best, 0.0, self.values
+    def regular(self, k: int) -> bool:
+        """Whether the cost rises about number k, as far as its interval goes, as it should."""
+        error = float(self.spread.errors[k])
+        return not np.isfinite(error) or all(self._nearby(k, error, side) is not None
+                                             for side in (-1.0, 1.0))
+
+    def _nearby(self, k: int, error: float, side: float) -> float | None:
+        """The end of the interval where the cost is about quadratic as far as there, or None."""
+        step = QUANTILE
+        for _ in range(STEPS_NEARBY):
+            try:
+                there = self._along(k, self.values, side * step * error)
+                rise = self._rise(there)
+            except NoOrbit:
+                return None
+            if abs(rise - QUANTILE) <= CLOSE * QUANTILE:
+                return float(there[k])
+            if not REGULAR[0] <= rise / QUANTILE <= REGULAR[1]:
+                return None
+            step *= QUANTILE / rise
+        return None
+
+    def _along(self, k: int, values: np.ndarray, step: float) -> np.ndarray:
+        """Move number k by a step, and the others as they go with it."""
+        return self.moved(values, step * self.spread.covariance[:, k]
+                          / self.spread.covariance[k, k])
+
+    def _profile(self, k: int, step: float, side: float, at: np.ndarray) -> tuple[float, bool]:
+        """Follow the least cost for given values of number k to where it has risen enough.
+
+        From values where it has not, by a step to begin with.
+        """
+        limit = self.free[k].low if side < 0.0 else self.free[k].high
+        best = inside = float(at[k])
+        inside_rise = self._rise(at)
         outside, outside_rise = None, np.inf
-        place = best + side * QUANTILE * error
+        place = best + side * step
         for _ in range(STEPS):
-            if side * (place - limit) >= 0.0:
-                place = limit
-            found = self._least(k, place, at, inside, others)
-            if found is None:
-                # No orbit: the edge is between.
-                outside, outside_rise = place, np.inf
+            place = limit if side * (place - limit) >= 0.0 else place
+            found = self._least(k, place, at, CLOSE * min(step, abs(place - inside)))
+            rise, reached = self._rise(found), float(found[k])
+            short = abs(reached - place) > CLOSE * abs(place - inside)
+            if abs(rise - QUANTILE) <= CLOSE * QUANTILE:
+                return reached, True
+            if rise < QUANTILE:
+                inside, inside_rise, at = reached, rise, found
+                if short or place == limit:
+                    # A bound, or the edge of where there is an orbit.
+                    return reached, False
             else:
-                rise = self._rise(found[0])
-                if abs(rise - QUANTILE) <= CLOSE * QUANTILE:
-                    return place, True
-                if rise < QUANTILE:
-                    inside, inside_rise, at = place, rise, found[1]
-                    if place == limit:
-                        return limit, False
-                else:
-                    outside, outside_rise = place, rise
+                outside, outside_rise = reached, rise
             if outside is None:
-                place = best + (place - best) * min(3.0, 1.02 * QUANTILE / max(inside_rise, 0.1))
-            elif np.isfinite(outside_rise):
+                place = best + (place - best) * min(3.0, 1.02 * QUANTILE / max(rise, 0.1))
+            else:
                 share = (QUANTILE - inside_rise) / (outside_rise - inside_rise)
                 place = inside + float(np.clip(share, 0.1, 0.9)) * (outside - inside)
-            else:
-                place = 0.5 * (inside + outside)
-        if outside is not None and np.isfinite(outside_rise):
-            return outside, True
-        return inside, False
+        return (inside, False) if outside is None else (outside, True)
 
-    def _least(self, k: int, place: float, at: np.ndarray, inside: float, others: np.ndarray
-               ) -> tuple[float, np.ndarray] | None:
-        """Least cost with number k at a place, and the values there; None without an orbit."""
-        begin = at.copy()
-        if place != inside and np.isfinite(self.spread.errors).all():
-            along = self.spread.covariance[:, k] / self.spread.covariance[k, k]
-            begin = np.clip(at + (place - inside) * along, self.low, self.high)
-        begin[k] = place
+    def _least(self, k: int, place: float, at: np.ndarray, size: float) -> np.ndarray:
+        """Values of least cost with number k at a place, up to a share of size; from values.
 
-        def filled(values: np.ndarray) -> np.ndarray:
-            whole = begin.copy()
-            whole[others] = values
-            return whole
+        Number k is drawn there by a residual of its own, so that no step need start from where
+        there is no orbit.
+        """
+        row = (np.arange(at.size) == k) / (DRAWN * size)
 
         def evaluate(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-            left, slopes = self.evaluate(filled(values))
-            return left, slopes[:, others]
+            left, slopes = self.evaluate(values)
+            return np.append(left, row @ values - row[k] * place), np.vstack([slopes, row])
 
-        trial = descend(evaluate, begin[others], self.low[others], self.high[others], TOLERANCE,
-                        most=15)
-        return None if trial.why else (trial.cost, filled(trial.values))
-
-
+        try:
+            begin = self.rephased(self._along(k, at, place - at[k]))
+        except NoOrbit:
+            begin = at
+        return self.descend(evaluate, begin, TOLERANCE, MOST).values

@@ -7,20 +7,20 @@ counts only where a time scale is given.
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
+from contextlib import suppress
 
 import numpy as np
 
 from cpg_ros.dynamics.periodic import NoOrbit, Orbit
 from cpg_ros.fitting.findings import findings
 from cpg_ros.fitting.fit import Fit
-from cpg_ros.fitting.free import Free, free_numbers, with_values, within_hopf_set
+from cpg_ros.fitting.free import Free, free_numbers
 from cpg_ros.fitting.identifiability import Optimum, correlation_length, spread
 from cpg_ros.fitting.joints import MeanCycle, joints_of
 from cpg_ros.fitting.problem import Period, Problem
 from cpg_ros.fitting.readout_fit import WEIGHTS
 from cpg_ros.fitting.runnable import refusal
-from cpg_ros.fitting.trials import Trial, descend
+from cpg_ros.fitting.trials import Trial
 from cpg_ros.networks.network import Network
 from cpg_ros.robot import HARMONICS
 
@@ -38,7 +38,8 @@ def invert(cycle: MeanCycle, cells: Mapping[str, int], network: Network, gait: s
            free: Sequence[str] = (), order: int = 3,
            starts: Sequence[Mapping[str, float]] = ({},),
            bounds: Mapping[str, tuple[float, float]] | None = None, harmonics: int = HARMONICS,
-           time_scale: float = 0.0, done: Callable[[int], None] = lambda count: None) -> Fit:
+           time_scale: float = 0.0, profiles: bool = True,
+           done: Callable[[int], None] = lambda count: None) -> Fit:
     """Fit free numbers of a network, and readouts, to the mean cycle of a recorded gait.
 
     Args:
@@ -53,6 +54,8 @@ def invert(cycle: MeanCycle, cells: Mapping[str, int], network: Network, gait: s
         harmonics: of a Morris-Lecar cell's waveform that joints follow.
         time_scale: seconds in a unit of model time, if the period is to be fitted, too; 0
             leaves it free, as the generator's frequency does.
+        profiles: whether intervals are those of the profile likelihood where the cost is not
+            quadratic; they take most of the time.
         done: told how many starts are done.
 
     Raises:
@@ -77,7 +80,7 @@ def invert(cycle: MeanCycle, cells: Mapping[str, int], network: Network, gait: s
         period = Period(value, value * share)
     begins = [_begin(network, numbers, start) for start in starts]
 
-    def attempt(refuses: Callable[[Orbit], str]) -> Fit:
+    def attempt(refuses: Callable[[Orbit], str]) -> tuple[Problem, list[Trial], np.ndarray]:
         problem = Problem(joints, joints.stated, network, gait, numbers, order, harmonics, period,
                           refuses)
         trials: list[Trial] = []
@@ -88,19 +91,26 @@ def invert(cycle: MeanCycle, cells: Mapping[str, int], network: Network, gait: s
         best = min(trials, key=lambda trial: trial.cost)
         if best.why:
             raise NoOrbit(trials[0].why)
-        return _completed(problem, best, trials)
+        return problem, trials, _weighed(problem, best.values)
 
-    fit = attempt(lambda orbit: '')
-    flaw = refusal(fit.orbit, harmonics)
-    if not flaw:
-        return fit
-    said = f'the generator would refuse the {gait} that fits best: {flaw}'
-    try:
-        second = attempt(lambda orbit: refusal(orbit, harmonics))
-    except NoOrbit:
-        return replace(fit, warnings=(*fit.warnings, said))
-    return replace(second, warnings=(*second.warnings,
-                                     f'{said}; this is the best one that it runs'))
+    problem, trials, values = attempt(lambda orbit: '')
+    flaw, warnings = refusal(problem.placed(values).orbit, harmonics), []
+    if flaw:
+        said = f'the generator would refuse the {gait} that fits best: {flaw}'
+        try:
+            problem, trials, values = attempt(lambda orbit: refusal(orbit, harmonics))
+            said += '; this is the best one that it runs'
+        except NoOrbit:
+            pass
+        warnings = [said]
+    others = _along_the_valley(problem, values) if profiles else []
+    if others:
+        better = min(others, key=lambda trial: trial.cost)
+        left = problem(values)[0]
+        if better.cost < 0.5 * float(left @ left):
+            values = _weighed(problem, better.values)
+    return _judged(problem, trials, [trial.values for trial in others], values, profiles,
+                   warnings)
 
 
 def _begin(network: Network, numbers: Sequence[Free], start: Mapping[str, float]) -> np.ndarray:
@@ -115,16 +125,6 @@ def _begin(network: Network, numbers: Sequence[Free], start: Mapping[str, float]
             raise ValueError(f'{one.name} {known[one.name]:g} to start from is not within '
                              f'{one.low:g} to {one.high:g}')
     return np.array(list(known.values()))
-
-
-def _limits(problem: Problem, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Bounds of all values: a single free number's are those of its Hopf set, too."""
-    free = problem.free
-    if len(free) == 1:
-        there = with_values(problem.network, free, values[:1])
-        free = (within_hopf_set(there, problem.gait, free[0]),)
-    return (np.array([*(one.low for one in free), -np.inf]),
-            np.array([*(one.high for one in free), np.inf]))
 
 
 def _left(problem: Problem, values: np.ndarray) -> np.ndarray:
@@ -144,26 +144,50 @@ def _trial(problem: Problem, begin: np.ndarray, weigh: bool) -> Trial:
                      str(error))
     if weigh:
         problem.sizes = np.maximum(problem.joints.stated, _left(problem, values))
-    return descend(problem, values, *_limits(problem, values), TOLERANCE)
+    return problem.coordinates.descend(problem, values, TOLERANCE)
 
 
-def _completed(problem: Problem, best: Trial, trials: Sequence[Trial]) -> Fit:
-    """Weigh the joints by what is left of each, fit again, and judge."""
-    joints, values = problem.joints, best.values
-    low, high = _limits(problem, values)
+def _weighed(problem: Problem, values: np.ndarray) -> np.ndarray:
+    """Weigh the joints by what is left of each, and fit again."""
     for last in range(WEIGHINGS):
-        sizes = np.maximum(joints.stated, _left(problem, values))
+        sizes = np.maximum(problem.joints.stated, _left(problem, values))
         if last and np.abs(sizes / problem.sizes - 1.0).max() < SAME:
             break
         problem.sizes = sizes
-        values = descend(problem, values, low, high, LAST).values
-    placed = problem.placed(values)
+        values = problem.coordinates.descend(problem, problem.rephased(values), LAST).values
+    return values
+
+
+def _optimum(problem: Problem, values: np.ndarray, elsewhere: Sequence[np.ndarray] = ()
+             ) -> Optimum:
     left, slopes = problem(values)
-    sharing = correlation_length(placed.residual / problem.sizes)
-    known = spread(slopes, sharing)
-    cost = 0.5 * float(left @ left)
-    optimum = Optimum(problem, values, low, high, cost, sharing, known)
-    estimates = {one.name: optimum.estimate(k) for k, one in enumerate(problem.free)}
+    sharing = correlation_length(problem.placed(values).residual / problem.sizes)
+    return Optimum(problem, values, problem.free, 0.5 * float(left @ left), sharing,
+                   spread(slopes, sharing), problem.coordinates.descend,
+                   problem.coordinates.moved, problem.rephased, elsewhere)
+
+
+def _along_the_valley(problem: Problem, values: np.ndarray) -> list[Trial]:
+    """Look for other least costs, if that at the values is not the whole story."""
+    optimum = _optimum(problem, values)
+    if all(optimum.regular(k) for k in range(len(problem.free))):
+        return []
+    found = []
+    for begin in problem.coordinates.valley(values):
+        with suppress(NoOrbit):
+            problem.begin(begin)
+            found.append(problem.coordinates.descend(problem, problem.rephased(begin), TOLERANCE))
+    return found
+
+
+def _judged(problem: Problem, trials: Sequence[Trial], elsewhere: Sequence[np.ndarray],
+            values: np.ndarray, profiles: bool, warnings: Sequence[str]) -> Fit:
+    """Say what was found, and how sure it is."""
+    joints, best = problem.joints, min(trials, key=lambda trial: trial.cost)
+    placed = problem.placed(values)
+    optimum = _optimum(problem, values, elsewhere)
+    known = optimum.spread
+    estimates = {one.name: optimum.estimate(k, profiles) for k, one in enumerate(problem.free)}
     rows = [(float(row[0]), tuple(row[1:].tolist())) for row in placed.weights.T]
     misfit = _left(problem, values) / joints.stated
     count = len(problem.free)
@@ -174,7 +198,7 @@ def _completed(problem: Problem, best: Trial, trials: Sequence[Trial]) -> Fit:
         cells=dict(zip(joints.names, (joints.cells + 1).tolist(), strict=True)),
         readouts=dict(zip(joints.names, rows, strict=True)), theta=joints.theta,
         recorded=joints.data.T, errors=placed.residual.T, phase=float(values[-1]) % 1.0,
-        cost=cost, sizes=dict(zip(joints.names, problem.sizes.tolist(), strict=True)),
-        misfit=dict(zip(joints.names, misfit.tolist(), strict=True)), sharing=sharing,
+        cost=optimum.cost, sizes=dict(zip(joints.names, problem.sizes.tolist(), strict=True)),
+        misfit=dict(zip(joints.names, misfit.tolist(), strict=True)), sharing=optimum.inflation,
         starts=tuple(trials),
-        warnings=tuple(findings(problem.free, estimates, known, low, high, best)))
+        warnings=(*findings(problem.free, estimates, known, best), *warnings))

@@ -9,6 +9,7 @@ from cpg_ros.dynamics import cell_orbit
 from cpg_ros.dynamics.mesh_orbit import MeshOrbit
 from cpg_ros.dynamics.orbit import solve_orbit
 from cpg_ros.dynamics.periodic import NoOrbit, Orbit
+from cpg_ros.fitting.coordinates import Coordinates
 from cpg_ros.fitting.free import Free, with_values
 from cpg_ros.fitting.joints import Joints
 from cpg_ros.fitting.readout_fit import WEIGHTS, basis, basis_moved, project
@@ -53,6 +54,7 @@ class Problem:
     Attributes:
         joints, network, gait, free, order, harmonics: what is fitted to what.
         refuses: why an orbit shall not count, or ''.
+        coordinates: in which a trust region moves.
         sizes: standard error of each joint's mean cycle as far as it counts, rad, (joints,).
 
     """
@@ -63,6 +65,7 @@ class Problem:
         self.joints, self.sizes, self.free = joints, sizes, tuple(free)
         self.network, self.gait, self._period = network, gait, period
         self._symmetry = network.symmetry(gait)
+        self.coordinates = Coordinates(network, gait, self.free)
         self.order, self.harmonics, self.refuses = order, harmonics, refuses
         names = network.parameters()
         self._members = np.array([[float(name in one.members) for one in free]
@@ -179,3 +182,12 @@ class Problem:
             gram = np.einsum('msn,msk->snk', psi, psi)
             explained += np.sum(sums * np.linalg.solve(gram, sums), axis=(1, 2))
         return float(shifts[explained.argmax()])
+
+    def rephased(self, values: np.ndarray) -> np.ndarray:
+        """Return values with the guessed phase if it leaves less than their own does.
+
+        Close to a cosine any phase does nearly as well, and none is the best one nearby for sure.
+        """
+        there = np.append(values[:-1], self.first_phase(values))
+        here_left, there_left = self(values)[0], self(there)[0]
+        return there if there_left @ there_left < here_left @ here_left else values
