@@ -9,9 +9,14 @@ from cpg_ros.dynamics.hopf import HopfPoint, hopf_point
 from cpg_ros.dynamics.periodic import Orbit
 from cpg_ros.dynamics.verdict import Verdict
 from cpg_ros.fitting.identifiability import Estimate
+from cpg_ros.fitting.readout_fit import basis
+from cpg_ros.fitting.signals import signals
 from cpg_ros.fitting.trials import Trial
 from cpg_ros.networks.delayed import Delayed
 from cpg_ros.networks.network import Network
+
+#: Phases between recording and orbit that are tried.
+SHIFTS = 120
 
 
 @dataclass(frozen=True)
@@ -90,6 +95,23 @@ class Fit:
     def mean_rms_share(self) -> float:
         """Mean over the joints."""
         return float(np.mean(list(self.rms_share.values())))
+
+    def share_at(self, order: int) -> float:
+        """Mean RMS error over range with readouts of another order, the parameters kept."""
+        if order == self.order:
+            return self.mean_rms_share
+        seen, shifts = signals(self.orbit, self.harmonics), np.arange(SHIFTS) / SHIFTS
+        spans = np.ptp(self.recorded, axis=1)
+        shares = np.zeros((len(self.recorded), SHIFTS))
+        for j, name in enumerate(self.joints):
+            cell = self.cells[name] - 1
+            psi = basis(order, *seen.values(self.theta, self.orbit.phases[cell] + shifts,
+                                            int(self.orbit.waves[cell])))[0]
+            columns = psi.transpose(1, 0, 2)
+            weights = np.linalg.pinv(columns) @ self.recorded[j][:, None]
+            left = (columns @ weights)[..., 0] - self.recorded[j]
+            shares[j] = np.sqrt(np.mean(left**2, axis=1)) / (spans[j] or np.inf)
+        return float(shares.mean(axis=0).min())
 
     def synchronisation(self, points: int = 20) -> tuple[np.ndarray, np.ndarray]:
         """Errors at even instants, as in Liu & Zhang's Figures 5, 6, 8 and 9.

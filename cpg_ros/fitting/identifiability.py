@@ -180,8 +180,14 @@ class Optimum:
     def _end(self, k: int, error: float, side: float) -> tuple[float, bool]:
         """One end of the interval, and whether the data set it."""
         end = self._nearby(k, error, side)
-        return (end, True) if end is not None else self._profile(
-            k, QUANTILE * error, side, self.values)
+        if end is not None:
+            return end, True
+        try:
+            return self._profile(k, QUANTILE * error, side, self.values)
+        except NoOrbit:
+            # Not even the way back is found: the quadratic has to do, and bounds nothing.
+            end = float(self.values[k]) + side * QUANTILE * error
+            return min(max(end, self.free[k].low), self.free[k].high), False
 
     def regular(self, k: int) -> bool:
         """Whether the cost rises about number k, as far as its interval goes, as it should."""

@@ -39,7 +39,7 @@ def invert(cycle: MeanCycle, cells: Mapping[str, int], network: Network, gait: s
            starts: Sequence[Mapping[str, float]] = ({},),
            bounds: Mapping[str, tuple[float, float]] | None = None, harmonics: int = HARMONICS,
            time_scale: float = 0.0, profiles: bool = True,
-           done: Callable[[int], None] = lambda count: None) -> Fit:
+           done: Callable[[float], None] = lambda share: None) -> Fit:
     """Fit free numbers of a network, and readouts, to the mean cycle of a recorded gait.
 
     Args:
@@ -56,7 +56,7 @@ def invert(cycle: MeanCycle, cells: Mapping[str, int], network: Network, gait: s
             leaves it free, as the generator's frequency does.
         profiles: whether intervals are those of the profile likelihood where the cost is not
             quadratic; they take most of the time.
-        done: told how many starts are done.
+        done: told which share of the work is done, 0 to 1.
 
     Raises:
         ValueError: names, shapes, bounds or starts cannot be used.
@@ -85,9 +85,9 @@ def invert(cycle: MeanCycle, cells: Mapping[str, int], network: Network, gait: s
                           refuses)
         trials: list[Trial] = []
         for begin in begins:
-            done(len(trials))
+            done(0.5 * len(trials) / len(begins))
             trials.append(_trial(problem, begin, weigh=all(other.why for other in trials)))
-        done(len(trials))
+        done(0.5)
         best = min(trials, key=lambda trial: trial.cost)
         if best.why:
             raise NoOrbit(trials[0].why)
@@ -110,7 +110,7 @@ def invert(cycle: MeanCycle, cells: Mapping[str, int], network: Network, gait: s
         if better.cost < 0.5 * float(left @ left):
             values = _weighed(problem, better.values)
     return _judged(problem, trials, [trial.values for trial in others], values, profiles,
-                   warnings)
+                   warnings, done)
 
 
 def _begin(network: Network, numbers: Sequence[Free], start: Mapping[str, float]) -> np.ndarray:
@@ -181,13 +181,18 @@ def _along_the_valley(problem: Problem, values: np.ndarray) -> list[Trial]:
 
 
 def _judged(problem: Problem, trials: Sequence[Trial], elsewhere: Sequence[np.ndarray],
-            values: np.ndarray, profiles: bool, warnings: Sequence[str]) -> Fit:
+            values: np.ndarray, profiles: bool, warnings: Sequence[str],
+            done: Callable[[float], None]) -> Fit:
     """Say what was found, and how sure it is."""
     joints, best = problem.joints, min(trials, key=lambda trial: trial.cost)
     placed = problem.placed(values)
     optimum = _optimum(problem, values, elsewhere)
     known = optimum.spread
-    estimates = {one.name: optimum.estimate(k, profiles) for k, one in enumerate(problem.free)}
+    estimates = {}
+    for k, one in enumerate(problem.free):
+        done(0.6 + 0.4 * k / len(problem.free))
+        estimates[one.name] = optimum.estimate(k, profiles)
+    done(1.0)
     rows = [(float(row[0]), tuple(row[1:].tolist())) for row in placed.weights.T]
     misfit = _left(problem, values) / joints.stated
     count = len(problem.free)

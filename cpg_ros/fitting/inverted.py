@@ -106,7 +106,7 @@ def _legs(recording: Recording, robot: Robot | None) -> tuple[dict[str, tuple[st
 def inverted(recording: Recording, robot: Robot | None = None, network: str = '', gait: str = '',
              free: Sequence[str] = (), order: int = 3, base: Network | None = None,
              starts: Sequence[Mapping[str, float]] = ({},),
-             done: Callable[[int], None] = lambda count: None) -> Inverted:
+             done: Callable[[float], None] = lambda share: None) -> Inverted:
     """Find the steady gait of a recording and fit a network's gait and readouts to it.
 
     Args:
@@ -119,7 +119,7 @@ def inverted(recording: Recording, robot: Robot | None = None, network: str = ''
         order: of the readouts, 1 to 3.
         base: parameters that are not free; the gait's preset by default.
         starts: free number -> value to start from.
-        done: told how many starts are done.
+        done: told which share of the fit is done, 0 to 1.
 
     Raises:
         ValueError: one line that says what is wrong: no legs, no steady gait (NoSteadyGait), no
@@ -153,10 +153,6 @@ def inverted(recording: Recording, robot: Robot | None = None, network: str = ''
                         f'not of {gait}')
     parameters = preset_of(network, gait).network if base is None else base
     fit = invert(stride, cells, parameters, gait, free, order, starts, done=done)
-    shares = {order: fit.mean_rms_share}
-    for other in ORDERS:
-        if other != order:
-            shares[other] = invert(stride, cells, fit.network, gait, tuple(fit.parameters),
-                                   other).mean_rms_share
-    return Inverted(recording, read, legs, stride, fit, dict(sorted(shares.items())),
+    return Inverted(recording, read, legs, stride, fit,
+                    {order: fit.share_at(order) for order in ORDERS},
                     (*warnings, *fit.warnings))

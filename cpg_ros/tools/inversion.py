@@ -114,9 +114,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
         robot = None if chosen.robot is None else find_robot(chosen.robot)
         starts = [dict(start) for start in chosen.start] or [{}]
         recording = _recording(chosen, robot)
-        with progress_bar('fitting', len(starts)) as bar:
+        with progress_bar('fitting', 100) as bar:
             found = inverted(recording, robot, chosen.network or '', chosen.gait or '',
-                             chosen.free, chosen.order, starts=starts, done=bar)
+                             chosen.free, chosen.order, starts=starts,
+                             done=lambda share: bar(round(100.0 * share)))
         written = _written(chosen, found, robot)
     except NoSteadyGait as error:
         print(f'inversion: {error}', file=sys.stderr)

@@ -49,7 +49,8 @@ def joints(found: Inverted) -> Figure:
         axes.set_title(f'{name}: {100 * share[name]:.1f} % of range', fontsize=8, loc='left')
         axes.set_ylabel('angle [rad]', fontsize=8)
     grid[0].legend(fontsize=7, frameon=False)
-    figure.suptitle(f'Mean cycle of {stride.cycles} strides at {stride.frequency:.4f} Hz, and the '
+    strides = f'{stride.cycles} strides' if stride.cycles > 1 else '1 stride'
+    figure.suptitle(f'Mean cycle of {strides} at {stride.frequency:.4f} Hz, and the '
                     f'{fit.gait} of the {fit.network.name} network, readout of order '
                     f'{fit.order}', fontsize=10)
     return figure
