@@ -77,8 +77,9 @@ def parameter_tree(found: Inverted, robot: Path) -> dict[str, Any]:
     fit = found.fit
     return {'/**': {'ros__parameters': {
         'network': fit.network.name, 'robot': str(robot), 'gait': fit.gait,
-        'frequency': found.stride.frequency, 'amplitude': 1.0,
-        fit.network.name: fit.network.as_dict()}}}
+        'frequency': float(found.stride.frequency), 'amplitude': 1.0,
+        fit.network.name: {name: float(value)
+                           for name, value in fit.network.as_dict().items()}}}}
 
 
 def write_fitted(path: Path, found: Inverted, robot: Robot | None = None) -> list[Path]:
@@ -96,8 +97,9 @@ def write_fitted(path: Path, found: Inverted, robot: Robot | None = None) -> lis
     said = (f'{found.fit.gait} at {found.stride.frequency:.4f} Hz, fitted to '
             f'{found.recording.source}\nmean RMS error {100 * found.fit.mean_rms_share:.1f} % of '
             f'the joints\' range, readout of order {found.fit.order}')
-    write_robot(beside, fitted_robot(found, robot), said)
-    tree = parameter_tree(found, beside.resolve())
+    moved, tree = fitted_robot(found, robot), parameter_tree(found, beside.resolve())
     comment = ''.join(f'# {line}\n' for line in said.splitlines())
-    write_whole(path, comment + yaml.safe_dump(tree, sort_keys=False))
+    parameters = comment + yaml.safe_dump(tree, sort_keys=False)
+    write_robot(beside, moved, said)
+    write_whole(path, parameters)
     return [path, beside]

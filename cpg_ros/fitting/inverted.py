@@ -60,6 +60,10 @@ class Inverted:
             'rms_share_by_order': {str(order): value for order, value in self.shares.items()},
             'joints': {name: {'rms': rms[name], 'rms_share': share[name], 'cell': fit.cells[name]}
                        for name in fit.joints},
+            'starts': [{'start': dict(zip(fit.parameters, trial.start.tolist(), strict=False)),
+                        'end': dict(zip(fit.parameters, trial.values.tolist(), strict=False)),
+                        'iterations': trial.iterations, 'cost': trial.cost, 'why': trial.why}
+                       for trial in fit.starts],
             'period': fit.orbit.period,
             'critical_delay': None if fit.hopf is None else fit.hopf.tau,
             'stable': verdict.stable, 'stable_with_default_gain': verdict.stable_with_default_gain,

@@ -1,15 +1,10 @@
 """Joint states as they come in, kept as bytes until they are asked for."""
 
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Sequence
 
-import numpy as np
-
-from cpg_ros.fitting.cdr import UndecodableError, decode
-from cpg_ros.fitting.recording import Chunk, Recording, RecordingError, merged
-
-#: Messages decoded at once.
-BATCH = 4096
+from cpg_ros.fitting.recording import Recording, RecordingError
+from cpg_ros.fitting.streams import BATCH, Stream, recorded
 
 
 class Live:
@@ -21,7 +16,7 @@ class Live:
 
     """
 
-    def __init__(self, topics: tuple[str, ...], window: float) -> None:
+    def __init__(self, topics: Sequence[str], window: float) -> None:
         self.window = window
         self._kept: dict[str, deque[tuple[int, bytes]]] = {topic: deque() for topic in topics}
 
@@ -34,9 +29,6 @@ class Live:
             while kept[0][0] < oldest:
                 kept.popleft()
 
-    def __len__(self) -> int:
-        return sum(map(len, self._kept.values()))
-
     def copy(self) -> 'Live':
         """Return the same messages, to be decoded while more come in."""
         other = Live(tuple(self._kept), self.window)
@@ -44,33 +36,26 @@ class Live:
             other._kept[topic].extend(kept)
         return other
 
-    def recording(self) -> Recording:
+    def recording(self, joints: Sequence[str] = (), some: bool = False) -> Recording:
         """Decode what is kept.
+
+        Args:
+            joints: which to take; all of them, if empty.
+            some: joints that are not there are passed over, unless none is.
 
         Raises:
             RecordingError: nothing, or nothing that can be used, came in.
 
         """
-        source = ', '.join(self._kept)
-        if not len(self):
-            raise RecordingError(f'{source}: no joint states came in')
-        chunks = [chunk for topic, kept in self._kept.items()
-                  for chunk in _chunks(topic, list(kept))]
-        if not chunks:
-            raise RecordingError(f'{source}: no message with names and positions came in')
-        return merged(chunks, source)
-
-
-def _chunks(topic: str, kept: list[tuple[int, bytes]]) -> Iterator[Chunk]:
-    """Decode a topic's messages; their times are those of their headers, or of receipt."""
-    for first in range(0, len(kept), BATCH):
-        part = kept[first:first + BATCH]
-        received = np.array([time for time, _ in part], dtype=np.int64)
-        try:
-            for block in decode([message for _, message in part]):
-                if block.positions.shape[1] == len(block.names) > 0:
-                    stamps = block.stamps if block.stamps.any() else received[block.rows]
-                    yield stamps, block.names, block.positions
-        except UndecodableError as error:
-            raise RecordingError(f'{topic}: message {first + error.index + 1} cannot be decoded: '
-                                 f'{error}') from error
+        if not any(self._kept.values()):
+            raise RecordingError(f'{", ".join(self._kept)}: no joint states came in')
+        streams = []
+        for topic, kept in self._kept.items():
+            stream = Stream(topic, joints)
+            for received, message in kept:
+                stream.add(received, message)
+                if len(stream.messages) == BATCH:
+                    stream.decode('')
+            stream.decode('')
+            streams.append(stream)
+        return recorded(streams, joints, '', some=some)

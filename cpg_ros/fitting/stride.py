@@ -146,7 +146,8 @@ def find_stride(recording: Recorded, legs: Legs | Mapping[str, Sequence[str]],
     if warp.cycles < CYCLES:
         raise NoSteadyGait(f'{source}: no steady gait: only {warp.cycles:.1f} cycles of '
                            f'{1.0 / warp.frequency:.3g} s are alike, {CYCLES:g} are needed')
-    inside = (times >= warp.knots[0]) & (times <= warp.knots[-1])
+    inside = slice(np.searchsorted(times, warp.knots[0]),
+                   np.searchsorted(times, warp.knots[-1], side='right'))
     phases, x = warp(times[inside]), positions[inside]
     theta = np.arange(POINTS) / POINTS
     full = np.isfinite(x).sum(axis=0) >= SAMPLES
@@ -160,7 +161,7 @@ def find_stride(recording: Recorded, legs: Legs | Mapping[str, Sequence[str]],
         found = warped(phases, x, theta, [names.index(name) for name in chosen[next(iter(own))]])
     except ValueError as error:
         raise NoSteadyGait(f'{source}: {error}') from error
-    power = np.nanvar(x, axis=0)
+    power = np.array([np.nanvar(column) for column in x.T])
     left = float(np.sum(found.left * power) / np.sum(power))
     if left > LEFT:
         raise NoSteadyGait(f'{source}: no steady gait: the mean cycle, of '
@@ -202,7 +203,8 @@ def _usable(recording: Recorded, legs: Mapping[str, Sequence[str]]
     """Return the legs' joints that have angles, their positions without spikes, and notes."""
     listed = [name for name in recording.joints if any(name in one for one in legs.values())]
     x = recording.positions[:, [recording.joints.index(name) for name in listed]].astype(float)
-    x[np.isinf(x)] = np.nan
+    for column in x.T:
+        column[np.isinf(column)] = np.nan
     enough = np.isfinite(x).sum(axis=0) >= SAMPLES
     names = [name for name, good in zip(listed, enough, strict=True) if good]
     lost = [name for name in listed if name not in names]
@@ -211,14 +213,17 @@ def _usable(recording: Recorded, legs: Mapping[str, Sequence[str]]
         raise NoSteadyGait(f'{recording.source}: {len(recording.times)} samples are not enough '
                            f'for a gait, at least {SAMPLES} are needed')
     kept = _kept(legs, names, recording.source)
-    x = x[:, enough]
-    before, here, after = x[:-2], x[1:-1], x[2:]
-    with np.errstate(invalid='ignore'):
+    x = x if enough.all() else x[:, enough]
+    spikes = 0
+    for column in x.T:
+        before, here, after = column[:-2], column[1:-1], column[2:]
         off = np.abs(here - 0.5 * (before + after))
-        wild = (off > SPIKE * np.nanstd(x, axis=0)) & (off > SPIKE * np.abs(after - before))
-    if wild.any():
-        x[1:-1][wild] = np.nan
-        notes.append(f'left out, far off both neighbours: {np.count_nonzero(wild)} samples')
+        with np.errstate(invalid='ignore'):
+            wild = ((off > SPIKE * np.nanstd(column)) & (off > SPIKE * np.abs(after - before)))
+        here[wild] = np.nan
+        spikes += int(np.count_nonzero(wild))
+    if spikes:
+        notes.append(f'left out, far off both neighbours: {spikes} samples')
     return kept, x, notes
 
 

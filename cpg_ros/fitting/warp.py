@@ -13,6 +13,7 @@ from scipy.linalg import solveh_banded
 
 from cpg_ros.fitting.cycle import rows_of, series, weights_for
 from cpg_ros.fitting.steady import Stretch, even, longest
+from cpg_ros.fitting.warped import blocks, mean_weights
 
 #: Blocks in a period, a window begins at each of them, and points in a block.
 BLOCKS, POINTS = 8, 4
@@ -31,6 +32,8 @@ ODD, MARKED = 3.0, 0.05
 ODD_RATE, MARKED_RATE = 4.5, 0.03
 #: Harmonics that fix the phase, and most of its cycles without own knots.
 HARMONICS, FEW = 8, 4.0
+#: Fewest rates of which a drift is told from wander.
+DRIFTS = 12
 #: Steps of Gauss-Newton, the most that one may move the phase, in cycles.
 STEPS, FARTHEST = 6, 0.1
 #: Weight of a knot's neighbours where there are no data around it.
@@ -164,20 +167,26 @@ def _mean_rate(knots: np.ndarray, phases: np.ndarray) -> tuple[float, float]:
     """Return the mean rate and its standard error.
 
     Phases at the knots wander, as no stride is like the last, and are in error besides. So rates
-    between knots vary by q + 2 s and with their neighbours by -s, s the variance of the errors, q
-    that of the wander, apart from a drift; and the mean of least variance gives all rates the
-    same weight where they only wander, and is the slope of a straight line where they do not.
+    between knots vary by 2 q/3 + 2 s and with their neighbours by q/6 - s: s is the variance of
+    the errors, q that of strides, as knots lie anywhere in these. A drift is set apart. The mean
+    of least variance gives all rates the same weight where they only wander, and is the slope of
+    a straight line where they do not.
     """
     rates = np.diff(phases) / np.diff(knots)
     n = rates.size
-    place = np.arange(n) - 0.5 * (n - 1)
-    off = rates - rates.mean() - place * (place @ rates) / (place @ place)
-    own = float(off @ off) / max(n - 2, 1)
-    next_ = float(off[1:] @ off[:-1]) / max(n - 3, 1)
-    errors = min(max(-next_, 0.0), 0.5 * own)
+    off, free = rates - rates.mean(), n - 1
+    if n >= DRIFTS:
+        place = np.arange(n) - 0.5 * (n - 1)
+        off, free = off - place * (place @ rates) / (place @ place), n - 2
+    own = float(off @ off) / max(free, 1)
+    next_ = float(off[1:] @ off[:-1]) / max(n - 1, 1)
+    # Of few rates a covariance as large comes by chance.
+    errors = (0.25 * own - next_ - 0.5 * own / np.sqrt(n)) / 1.5
+    errors = min(max(errors, 0.0), 0.499 * own)
+    wander = 1.5 * (own - 2.0 * errors)
     if own <= 0.0:
         return float(rates.mean()), 0.0
-    bands = np.stack([np.full(n, -errors), np.full(n, own)])
+    bands = np.stack([np.full(n, wander / 6.0 - errors), np.full(n, own)])
     weights = solveh_banded(bands, np.ones(n))
     return (float(weights @ rates / weights.sum()), float(1.0 / np.sqrt(weights.sum())))
 
@@ -188,14 +197,18 @@ def _extended(at: np.ndarray, times: np.ndarray, phases: np.ndarray, slope: floa
     return inner + slope * (np.minimum(at - times[0], 0.0) + np.maximum(at - times[-1], 0.0))
 
 
-def _model(x: np.ndarray, phases: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Fit the mean cycle; return what it leaves, its slope by phase, and the rows."""
-    rows = rows_of(phases, HARMONICS)
-    weights = weights_for(x, rows)
+def _model(x: np.ndarray, phases: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Fit the mean cycle; return what it leaves, and its slope by phase."""
+    weights = mean_weights(x, phases, HARMONICS)
     n = 2.0 * np.pi * np.arange(1, HARMONICS + 1)[:, None]
     turned = np.vstack([0.0 * weights[:1], n * weights[1 + HARMONICS:],
                         -n * weights[1:1 + HARMONICS]])
-    return x - series(weights, rows), series(turned, rows), rows
+    left, slope = np.empty_like(x), np.empty_like(x)
+    for part in blocks(phases):
+        rows = rows_of(phases[part], HARMONICS)
+        left[:, part] = x[:, part] - series(weights, rows)
+        slope[:, part] = series(turned, rows)
+    return left, slope
 
 
 def _straight(grid: np.ndarray, x: np.ndarray, phases: np.ndarray, span: float
@@ -203,8 +216,9 @@ def _straight(grid: np.ndarray, x: np.ndarray, phases: np.ndarray, span: float
     """Fit a constant rate with the mean cycle projected out; return phases and error."""
     centred = grid - 0.5 * span
     for _ in range(2 * STEPS):
-        left, slope, rows = _model(x, np.interp(grid, [0.0, span], phases))
-        by_rate = centred * slope
+        at = np.interp(grid, [0.0, span], phases)
+        left, slope = _model(x, at)
+        by_rate, rows = centred * slope, rows_of(at, HARMONICS)
         by_rate -= series(weights_for(by_rate, rows), rows)
         power = float(np.sum(by_rate * by_rate))
         step = float(np.sum(by_rate * left)) / max(power, 1e-300)
@@ -224,7 +238,7 @@ def _straight(grid: np.ndarray, x: np.ndarray, phases: np.ndarray, span: float
 def _steady(grid: np.ndarray, x: np.ndarray, knots: np.ndarray, phases: np.ndarray
             ) -> tuple[int, int]:
     """Return first and last stride between knots of the longest run that are like the mean."""
-    left, _, _ = _model(x, np.interp(grid, knots, phases))
+    left, _ = _model(x, np.interp(grid, knots, phases))
     starts = np.searchsorted(grid, knots[:-1])
     counts = np.diff(np.append(starts, grid.size))
 
@@ -264,7 +278,7 @@ def _bent(grid: np.ndarray, x: np.ndarray, knots: np.ndarray, phases: np.ndarray
                 + np.bincount(place + 1, high, knots.size))
 
     for _ in range(STEPS):
-        left, slope, _ = _model(x, np.interp(grid, knots, phases))
+        left, slope = _model(x, np.interp(grid, knots, phases))
         stiff, pull = np.einsum('jn,jn->n', slope, slope), np.einsum('jn,jn->n', slope, left)
         bands = np.zeros((2, knots.size))
         bands[1] = gathered(stiff * before**2, stiff * after**2)

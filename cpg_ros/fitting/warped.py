@@ -7,6 +7,7 @@ it leaves, averaged in as many bins of a cycle as the series has terms.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -17,8 +18,11 @@ HARMONICS = 24
 #: Samples further off than this many times the median distance, and than this many standard
 #: deviations of the joint, are none of the motion (spikes).
 FAR, WILD = 30.0, 3.0
-#: Fewest cycles for the scatter to be told for every phase by itself.
-ENOUGH = 4
+#: Samples of a long recording that are fitted at once, and fewest cycles in them.
+BLOCK, CYCLES = 1 << 15, 20.0
+#: Fewest cycles for the scatter to be told for every phase by itself, and as how many cycles
+#: that of all phases together counts there: that of a few may be small by chance.
+ENOUGH, POOLED = 4, 4
 
 
 @dataclass(frozen=True)
@@ -52,6 +56,23 @@ class Warped:
         return series(weights, rows_of(theta, len(c) - 1))
 
 
+def blocks(phases: np.ndarray) -> list[slice]:
+    """Cut a long recording into parts of many cycles each, so that none takes much memory."""
+    count = min(-(-phases.size // BLOCK), int((phases[-1] - phases[0]) / CYCLES))
+    edges = np.linspace(0, phases.size, max(count, 1) + 1).astype(int)
+    return [slice(low, high) for low, high in pairwise(edges)]
+
+
+def mean_weights(x: np.ndarray, phases: np.ndarray, harmonics: int) -> np.ndarray:
+    """Return the least-squares weights (2 n + 1, channels) of the series of x (channels, m).
+
+    Of a long recording the mean of those of its blocks.
+    """
+    parts = blocks(phases)
+    return np.mean([weights_for(x[:, part], rows_of(phases[part], harmonics))
+                    for part in parts], axis=0)
+
+
 def warped(phases: np.ndarray, positions: np.ndarray, theta: np.ndarray, first: Sequence[int]
            ) -> Warped:
     """Average cycles.
@@ -79,17 +100,15 @@ def warped(phases: np.ndarray, positions: np.ndarray, theta: np.ndarray, first: 
         mask = there[:, alike[0]]
         at, x = phases[mask], np.ascontiguousarray(positions[np.ix_(mask, alike)].T)
         weights[:, alike], rest, bins = _fitted(at, x)
-        far, variance = np.abs(rest), x.var(axis=1)
-        wild = ((far > FAR * np.median(far, axis=1, keepdims=True))
-                & (far > WILD * np.sqrt(variance)[:, None]))
         for row, joint in enumerate(alike):
-            keep = ~wild[row]
+            far, variance = np.abs(rest[row]), float(x[row].var())
+            keep = (far <= FAR * np.median(far)) | (far <= WILD * np.sqrt(variance))
             rests[joint] = at, rest[row], bins
             if not keep.all():
                 some, own, fewer = _fitted(at[keep], x[row:row + 1, keep])
                 weights[:, joint], rests[joint] = some[:, 0], (at[keep], own[0], fewer)
-            spikes[joint] = wild[row].sum()
-            left[joint] = rests[joint][1].var() / max(variance[row], 1e-300)
+            spikes[joint] = np.count_nonzero(~keep)
+            left[joint] = rests[joint][1].var() / max(variance, 1e-300)
     c = _coefficients(weights)
     lead = c[1, list(first)]
     zero = -float(np.angle(lead[np.argmax(np.abs(lead))])) / (2.0 * np.pi)
@@ -109,11 +128,13 @@ def _fitted(phases: np.ndarray, x: np.ndarray) -> tuple[np.ndarray, np.ndarray, 
     n = min(determined(phases - phases[0], 1.0), HARMONICS) if phases.size > 4 else 0
     if n < 1:
         raise ValueError(f'{phases.size} samples leave too much of the cycle empty')
-    rows = rows_of(phases, n)
-    some = weights_for(x, rows)
+    some = mean_weights(x, phases, n)
+    rest = np.empty_like(x)
+    for part in blocks(phases):
+        rest[:, part] = x[:, part] - series(some, rows_of(phases[part], n))
     weights = np.zeros((2 * HARMONICS + 1, len(x)))
     weights[:1 + n], weights[1 + HARMONICS:1 + HARMONICS + n] = some[:1 + n], some[1 + n:]
-    return weights, x - series(some, rows), 2 * n + 1
+    return weights, rest, 2 * n + 1
 
 
 def _scatter(phases: np.ndarray, rest: np.ndarray, bins: int, theta: np.ndarray
@@ -129,12 +150,11 @@ def _scatter(phases: np.ndarray, rest: np.ndarray, bins: int, theta: np.ndarray
     number = have.sum(axis=0)
     middle = means.sum(axis=0) / np.maximum(number, 1)
     square = np.sum(np.where(have, means - middle, 0.0)**2, axis=0)
-    if np.median(number) < ENOUGH:
-        # Too few for each phase by itself; and what is there once only tells nothing.
-        twice = number > 1
-        square = np.full(bins, square[twice].sum() / max((number[twice] - 1).sum(), 1))
-    else:
-        square = square / np.maximum(number - 1, 1)
+    # What is there once tells nothing.
+    free = np.maximum(number - 1, 0)
+    pooled = square[free > 0].sum() / max(free.sum(), 1)
+    square = (np.full(bins, pooled) if np.median(number) < ENOUGH
+              else (square + POOLED * pooled) / (free + POOLED))
     spread = np.sqrt(square)
     error = np.sqrt(square / np.maximum(number, 1) + middle**2)
     centres = (np.arange(bins) + 0.5) / bins

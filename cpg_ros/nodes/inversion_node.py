@@ -12,6 +12,7 @@ import rclpy
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
 from rcl_interfaces.srv import SetParametersAtomically
 from rclpy.callback_groups import ReentrantCallbackGroup
+from rclpy.exceptions import ParameterException
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
@@ -139,15 +140,20 @@ class Inversion(Node):
                     said = f'{said}; applied to {target}'
         finally:
             self._busy = False
-        log = self.get_logger()
-        (log.warning if found is None else log.info)(said)
+        # The logger tells its callers by their lines, and wants one severity of each.
+        if found is None:
+            self.get_logger().warning(said)
+        else:
+            self.get_logger().info(said)
         return found is not None, said
 
     def _work(self, heard: Live, work: Future) -> None:
         """Fit and write; the outcome is what to say, and what was found or None."""
         try:
             free = self.get_parameter_or('free').value or ()
-            found = inverted(heard.recording(), self._robot, self._value('network'),
+            robot = self._robot
+            names = () if robot is None else [joint.name for joint in robot.joints]
+            found = inverted(heard.recording(names, some=True), robot, self._value('network'),
                              self._value('gait'), tuple(free), self._value('order'))
             work.set_result(('; '.join([_summary(found), *self._written(found)]), found))
         except (ValueError, OSError) as error:
@@ -203,7 +209,7 @@ def run(args: list[str] | None = None) -> int:
     rclpy.init(args=args)
     try:
         node = Inversion()
-    except ValueError as error:
+    except (ValueError, ParameterException) as error:
         rclpy.logging.get_logger(NAME).fatal(str(error))
         rclpy.try_shutdown()
         return 1

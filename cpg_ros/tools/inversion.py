@@ -18,7 +18,7 @@ from cpg_ros.fitting.inverted import Inverted, inverted
 from cpg_ros.fitting.recording import Recording
 from cpg_ros.fitting.table import read_csv
 from cpg_ros.networks.registry import NETWORKS
-from cpg_ros.robot import find_robot
+from cpg_ros.robot import Robot, find_robot
 from cpg_ros.tools.arguments import Parser, as_json, assignment, say, twice
 from cpg_ros.whole import write_whole
 
@@ -46,8 +46,13 @@ def _parser() -> Parser:
     source.add_argument('--csv', type=Path, metavar='FILE', help='a table with a head')
     parser.add_argument('--topics', nargs='+', default=[], metavar='TOPIC', help='topics of the '
                         'bag to read (default: all of type sensor_msgs/msg/JointState)')
+    parser.add_argument('--joints', nargs='+', default=[], metavar='NAME', help='joints to take '
+                        "(default: the robot's, or all; of a CSV file also patterns such as "
+                        "'JointPos*')")
     parser.add_argument('--unit', choices=('rad', 'deg'), help='of the angles in the CSV file '
                         '(default: what its head says, or rad)')
+    parser.add_argument('--time', choices=('s', 'ms', 'us', 'ns'), help='unit of the time in the '
+                        'CSV file (default: what its head says, or s)')
     parser.add_argument('--robot', metavar='FILE', help='robot file, or the name of a shipped '
                         'one: which joints belong to which legs and cells, and their limits '
                         '(default: told from the names of the joints)')
@@ -69,10 +74,13 @@ def _parser() -> Parser:
     return parser
 
 
-def _recording(chosen) -> Recording:
+def _recording(chosen, robot: Robot | None) -> Recording:
     if chosen.csv is not None:
-        return read_csv(chosen.csv, unit=chosen.unit)
-    return read_bag(chosen.bag, tuple(chosen.topics))
+        return read_csv(chosen.csv, unit=chosen.unit, time=chosen.time, joints=chosen.joints)
+    if robot is None or chosen.joints:
+        return read_bag(chosen.bag, chosen.topics, chosen.joints)
+    names = [joint.name for joint in robot.joints]
+    return read_bag(chosen.bag, chosen.topics, names, some=True)
 
 
 def _checked(parser: Parser, chosen) -> None:
@@ -81,6 +89,8 @@ def _checked(parser: Parser, chosen) -> None:
         parser.error('argument --topics: a CSV file has none')
     if chosen.bag is not None and chosen.unit:
         parser.error('argument --unit: joint states are in rad')
+    if chosen.bag is not None and chosen.time:
+        parser.error('argument --time: joint states have their stamps')
     for option in ('out', 'report'):
         path = getattr(chosen, option)
         if path is not None and not path.absolute().parent.is_dir():
@@ -103,7 +113,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         robot = None if chosen.robot is None else find_robot(chosen.robot)
         starts = [dict(start) for start in chosen.start] or [{}]
-        recording = _recording(chosen)
+        recording = _recording(chosen, robot)
         with progress_bar('fitting', len(starts)) as bar:
             found = inverted(recording, robot, chosen.network or '', chosen.gait or '',
                              chosen.free, chosen.order, starts=starts, done=bar)

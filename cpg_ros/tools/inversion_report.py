@@ -24,7 +24,7 @@ def _stride(found: Inverted) -> list[str]:
         f'{found.recording.source}: {len(found.recording.times)} samples, '
         f'{found.recording.times[-1]:.2f} s; {found.read}.',
         f'Steady from {stride.begin:.2f} to {stride.end:.2f} s: {stride.cycles} strides at '
-        f'{stride.frequency:.4f} +- {stride.frequency_error:.4f} Hz.',
+        f'{stride.frequency:.4f} +- {stride.frequency_error:.1g} Hz.',
         'Phases [cycles]: ' + ', '.join(f'{leg} {phase:.3f}'
                                         for leg, phase in stride.phases.items())
         + f': {named} ({stride.distance:.3f} of a cycle off, the next one '

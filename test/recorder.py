@@ -1,0 +1,37 @@
+"""Record topics to a bag, as `ros2 bag record` would: raw messages, until SIGINT.
+
+Usage: python recorder.py BAG TOPIC...
+"""
+
+import signal
+import sys
+from contextlib import suppress
+from functools import partial
+
+import rclpy
+from bags import JOINT_STATE, STORE
+from rclpy.executors import ExternalShutdownException
+from rosbags.rosbag2 import StoragePlugin, Writer
+from sensor_msgs.msg import JointState
+
+
+def main(path, *topics):
+    rclpy.init()
+    node = rclpy.create_node('recorder')
+    with Writer(path, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
+        for topic in topics:
+            connection = writer.add_connection(topic, JOINT_STATE, typestore=STORE)
+
+            def write(connection, message):
+                writer.write(connection, node.get_clock().now().nanoseconds, message)
+
+            node.create_subscription(JointState, topic, partial(write, connection), 5000,
+                                     raw=True)
+        signal.signal(signal.SIGINT, lambda *_: rclpy.try_shutdown())
+        print('recording', flush=True)
+        with suppress(KeyboardInterrupt, ExternalShutdownException):
+            rclpy.spin(node)
+
+
+if __name__ == '__main__':
+    main(*sys.argv[1:])

@@ -1,0 +1,158 @@
+"""Round trips over the real graph: recorded to a bag and run again, and fitted live."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+from graph import EXECUTABLE, PATIENCE, Process, Watcher, until
+from rclpy.qos import DurabilityPolicy, QoSProfile
+from std_msgs.msg import String
+from std_srvs.srv import Trigger
+
+INVERSION = EXECUTABLE.with_name('inversion')
+RECORDER = Path(__file__).with_name('recorder.py')
+
+
+@pytest.fixture
+def ending():
+    """Processes and watchers that are ended with the test."""
+    started = []
+    yield started
+    for one in reversed(started):
+        one.end()
+
+
+def angles_at(times, positions, names, joint, instants):
+    """A joint's angle at instants, by linear interpolation."""
+    return np.interp(instants, times, positions[:, names.index(joint)])
+
+
+@pytest.mark.parametrize(('network', 'gait', 'topics'), [
+    ('delayed', 'walk', ('/joint_states',)),
+    ('quadruped', 'pace', tuple(f'/{leg}/joint_states' for leg in ('lh', 'rh', 'lf', 'rf')))])
+def test_a_gait_recorded_inverted_and_run_again_is_the_same(ending, tmp_path, network, gait,
+                                                           topics):
+    # Generator, recorder process, inversion of the bag, a second generator with the result.
+    first = Process('-p', f'network:={network}', '-p', f'gait:={gait}', '-p', 'frequency:=1.7',
+                    '-p', 'rate:=200.0')
+    ending.append(first)
+    first.wait_for('publishing')
+    watcher = Watcher(first.domain)
+    ending.append(watcher)
+    watcher.record(2.0)
+    bag = tmp_path / 'bag'
+    environment = dict(os.environ, ROS_DOMAIN_ID=str(first.domain))
+    recorder = subprocess.Popen([sys.executable, str(RECORDER), str(bag), *topics],
+                                env=environment, stdout=subprocess.PIPE, text=True)
+    assert recorder.stdout.readline() == 'recording\n'
+    began = len(watcher.samples)
+    watcher.record(8.0)
+    recorder.send_signal(signal.SIGINT)
+    assert recorder.wait(PATIENCE) == 0
+    times, positions, _ = (np.array(part) for part in zip(*watcher.samples[began:], strict=True))
+    names = watcher.names
+
+    out = tmp_path / 'fitted.yaml'
+    ended = subprocess.run([str(INVERSION), '--bag', str(bag), '--network', network, '--out',
+                            str(out), '--json'], capture_output=True, text=True, timeout=300)
+    assert ended.returncode == 0, ended.stderr
+    said = json.loads(ended.stdout)
+    assert said['gait'] == gait and said['frequency'] == pytest.approx(1.7, rel=2e-3)
+
+    second = Process('--params-file', str(out), '-p', 'rate:=200.0')
+    ending.append(second)
+    second.wait_for('publishing')
+    again = Watcher(second.domain)
+    ending.append(again)
+    again.record(2.0)
+    later, angles, _ = again.record(10.0)
+
+    # They were started at different instants: in step after one shift of time, for all joints
+    # and the whole of 10 s.
+    seconds = 10.0 - 1.0 / 1.7
+    instants = np.arange(0.0, min(seconds, times[-1] - times[0] - 0.7), 0.01)
+    spans = np.ptp(positions, axis=0)
+
+    def gap(shift):
+        return max(np.abs(
+            angles_at(times, positions, names, joint, times[0] + shift % (1.0 / 1.7) + instants)
+            - angles_at(later, angles, again.names, joint, later[0] + instants)).max()
+            / spans[names.index(joint)] for joint in names if spans[names.index(joint)] > 0.01)
+    shifts = np.linspace(0.0, 1.0 / 1.7, 171)
+    best = min(shifts, key=gap)
+    best = min(best + np.linspace(-0.005, 0.005, 201), key=gap)
+    # One per cent of range, and what interpolation between samples loses.
+    assert gap(best) < 0.012
+
+
+def test_live_fits_on_call_written_and_applied(ending, tmp_path):
+    source = Process('-p', 'gait:=trot', '-p', 'frequency:=2.0', '-p', 'rate:=200.0')
+    ending.append(source)
+    source.wait_for('publishing')
+    follower = Process('-p', 'gait:=pace', '-p', 'frequency:=1.0', '--ros-args', '-r',
+                       '__node:=other', '-r', '__ns:=/second', domain=source.domain)
+    ending.append(follower)
+    out, report = tmp_path / 'fitted.yaml', tmp_path / 'report.html'
+    node = Process('-p', f'out:={out}', '-p', f'report:={report}', '-p', 'window:=6.0', '-p',
+                   'apply_to:=/second/other', '-p', 'robot:=quadruped',
+                   domain=source.domain, executable=INVERSION)
+    ending.append(node)
+    node.wait_for('listening to /joint_states')
+    follower.wait_for('publishing')
+    watcher = Watcher(source.domain, '/second/other')
+    ending.append(watcher)
+    results = []
+    watcher.node.create_subscription(
+        String, '/cpg_inversion/result', lambda message: results.append(message.data),
+        QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL))
+
+    early = watcher.call(Trigger, '/cpg_inversion/fit', Trigger.Request())
+    assert early.success or early.message
+    time.sleep(7.0)
+    answer = watcher.call(Trigger, '/cpg_inversion/fit', Trigger.Request())
+    assert answer.success, answer.message
+    for words in ('trot at 2.0', 'mean RMS error', f'written: {report}, {out}',
+                  'applied to /second/other'):
+        assert words in answer.message
+    tree = yaml.safe_load(out.read_text())['/**']['ros__parameters']
+    until(lambda: 'trot' in watcher.gaits, 'the gait of the generator that was set')
+    frequency, c, tau = watcher.get('frequency', 'delayed.c', 'delayed.tau')
+    assert frequency == pytest.approx(2.0, rel=2e-3)
+    assert (c, tau) == pytest.approx((tree['delayed']['c'], tree['delayed']['tau']))
+    until(lambda: results, 'the result as JSON')
+    said = json.loads(results[-1])
+    assert said['gait'] == 'trot' and said['rms_share'] < 0.02
+    assert said['params'] == tree['delayed']
+
+    # No source any more: what is left of the window is fitted or refused, in words.
+    source.end()
+    node.signal(signal.SIGINT)
+    assert node.wait() == 0
+    assert 'Traceback' not in node.log
+
+
+@pytest.mark.parametrize(('arguments', 'words'), [
+    (('robot:=nothing',), "robot 'nothing' is neither"),
+    (('order:=5',), 'order'), (('topics:=[1, 2]',), 'topics')])
+def test_a_node_that_cannot_start_says_why(ending, arguments, words):
+    node = Process('-p', *arguments, executable=INVERSION)
+    ending.append(node)
+    assert node.wait() == 1
+    assert words in node.log and 'Traceback' not in node.log
+
+
+def test_a_call_without_joint_states_is_answered(ending):
+    node = Process('-p', 'topics:=[silent]', executable=INVERSION)
+    ending.append(node)
+    node.wait_for('listening to /silent')
+    watcher = Watcher(node.domain)
+    ending.append(watcher)
+    answer = watcher.call(Trigger, '/cpg_inversion/fit', Trigger.Request())
+    assert not answer.success and answer.message == '/silent: no joint states came in'
