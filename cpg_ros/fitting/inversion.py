@@ -104,11 +104,11 @@ def invert(cycle: MeanCycle, cells: Mapping[str, int], network: Network, gait: s
             pass
         warnings = [said]
     others = _along_the_valley(problem, values) if profiles else []
-    if others:
-        better = min(others, key=lambda trial: trial.cost)
-        left = problem(values)[0]
-        if better.cost < 0.5 * float(left @ left):
-            values = _weighed(problem, better.values)
+    better = min(others, key=lambda trial: trial.cost, default=None)
+    left = problem(values)[0]
+    if (better is not None and better.cost < 0.5 * float(left @ left)
+            and (flaw or not refusal(problem.placed(better.values).orbit, harmonics))):
+        values = _weighed(problem, better.values)
     return _judged(problem, trials, [trial.values for trial in others], values, profiles,
                    warnings, done)
 
