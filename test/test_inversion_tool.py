@@ -4,6 +4,8 @@ import csv
 import json
 import subprocess
 import sys
+from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -152,6 +154,35 @@ def test_a_robot_file_keeps_its_cells_and_limits(tmp_path, capsys):
     for joint in fitted.joints:
         assert (joint.lower, joint.upper, joint.velocity) == (-3.0, 3.0, 40.0)
         assert joint.weights == (0.1,) if 'gripper' in joint.name else len(joint.weights) == 6
+
+
+def test_the_papers_own_procedure(tmp_path, capsys):
+    # Eight joints that are the cells of a trot with c = 6.43, about their offsets; section 4.1.
+    network = replace(PRESETS['delayed']['goat_trot'].network)
+    orbit = solve_orbit(network, 'trot')
+    goat = yaml.safe_load(Path('config/goat.yaml').read_text())
+    cells = {joint['name']: joint['cell'] for leg in goat['legs'].values()
+             for joint in leg['joints']}
+    t = np.arange(2400) / 200.0
+    rng = np.random.default_rng(0)
+    angles = np.array([0.3 + orbit.waveform(1.3 * t + 0.37 + orbit.phases[cell - 1])
+                       for cell in cells.values()]).T
+    path = table_of(tmp_path / 'goat.csv', list(cells), t,
+                    angles + 0.01 * rng.standard_normal(angles.shape))
+    starts = [part for value in (6.1, 6.3, 6.9, 7.2) for part in ('--start', f'c={value}')]
+    base = ['--csv', str(path), '--robot', 'goat', '--preset', 'goat_trot', '--free',
+            'c', '--paper']
+    assert main([*base, *starts, '--json']) == 0
+    fits = json.loads(capsys.readouterr().out)['paper']
+    ends = [fit['end']['c'] for fit in fits]
+    assert np.ptp(ends) < 1e-4 and len(ends) == 4
+    assert ends[0] == pytest.approx(6.43, rel=0.01)
+    assert all(fit['error'] < 0.1 and fit['iterations'] > 0 for fit in fits)
+    assert main(base) == 0
+    said = capsys.readouterr().out
+    assert 'numerical solution' in said and 'synchronisation errors [rad]' in said
+    assert main(['--csv', str(path), '--free', 'c', '--paper', '--gait', 'trot']) == 2
+    assert 'one joint for each of the eight cells' in capsys.readouterr().err
 
 
 @pytest.mark.parametrize('signals', ['stand', 'pose', 'noise'])

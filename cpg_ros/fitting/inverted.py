@@ -10,7 +10,7 @@ from cpg_ros.fitting.joints import cells_of
 from cpg_ros.fitting.legs import legs_of
 from cpg_ros.fitting.recording import Recording
 from cpg_ros.fitting.stride import Stride, find_stride
-from cpg_ros.networks.network import Network, Preset
+from cpg_ros.networks.network import Preset
 from cpg_ros.networks.registry import NETWORKS, PRESETS
 from cpg_ros.robot import Robot
 
@@ -82,7 +82,7 @@ def preset_of(network: str, gait: str) -> Preset:
     """
     presets = PRESETS[network]
     if gait not in presets:
-        raise ValueError(f"gait '{gait}' is not one of the network {network}: "
+        raise ValueError(f"'{gait}' is not one of the presets of the network {network}: "
                          f'{", ".join(presets)}')
     return presets[gait]
 
@@ -104,7 +104,7 @@ def _legs(recording: Recording, robot: Robot | None) -> tuple[dict[str, tuple[st
 
 
 def inverted(recording: Recording, robot: Robot | None = None, network: str = '', gait: str = '',
-             free: Sequence[str] = (), order: int = 3, base: Network | None = None,
+             free: Sequence[str] = (), order: int = 3, preset: str = '',
              starts: Sequence[Mapping[str, float]] = ({},),
              done: Callable[[float], None] = lambda share: None) -> Inverted:
     """Find the steady gait of a recording and fit a network's gait and readouts to it.
@@ -117,7 +117,7 @@ def inverted(recording: Recording, robot: Robot | None = None, network: str = ''
         gait: of the network; by default the recorded one, as it is recognised.
         free: parameters to fit; the network's usual ones by default.
         order: of the readouts, 1 to 3.
-        base: parameters that are not free; the gait's preset by default.
+        preset: whose parameters are taken that are not free; the gait's by default.
         starts: free number -> value to start from.
         done: told which share of the fit is done, 0 to 1.
 
@@ -151,7 +151,7 @@ def inverted(recording: Recording, robot: Robot | None = None, network: str = ''
     elif stride.gait != gait:
         warnings.append(f'the recorded phases are those of {stride.gait or "none of the gaits"}, '
                         f'not of {gait}')
-    parameters = preset_of(network, gait).network if base is None else base
+    parameters = preset_of(network, preset or gait).network
     fit = invert(stride, cells, parameters, gait, free, order, starts, done=done)
     return Inverted(recording, read, legs, stride, fit,
                     {order: fit.share_at(order) for order in ORDERS},

@@ -59,6 +59,9 @@ class Inversion(Node):
         self.declare_parameter('network', '', text(
             description="network to fit; empty: the robot's, or by the number of legs"))
         self.declare_parameter('gait', '', text(description='gait to fit; empty: as recognised'))
+        self.declare_parameter('preset', '', text(
+            description="shipped set that parameters which are not free are taken from; empty: "
+            "the gait's"))
         self.declare_parameter('free', Parameter.Type.STRING_ARRAY, text(
             description="parameters to fit; not set: the network's usual ones"))
         self.declare_parameter('order', 3, ParameterDescriptor(
@@ -154,7 +157,8 @@ class Inversion(Node):
             robot = self._robot
             names = () if robot is None else [joint.name for joint in robot.joints]
             found = inverted(heard.recording(names, some=True), robot, self._value('network'),
-                             self._value('gait'), tuple(free), self._value('order'))
+                             self._value('gait'), tuple(free), self._value('order'),
+                             self._value('preset'))
             work.set_result(('; '.join([_summary(found), *self._written(found)]), found))
         except (ValueError, OSError) as error:
             work.set_result((str(error), None))

@@ -14,9 +14,11 @@ from cpg_ros.checked import shown
 from cpg_ros.dynamics.progress import progress_bar
 from cpg_ros.fitting.bag import read_bag
 from cpg_ros.fitting.fitted import write_fitted
-from cpg_ros.fitting.inverted import Inverted, inverted
+from cpg_ros.fitting.inverted import Inverted, inverted, preset_of
+from cpg_ros.fitting.paper_fit import PaperFit, paper_fits
 from cpg_ros.fitting.recording import Recording
 from cpg_ros.fitting.table import read_csv
+from cpg_ros.networks.delayed import Delayed
 from cpg_ros.networks.registry import NETWORKS
 from cpg_ros.robot import Robot, find_robot
 from cpg_ros.tools.arguments import Parser, as_json, assignment, say, twice
@@ -59,14 +61,19 @@ def _parser() -> Parser:
     parser.add_argument('--network', metavar='NAME', help=f'{", ".join(NETWORKS)} (default: the '
                         "robot's first; four legs: delayed, two legs: biped)")
     parser.add_argument('--gait', metavar='NAME', help='gait to fit (default: as recognised)')
+    parser.add_argument('--preset', metavar='NAME', help="shipped set that parameters which are "
+                        "not free are taken from (default: the gait's)")
     parser.add_argument('--free', nargs='+', default=[], metavar='PARAMETER',
-                        help='parameters to fit (default: delayed c tau, quadruped alpha gamma, '
-                        'biped w_a phi)')
+                        help='parameters to fit (default: delayed c tau, quadruped alpha beta, '
+                        'biped current phi)')
     parser.add_argument('--order', type=int, choices=(1, 2, 3), default=3, metavar='N',
                         help='order of the readout, 1 to 3 (default: %(default)s)')
     parser.add_argument('--start', nargs='+', action='append', default=[], type=assignment,
                         metavar='PARAMETER=VALUE', help='values to start from; may be given '
                         'several times, for several starts')
+    parser.add_argument('--paper', action='store_true', help='also fit as Liu & Zhang (2024) do: '
+                        'eight joints taken for the eight cells, 20 instants, no readout; the '
+                        'table of starts, iterations and errors is printed')
     parser.add_argument('--out', type=Path, metavar='FILE', help='parameter file to write, such '
                         'as fitted.yaml; the robot file goes beside it')
     parser.add_argument('--report', type=Path, metavar='FILE', help='page to write, .html')
@@ -116,8 +123,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         recording = _recording(chosen, robot)
         with progress_bar('fitting', 100) as bar:
             found = inverted(recording, robot, chosen.network or '', chosen.gait or '',
-                             chosen.free, chosen.order, starts=starts,
+                             chosen.free, chosen.order, chosen.preset or '', starts,
                              done=lambda share: bar(round(100.0 * share)))
+        fits = _paper(chosen, found, starts)
         written = _written(chosen, found, robot)
     except NoSteadyGait as error:
         print(f'inversion: {error}', file=sys.stderr)
@@ -129,12 +137,26 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print('inversion: stopped', file=sys.stderr)
         return 130
     if chosen.json:
-        say(as_json(found.as_dict()))
+        say(as_json({**found.as_dict(), **({'paper': [{
+            'start': one.start, 'end': one.end, 'iterations': one.fit.trial.iterations,
+            'error': one.fit.cost, 'synchronisation_errors': one.errors} for one in fits]}
+            if chosen.paper else {})}))
     else:
-        from cpg_ros.tools.inversion_report import as_text
-        said = as_text(found)
+        from cpg_ros.tools.inversion_report import as_table, as_text
+        said = '\n'.join([as_text(found), *as_table(fits)])
         say(f'{said}\nwritten: {", ".join(map(str, written))}' if written else said)
     return 0
+
+
+def _paper(chosen, found: Inverted, starts: list[dict[str, float]]) -> list[PaperFit]:
+    """Fit as the paper does, if that is wanted."""
+    if not chosen.paper:
+        return []
+    network = preset_of(found.fit.network.name, chosen.preset or found.fit.gait).network
+    if not isinstance(network, Delayed):
+        raise ValueError(f'--paper: the paper has the delayed network, not the {network.name}')
+    return paper_fits(found.stride, found.fit.cells, network, found.fit.gait,
+                      list(found.fit.parameters), starts)
 
 
 def _written(chosen, found: Inverted, robot) -> list[Path]:

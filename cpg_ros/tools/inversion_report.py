@@ -7,6 +7,7 @@ from html import escape
 from matplotlib.figure import Figure
 
 from cpg_ros.fitting.inverted import Inverted
+from cpg_ros.fitting.paper_fit import PaperFit
 from cpg_ros.tools import inversion_figures
 from cpg_ros.tools.arguments import table
 from cpg_ros.tools.report import STYLE
@@ -95,6 +96,25 @@ def as_text(found: Inverted) -> str:
     lines += [*_judged(found), *(f'note: {note}' for note in notes),
               *(f'warning: {warning}' for warning in found.warnings)]
     return '\n'.join(lines)
+
+
+def as_table(fits: list[PaperFit]) -> list[str]:
+    """The paper's fits as its Tables 1 and 2, and the ranges of errors as its Figures 5 to 9."""
+    if not fits:
+        return []
+
+    def values(parameters: dict[str, float]) -> str:
+        return ', '.join(f'{name} {value:.4f}' for name, value in parameters.items())
+
+    rows: list[tuple[str, ...]] = [('initial value', 'iterations', 'error f [rad^2]',
+                                    'numerical solution')]
+    rows += [(values(one.start), str(one.fit.trial.iterations), f'{one.fit.cost:.4f}',
+              values(one.end)) for one in fits]
+    best = min(fits, key=lambda one: one.fit.cost)
+    ranges = ', '.join(f'{name} [{low:.3f}, {high:.3f}]'
+                       for name, (low, high) in best.errors.items())
+    return ['', "As Liu & Zhang (2024) fit, eight joints taken for the eight cells:",
+            *table(rows, '<>><'), f'synchronisation errors [rad]: {ranges}']
 
 
 def _html_table(rows: list[tuple[str, ...]]) -> str:
