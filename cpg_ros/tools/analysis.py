@@ -1,5 +1,6 @@
 """What ``analyze`` has to say about a parameter set: as text, and as JSON."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -158,7 +159,7 @@ class DelayAnalysis(Analysis):
             form, printed = point.normal_form, point.published
             rows.append((
                 point.gait, point.wave, f'{point.tau:.4f}', f'{point.omega:.4f}',
-                f'{6.283185307179586 / point.omega:.4f}', f'{form.k1.real:.4f}',
+                f'{math.tau / point.omega:.4f}', f'{form.k1.real:.4f}',
                 f'{form.k2.real:.4f}', f'{printed.k1.real:.4f}', f'{printed.k2.real:.4f}',
                 'supercritical' if point.supercritical else 'subcritical',
                 'above' if form.side > 0 else 'below', str(point.unstable_roots),
@@ -239,7 +240,7 @@ class CellAnalysis(Analysis):
             form = point.normal_form
             rows.append((
                 point.gait, point.wave, f'{point.value:.4f}', f'{point.omega:.4f}',
-                f'{6.283185307179586 / point.omega:.4f}', f'{form.k1.real:.4f}',
+                f'{math.tau / point.omega:.4f}', f'{form.k1.real:.4f}',
                 f'{form.k2.real:.4f}', f'{point.lyapunov:.4f}',
                 'supercritical' if point.supercritical else 'subcritical',
                 'above' if form.side > 0 else 'below', str(point.unstable_roots),
