@@ -28,6 +28,7 @@ from cpg_ros.networks.network import Network, Preset
 from cpg_ros.networks.presets import PresetError, read_presets
 from cpg_ros.networks.registry import NETWORKS, PRESETS
 from cpg_ros.nodes.diagnostics import Diagnostics
+from cpg_ros.nodes.ending import ended
 from cpg_ros.nodes.outputs import Outputs
 from cpg_ros.nodes.parameter_services import StrictParameterService
 from cpg_ros.nodes.settings import COMMANDS, NETWORK, Planner, Spec, as_doubles, specs
@@ -285,7 +286,7 @@ def main(args: list[str] | None = None) -> int:
     node.finish()
     executor.shutdown(timeout_sec=0.1)
     rclpy.shutdown()
-    return 0 if node.failure is None else 1
+    return ended(0 if node.failure is None else 1, serving)
 
 
 if __name__ == '__main__':

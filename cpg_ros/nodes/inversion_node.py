@@ -27,6 +27,7 @@ from std_srvs.srv import Trigger
 from cpg_ros.fitting.fitted import write_fitted
 from cpg_ros.fitting.inverted import Inverted, inverted
 from cpg_ros.fitting.live import Live
+from cpg_ros.nodes.ending import ended
 from cpg_ros.robot import Robot, find_robot
 from cpg_ros.tools.arguments import finite
 from cpg_ros.whole import write_whole
@@ -90,6 +91,7 @@ class Inversion(Node):
         self.create_service(Trigger, '~/fit', self._fit, callback_group=self._group)
         self._timer: Timer | None = None
         self._busy = False
+        self.thread: threading.Thread | None = None
         self._often(self._value('every'))
         self.add_post_set_parameters_callback(self._changed)
         self.get_logger().info(f'listening to {", ".join(topics)}; call ~/fit')
@@ -131,7 +133,8 @@ class Inversion(Node):
         self._busy = True
         try:
             heard, work = self._live.copy(), Future(executor=self.executor)
-            threading.Thread(target=self._work, args=(heard, work), daemon=True).start()
+            self.thread = threading.Thread(target=self._work, args=(heard, work), daemon=True)
+            self.thread.start()
             said, found = await work
             if found is not None:
                 self._result.publish(String(data=json.dumps(finite(found.as_dict()))))
@@ -226,4 +229,4 @@ def run(args: list[str] | None = None) -> int:
     finally:
         executor.shutdown(timeout_sec=1.0)
         rclpy.try_shutdown()
-    return 0
+    return ended(0, node.thread)
