@@ -144,16 +144,17 @@ def test_a_failed_write_leaves_the_old_file(tmp_path, monkeypatch):
     with pytest.raises(yaml.YAMLError):
         write_presets(path, Biped, {'walk': replace(WALK, start=(object(),) * 8)})
     # The disk is full half way.
-    real = Path.write_text
+    real = Path.write_bytes
 
-    def half(self, text, **how):
-        real(self, text[:len(text) // 2], **how)
+    def half(self, content):
+        real(self, content[:len(content) // 2])
         raise OSError(28, 'No space left on device')
-    monkeypatch.setattr(Path, 'write_text', half)
+    monkeypatch.setattr(Path, 'write_bytes', half)
     with pytest.raises(OSError, match='No space'):
         write_presets(path, Biped, {'run': PRESETS['biped']['run']})
     monkeypatch.undo()
     assert path.read_bytes() == before and read_presets(path, Biped) == {'walk': WALK}
+    assert list(tmp_path.iterdir()) == [path]
     with pytest.raises(OSError):
         write_presets(tmp_path / 'no' / 'b.yaml', Biped, {'walk': WALK})
 
