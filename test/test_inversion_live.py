@@ -12,6 +12,8 @@ import numpy as np
 import pytest
 import yaml
 from graph import EXECUTABLE, PATIENCE, Process, Watcher, until
+from rcl_interfaces.srv import SetParametersAtomically
+from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
@@ -132,8 +134,15 @@ def test_live_fits_on_call_written_and_applied(ending, tmp_path):
     assert said['gait'] == 'trot' and said['rms_share'] < 0.02
     assert said['params'] == tree['delayed']
 
-    # No source any more: what is left of the window is fitted or refused, in words.
+    # No source any more, as after a bag has been played: what was heard is fitted all the same.
     source.end()
+    follower.end()
+    time.sleep(1.0)
+    watcher.call(SetParametersAtomically, '/cpg_inversion/set_parameters_atomically',
+                 SetParametersAtomically.Request(parameters=[
+                     Parameter('apply_to', value='').to_parameter_msg()]))
+    answer = watcher.call(Trigger, '/cpg_inversion/fit', Trigger.Request())
+    assert answer.success and 'trot at 2.0' in answer.message
     node.signal(signal.SIGINT)
     assert node.wait() == 0
     assert 'Traceback' not in node.log

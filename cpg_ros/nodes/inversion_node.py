@@ -133,6 +133,9 @@ class Inversion(Node):
         self._busy = True
         try:
             heard, work = self._live.copy(), Future(executor=self.executor)
+            # The executor asks those that wait only when something wakes it, and where no more
+            # joint states come in nothing else would: a callback does.
+            work.add_done_callback(lambda _: None)
             self.thread = threading.Thread(target=self._work, args=(heard, work), daemon=True)
             self.thread.start()
             said, found = await work
