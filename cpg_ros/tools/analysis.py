@@ -1,6 +1,7 @@
 """What ``analyze`` has to say about a parameter set: as text, and as JSON."""
 
 import math
+from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -33,7 +34,7 @@ def _yes(value: bool) -> str:
 
 
 @dataclass(frozen=True, eq=False)
-class Analysis:
+class Analysis(ABC):
     """A parameter set with its gaits.
 
     Attributes:
@@ -50,9 +51,9 @@ class Analysis:
     span: tuple[float, float]
 
     @property
+    @abstractmethod
     def hopf(self) -> list:
         """Hopf points of rest, by rising parameter."""
-        raise NotImplementedError
 
     @property
     def existing(self) -> list[Verdict]:
@@ -124,8 +125,9 @@ class Analysis:
         return '\n'.join([f'{self.network.name}: {self.parameters}', '', *self._rest(), '',
                           *self._gaits(), '', self._conclusion()])
 
+    @abstractmethod
     def _rest(self) -> list[str]:
-        raise NotImplementedError
+        """Lines on the rest state and its Hopf points."""
 
     def as_dict(self) -> dict[str, Any]:
         """Everything in plain types."""
