@@ -85,7 +85,7 @@ def test_a_set_without_gait_is_told_its_nearest_threshold(capsys, changes, name,
         assert there and (gait is None or gait in there)
     else:
         below, above = (as_json(capsys, '--set', *rest, f'c={factor * threshold}',
-                                '--longest-delay', '1e3') for factor in (0.99, 1.01))
+                                '--longest-delay', '100') for factor in (0.99, 1.01))
         assert not below['hopf'] and above['hopf']
 
 
@@ -101,6 +101,19 @@ def test_gaits_that_are_born_unstable_are_found_and_judged(capsys):
     assert point['unstable_roots'] > point['unstable_transverse_roots']
     assert not said['gaits']['pronk']['exists']
     assert 'critical delay 1.6515' in said['gaits']['pronk']['why']
+
+
+def test_what_is_neutral_does_not_attract(capsys):
+    # With d = 0 the rings do not hear one another: nothing holds a walk's fore and hind legs.
+    walk = as_json(capsys, '--set', 'd=0')['gaits']['walk']
+    assert walk['exists'] and walk['floquet_leading'] == pytest.approx(1.0, abs=1e-9)
+    assert not walk['stable'] and not walk['stable_with_default_gain']
+
+
+def test_branches_along_another_parameter_than_the_delay(tmp_path):
+    path = tmp_path / 'c.png'
+    assert main(['--along', 'c', '--range', '6:7', '--plot', str(path)]) == 0
+    assert path.stat().st_size > 10_000
 
 
 def test_a_quadruped_set(capsys):
@@ -147,6 +160,9 @@ def test_a_biped_set_with_weights_of_its_own(capsys):
     (('--network', 'quadruped', '--along', 'alpha=alpha'), 'alpha twice'),
     (('--network', 'quadruped', '--range', '1:0'), '1:0 is not from low to high'),
     (('--longest-delay', 'nan'), '--longest-delay'),
+    (('--set', 'tau=6'), 'tau is 6, delays go up to 5'),
+    (('--along', 'c', '--plot', 'a.png'), 'c needs a --range'),
+    (('--network', 'quadruped', '--range', '0:0'), '0:0 is not from low to high'),
     (('--plot', 'nowhere/a.png'), 'there is no folder nowhere'),
     (('--plot', 'a.xyz'), "'.xyz' is not a kind of picture"),
     (('--quietly',), '--quietly')])

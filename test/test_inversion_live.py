@@ -150,7 +150,8 @@ def test_live_fits_on_call_written_and_applied(ending, tmp_path):
 
 @pytest.mark.parametrize(('arguments', 'words'), [
     (('robot:=nothing',), "robot 'nothing' is neither"),
-    (('order:=5',), 'order'), (('topics:=[1, 2]',), 'topics')])
+    (('order:=5',), 'order'), (('topics:=[1, 2]',), 'topics'),
+    (('topics:=["bad topic"]',), 'bad topic')])
 def test_a_node_that_cannot_start_says_why(ending, arguments, words):
     node = Process('-p', *arguments, executable=INVERSION)
     ending.append(node)

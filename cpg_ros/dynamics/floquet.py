@@ -16,6 +16,8 @@ from cpg_ros.dynamics.mesh_orbit import MeshOrbit
 from cpg_ros.dynamics.periodic import Orbit
 from cpg_ros.networks.delayed import default_symmetry_gain
 
+#: A multiplier from here on up is 1 as far as can be told.
+ATTRACTS = 1.0 - 1e-7
 #: Gains between none and the bound among which the smallest that is enough is looked for.
 GAINS = 8
 
@@ -50,6 +52,11 @@ class Multipliers:
     def leading_transverse(self) -> float:
         """Modulus of the largest outside the class; 0 if there is none."""
         return float(np.abs(self.transverse).max(initial=0.0))
+
+    @property
+    def attracts(self) -> bool:
+        """Whether all disturbances decay: neutral ones, such as of rings not coupled, do not."""
+        return self.leading < ATTRACTS
 
     @property
     def leading(self) -> float:

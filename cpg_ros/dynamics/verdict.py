@@ -70,7 +70,7 @@ class Verdict:
     @property
     def stable(self) -> bool:
         """Whether the gait attracts in the full network, without a lock."""
-        return self.multipliers.leading < 1.0
+        return self.multipliers.attracts
 
     @cached_property
     def smallest_gain(self) -> float:
@@ -85,7 +85,7 @@ class Verdict:
     @cached_property
     def stable_with_default_gain(self) -> bool:
         """Whether the gait attracts with the gain the generator would choose."""
-        return multipliers(self._orbit, self.default_gain).leading < 1.0
+        return multipliers(self._orbit, self.default_gain).attracts
 
     def as_dict(self) -> dict[str, Any]:
         """Everything in plain types, for JSON."""
@@ -145,8 +145,9 @@ def _beyond(network: Delayed, gait: str, why: str) -> Verdict:
             continue
         if orbits:
             return Verdict(gait, orbits[-1])
-    if points and points[0].tau > network.tau:
-        why = f"tau {network.tau:g} is below the {gait}'s critical delay {points[0].tau:.4f}"
+    first = hopf_point(network, network.symmetry(gait))
+    if first is not None and first.tau > network.tau:
+        why = f"tau {network.tau:g} is below the {gait}'s critical delay {first.tau:.4f}"
     return Verdict(gait, None, why)
 
 

@@ -5,6 +5,7 @@ One thread listens and answers; a fit runs in a thread of its own, while more co
 
 import json
 import threading
+import traceback
 from functools import partial
 from pathlib import Path
 
@@ -12,7 +13,7 @@ import rclpy
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
 from rcl_interfaces.srv import SetParametersAtomically
 from rclpy.callback_groups import ReentrantCallbackGroup
-from rclpy.exceptions import ParameterException
+from rclpy.exceptions import NameValidationException, ParameterException
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
@@ -20,6 +21,7 @@ from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.qos_overriding_options import QoSOverridingOptions
 from rclpy.task import Future
 from rclpy.timer import Timer
+from rclpy.validate_topic_name import validate_topic_name
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
@@ -76,6 +78,8 @@ class Inversion(Node):
 
         name = self._value('robot')
         self._robot: Robot | None = find_robot(name) if name else None
+        for topic in self._value('topics'):
+            validate_topic_name(topic)
         topics = tuple(self.resolve_topic_name(topic) for topic in self._value('topics'))
         self._live = Live(topics, self._value('window'))
         # Best effort goes with every publisher; a reader may fall behind while it fits.
@@ -168,8 +172,10 @@ class Inversion(Node):
             work.set_result(('; '.join([_summary(found), *self._written(found)]), found))
         except (ValueError, OSError) as error:
             work.set_result((str(error), None))
-        except BaseException as error:
-            work.set_exception(error)
+        except Exception as error:
+            # One fit must not end a node that listens.
+            self.get_logger().error('a fit failed:\n' + traceback.format_exc())
+            work.set_result((f'{type(error).__name__}: {error}', None))
 
     def _written(self, found: Inverted) -> list[str]:
         written = []
@@ -186,7 +192,11 @@ class Inversion(Node):
     async def _applied(self, target: str, found: Inverted) -> str:
         """Set a running generator; return why that failed, or ''."""
         name = f'{target}/set_parameters_atomically'
-        client = self.create_client(SetParametersAtomically, name, callback_group=self._group)
+        try:
+            client = self.create_client(SetParametersAtomically, name,
+                                        callback_group=self._group)
+        except NameValidationException as error:
+            return ' '.join(str(error).split())
         try:
             network = found.fit.network
             values = {'gait': found.fit.gait, 'frequency': found.stride.frequency,
@@ -219,8 +229,8 @@ def run(args: list[str] | None = None) -> int:
     rclpy.init(args=args)
     try:
         node = Inversion()
-    except (ValueError, ParameterException) as error:
-        rclpy.logging.get_logger(NAME).fatal(str(error))
+    except (ValueError, ParameterException, NameValidationException) as error:
+        rclpy.logging.get_logger(NAME).fatal(' '.join(str(error).split()))
         rclpy.try_shutdown()
         return 1
     executor = SingleThreadedExecutor()

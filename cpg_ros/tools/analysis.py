@@ -137,13 +137,20 @@ class Analysis(ABC):
 
 @dataclass(frozen=True, eq=False)
 class DelayAnalysis(Analysis):
-    """Of the delayed network; the span is one of delays."""
+    """Of the delayed network.
+
+    Attributes:
+        longest: bound of the delay for Hopf points, model time.
+
+    """
+
+    longest: float = 0.0
 
     @cached_property
     def hopf(self) -> list[HopfPoint]:
         """Hopf points of rest, by rising delay."""
         assert isinstance(self.network, Delayed)
-        return hopf_points(self.network, self.span[1])
+        return hopf_points(self.network, self.longest)
 
     def _rest(self) -> list[str]:
         assert isinstance(self.network, Delayed)
@@ -153,7 +160,7 @@ class DelayAnalysis(Analysis):
         lines = [f'Rest: {count} with positive real part; the rightmost is {_root(leading)} '
                  f'per model time, of mode ({mode.j}, {mode.k}).', '']
         if not self.hopf:
-            return [*lines, f'No Hopf point up to a delay of {self.span[1]:g}.']
+            return [*lines, f'No Hopf point up to a delay of {self.longest:g}.']
         rows: list[tuple[str, ...]] = [(
             'gait', 'wave', 'tau', 'omega', 'period', 'k1', 'k2', "k1'", "k2'", 'type', 'orbits',
             'others', 'transverse')]
@@ -166,7 +173,7 @@ class DelayAnalysis(Analysis):
                 'supercritical' if point.supercritical else 'subcritical',
                 'above' if form.side > 0 else 'below', str(point.unstable_roots),
                 str(point.unstable_transverse_roots)))
-        return [*lines, f'Hopf points up to a delay of {self.span[1]:g} (tau and period in model '
+        return [*lines, f'Hopf points up to a delay of {self.longest:g} (tau and period in model '
                 "time; omega in rad per model time; k1', k2' as",
                 'Liu & Zhang print them, which is wrong; others: further roots with positive real '
                 'part, transverse: of them outside the class):',
@@ -292,10 +299,10 @@ def analysed(network: Network, gaits: Mapping[str, Verdict], along: Along,
         network: the parameters.
         gaits: gait -> verdict.
         along: parameters that move.
-        span: from where to where they do; of the delayed network, for branches only.
+        span: from where to where they do.
         longest: bound of the delay for Hopf points, model time.
 
     """
     if isinstance(network, Delayed):
-        return DelayAnalysis(network, gaits, along, (0.0, longest))
+        return DelayAnalysis(network, gaits, along, span, longest)
     return CellAnalysis(network, gaits, along, span)

@@ -14,7 +14,7 @@ from cpg_ros.dynamics.cell_hopf import CellHopf
 from cpg_ros.dynamics.characteristic import characteristic_roots
 from cpg_ros.dynamics.continuation import Branch, follow, from_hopf
 from cpg_ros.dynamics.delayed_orbit import DelayedOrbit
-from cpg_ros.dynamics.floquet import multipliers
+from cpg_ros.dynamics.floquet import ATTRACTS, multipliers
 from cpg_ros.dynamics.hopf import HopfPoint
 from cpg_ros.dynamics.mesh_orbit import MeshOrbit
 from cpg_ros.dynamics.orbit import NoOrbit, Orbit
@@ -44,7 +44,7 @@ def branches(analysis: Analysis) -> list[tuple[str, Branch]]:
     low, high = analysis.span
     value = analysis.along.value(analysis.network)
     found: list[tuple[str, Branch]] = []
-    for point in analysis.hopf[:BRANCHES]:
+    for point in _on_line(analysis)[:BRANCHES]:
         found.extend((point.gait, branch) for branch in _born(point, analysis))
     for verdict in analysis.existing:
         orbit = verdict.orbit
@@ -61,6 +61,15 @@ def _holds(branch: Branch, value: float, orbit: Orbit) -> bool:
         return any(abs(other.period / orbit.period - 1.0) < 1e-6 for other in branch.at(value))
     except NoOrbit:
         return False
+
+
+def _on_line(analysis: Analysis) -> list:
+    """Hopf points that lie on the line along which branches are drawn."""
+    if isinstance(analysis, CellAnalysis) or analysis.along.names == ('tau',):
+        return [point for point in analysis.hopf
+                if not isinstance(point, HopfPoint)
+                or analysis.span[0] <= point.tau <= analysis.span[1]]
+    return []
 
 
 def _born(point: HopfPoint | CellHopf, analysis: Analysis) -> list[Branch]:
@@ -99,13 +108,13 @@ def _draw_branches(axes: Axes, analysis: Analysis) -> None:
             kinds = []
             for place in branch.points:
                 judged = multipliers(place.orbit)
-                kinds.append(0 if judged.leading < 1.0 else
-                             1 if judged.leading_within < 1.0 else 2)
+                kinds.append(0 if judged.attracts else
+                             1 if judged.leading_within < ATTRACTS else 2)
                 done += 1
                 bar(done)
             _draw_branch(axes, branch, kinds, COLOURS[gait])
             shown.add(gait)
-    for point in analysis.hopf:
+    for point in _on_line(analysis):
         where = point.tau if isinstance(point, HopfPoint) else point.value
         axes.plot(where, 0.0, marker='o', color=COLOURS[point.gait], markersize=5, clip_on=False)
         shown.add(point.gait)

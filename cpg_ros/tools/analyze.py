@@ -41,6 +41,8 @@ examples:
   analyze --network biped --set w_a=0.2 current=0.25 --json
 
 exit codes: 0 analysed (also where no gait was found), 2 wrong arguments.'''
+#: Delays beyond which no Hopf points are looked for, model time.
+LONGEST = 100.0
 #: Parameters that are moved to look for Hopf points, and how far, where --along is not given.
 ALONG = {'quadruped': ('alpha=beta', (-1.0, 1.0)), 'biped': ('current', (0.0, 1.0))}
 
@@ -98,6 +100,9 @@ def parameters(name: str, preset: str | None, changes: list[tuple[str, float]]) 
         network = replace(network, **dict.fromkeys(members, value))  # type: ignore[type-var]
     if network.as_dict().get('tau', 1.0) <= 0.0:
         raise ValueError(f'--set: tau is {network.delay:g}, a delay must be positive')
+    if network.delay > kind.longest_delay > 0.0:
+        raise ValueError(f'--set: tau is {network.delay:g}, delays go up to '
+                         f'{kind.longest_delay:g}: take another unit of time')
     if network.as_dict().get('c', 1.0) == 0.0:
         raise ValueError('--set: c is 0: left and right legs would not be coupled, and no delay '
                          'would matter')
@@ -108,17 +113,20 @@ def _analysed(chosen) -> DelayAnalysis | CellAnalysis:
     if chosen.plot is not None and not chosen.plot.absolute().parent.is_dir():
         raise ValueError(f'--plot: there is no folder {chosen.plot.parent}')
     network = parameters(chosen.network, chosen.preset, chosen.set)
-    text, span = ALONG.get(network.name, ('tau', (0.0, 0.0)))
-    span = span if chosen.range is None else chosen.range
     longest = 2.0 * network.delay if chosen.longest_delay is None else chosen.longest_delay
-    if not np.isfinite(longest) or longest < 0.0:
-        raise ValueError(f'--longest-delay: {longest:g} must be finite and not negative')
-    if not np.isfinite(span).all() or span[0] > span[1]:
-        raise ValueError(f'--range: {span[0]:g}:{span[1]:g} is not from low to high')
+    if not 0.0 <= longest <= LONGEST:
+        raise ValueError(f'--longest-delay: {longest:g} is not from 0 to {LONGEST:g}')
+    text, span = ALONG.get(network.name, ('tau', (0.0, max(longest, 1.01 * network.delay))))
     try:
         along = Along.parse(chosen.along or text, type(network))
     except ValueError as error:
         raise ValueError(f'--along: {error}') from error
+    if chosen.range is not None:
+        span = chosen.range
+    elif network.delay and along.names != ('tau',):
+        raise ValueError(f'--along: {along} needs a --range')
+    if not np.isfinite(span).all() or span[0] >= span[1]:
+        raise ValueError(f'--range: {span[0]:g}:{span[1]:g} is not from low to high')
     with progress_bar('gaits', len(network.gaits())) as bar:
         found = verdicts(network, bar)
     return analysed(network, found, along, span, longest)
@@ -133,13 +141,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
             # matplotlib takes half a second, and only pictures need it.
             from cpg_ros.tools.analysis_plot import picture
             write_whole(chosen.plot, picture(found, chosen.plot.suffix))
+        said = as_json(found.as_dict()) if chosen.json else found.text()
     except (ValueError, OSError) as error:
         print(f'analyze: {error}', file=sys.stderr)
         return 2
     except KeyboardInterrupt:
         print('analyze: stopped', file=sys.stderr)
         return 130
-    say(as_json(found.as_dict()) if chosen.json else found.text())
+    say(said)
     return 0
 
 

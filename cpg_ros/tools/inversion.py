@@ -18,7 +18,7 @@ from cpg_ros.fitting.inverted import Inverted, inverted, preset_of
 from cpg_ros.fitting.paper_fit import PaperFit, paper_fits
 from cpg_ros.fitting.recording import Recording
 from cpg_ros.fitting.table import read_csv
-from cpg_ros.networks.delayed import Delayed
+from cpg_ros.networks.delayed import CELLS, Delayed
 from cpg_ros.networks.registry import NETWORKS
 from cpg_ros.robot import Robot, find_robot
 from cpg_ros.tools.arguments import Parser, as_json, assignment, say, twice
@@ -120,6 +120,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         robot = None if chosen.robot is None else find_robot(chosen.robot)
         starts = [dict(start) for start in chosen.start] or [{}]
+        if chosen.paper and (robot is None or 'delayed' not in robot.networks
+                             or chosen.network not in (None, 'delayed')
+                             or sorted(robot.cells) != list(range(CELLS))):
+            raise ValueError('--paper: the paper has one joint for each of the eight cells of the '
+                             'delayed network: a --robot file has to say which, such as goat')
         recording = _recording(chosen, robot)
         with progress_bar('fitting', 100) as bar:
             found = inverted(recording, robot, chosen.network or '', chosen.gait or '',

@@ -75,7 +75,9 @@ def phases(found: Inverted) -> Figure:
     from matplotlib import pyplot
     figure, axes = pyplot.subplots(figsize=(6.0, 0.9 + 0.45 * len(found.stride.phases)),
                                    layout='constrained')
-    wanted = found.fit.verdict.phases
+    orbit = found.fit.orbit
+    cells = next(iter(orbit.network.legs.values()))
+    wanted = {leg: float(orbit.phases[own[0] - 1]) for leg, own in cells.items()}
     for row, (leg, phase) in enumerate(found.stride.phases.items()):
         height = len(found.stride.phases) - 1 - row
         axes.plot(phase % 1.0, height, 'o', color=RECORDED, markersize=8,
