@@ -11,7 +11,7 @@ from graph import Process, Watcher, until
 from cpg_ros.dynamics.program import plan
 from cpg_ros.networks.presets import write_presets
 from cpg_ros.networks.registry import NETWORKS, PRESETS
-from cpg_ros.robot import load_robot
+from cpg_ros.robot_file import load_robot
 
 CONFIG = Path(get_package_share_directory('cpg_ros')) / 'config'
 # DESIGN 2.1 and 2.3: phases of the legs, where the gait's symmetry prescribes them.

@@ -12,7 +12,7 @@ from cpg_ros.dynamics.pattern import Pattern
 from cpg_ros.dynamics.phase_readout import PhaseReadout
 from cpg_ros.dynamics.program import plan
 from cpg_ros.networks.registry import PRESETS
-from cpg_ros.robot import load_robot
+from cpg_ros.robot_file import load_robot
 
 ROBOTS = {name: load_robot(Path(__file__).parents[1] / 'config' / f'{name}.yaml')
           for name in ('quadruped', 'biped')}

@@ -9,7 +9,7 @@ import yaml
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from cpg_ros.robot import RobotError, load_robot, write_robot
+from cpg_ros.robot_file import RobotError, load_robot, write_robot
 
 CONFIG = Path(__file__).resolve().parent.parent / 'config'
 GOAT = yaml.safe_load((CONFIG / 'goat.yaml').read_text())
@@ -49,8 +49,8 @@ def test_the_goat():
     written = [joint for leg in GOAT['legs'].values() for joint in leg['joints']]
     for key in ('offset', 'lower', 'upper', 'velocity'):
         assert np.array_equal(robot.column(key), [joint[key] for joint in written])
-    assert np.array_equal(robot.weights[:, 0], [joint['amplitude'] for joint in written])
-    assert not robot.weights[:, 1:].any()
+    assert np.array_equal(robot.weights()[:, 0], [joint['amplitude'] for joint in written])
+    assert not robot.weights()[:, 1:].any()
 
 
 def test_the_quadruped_whose_controllers_have_an_order_of_their_own():
@@ -58,7 +58,7 @@ def test_the_quadruped_whose_controllers_have_an_order_of_their_own():
     names = [joint.name for joint in robot.joints]
     assert len(names) == 12
     assert sorted(robot.order) == sorted(names) and list(robot.order) != names
-    assert np.array_equal(robot.weights[2], [0.0, -0.22, 0.15, 0.0, 0.0, 0.0])
+    assert np.array_equal(robot.weights()[2], [0.0, -0.22, 0.15, 0.0, 0.0, 0.0])
 
 
 def test_without_an_order_joints_come_as_in_the_file(tmp_path):
@@ -147,7 +147,7 @@ def test_whatever_stands_there_it_loads_or_says_why_not(tmp_path, path, value):
     except RobotError as error:
         assert str(file) in str(error) and len(str(error).splitlines()) == 1
     else:
-        assert robot.cells.dtype.kind == 'i' and np.isfinite(robot.weights).all()
+        assert robot.cells.dtype.kind == 'i' and np.isfinite(robot.weights()).all()
 
 
 @pytest.mark.parametrize('file', sorted(CONFIG.glob('*.yaml')), ids=lambda path: path.stem)

@@ -11,6 +11,7 @@ from collections import deque
 
 import numpy as np
 
+from cpg_ros.dynamics.drive import Drive
 from cpg_ros.dynamics.program import Program
 from cpg_ros.dynamics.readout import confine
 from cpg_ros.dynamics.track import Track
@@ -40,16 +41,18 @@ class Pattern:
 
     """
 
-    def __init__(self, program: Program, ramp: float = 1.0, enabled: bool = True) -> None:
-        """Stand, then ramp into the program if enabled."""
+    def __init__(self, program: Program, ramp: float = 1.0, enabled: bool = True,
+                 drive: Drive | None = None) -> None:
+        """Stand, then ramp into the program if enabled; a drive steers it."""
         robot = program.robot
-        self.robot = robot
+        self.robot, self.drive = robot, drive
+        self._leg = robot.leg_of_joint
         self.faults = 0
         self.held = 0
         self._offset, self._lower = robot.column('offset'), robot.column('lower')
         self._upper, self._limit = robot.column('upper'), robot.column('velocity')
         self._requests: deque = deque()
-        self._tracks = [Track(program, 0.0)]
+        self._tracks = [Track(program, 0.0, drive)]
         self._ramps: deque[tuple[float, float, float, float]] = deque()
         self.restart(ramp, enabled)
 
@@ -75,7 +78,7 @@ class Pattern:
     def apply(self, program: Program, transition: float) -> None:
         """Change to a program over a transition in s; 0 leaves it to the network's dynamics."""
         # Seeding an orbit takes its time: here, in the caller's thread, not in that of the ticks.
-        prepared = Track(program, max(transition, SUBSTEP))
+        prepared = Track(program, max(transition, SUBSTEP), self.drive)
         self._requests.append((program, prepared if transition > 0.0 else None))
 
     def enable(self, enabled: bool, ramp: float) -> None:
@@ -153,8 +156,11 @@ class Pattern:
     def _cruise(self, dt: float) -> None:
         """One gait, at the stand or in full swing: nothing to mix, nothing to allocate."""
         self._slowing, self._last_rate = 1.0, None
-        track = self._tracks[0]
+        track, drive = self._tracks[0], self.drive
         frequency = track.program.frequency
+        if drive is not None:
+            drive.advance(dt)
+            frequency *= drive.pace
         if not track.advance(frequency * dt):
             self._recover(track)
             self._step(0.0)
@@ -162,6 +168,8 @@ class Pattern:
         np.multiply(track.angle, self._level, out=self._wanted)
         self._wanted += self._offset
         np.multiply(track.rise, self._level * frequency, out=self._rate)
+        if drive is not None:
+            self._rate += self._level * drive.rate[self._leg] * track.reach
 
     def _recover(self, track: Track) -> None:
         self.faults += 1
@@ -181,13 +189,16 @@ class Pattern:
                 share, share_rate = ease(track.progress)
                 fades.append((share, share_rate / track.transition))
                 frequency += share * (track.program.frequency - frequency)
+        if self.drive is not None:
+            self.drive.advance(dt)
+            frequency *= self.drive.pace
         for track in tracks:
             if not track.advance(frequency * clock):
                 self._recover(track)
 
-        wanted, rate = first.angle, first.rise * frequency
+        wanted, rate = first.angle, self._rate_of(first, frequency)
         for track, (share, share_rate) in zip(tracks[1:], fades, strict=True):
-            rate = (rate + share * (track.rise * frequency - rate)
+            rate = (rate + share * (self._rate_of(track, frequency) - rate)
                     + share_rate * (track.angle - wanted))
             wanted = wanted + share * (track.angle - wanted)
         while len(tracks) > 1 and tracks[1].progress >= 1.0:
@@ -217,6 +228,12 @@ class Pattern:
             self._wanted[:] = wanted
             self._wanted += self._offset
             self._rate[:] = rate
+
+    def _rate_of(self, track: Track, frequency: float) -> np.ndarray:
+        rate = track.rise * frequency
+        if self.drive is not None:
+            rate += self.drive.rate[self._leg] * track.reach
+        return rate
 
     def _ramp_to(self, end: float, time: float) -> None:
         """Plan the level's way to its end, from its present value and rate, without overshoot.

@@ -11,7 +11,7 @@ from cpg_ros.dynamics.readout import WaveReadout, extremes
 from cpg_ros.dynamics.stability import Stability, stability
 from cpg_ros.dynamics.stepper import Stepper
 from cpg_ros.networks.network import Network, Preset
-from cpg_ros.robot import Robot
+from cpg_ros.robot import Motion, Robot
 
 #: Strides per second below which a robot would seem to stand (Hz).
 SLOWEST = 0.01
@@ -34,7 +34,10 @@ class Program:
         stability: whether it attracts, and with what symmetry gain.
         gain: symmetry lock in 1/model time.
         frequency: strides per second (Hz).
+        motion: what the gait makes of the robot.
+        shift: of each joint from the stand to where the gait swings about, rad, (joints,).
         readout: reads joints and legs off the network's state.
+        in_place: the same for legs that take strides of length 0.
         span: smallest and largest deviation of each joint from its offset, rad, (2, joints).
         speed: largest speed of each joint, rad/s, shape (joints,).
 
@@ -47,7 +50,10 @@ class Program:
     stability: Stability
     gain: float
     frequency: float
+    motion: Motion
+    shift: np.ndarray
     readout: WaveReadout | PhaseReadout
+    in_place: WaveReadout | PhaseReadout
     span: np.ndarray
     speed: np.ndarray
 
@@ -120,19 +126,22 @@ def plan(robot: Robot, name: str, preset: Preset, network: Network, frequency: f
     if judged.flaw:
         raise Refused(f'the {gait} exists at these parameters but does not attract: {judged.flaw}')
 
-    weights = amplitude * robot.weights
+    motion = robot.motion(name, gait)
+    shift = robot.shift(motion)
     try:
-        if network.variables == 1:
-            readout: WaveReadout | PhaseReadout = WaveReadout(
-                orbit, robot.cells, weights, robot.leg_cells)
-        else:
-            readout = PhaseReadout(orbit, robot.cells, weights, robot.leg_cells,
-                                   robot.harmonics)
+        readout, in_place = (_readout(orbit, robot, amplitude * robot.weights(motion, at_rest))
+                             for at_rest in (False, True))
     except ValueError as error:
         raise Refused(f'the {gait} at these parameters cannot drive joints: {error}') from error
     strides = frequency if frequency > 0.0 else 1.0 / orbit.period
-    span = np.stack(extremes(readout.angles))
-    speed = strides * np.abs(extremes(readout.rises)).max(axis=0)
+    swings = [(readout.angles, readout.rises)]
+    if motion.steering is not None:
+        # Strides from 1 to -1: at one of the ends a joint goes furthest.
+        swings.append((2.0 * in_place.angles - readout.angles,
+                       2.0 * in_place.rises - readout.rises))
+    lows, highs = zip(*(extremes(angles) for angles, _ in swings), strict=True)
+    span = shift + np.stack([np.min(lows, axis=0), np.max(highs, axis=0)])
+    speed = strides * np.max([np.abs(extremes(rises)) for _, rises in swings], axis=(0, 1))
     for joint, low, high, fastest in zip(robot.joints, *span, speed, strict=True):
         if joint.offset + low < joint.lower - 1e-9:
             raise Refused(f'amplitude {amplitude:g} takes {joint.name} to '
@@ -145,4 +154,11 @@ def plan(robot: Robot, name: str, preset: Preset, network: Network, frequency: f
                           f'{joint.name} at {fastest:.2f} rad/s, above its limit '
                           f'{joint.velocity:g}')
     gain = judged.chosen if gain < 0.0 else gain
-    return Program(name, robot, gait, orbit, judged, gain, strides, readout, span, speed)
+    return Program(name, robot, gait, orbit, judged, gain, strides, motion, shift, readout,
+                   in_place, span, speed)
+
+
+def _readout(orbit: Orbit, robot: Robot, weights: np.ndarray) -> WaveReadout | PhaseReadout:
+    if orbit.network.variables == 1:
+        return WaveReadout(orbit, robot.cells, weights, robot.leg_cells)
+    return PhaseReadout(orbit, robot.cells, weights, robot.leg_cells, robot.harmonics)

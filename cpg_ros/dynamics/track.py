@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 
+from cpg_ros.dynamics.drive import Drive
 from cpg_ros.dynamics.program import Program
 
 #: Off the orbit: a cell further away than this share of the peak, or the phase behind or ahead
@@ -18,13 +19,23 @@ KICK = 0.05
 
 
 class Track:
-    """A network running one program."""
+    """A network running one program.
 
-    def __init__(self, program: Program, transition: float) -> None:
+    Attributes:
+        angle: of each joint from the stand, rad.
+        rise: its derivative by phase, rad per cycle.
+        reach: its derivative by the stride of the joint's leg, rad; only with a drive.
+        legs: phase of each leg, cycles.
+
+    """
+
+    def __init__(self, program: Program, transition: float, drive: Drive | None = None) -> None:
+        """Run a program, its strides as long as a drive has them, if there is one."""
         self.transition = transition
         self.progress = 0.0
-        self.angle = np.zeros(len(program.robot.joints))
-        self.rise = np.zeros_like(self.angle)
+        self.drive = drive
+        self._leg = program.robot.leg_of_joint
+        self.angle, self.rise, self.reach, self._lift = np.zeros((4, self._leg.size))
         self.legs = np.zeros(len(program.robot.legs))
         self.stepper = program.seed.copy()
         self.settling = self._calm = self._still = 0.0
@@ -47,7 +58,18 @@ class Track:
         self._astray = 0.0
 
     def _look(self) -> float:
-        return self.program.readout.look(self.stepper.now, self.angle, self.rise, self.legs)
+        program, now, angle, rise = self.program, self.stepper.now, self.angle, self.rise
+        distance = program.readout.look(now, angle, rise, self.legs)
+        if self.drive is not None:
+            # angle = in_place + stride (angle - in_place), and so its derivatives.
+            stride = self.drive.stride[self._leg]
+            still, lift = self.reach, self._lift
+            program.in_place.look(now, still, lift, self.legs)
+            rise += (stride - 1.0) * (rise - lift)
+            np.subtract(angle, still, out=self.reach)
+            angle += (stride - 1.0) * self.reach
+        angle += program.shift
+        return distance
 
     def advance(self, strides: float) -> bool:
         """Advance by some strides; tell whether the network is still on its orbit."""

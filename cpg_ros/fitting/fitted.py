@@ -8,7 +8,8 @@ import yaml
 
 from cpg_ros.fitting.inverted import Inverted
 from cpg_ros.networks.registry import NETWORKS
-from cpg_ros.robot import Joint, Robot, write_robot
+from cpg_ros.robot import Joint, Robot
+from cpg_ros.robot_file import write_robot
 from cpg_ros.whole import write_whole
 
 #: Limits of joints that no robot file gives: the share of the recorded range that is left on

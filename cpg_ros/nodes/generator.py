@@ -33,7 +33,7 @@ from cpg_ros.nodes.outputs import Outputs
 from cpg_ros.nodes.parameter_services import StrictParameterService
 from cpg_ros.nodes.settings import COMMANDS, NETWORK, Planner, Spec, as_doubles, specs
 from cpg_ros.nodes.ticker import Ticker
-from cpg_ros.robot import RobotError, find_robot
+from cpg_ros.robot_file import RobotError, find_robot
 
 NAME = 'cpg_generator'
 #: On SIGINT or SIGTERM the ramp takes this long, and the node ends by the later time, s.

@@ -30,7 +30,8 @@ from cpg_ros.fitting.fitted import write_fitted
 from cpg_ros.fitting.inverted import Inverted, inverted
 from cpg_ros.fitting.live import Live
 from cpg_ros.nodes.ending import ended
-from cpg_ros.robot import Robot, find_robot
+from cpg_ros.robot import Robot
+from cpg_ros.robot_file import find_robot
 from cpg_ros.tools.arguments import finite
 from cpg_ros.whole import write_whole
 

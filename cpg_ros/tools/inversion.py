@@ -20,7 +20,8 @@ from cpg_ros.fitting.recording import Recording
 from cpg_ros.fitting.table import read_csv
 from cpg_ros.networks.delayed import CELLS, Delayed
 from cpg_ros.networks.registry import NETWORKS
-from cpg_ros.robot import Robot, find_robot
+from cpg_ros.robot import Robot
+from cpg_ros.robot_file import find_robot
 from cpg_ros.tools.arguments import Parser, as_json, assignment, say, twice
 from cpg_ros.whole import write_whole
 

@@ -1,0 +1,50 @@
+"""Steering a gait: how long each leg's stride is and how fast they follow one another."""
+
+import math
+
+import numpy as np
+
+#: What is asked for is approached with this time constant, s.
+TIME_CONSTANT = 0.2
+
+
+class Drive:
+    """Strides of the legs and their pace, on the way to what is asked for.
+
+    Each approaches its target as a critically damped oscillator does, so that a change of
+    target changes neither value nor rate at once.
+
+    Attributes:
+        stride: factor of each leg's stride, shape (legs,); 1 is the gait as it is.
+        rate: its derivative, 1/s.
+        pace: factor of the stride frequency.
+
+    """
+
+    def __init__(self, legs: int) -> None:
+        # One row: the legs' strides and the pace; nothing is asked before the first step.
+        self._now, self._rate = np.ones(legs + 1), np.zeros(legs + 1)
+        self._target = np.ones(legs + 1)
+        self.stride, self.rate = self._now[:legs], self._rate[:legs]
+
+    @property
+    def pace(self) -> float:
+        """Factor of the stride frequency."""
+        return float(self._now[-1])
+
+    def ask(self, stride: np.ndarray, pace: float) -> None:
+        """Set the targets; may be called from another thread."""
+        self._target = np.append(stride, pace)
+
+    def jump(self) -> None:
+        """Be at the targets at once, as where nothing moves yet."""
+        self._now[:], self._rate[:] = self._target, 0.0
+
+    def advance(self, dt: float) -> None:
+        """Advance by dt in s."""
+        # e(t) = (e + (v + e / T) t) exp(-t / T), e the distance from the target.
+        target, decay = self._target, math.exp(-dt / TIME_CONSTANT)
+        gap = self._now - target
+        pull = self._rate + gap / TIME_CONSTANT
+        self._now[:] = target + (gap + pull * dt) * decay
+        self._rate[:] = (self._rate - pull * dt / TIME_CONSTANT) * decay
