@@ -99,14 +99,19 @@ def load(name: str, robot: Robot, kp: float = 60.0, kd: float = 2.0, timestep: f
         _check(robot, joints, path)
         _drive(spec, robot, kp, kd)
         _sense(spec, robot, joints, base)
-        _floor(spec)
+        _surround(spec, base)
         spec.option.timestep = timestep
         spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
         spec.compiler.discardvisual = not visual
         return spec.compile()
     except ValueError as error:
-        # Further lines tell about MuJoCo's own state.
-        raise SimulationError(f'model {path}: {str(error).splitlines()[0]}') from error
+        raise SimulationError(f'model {path}: {_reason(error)}') from error
+
+
+def _reason(error: ValueError) -> str:
+    """Put MuJoCo's reason on one line, without what it says about the state of the spec."""
+    lines = str(error).splitlines()
+    return ' '.join(line.strip() for line in lines if ' of the spec ' not in line)
 
 
 def _free(spec: Any, path: Path) -> None:
@@ -201,20 +206,24 @@ def _depth(body: Any) -> int:
     return depth
 
 
-def _floor(spec: Any) -> None:
-    """Add a light, and a floor with checks where the file brings none."""
+def _surround(spec: Any, base: Any) -> None:
+    """Add a light that goes along, a sky, and a floor with checks where the file brings none."""
     mujoco, world = engine(), spec.worldbody
-    if not spec.lights:
-        world.add_light(pos=[0.0, 0.0, 4.0], dir=[0.3, 0.3, -1.0], castshadow=True,
-                        type=mujoco.mjtLightType.mjLIGHT_DIRECTIONAL)
+    for light in spec.lights:
+        spec.delete(light)
+    base.add_light(pos=[0.0, 0.0, 3.0], dir=[0.0, 0.0, -1.0], castshadow=True,
+                   mode=mujoco.mjtCamLight.mjCAMLIGHT_TRACKCOM, diffuse=[0.5, 0.5, 0.5],
+                   type=mujoco.mjtLightType.mjLIGHT_DIRECTIONAL)
+    spec.add_texture(name='sky', type=mujoco.mjtTexture.mjTEXTURE_SKYBOX, width=64, height=64,
+                     builtin=mujoco.mjtBuiltin.mjBUILTIN_FLAT, rgb1=[0.93, 0.95, 0.97])
     if any(geom.type == mujoco.mjtGeom.mjGEOM_PLANE for geom in world.geoms):
         return
     spec.add_texture(name='checks', type=mujoco.mjtTexture.mjTEXTURE_2D,
                      builtin=mujoco.mjtBuiltin.mjBUILTIN_CHECKER, width=256, height=256,
                      rgb1=[0.80, 0.82, 0.84], rgb2=[0.62, 0.66, 0.70])
-    material = spec.add_material(name='floor', texrepeat=[0.5 / SQUARE] * 2, texuniform=True)
+    material = spec.add_material(name='checks', texrepeat=[0.5 / SQUARE] * 2, texuniform=True)
     material.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = 'checks'
     # Whatever can collide with anything collides with the floor.
     world.add_geom(name='floor', type=mujoco.mjtGeom.mjGEOM_PLANE, size=[0.0, 0.0, 0.05],
                    friction=[1.0, 0.02, 0.01], contype=1, conaffinity=0x7FFFFFFF,
-                   material='floor')
+                   material='checks')
