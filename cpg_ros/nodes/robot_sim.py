@@ -32,6 +32,8 @@ from cpg_ros.simulation.model import SimulationError
 NAME = 'robot_sim'
 #: How long the force of one message on ~/push acts, s of simulated time.
 PUSH = 0.1
+#: A robot is up again after a fall once it has not been down for this long, s.
+BOUNCE = 1.0
 
 SPECS = {
     'robot': Spec('unitree_go2', 'robot file, or the name of a shipped one',
@@ -93,7 +95,7 @@ class RobotSim(StartedNode):
         self._requests: deque = deque()
         self._last = round(self._value('duration') * self._rate)
         self._now, self._began, self._since = 0, 0.0, 0
-        self._fallen = False
+        self._fallen, self._upright_from = False, -1.0
         self._clock_message = Clock()
         self._tell_time: Publisher | None = None
         if self._value('clock') or not factor:
@@ -136,7 +138,7 @@ class RobotSim(StartedNode):
     def _stand_up(self) -> None:
         """Put it at the origin, at the angles that are commanded, so that nothing jerks."""
         self._body.reset(self._commands.angles)
-        self._since, self._fallen = self._now, False
+        self._since, self._fallen, self._upright_from = self._now, False, -1.0
         self.get_logger().info('standing at the origin')
 
     # -- the thread -----------------------------------------------------------------------
@@ -171,11 +173,15 @@ class RobotSim(StartedNode):
         self._now += 1
         self._measurements.publish(stamp)
         self._diary.look(self._now / self._rate)
-        if body.fallen != self._fallen:
-            self._fallen = body.fallen
-            if self._fallen:
+        if body.fallen:
+            if not self._fallen:
                 self.get_logger().error(f'the robot has fallen: {self._summary()}; ~/reset '
                                         'stands it up')
+            # Bouncing is part of the fall.
+            self._upright_from = self._now + self._rate * BOUNCE
+        elif self._fallen and self._now > self._upright_from:
+            self.get_logger().info('the robot has come upright again')
+        self._fallen = body.fallen or self._now <= self._upright_from
         if self._now == self._last:
             self.stop.set()
             self.ticker.end()
