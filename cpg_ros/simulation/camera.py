@@ -48,9 +48,9 @@ class Camera:
         free = int(np.argmax(model.jnt_type == int(mujoco.mjtJoint.mjJNT_FREE)))
         self._base = slice(model.jnt_qposadr[free], model.jnt_qposadr[free] + 3)
         self._option, self._view = mujoco.MjvOption(), mujoco.MjvCamera()
-        own = model.geom_bodyid > 0
-        if not np.any(self._option.geomgroup[model.geom_group[own]]):
-            # Nothing but collision shapes, which are hidden by default.
+        shown = self._option.geomgroup[model.geom_group] > 0
+        if 2 * len(set(model.geom_bodyid[shown])) < len(set(model.geom_bodyid)):
+            # Hardly more than collision shapes, which are hidden by default.
             self._option.geomgroup[:] = 1
         self._view.azimuth, self._view.elevation = AZIMUTH, ELEVATION
         self._view.distance = 0.0

@@ -10,11 +10,15 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+import numpy as np
+
 from cpg_ros.networks.registry import NETWORKS
 from cpg_ros.robot import Robot
 
 #: Side of a square of the floor, m.
 SQUARE = 0.25
+#: Size of the smallest feature of a mesh that is drawn, m: less than a pixel, and far fewer faces.
+GRAIN = 0.004
 
 
 class SimulationError(RuntimeError):
@@ -83,7 +87,8 @@ def load(name: str, robot: Robot, kp: float = 60.0, kd: float = 2.0, timestep: f
         kp: proportional gain, N m / rad.
         kd: damping gain, N m s / rad.
         timestep: of the integration, s.
-        visual: keep meshes that are there for pictures only; they take a second to load.
+        visual: keep what is there for pictures only, meshes coarsened to GRAIN; they take a
+            second to load.
 
     Raises:
         SimulationError: the file cannot be read, or does not go with the robot file.
@@ -103,7 +108,8 @@ def load(name: str, robot: Robot, kp: float = 60.0, kd: float = 2.0, timestep: f
         spec.option.timestep = timestep
         spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
         spec.compiler.discardvisual = not visual
-        return spec.compile()
+        model = spec.compile()
+        return _coarsened(spec, model) if visual else model
     except ValueError as error:
         raise SimulationError(f'model {path}: {_reason(error)}') from error
 
@@ -138,8 +144,9 @@ def _check(robot: Robot, joints: dict[str, Any], path: Path) -> None:
     for name in robot.order:
         if name not in turning:
             near = difflib.get_close_matches(name, turning, 3, 0.4) or turning[:3]
+            others = f'nearest: {", ".join(near)}' if near else 'it has none'
             raise SimulationError(f"model {path}: joint '{name}' of the robot file "
-                                  f"'{robot.name}' is not there; nearest: {', '.join(near)}")
+                                  f"'{robot.name}' is not there; {others}")
 
 
 def _drive(spec: Any, robot: Robot, kp: float, kd: float) -> None:
@@ -227,3 +234,29 @@ def _surround(spec: Any, base: Any) -> None:
     world.add_geom(name='floor', type=mujoco.mjtGeom.mjGEOM_PLANE, size=[0.0, 0.0, 0.05],
                    friction=[1.0, 0.02, 0.01], contype=1, conaffinity=0x7FFFFFFF,
                    material='checks')
+
+
+def _coarsened(spec: Any, model: Any) -> Any:
+    """Compile once more, with vertices of meshes that lie close together made one."""
+    for k, mesh in enumerate(list(spec.meshes)):
+        first, count = model.mesh_vertadr[k], model.mesh_vertnum[k]
+        faces = model.mesh_face[model.mesh_faceadr[k]:][:model.mesh_facenum[k]]
+        turn = np.zeros(9)
+        engine().mju_quat2Mat(turn, model.mesh_quat[k])
+        places = model.mesh_vert[first:first + count] @ turn.reshape(3, 3).T + model.mesh_pos[k]
+        _, firsts, cells = np.unique(np.round(places / GRAIN), axis=0, return_index=True,
+                                     return_inverse=True)
+        corners = cells.reshape(-1)[faces]
+        whole = ((corners[:, 0] != corners[:, 1]) & (corners[:, 1] != corners[:, 2])
+                 & (corners[:, 2] != corners[:, 0]))
+        if whole.sum() < 20:
+            continue
+        name = f'{mesh.name} coarse'
+        spec.add_mesh(name=name, inertia=engine().mjtMeshInertia.mjMESH_INERTIA_SHELL,
+                      uservert=places[firsts].reshape(-1),
+                      userface=corners[whole].reshape(-1))
+        for geom in spec.geoms:
+            if geom.meshname == mesh.name:
+                geom.meshname = name
+        spec.delete(mesh)
+    return spec.compile()
