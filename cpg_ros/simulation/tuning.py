@@ -27,6 +27,8 @@ SHORT, LONG = 6.0, 10.0
 SCENARIOS = (Scenario(), Scenario(0.9),
              Scenario(0.6, 1.05, ((2.5, 0.0, 50.0), (4.2, 50.0, 0.0))),
              Scenario(0.8, 0.95, ((3.0, -50.0, 0.0), (4.5, 0.0, -50.0))))
+#: Height that feet are to have for a tenth of the time, m.
+CLEAR = 0.02
 #: Price of a design that the joints cannot follow.
 REFUSED = 100.0
 #: Designs in a generation, and how far about the start the first ones are (1: all there is).
@@ -59,7 +61,8 @@ def price(trial: Trial, aim: Aim, duration: float) -> float:
     """Weigh a run's figures; 0 would be perfect.
 
     Slower or much faster than wanted, fewer hops or, where none are wanted, bobbing, turning,
-    leaning, drifting, sliding, torques at their limit and work all cost; a fall costs most.
+    leaning, dragging feet, drifting, sliding, torques at their limit and work all cost; a fall
+    costs most.
     """
     fall = 0.0 if trial.upright else 15.0 + 25.0 * (1.0 - trial.fell / duration)
     share = trial.speed / aim.speed
@@ -67,10 +70,11 @@ def price(trial: Trial, aim: Aim, duration: float) -> float:
     turning = (0.15 * min(abs(math.degrees(trial.turn)) / 0.5, 8.0)**2
                + 0.1 * min(abs(trial.heading) / 4.0, 8.0)**2)
     leaning = (trial.sway / 5.0)**1.5
+    dragging = 6.0 * max(0.0, 1.0 - trial.lift / CLEAR)
     restless = 0.5 * trial.bob / 0.01
     if aim.hops:
         restless = 5.0 * max(0.0, 1.0 - trial.hops / (0.85 * aim.hops * duration))
-    return (fall + speed + turning + leaning + restless + 0.3 * (trial.drift / 0.4)**2
+    return (fall + speed + turning + leaning + dragging + restless + 0.3 * (trial.drift / 0.4)**2
             + 2.0 * min(trial.slip, 3.0) + 20.0 * trial.saturation + 0.6 * min(trial.cost, 5.0))
 
 
