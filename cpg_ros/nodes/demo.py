@@ -108,7 +108,7 @@ def guide(operator: Operator, gaits: Sequence[str], every: float,
         say(f'{time.monotonic() - began:5.1f} s  {text:<10} at x {x:6.2f} m, y {y:6.2f} m')
 
     report(gaits[0])
-    while due is None or time.monotonic() < due or tour:
+    while tour or due is None or time.monotonic() < due:
         rclpy.spin_once(operator, timeout_sec=0.05)
         for node in nodes:
             if node.poll() is not None:
@@ -118,11 +118,10 @@ def guide(operator: Operator, gaits: Sequence[str], every: float,
             wanted, due = lines.get(), None
             if wanted == 'q':
                 return
-        elif due is not None and time.monotonic() >= due:
+        elif tour and due is not None and time.monotonic() >= due:
             wanted, due = tour.pop(0), due + every
         if wanted:
-            refused = operator.switch(wanted)
-            report(refused or wanted)
+            report(operator.switch(wanted) or wanted)
 
 
 def wait_for(operator: Operator, nodes: Sequence[subprocess.Popen]) -> None:
