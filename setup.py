@@ -27,6 +27,7 @@ setup(
         'generator = cpg_ros.nodes.generator:main',
         'inversion = cpg_ros.nodes.inversion:main',
         'analyze = cpg_ros.tools.analyze:main',
+        'check_robot = cpg_ros.tools.check_robot:main',
         'optimize = cpg_ros.tools.optimize:main',
         'reproduce = cpg_ros.tools.reproduce:main']},
 )
