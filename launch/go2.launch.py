@@ -1,0 +1,45 @@
+"""A simulated Unitree Go2 walks: ros2 launch cpg_ros go2.launch.py gait:=walk film:=walk.gif.
+
+The generator and the physics run side by side, as fast as the clock on the wall or, with
+real_time_factor:=0, as fast as they can. Needs MuJoCo: pip install cpg-ros[sim].
+"""
+
+from launch.actions import OpaqueFunction, Shutdown
+from launch.substitutions import LaunchConfiguration
+
+from cpg_ros.launching import declared, started
+from launch import LaunchDescription
+
+GENERATOR = {
+    'network': ('delayed', str, 'delayed or quadruped'),
+    'gait': ('trot', str, 'gait to start with'),
+    'frequency': ('', float, "strides per second [Hz]; empty for the gait's usual one"),
+    'cmd_vel': ('false', bool, 'walk as cmd_vel (geometry_msgs/Twist) asks'),
+}
+SIMULATION = {
+    'command': ('joint_states', str, 'what moves the robot: joint_states, joint_trajectory or '
+                'forward_position'),
+    'real_time_factor': ('1.0', float, 'speed of simulated time; 0 for as fast as it can'),
+    'film': ('', str, 'film to write, .gif or .mp4; empty for none'),
+    'footfalls': ('', str, 'picture of the footfalls to write; empty for none'),
+    'duration': ('0.0', float, 'end after this much simulated time [s]; 0 for never'),
+}
+#: Commands of the simulation -> of the generator.
+COMMANDS = {'joint_states': 'none'}
+
+
+def nodes(context):
+    """Return generator and simulation, which speak the same command and follow one clock."""
+    command = LaunchConfiguration('command').perform(context)
+    fast = float(LaunchConfiguration('real_time_factor').perform(context)) == 0.0
+    return [started(context, 'generator', 'cpg_generator', GENERATOR, {
+                'robot': 'unitree_go2', 'rate': 500.0, 'combined_topic': '',
+                'command': COMMANDS.get(command, command), 'use_sim_time': fast}),
+            started(context, 'robot_sim', 'robot_sim', SIMULATION, {
+                'robot': 'unitree_go2', 'model': 'go2'}, on_exit=Shutdown())]
+
+
+def generate_launch_description():
+    """Generator and robot_sim, optionally in a namespace."""
+    return LaunchDescription([*declared({**GENERATOR, **SIMULATION}),
+                              OpaqueFunction(function=nodes)])
