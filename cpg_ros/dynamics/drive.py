@@ -22,9 +22,9 @@ class Drive:
     """
 
     def __init__(self, legs: int) -> None:
-        # One row: the legs' strides and the pace; nothing is asked before the first step.
+        # One row: the legs' strides and the pace.
         self._now, self._rate = np.ones(legs + 1), np.zeros(legs + 1)
-        self._target = np.ones(legs + 1)
+        self._asked = (np.ones(legs + 1), False)
         self.stride, self.rate = self._now[:legs], self._rate[:legs]
 
     @property
@@ -32,18 +32,21 @@ class Drive:
         """Factor of the stride frequency."""
         return float(self._now[-1])
 
-    def ask(self, stride: np.ndarray, pace: float) -> None:
-        """Set the targets; may be called from another thread."""
-        self._target = np.append(stride, pace)
+    def ask(self, stride: np.ndarray, pace: float, at_once: bool = False) -> None:
+        """Set the targets, to be reached at once where nothing moves yet.
 
-    def jump(self) -> None:
-        """Be at the targets at once, as where nothing moves yet."""
-        self._now[:], self._rate[:] = self._target, 0.0
+        May be called from another thread than advance.
+        """
+        self._asked = np.append(stride, pace), at_once
 
     def advance(self, dt: float) -> None:
         """Advance by dt in s."""
         # e(t) = (e + (v + e / T) t) exp(-t / T), e the distance from the target.
-        target, decay = self._target, math.exp(-dt / TIME_CONSTANT)
+        target, at_once = self._asked
+        if at_once:
+            self._now[:], self._rate[:] = target, 0.0
+            return
+        decay = math.exp(-dt / TIME_CONSTANT)
         gap = self._now - target
         pull = self._rate + gap / TIME_CONSTANT
         self._now[:] = target + (gap + pull * dt) * decay

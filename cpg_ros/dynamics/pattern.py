@@ -85,6 +85,17 @@ class Pattern:
         """Ramp into the gait, or down to the stand, over a time in s."""
         self._requests.append((enabled, max(ramp, SUBSTEP)))
 
+    def steer(self, stride: np.ndarray, pace: float) -> None:
+        """Ask for the legs' strides, shape (legs,), and the pace; see Drive.
+
+        Raises:
+            ValueError: the pattern was made without a drive.
+
+        """
+        if self.drive is None:
+            raise ValueError('this pattern has no drive')
+        self.drive.ask(stride, pace, at_once=self._level == 0.0)
+
     @property
     def program(self) -> Program:
         """The newest program in force."""

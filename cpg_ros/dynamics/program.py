@@ -11,7 +11,7 @@ from cpg_ros.dynamics.readout import WaveReadout, extremes
 from cpg_ros.dynamics.stability import Stability, stability
 from cpg_ros.dynamics.stepper import Stepper
 from cpg_ros.networks.network import Network, Preset
-from cpg_ros.robot import Motion, Robot
+from cpg_ros.robot import Motion, Robot, Steering
 
 #: Strides per second below which a robot would seem to stand (Hz).
 SLOWEST = 0.01
@@ -62,6 +62,35 @@ class Program:
         """A stepper on the orbit at phase 0; copy it, do not advance it."""
         network = self.orbit.network
         return Stepper(network, self.orbit, gain=self.gain, symmetry=self.orbit.symmetry)
+
+    @property
+    def speeds(self) -> tuple[float, float]:
+        """Slowest and fastest forward speed that steering can ask for, m/s."""
+        speed = self._steering.speed
+        return speed[0], speed[-1]
+
+    def steer(self, speed: float, turn: float) -> tuple[np.ndarray, float]:
+        """Return each leg's stride, shape (legs,), and the pace for a wanted motion.
+
+        Args:
+            speed: forward, m/s.
+            turn: yaw rate, rad/s, positive to the left.
+
+        Raises:
+            ValueError: the robot file does not say how to steer this gait.
+
+        """
+        left, right, frequency = self._steering.ask(speed, turn)
+        strides = np.array([left if leg[0] == 'l' else right for leg in self.robot.legs])
+        # The table is for the gait's own frequency; a wanted one scales it.
+        return strides, frequency / (self.motion.frequency or frequency)
+
+    @property
+    def _steering(self) -> Steering:
+        if self.motion.steering is None:
+            raise ValueError(f"robot file '{self.robot.name}' does not say how to steer the gait "
+                             f"'{self.name}' (gaits.{self.gait}.steering)")
+        return self.motion.steering
 
     @property
     def character(self) -> str:

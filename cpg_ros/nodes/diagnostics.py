@@ -6,14 +6,17 @@ from rclpy.clock_type import ClockType
 from rclpy.node import Node
 
 from cpg_ros.dynamics.pattern import Pattern
+from cpg_ros.nodes.cmd_vel import CmdVel
 from cpg_ros.nodes.ticker import Ticker
 
 
 class Diagnostics:
     """Reports ERROR from a fault until the pattern is back, at least once; WARN on lateness."""
 
-    def __init__(self, node: Node, pattern: Pattern, ticker: Ticker) -> None:
+    def __init__(self, node: Node, pattern: Pattern, ticker: Ticker, cmd_vel: CmdVel | None
+                 ) -> None:
         self._node, self._pattern, self._ticker = node, pattern, ticker
+        self._cmd_vel = cmd_vel
         self._publisher = node.create_publisher(DiagnosticArray, '/diagnostics', 10)
         self._before = self._counts()
         self._seconds = 0
@@ -55,6 +58,8 @@ class Diagnostics:
             str(new['ticks']), **{key: str(value) for key, value in counts.items()},
             'worst delay of a tick [ms]': f'{1e3 * self._ticker.worst:.3f}',
         }
+        if self._cmd_vel:
+            values['cmd_vel'] = self._cmd_vel.state
         status = DiagnosticStatus(
             level=level, name=f'{self._node.get_fully_qualified_name()}: pattern', message=text,
             hardware_id=self._pattern.robot.name,

@@ -21,12 +21,14 @@ from rclpy.signals import SignalHandlerOptions
 from std_msgs.msg import String
 from std_srvs.srv import SetBool
 
+from cpg_ros.dynamics.drive import Drive
 from cpg_ros.dynamics.pattern import Pattern
 from cpg_ros.dynamics.program import Refused
 from cpg_ros.dynamics.warm import warm
 from cpg_ros.networks.network import Network, Preset
 from cpg_ros.networks.presets import PresetError, read_presets
 from cpg_ros.networks.registry import NETWORKS, PRESETS
+from cpg_ros.nodes.cmd_vel import CmdVel
 from cpg_ros.nodes.diagnostics import Diagnostics
 from cpg_ros.nodes.ending import ended
 from cpg_ros.nodes.outputs import Outputs
@@ -74,7 +76,7 @@ class Generator(Node):
         if network not in robot.networks:
             raise StartError(f"robot file '{robot.name}' is for the network "
                              f"{' or '.join(robot.networks)}, not '{network}'")
-        self._planner = Planner(NETWORKS[network], presets, robot)
+        self._planner = Planner(NETWORKS[network], presets, robot, self._value('cmd_vel'))
         self._given_groups()
         for name, spec in self._planner.specs(self._value('gait')).items():
             self._declare(name, spec)
@@ -84,7 +86,12 @@ class Generator(Node):
             raise StartError(str(error)) from error
         self._planner.prepare()
 
-        self.pattern = Pattern(program, self._value('ramp'), self._value('autostart'))
+        steered, autostart = self._value('cmd_vel'), self._value('autostart')
+        self.pattern = Pattern(program, self._value('ramp'), autostart and not steered,
+                               Drive(len(robot.legs)) if steered else None)
+        self._cmd_vel = CmdVel(self, self.pattern, program, autostart,
+                               lambda: self._value('cmd_vel_timeout'),
+                               lambda: self._value('ramp')) if steered else None
         self._outputs = Outputs(self, robot, self._value('combined_topic'),
                                 self._value('command'))
         self._gait = self.create_publisher(
@@ -93,7 +100,7 @@ class Generator(Node):
             qos_overriding_options=QoSOverridingOptions.with_default_policies())
         self.create_service(SetBool, '~/enable', self._enable)
         self.ticker = Ticker(self, self._value('rate'), self._tick, self._restart, self._fail)
-        self._diagnostics = Diagnostics(self, self.pattern, self.ticker)
+        self._diagnostics = Diagnostics(self, self.pattern, self.ticker, self._cmd_vel)
         self.add_pre_set_parameters_callback(self._complete)
         self.add_on_set_parameters_callback(self._judge)
         self.add_post_set_parameters_callback(self._apply)
@@ -169,6 +176,9 @@ class Generator(Node):
         if any(p.name in self._planner.names for p in parameters):
             program = self._planner.plan(self._values())
             self.pattern.apply(program, self._value('transition'))
+            if self._cmd_vel:
+                self._cmd_vel.program = program
+                self._cmd_vel.act()
             self._announce()
 
     def _announce(self) -> None:
@@ -187,9 +197,15 @@ class Generator(Node):
 
     def _enable(self, request: SetBool.Request, response: SetBool.Response) -> SetBool.Response:
         ramp = self._value('ramp')
-        self.pattern.enable(request.data, ramp)
         response.success = True
         response.message = f'ramping {"up" if request.data else "down"} over {ramp:g} s'
+        if self._cmd_vel:
+            self._cmd_vel.enabled = request.data
+            self._cmd_vel.act()
+            if request.data and not self._cmd_vel.walking:
+                response.message = 'enabled: standing until cmd_vel asks for motion'
+        else:
+            self.pattern.enable(request.data, ramp)
         self.get_logger().info(response.message)
         return response
 
@@ -221,6 +237,8 @@ class Generator(Node):
         began = time.monotonic()
         if self.failure is None and not self.pattern.standing:
             self.get_logger().info(f'ramping down over {LAST_RAMP:g} s before the end')
+            if self._cmd_vel:
+                self._cmd_vel.end()
             self.pattern.enable(False, LAST_RAMP)
             while not self.pattern.standing and time.monotonic() < began + LAST_DEADLINE:
                 time.sleep(0.005)

@@ -46,7 +46,7 @@ NETWORK = Spec('delayed', 'network of cells that makes the rhythm', read_only=Tr
 
 
 def specs(network: str) -> dict[str, Spec]:
-    """Return every parameter but ``network`` and the network's own, in order of declaration."""
+    """Return the parameters that depend on nothing but the network, in order of declaration."""
     robot, gait = USUAL[network]
     return {
         'presets': Spec('', 'file with further presets; empty for none', read_only=True),
@@ -56,8 +56,6 @@ def specs(network: str) -> dict[str, Spec]:
                      constraints='one of: ' + ', '.join(PRESETS[network])
                      + ', and those of the file given by presets'),
         'rate': Spec(100.0, 'messages per second on every output topic [Hz]', 1.0, 2000.0),
-        'frequency': Spec(1.0, "strides per second [Hz]; 0 runs in the model's own time, one "
-                          'unit a second', 0.0, 10.0),
         'amplitude': Spec(1.0, "factor on the robot file's joint amplitudes", 0.0, 3.0),
         'transition': Spec(1.0, 'duration of a change of gait or parameters [s]; 0 leaves it to '
                            "the network's own dynamics", 0.0, 30.0),
@@ -69,7 +67,10 @@ def specs(network: str) -> dict[str, Spec]:
         'command': Spec('none', 'command topic for ros2_control', read_only=True,
                         constraints='one of: ' + ', '.join(COMMANDS)),
         'autostart': Spec(True, 'ramp into the gait at start; false waits for ~/enable',
-                          read_only=True)}
+                          read_only=True),
+        'cmd_vel': Spec(False, 'walk as the topic cmd_vel asks; the robot file must say how',
+                        read_only=True),
+        'cmd_vel_timeout': Spec(0.5, 'a cmd_vel older than this stops the robot [s]', 0.05, 60.0)}
 
 
 @dataclass(frozen=True)
@@ -90,12 +91,15 @@ class Planner:
         network: whose parameters.
         presets: name -> preset, all that ``gait`` can be set to.
         robot: which the programs are for.
+        steered: whether only gaits that the robot file says how to steer can run.
         names: of the parameters that make up the settings.
 
     """
 
-    def __init__(self, network: type[Network], presets: dict[str, Preset], robot: Robot) -> None:
+    def __init__(self, network: type[Network], presets: dict[str, Preset], robot: Robot,
+                 steered: bool = False) -> None:
         self.network, self.presets, self.robot = network, presets, robot
+        self.steered = steered
         self.names = ('gait', 'frequency', 'amplitude', 'symmetry_gain',
                       *(f'{network.name}.{key}' for key in network.parameters()))
         self.program = functools.lru_cache(maxsize=32)(self._program)
@@ -108,9 +112,13 @@ class Planner:
                 gait_of(preset, preset.network)
 
     def specs(self, preset: str) -> dict[str, Spec]:
-        """Return the network's own parameters, with a preset's values as defaults."""
+        """Return ``frequency`` and the network's own, with a preset's values as defaults."""
         network, values = self.network, self._values(self.presets[preset].network)
-        found = {f'{network.name}.{key}': Spec(values[key], allowed.text, allowed.low,
+        frequency = self._frequency(preset)
+        found = {'frequency': Spec(1.0 if frequency is None else frequency,
+                                   "strides per second [Hz]; 0 runs in the model's own time, one "
+                                   'unit a second', 0.0, 10.0)}
+        found |= {f'{network.name}.{key}': Spec(values[key], allowed.text, allowed.low,
                                                allowed.high)
                  for key, allowed in network.ranges.items()}
         for group, members in network.groups.items():
@@ -119,6 +127,10 @@ class Planner:
                 values[group], f'{" ".join(members)}: the mean; setting it sets all of them',
                 allowed.low, allowed.high)
         return found
+
+    def _frequency(self, preset: str) -> float | None:
+        """Frequency for which the robot file has this gait, Hz."""
+        return self.robot.motion(preset, self.presets[preset].gait).frequency
 
     def _values(self, network: Network) -> dict[str, float]:
         """Parameters and groups by their bare names."""
@@ -153,7 +165,13 @@ class Planner:
             Refused: it cannot be run.
 
         """
-        return self.program(self.settings(values))
+        program = self.program(self.settings(values))
+        if self.steered:
+            try:
+                program.steer(0.0, 0.0)
+            except ValueError as error:
+                raise Refused(f'{error}, which cmd_vel needs') from error
+        return program
 
     def _program(self, settings: Settings) -> Program:
         return plan(self.robot, settings.gait, self.presets[settings.gait], settings.network,
@@ -162,9 +180,9 @@ class Planner:
     def complete(self, parameters: list[Parameter], current: dict[str, Any]) -> list[Parameter]:
         """Add to a batch what follows from it.
 
-        The gait's preset, then what a group sets, then the means of the groups; single
-        parameters in the batch win over all of them. An unknown gait adds nothing; it is
-        refused later.
+        The gait's preset, the frequency that the robot file has for it, then what a group sets,
+        then the means of the groups; single parameters in the batch win over all of them. An
+        unknown gait adds nothing; it is refused later.
         """
         prefix = f'{self.network.name}.'
         given = {p.name: p.value for p in parameters}
@@ -172,6 +190,9 @@ class Planner:
         preset = self.presets.get(gait) if isinstance(gait, str) else None
         wanted: dict[str, float] = {} if preset is None else {
             prefix + key: value for key, value in preset.network.as_dict().items()}
+        frequency = None if preset is None else self._frequency(str(gait))
+        if frequency is not None:
+            wanted['frequency'] = frequency
         for group, members in self.network.groups.items():
             if isinstance(given.get(prefix + group), float):
                 wanted.update({prefix + key: given[prefix + group] for key in members})

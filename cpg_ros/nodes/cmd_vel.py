@@ -1,0 +1,104 @@
+"""Walking as the topic cmd_vel asks: fast or slow, turning, and standing where nobody asks."""
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+from geometry_msgs.msg import Twist
+from rclpy.clock import Clock
+from rclpy.clock_type import ClockType
+from rclpy.node import Node
+from rclpy.qos import QoSProfile
+from rclpy.qos_overriding_options import QoSOverridingOptions
+
+from cpg_ros.dynamics.pattern import Pattern
+from cpg_ros.dynamics.program import Program
+
+#: How often it is seen whether the last command is too old, s.
+LOOK = 0.05
+#: Time between two warnings of a kind, s.
+QUIET = 5.0
+
+
+class CmdVel:
+    """Steers a pattern by the newest command.
+
+    Attributes:
+        program: the gait to steer.
+        enabled: whether the robot may walk at all.
+
+    """
+
+    def __init__(self, node: Node, pattern: Pattern, program: Program, enabled: bool,
+                 timeout: Callable[[], float], ramp: Callable[[], float]) -> None:
+        self.program, self.enabled = program, enabled
+        self._node, self._pattern, self._timeout, self._ramp = node, pattern, timeout, ramp
+        self._asked, self._when, self._stale = (0.0, 0.0), -math.inf, True
+        self._up = False
+        self._log = node.get_logger()
+        node.create_subscription(
+            Twist, 'cmd_vel', self._take, QoSProfile(depth=10),
+            qos_overriding_options=QoSOverridingOptions.with_default_policies())
+        # On the steady clock: a system clock that is set must not stop the robot, nor keep it
+        # going.
+        self._steady = Clock(clock_type=ClockType.STEADY_TIME)
+        node.create_timer(LOOK, self._look, clock=self._steady)
+
+    @property
+    def walking(self) -> bool:
+        """Tell whether a fresh command asks for motion."""
+        return self.enabled and not self._stale and self._asked != (0.0, 0.0)
+
+    @property
+    def state(self) -> str:
+        """What is asked for, for diagnostics."""
+        if self._stale:
+            return 'none'
+        return f'{self._asked[0]:.3g} m/s, {self._asked[1]:.3g} rad/s'
+
+    def _now(self) -> float:
+        clock: Any = self._node.get_clock()
+        return (clock if clock.ros_time_is_active else self._steady).now().nanoseconds * 1e-9
+
+    def _take(self, message: Twist) -> None:
+        speed, turn, aside = message.linear.x, message.angular.z, message.linear.y
+        if not all(math.isfinite(value) for value in (speed, turn, aside)):
+            self._log.warning(f'cmd_vel ignored: {speed} m/s forward, {aside} m/s to the left, '
+                              f'{turn} rad/s are not all finite',
+                              throttle_duration_sec=QUIET)
+            return
+        if aside:
+            self._log.warning(f'cmd_vel asks for {aside:g} m/s to the left: this robot walks '
+                              'forward, backward and in curves only',
+                              throttle_duration_sec=QUIET)
+        self._asked, self._when, self._stale = (speed, turn), self._now(), False
+        self.act()
+
+    def _look(self) -> None:
+        age = self._now() - self._when
+        stale = not 0.0 <= age <= self._timeout()
+        if stale == self._stale:
+            return
+        if stale and self.walking:
+            self._log.warning(f'no cmd_vel for {age:.2g} s: stopping')
+        self._stale = stale
+        self.act()
+
+    def act(self) -> None:
+        """Make the pattern do what is asked."""
+        walking = self.walking
+        if walking:
+            speed, turn = self._asked
+            slowest, fastest = self.program.speeds
+            if not slowest <= speed <= fastest:
+                self._log.warning(f"cmd_vel asks for {speed:g} m/s: the {self.program.name}'s "
+                                  f'range is {slowest:g} to {fastest:g} m/s',
+                                  throttle_duration_sec=QUIET)
+            self._pattern.steer(*self.program.steer(speed, turn))
+        if walking != self._up:
+            self._up = walking
+            self._pattern.enable(walking, self._ramp())
+
+    def end(self) -> None:
+        """Leave the pattern alone from now on, as it is ramped down for the last time."""
+        self.enabled = self._up = False
