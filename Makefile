@@ -3,7 +3,7 @@ PYTHON ?= python3
 SHELL := /bin/bash
 
 VENV := .venv
-SOURCES := $(shell find cpg_ros config launch resource -type f -not -path '*/__pycache__/*') package.xml setup.py setup.cfg
+SOURCES := $(shell find cpg_ros config launch urdf rviz plotjuggler foxglove resource -type f -not -path '*/__pycache__/*') package.xml setup.py setup.cfg
 # A domain of our own, seen by this machine only; both can be overridden from outside.
 export ROS_DOMAIN_ID ?= 42
 export ROS_AUTOMATIC_DISCOVERY_RANGE ?= LOCALHOST

@@ -4,11 +4,10 @@ from collections.abc import Mapping
 from typing import Any
 
 from launch.actions import DeclareLaunchArgument
+from launch.launch_context import LaunchContext
 from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
 from launch_ros.parameter_descriptions import ParameterValue
-
-from launch import LaunchContext
 
 #: Argument -> (default, type, what it is); each sets the parameter of the same name, but an
 #: empty one is left to the node.
