@@ -158,6 +158,21 @@ def load_urdf(path: str | Path) -> dict[str, UrdfJoint]:
     return document.joints
 
 
+def root(joints: dict[str, UrdfJoint]) -> str:
+    """Return the link that no joint moves.
+
+    Raises:
+        UrdfError: there is none, or more than one.
+
+    """
+    moved = {joint.child for joint in joints.values()}
+    found = sorted({joint.parent for joint in joints.values()} - moved)
+    if len(found) != 1:
+        raise UrdfError(f'the URDF has {len(found)} root links ({", ".join(found)}), it must '
+                        'have one')
+    return found[0]
+
+
 def chain(joints: dict[str, UrdfJoint], name: str) -> list[UrdfJoint]:
     """Return the joints from the root to one joint, which is the last.
 

