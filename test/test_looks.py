@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 import yaml
 
+from cpg_ros.nodes.outputs import COMMAND_TOPICS
 from cpg_ros.robot_file import find_robot
 from cpg_ros.tools.check_robot import main
 
@@ -212,3 +213,23 @@ def test_all_of_it_is_installed():
     for name in ('urdf/quadruped.urdf', 'rviz/cpg.rviz', 'plotjuggler/cpg.xml',
                  'foxglove/cpg.json'):
         assert (share / name).read_text() == (SOURCE / name).read_text()
+
+
+def test_the_page_on_your_own_robot_names_what_there_is():
+    page = (SOURCE / 'docs' / 'your_robot.md').read_text()
+    assert re.findall(r'^\*\*(\d+)\.', page, re.MULTILINE) == [str(k) for k in range(1, 11)]
+    entry_points = (SOURCE / 'setup.py').read_text()
+    for name in set(re.findall(r'ros2 run cpg_ros (\w+)', page)) - {'tune'}:
+        assert f"'{name} = cpg_ros." in entry_points
+    for name in re.findall(r'(\w+\.launch\.py)', page):
+        assert (SOURCE / 'launch' / name).is_file()
+    for name in re.findall(r'(?:plotjuggler|foxglove|config)/\w+\.\w+', page):
+        assert (SOURCE / name).is_file()
+    (snippet,) = re.findall(r'```yaml\n(.*?)```', page, re.DOTALL)
+    controllers = yaml.safe_load(snippet)
+    managed = controllers['controller_manager']['ros__parameters']
+    # Each command of the generator goes to a controller of the name it publishes under.
+    for topic in COMMAND_TOPICS.values():
+        name = topic.partition('/')[0]
+        assert managed[name]['type'].partition('/')[0] in page
+        assert len(set(controllers[name]['ros__parameters']['joints'])) == 12
