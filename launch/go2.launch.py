@@ -29,6 +29,8 @@ SIMULATION = {
     'footfalls': ('', str, 'picture of the footfalls to write; empty for none'),
     'duration': ('0.0', float, 'end after this much simulated time [s]; 0 for never'),
 }
+#: After Ctrl-C the film still has to be drawn: seconds until the simulation is ended.
+DRAWING = '300'
 #: Commands of the simulation -> of the generator.
 COMMANDS = {'joint_states': 'none'}
 
@@ -41,7 +43,7 @@ def nodes(context):
                 'rate': 500.0, 'combined_topic': '', 'command': COMMANDS.get(command, command),
                 'use_sim_time': simulated}),
             started(context, 'robot_sim', 'robot_sim', {**BOTH, **SIMULATION}, {
-                'clock': simulated}, on_exit=Shutdown())]
+                'clock': simulated}, on_exit=Shutdown(), sigterm_timeout=DRAWING)]
 
 
 def generate_launch_description():
