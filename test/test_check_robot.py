@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import yaml
-from hypothesis import given, settings
+from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 
 from cpg_ros.robot_file import load_robot
@@ -247,7 +247,8 @@ def test_a_biped_is_made(tmp_path):
 limits = st.tuples(st.floats(-3.0, 3.0), st.floats(0.02, 6.0), st.floats(0.3, 40.0))
 
 
-@settings(max_examples=15, deadline=None)
+# Each example takes its time: a failing one is not made smaller.
+@settings(max_examples=15, deadline=None, phases=(Phase.reuse, Phase.generate))
 @given(hip=limits, thigh=limits, calf=limits)
 def test_whatever_the_limits_what_is_made_fits(tmp_path_factory, hip, thigh, calf):
     texts = [f'lower="{low:.5f}" upper="{low + width:.5f}" velocity="{speed:.4f}"'
@@ -280,7 +281,7 @@ REFUSED = [
     ('solid teapot\n', 'syntax error')]
 
 
-@pytest.mark.parametrize(('urdf', 'words'), REFUSED)
+@pytest.mark.parametrize(('urdf', 'words'), REFUSED, ids=[words for _, words in REFUSED])
 def test_files_that_are_no_urdf_end_in_one_line(tmp_path, capsys, urdf, words):
     path = tmp_path / 'my.urdf'
     path.write_text(urdf)

@@ -232,7 +232,7 @@ def test_rviz_shows_the_urdf_of_the_robot(described, tmp_path):
 @pytest.mark.parametrize(('text', 'words'), [
     ('<robot', 'line 1'), ('<robot name="a"/>', 'no joint'),
     ('<robot><joint name="a" type="fixed"><parent link="a"/><child link="a"/></joint></robot>',
-     '0 root links')])
+     '0 root links')], ids=['malformed', 'empty', 'circle'])
 def test_rviz_refuses_what_is_no_urdf(described, tmp_path, text, words):
     urdf = tmp_path / 'my.urdf'
     urdf.write_text(text)

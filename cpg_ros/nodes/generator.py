@@ -1,23 +1,15 @@
 """The generator node: a central pattern generator that publishes joint states in real time."""
 
-import gc
-import signal
 import sys
 import threading
 import time
-import traceback
 from pathlib import Path
 
-import rclpy
 from rcl_interfaces.msg import SetParametersResult
-from rclpy.exceptions import InvalidParameterTypeException, InvalidParameterValueException
-from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.logging import get_logger
-from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from rclpy.qos_overriding_options import QoSOverridingOptions
-from rclpy.signals import SignalHandlerOptions
 from std_msgs.msg import String
 from std_srvs.srv import SetBool
 
@@ -30,10 +22,9 @@ from cpg_ros.networks.presets import PresetError, read_presets
 from cpg_ros.networks.registry import NETWORKS, PRESETS
 from cpg_ros.nodes.cmd_vel import CmdVel
 from cpg_ros.nodes.diagnostics import Diagnostics
-from cpg_ros.nodes.ending import ended
 from cpg_ros.nodes.outputs import Outputs
-from cpg_ros.nodes.parameter_services import StrictParameterService
-from cpg_ros.nodes.settings import COMMANDS, NETWORK, Planner, Spec, as_doubles, specs
+from cpg_ros.nodes.settings import COMMANDS, NETWORK, Planner, as_doubles, specs
+from cpg_ros.nodes.starting import StartedNode, StartError, run
 from cpg_ros.nodes.ticker import Ticker
 from cpg_ros.robot_file import RobotError, find_robot
 
@@ -42,11 +33,7 @@ NAME = 'cpg_generator'
 LAST_RAMP, LAST_DEADLINE = 0.5, 0.8
 
 
-class StartError(RuntimeError):
-    """The node cannot start; the message is one line for the user."""
-
-
-class Generator(Node):
+class Generator(StartedNode):
     """Parameters, topics and services around one moving pattern."""
 
     def __init__(self) -> None:
@@ -56,10 +43,7 @@ class Generator(Node):
             StartError: a parameter or the robot file cannot be used.
 
         """
-        super().__init__(NAME, start_parameter_services=False)
-        self._parameter_service = StrictParameterService(self)
-        self._doubles: set[str] = set()
-        self.failure: BaseException | None = None
+        super().__init__(NAME)
         self._declare('network', NETWORK)
         self._one_of('network', tuple(NETWORKS))
         network = self._value('network')
@@ -104,10 +88,7 @@ class Generator(Node):
         self.add_pre_set_parameters_callback(self._complete)
         self.add_on_set_parameters_callback(self._judge)
         self.add_post_set_parameters_callback(self._apply)
-        self.stop = threading.Event()
-        for name in self._parameter_overrides:
-            if not self.has_parameter(name):
-                self.get_logger().warning(f"there is no parameter '{name}': ignored")
+        self._warn_of_unknown()
 
     # -- parameters -----------------------------------------------------------------------
 
@@ -127,29 +108,6 @@ class Generator(Node):
                    for key, value in preset.network.as_dict().items()}
         for parameter in self._planner.complete(as_doubles(given, names), current):
             self._parameter_overrides[parameter.name] = parameter
-
-    def _declare(self, name: str, spec: Spec) -> None:
-        override = self._parameter_overrides.get(name)
-        if isinstance(spec.default, float):
-            self._doubles.add(name)
-            if override is not None and override.type_ == Parameter.Type.INTEGER:
-                self._parameter_overrides[name] = as_doubles([override], {name})[0]
-        try:
-            self.declare_parameter(name, spec.default, spec.descriptor())
-        except InvalidParameterTypeException as error:
-            kind = type(spec.default).__name__
-            raise StartError(f'parameter {name} must be a {kind}, not '
-                             f'{self._parameter_overrides[name].value!r}') from error
-        except InvalidParameterValueException as error:
-            raise StartError(f'parameter {name}: {self._parameter_overrides[name].value} is not '
-                             f'from {spec.low:g} to {spec.high:g}') from error
-
-    def _value(self, name: str):
-        return self.get_parameter(name).value
-
-    def _one_of(self, name: str, allowed: tuple[str, ...]) -> None:
-        if self._value(name) not in allowed:
-            raise StartError(f"{name} '{self._value(name)}' is not one of {', '.join(allowed)}")
 
     def _values(self, changes: list[Parameter] | None = None) -> dict:
         values = {name: self._value(name) for name in self._planner.names}
@@ -218,12 +176,6 @@ class Generator(Node):
         self.get_logger().warning('simulated time jumped back: starting again from the stand')
         self.pattern.restart(self._value('ramp'), self.pattern.enabled)
 
-    def _fail(self, error: BaseException) -> None:
-        self.failure = error
-        self.get_logger().fatal('the publishing thread failed:\n'
-                                + ''.join(traceback.format_exception(error)))
-        self.stop.set()
-
     def begin(self) -> None:
         """Start publishing."""
         self._announce()
@@ -261,50 +213,9 @@ def compile_kernels(network: str) -> None:
         logger.info(f'compiled in {time.monotonic() - began:.1f} s')
 
 
-def _spin(executor: SingleThreadedExecutor, node: Generator) -> None:
-    """Serve parameters, services and timers until the executor is shut down."""
-    while not node.stop.is_set():
-        try:
-            executor.spin_once()
-        except ExternalShutdownException:
-            return
-        except Exception:
-            # One bad request must not end a node that moves a robot.
-            node.get_logger().error('a request failed:\n' + traceback.format_exc())
-
-
 def main(args: list[str] | None = None) -> int:
     """Run the node until SIGINT or SIGTERM; return the exit code."""
-    def leave(*_: object) -> None:
-        raise SystemExit(0)
-
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, leave)
-    # The publishing thread must not wait long for one that computes in Python.
-    sys.setswitchinterval(2e-4)
-    rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
-    try:
-        node = Generator()
-    except StartError as error:
-        get_logger(NAME).fatal(str(error))
-        rclpy.shutdown()
-        return 1
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, lambda *_: node.stop.set())
-    executor = SingleThreadedExecutor()
-    executor.add_node(node)
-    serving = threading.Thread(target=_spin, args=(executor, node), name='executor', daemon=True)
-    gc.collect()
-    gc.freeze()
-    node.begin()
-    serving.start()
-    # A bare wait() can miss a signal that another thread received.
-    while not node.stop.wait(0.2):
-        pass
-    node.finish()
-    executor.shutdown(timeout_sec=0.1)
-    rclpy.shutdown()
-    return ended(0 if node.failure is None else 1, serving)
+    return run(Generator, NAME, args)
 
 
 if __name__ == '__main__':

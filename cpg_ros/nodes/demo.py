@@ -1,0 +1,194 @@
+"""A robot that walks in simulation: starts a generator and a body, and tours the gaits.
+
+``ros2 run cpg_ros demo``: two nodes run as a user would start them, this one sets the
+generator's parameter ``gait``, by itself or as typed. A film and a footfall diagram are left.
+"""
+
+import queue
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+
+import rclpy
+from nav_msgs.msg import Odometry
+from rcl_interfaces.srv import SetParametersAtomically
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+from rclpy.signals import SignalHandlerOptions
+
+from cpg_ros.tools.arguments import Parser, say
+
+TOUR = ('trot', 'walk', 'pace', 'bound', 'jump', 'pronk', 'trot')
+#: A node must answer within this time, s: the very first start compiles for 20 s.
+PATIENCE = 120.0
+#: The generator and the body are in step at this rate, Hz.
+RATE = 500
+
+
+class DemoError(RuntimeError):
+    """The demonstration cannot go on; one line for the user."""
+
+
+class Operator(Node):
+    """Sets the gait of the generator and knows where the robot is."""
+
+    def __init__(self) -> None:
+        super().__init__('cpg_demo')
+        self.place: tuple[float, float] | None = None
+        self._client = self.create_client(SetParametersAtomically,
+                                          'cpg_generator/set_parameters_atomically')
+        self.create_subscription(Odometry, 'odom', self._odom, 1)
+
+    def _odom(self, message: Odometry) -> None:
+        self.place = message.pose.pose.position.x, message.pose.pose.position.y
+
+    def switch(self, gait: str) -> str:
+        """Set the gait; return why that was refused, or ''.
+
+        Raises:
+            DemoError: the generator does not answer.
+
+        """
+        request = SetParametersAtomically.Request(
+            parameters=[Parameter('gait', value=gait).to_parameter_msg()])
+        answer = self._client.call_async(request)
+        rclpy.spin_until_future_complete(self, answer, timeout_sec=10.0)
+        result = answer.result()
+        if result is None:
+            raise DemoError('the generator does not answer')
+        return '' if result.result.successful else result.result.reason
+
+
+@contextmanager
+def running(*arguments: str) -> Iterator[subprocess.Popen]:
+    """Run one of this package's nodes, out of reach of Ctrl-C, and interrupt it in the end."""
+    module, *ros = arguments
+    process = subprocess.Popen(
+        [sys.executable, '-m', f'cpg_ros.nodes.{module}', '--ros-args', *ros],
+        # In a session of its own: a terminal's Ctrl-C would reach it beside our own signal.
+        start_new_session=True, stdin=subprocess.DEVNULL)
+    try:
+        yield process
+    finally:
+        if process.poll() is None:
+            process.send_signal(signal.SIGINT)
+        process.wait()
+
+
+def typed() -> queue.Queue:
+    """Return a queue of the lines that are typed."""
+    lines: queue.Queue = queue.Queue()
+
+    def read() -> None:
+        for line in sys.stdin:
+            lines.put(line.strip())
+
+    threading.Thread(target=read, daemon=True).start()
+    return lines
+
+
+def guide(operator: Operator, gaits: Sequence[str], every: float,
+          nodes: Sequence[subprocess.Popen]) -> None:
+    """Take the robot through the gaits; from the first line that is typed on, as typed.
+
+    Raises:
+        DemoError: a node ended, or does not answer.
+
+    """
+    lines, tour, began = typed(), list(gaits[1:]), time.monotonic()
+    due: float | None = began + every
+
+    def report(text: str) -> None:
+        x, y = operator.place or (0.0, 0.0)
+        say(f'{time.monotonic() - began:5.1f} s  {text:<10} at x {x:6.2f} m, y {y:6.2f} m')
+
+    report(gaits[0])
+    while due is None or time.monotonic() < due or tour:
+        rclpy.spin_once(operator, timeout_sec=0.05)
+        for node in nodes:
+            if node.poll() is not None:
+                raise DemoError(f'a node ended with exit code {node.returncode}')
+        wanted = None
+        if not lines.empty():
+            wanted, due = lines.get(), None
+            if wanted == 'q':
+                return
+        elif due is not None and time.monotonic() >= due:
+            wanted, due = tour.pop(0), due + every
+        if wanted:
+            refused = operator.switch(wanted)
+            report(refused or wanted)
+
+
+def wait_for(operator: Operator, nodes: Sequence[subprocess.Popen]) -> None:
+    """Wait until the robot stands in its simulation and the generator serves.
+
+    Raises:
+        DemoError: a node ended, or took too long.
+
+    """
+    end = time.monotonic() + PATIENCE
+    while operator.place is None or not operator._client.service_is_ready():
+        rclpy.spin_once(operator, timeout_sec=0.1)
+        for node in nodes:
+            if node.poll() is not None:
+                raise DemoError(f'a node ended with exit code {node.returncode}')
+        if time.monotonic() > end:
+            raise DemoError(f'the nodes were not ready after {PATIENCE:g} s')
+
+
+def parser() -> Parser:
+    """Arguments of the executable."""
+    made = Parser(prog='demo', description='A simulated Unitree Go2 that walks; type a gait and '
+                  'Enter to switch, q to end.')
+    made.add_argument('--gaits', nargs='+', default=list(TOUR), metavar='GAIT',
+                      help=f'tour of gaits (default: {" ".join(TOUR)})')
+    made.add_argument('--every', type=float, default=6.0, metavar='S',
+                      help='seconds for each (default: 6)')
+    made.add_argument('--out', type=Path, default=Path('out'), metavar='DIR',
+                      help='where go2.gif and footfalls.png are left (default: out)')
+    made.add_argument('--no-film', action='store_true', help='leave the diagram only')
+    return made
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the demonstration; return 0, or 1 if the nodes failed, or 2 for wrong arguments."""
+    chosen = parser().parse_args(arguments)
+    if not chosen.every > 0.0:
+        parser().error(f'argument --every: {chosen.every:g} must be positive')
+    film, footfalls = chosen.out / 'go2.gif', chosen.out / 'footfalls.png'
+    try:
+        chosen.out.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        print(f'demo: {chosen.out}: {error.strerror}', file=sys.stderr)
+        return 2
+    rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
+    operator = Operator()
+    body = ['robot_sim', '-p', f'rate:={RATE}.0', '-p', f'footfalls:={footfalls}']
+    if not chosen.no_film:
+        body += ['-p', f'film:={film}']
+    try:
+        with running(*body) as sim, running(
+                'generator', '-p', 'robot:=unitree_go2', '-p', f'gait:={chosen.gaits[0]}',
+                '-p', f'rate:={RATE}.0', '-p', 'combined_topic:=""') as generator:
+            wait_for(operator, (sim, generator))
+            say('the robot walks; type a gait and Enter to switch, q to end')
+            guide(operator, chosen.gaits, chosen.every, (sim, generator))
+    except KeyboardInterrupt:
+        pass
+    except DemoError as error:
+        print(f'demo: {error}', file=sys.stderr)
+        return 1
+    finally:
+        operator.destroy_node()
+        rclpy.try_shutdown()
+    return 1 if sim.returncode or generator.returncode else 0
+
+
+if __name__ == '__main__':
+    sys.exit(main())

@@ -1,0 +1,97 @@
+"""A thread that lets a simulation and what commands it take turns, each as fast as it can."""
+
+import threading
+import time
+from collections.abc import Callable
+
+from rclpy.node import Node
+
+from cpg_ros.nodes.commands import Commands
+
+#: How long an answer to an instant is waited for, s: at first, and while none comes.
+PATIENCE, IMPATIENCE = 1.0, 0.02
+#: Between two looks at whether an answer is there, s.
+LOOK = 5e-5
+
+
+class Lockstep(threading.Thread):
+    """Tells the time with ``tell``, waits for the commands of that instant, calls ``tick``.
+
+    Simulated time begins when there is a publisher of every command and a reader of /clock, and
+    the first ``tick`` is at the first command, so that a run can be repeated exactly. Where
+    commands come only every few periods, as from a generator of a lower rate, that is learnt.
+
+    Attributes:
+        ticks: so far.
+        late: those that did not get the command they waited for.
+        dropped: none ever.
+        rate: of the ticks in simulated time, Hz.
+
+    """
+
+    def __init__(self, node: Node, rate: float, commands: Commands,
+                 tell: Callable[[int], None], ready: Callable[[], bool],
+                 tick: Callable[[float, int], None], failed: Callable[[BaseException], None]
+                 ) -> None:
+        super().__init__(name='lockstep', daemon=True)
+        self.rate = rate
+        self.ticks = self.late = self.dropped = 0
+        self.worst = 0.0
+        self._node, self._commands = node, commands
+        self._tell, self._ready, self._tick, self._failed = tell, ready, tick, failed
+        self._ending = threading.Event()
+
+    def end(self) -> None:
+        """Stop after the tick under way."""
+        self._ending.set()
+
+    def run(self) -> None:
+        """Take turns until ended; hand any exception to ``failed``."""
+        try:
+            self._run()
+        except BaseException as error:
+            self._failed(error)
+
+    def _run(self) -> None:
+        logger = self._node.get_logger()
+        told = False
+        while not (self._ready() and self._commands.connected):
+            if self._ending.wait(0.02):
+                return
+            if not told:
+                told = True
+                logger.info('waiting for somebody who listens to /clock and publishes '
+                            + ', '.join(self._commands.topics))
+        period = round(1e9 / self.rate)
+        now, every, since, patience = 0, 1, 0, PATIENCE
+        started = False
+        while not self._ending.is_set():
+            now += period
+            since += 1
+            self._commands.expect(now - period + 1)
+            self._tell(now)
+            if since < every:
+                if self._commands.take():
+                    every, since = since, 0
+            elif self._answered(patience):
+                since, patience, started = 0, PATIENCE, True
+            elif self._ending.is_set():
+                return
+            elif started:
+                every, patience = since + 1, IMPATIENCE
+                self.late += 1
+                logger.warning(f'no command for the time {1e-9 * now:.3f} s within '
+                               f'{PATIENCE:g} s: going on without; the rate of what commands '
+                               f'should be {self.rate:g} Hz', throttle_duration_sec=10.0)
+            if started:
+                self.ticks += 1
+                self._tick(1.0 / self.rate, now)
+
+    def _answered(self, patience: float) -> bool:
+        """Wait for the commands; return whether they came."""
+        deadline = time.monotonic() + patience
+        while not self._commands.take():
+            if time.monotonic() > deadline or self._ending.is_set():
+                return False
+            time.sleep(LOOK)
+        return True

