@@ -12,6 +12,10 @@ setup(
         ('share/cpg_ros/config', glob('config/*.yaml')),
         ('share/cpg_ros/config/presets', glob('config/presets/*.yaml')),
         ('share/cpg_ros/launch', glob('launch/*.launch.py')),
+        ('share/cpg_ros/urdf', glob('urdf/*.urdf')),
+        ('share/cpg_ros/rviz', glob('rviz/*.rviz')),
+        ('share/cpg_ros/plotjuggler', glob('plotjuggler/*.xml')),
+        ('share/cpg_ros/foxglove', glob('foxglove/*.json')),
     ],
     python_requires='>=3.10',
     install_requires=['setuptools', 'numpy', 'scipy', 'numba', 'matplotlib', 'PyYAML',
@@ -30,6 +34,7 @@ setup(
         'inversion = cpg_ros.nodes.inversion:main',
         'demo = cpg_ros.nodes.demo:main',
         'analyze = cpg_ros.tools.analyze:main',
+        'check_robot = cpg_ros.tools.check_robot:main',
         'optimize = cpg_ros.tools.optimize:main',
         'reproduce = cpg_ros.tools.reproduce:main']},
 )
