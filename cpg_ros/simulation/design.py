@@ -1,0 +1,107 @@
+"""A gait in a few numbers, and what each gait of a robot about knee high is to reach.
+
+All figures are for a leg of LENGTH from thigh joint to foot in the stand; for other robots lengths
+go with that length, times and speeds with its square root, as for pendulums.
+"""
+
+from dataclasses import astuple, dataclass
+
+import numpy as np
+
+from cpg_ros.simulation.foot_path import Path
+
+#: Of a leg in the stand, m.
+LENGTH = 0.2664
+
+
+@dataclass(frozen=True)
+class Design:
+    """A gait.
+
+    Attributes:
+        frequency: Hz.
+        stride, lift, height: as of Path.
+        duty, lead, late: as of Path.
+        fore, hind: of fore and hind legs, how far ahead of the joint the foot is, as of Path.
+        push_fore, push_hind: of fore and hind legs, as of Path.
+
+    """
+
+    frequency: float
+    stride: float
+    duty: float
+    lift: float
+    height: float
+    lead: float
+    fore: float
+    hind: float
+    push_fore: float
+    push_hind: float
+    late: float
+
+    def path(self, hind: bool, scale: float) -> Path:
+        """Return the way of a fore or hind foot of a robot this much larger."""
+        ahead, push = ((self.hind, self.push_hind) if hind else (self.fore, self.push_fore))
+        return Path(scale * self.stride, self.duty, scale * self.lift, scale * self.height,
+                    scale * ahead, scale * push, self.late, self.lead)
+
+
+@dataclass(frozen=True)
+class Aim:
+    """What a gait is to reach, and where to look for it.
+
+    Attributes:
+        speed: steady, m/s; more is worth nothing, and much more is a fault.
+        hops: a second; 0 if it need not leave the floor.
+        low, start, high: designs.
+
+    """
+
+    speed: float
+    hops: float
+    low: Design
+    start: Design
+    high: Design
+
+    def design(self, place: np.ndarray) -> Design:
+        """Return the design at a place in the unit cube between low and high."""
+        low, high = np.array(astuple(self.low)), np.array(astuple(self.high))
+        return Design(*(float(value) for value in low + place * (high - low)))
+
+    @property
+    def place(self) -> np.ndarray:
+        """Where the start is in the unit cube."""
+        low, high = np.array(astuple(self.low)), np.array(astuple(self.high))
+        return (np.array(astuple(self.start)) - low) / (high - low)
+
+
+def _aim(speed: float, hops: float, low: tuple, start: tuple, high: tuple) -> Aim:
+    return Aim(speed, hops, Design(*low), Design(*start), Design(*high))
+
+
+#: Columns as of Design.
+AIMS = {
+    'walk': _aim(0.45, 0.0,
+                 (1.0, 0.10, 0.55, 0.05, 0.25, 0.0, -0.08, -0.08, -0.02, -0.02, 0.7),
+                 (1.8, 0.20, 0.68, 0.08, 0.27, 0.1, 0.0, 0.0, 0.0, 0.0, 1.0),
+                 (2.4, 0.32, 0.80, 0.12, 0.29, 0.25, 0.06, 0.06, 0.04, 0.04, 2.0)),
+    'trot': _aim(0.80, 0.0,
+                 (1.8, 0.10, 0.45, 0.05, 0.25, 0.0, -0.06, -0.06, -0.02, -0.02, 0.7),
+                 (2.4, 0.20, 0.58, 0.08, 0.27, 0.1, 0.0, 0.0, 0.0, 0.0, 1.0),
+                 (3.0, 0.32, 0.70, 0.12, 0.29, 0.25, 0.06, 0.06, 0.04, 0.04, 2.0)),
+    'pace': _aim(0.60, 0.0,
+                 (1.8, 0.10, 0.45, 0.04, 0.23, 0.0, -0.08, -0.08, -0.02, -0.02, 0.7),
+                 (2.5, 0.18, 0.55, 0.07, 0.26, 0.1, 0.0, 0.0, 0.0, 0.0, 1.0),
+                 (3.2, 0.32, 0.70, 0.12, 0.29, 0.25, 0.06, 0.06, 0.04, 0.04, 2.0)),
+    'bound': _aim(0.55, 0.0,
+                  (1.5, 0.06, 0.35, 0.03, 0.23, 0.0, -0.10, -0.10, -0.02, -0.02, 0.5),
+                  (2.2, 0.16, 0.50, 0.06, 0.26, 0.1, 0.0, 0.0, 0.03, 0.03, 1.0),
+                  (3.2, 0.32, 0.75, 0.12, 0.29, 0.25, 0.08, 0.08, 0.10, 0.10, 2.5)),
+    'jump': _aim(0.50, 1.25,
+                 (1.8, 0.05, 0.35, 0.02, 0.23, 0.0, -0.10, -0.10, 0.0, 0.0, 0.5),
+                 (3.1, 0.20, 0.55, 0.05, 0.255, 0.13, -0.05, -0.06, 0.05, 0.03, 2.0),
+                 (4.0, 0.32, 0.75, 0.12, 0.29, 0.25, 0.08, 0.08, 0.10, 0.10, 3.0)),
+    'pronk': _aim(0.50, 1.25,
+                  (1.8, 0.05, 0.35, 0.02, 0.23, 0.0, -0.10, -0.10, 0.0, 0.0, 0.5),
+                  (3.0, 0.20, 0.60, 0.05, 0.245, 0.13, -0.05, -0.08, 0.05, 0.03, 2.0),
+                  (4.0, 0.32, 0.75, 0.12, 0.29, 0.25, 0.08, 0.08, 0.10, 0.10, 3.0))}

@@ -1,0 +1,196 @@
+"""From the way of a foot to a gait's readout: path, inverse kinematics, fit.
+
+A gait is described by a few lengths and times, the same for the left and right leg of a pair.
+Legs move in the plane of their last two joints; the first ones hold still.
+"""
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from cpg_ros.dynamics.periodic import Orbit
+from cpg_ros.dynamics.phase_readout import PhaseReadout
+from cpg_ros.dynamics.readout import WaveReadout
+from cpg_ros.robot import JointMotion
+from cpg_ros.simulation.anatomy import Anatomy
+from cpg_ros.simulation.body import Body
+from cpg_ros.simulation.model import SimulationError, engine, legs
+
+#: Points of a cycle that the fit looks at.
+POINTS = 128
+#: Digits of weights and offsets, rad, in the file.
+DIGITS = 4
+
+
+@dataclass(frozen=True)
+class Path:
+    """The way of a foot relative to its thigh joint; lengths in m.
+
+    Attributes:
+        stride: way on the floor, 0 for steps in place.
+        duty: share of the cycle on the floor, from phase 0 on.
+        lift: largest height above the floor.
+        height: of the joint above the foot on the floor.
+        ahead: of the joint, middle of the way on the floor.
+        push: by how much more the leg is stretched at most while it is on the floor.
+        late: 1 if that is in the middle of this time, more if later.
+        lead: by how much the joints are told earlier than the foot is to be there, cycles.
+
+    """
+
+    stride: float
+    duty: float
+    lift: float
+    height: float
+    ahead: float
+    push: float
+    late: float = 1.0
+    lead: float = 0.0
+
+    def __call__(self, phase: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return the foot's places forward and upward of the joint, m, at phases in cycles."""
+        phase = (phase + self.lead) % 1.0
+        s = phase / self.duty
+        r = (phase - self.duty) / (1.0 - self.duty)
+        # On the floor at constant speed; in the air a cubic takes over place and speed.
+        slope = -(1.0 - self.duty) / self.duty
+        back = (-0.5 + slope * r + (3.0 - 3.0 * slope) * r**2 - (2.0 - 2.0 * slope) * r**3)
+        floor = phase < self.duty
+        x = self.ahead + self.stride * np.where(floor, 0.5 - s, back)
+        z = np.where(floor, -self.push * np.sin(math.pi * np.clip(s, 0.0, 1.0)**self.late)**2,
+                     self.lift * np.sin(math.pi * r)**2)
+        return x, z - self.height
+
+
+class Leg:
+    """Two links in a vertical plane, read off a model.
+
+    Attributes:
+        thigh, calf: the joints that move them.
+
+    """
+
+    def __init__(self, body: Body, parts: Anatomy, leg: str) -> None:
+        """Look at a leg with all joints at 0.
+
+        Raises:
+            SimulationError: its last two joints do not turn about parallel axes across the body.
+
+        """
+        mujoco, model = engine(), body.model
+        data = mujoco.MjData(model)
+        mujoco.mj_kinematics(model, data)
+        chain = sorted(body.robot.legs[leg], key=lambda joint: model.joint(joint.name).bodyid[0])
+        if len(chain) < 2:
+            raise SimulationError(f'leg {leg} has fewer than two joints')
+        self.thigh, self.calf = chain[-2:]
+        ids = [model.joint(joint.name).id for joint in chain[-2:]]
+        self._turns = data.xaxis[ids, 1]
+        if np.abs(self._turns).min() < 0.99:
+            raise SimulationError(f'leg {leg}: {self.thigh.name} and {self.calf.name} do not both '
+                                  'turn about an axis across the body')
+        foot = parts.feet[legs(body.robot).index(leg)]
+        corners = np.stack([*data.xanchor[ids], data.geom_xpos[foot]])[:, [0, 2]]
+        upper, lower = np.diff(corners, axis=0)
+        # As complex numbers z + i x a positive turn about y multiplies by exp(i angle).
+        self._upper, self._lower = complex(upper[1], upper[0]), complex(lower[1], lower[0])
+        bend = self._turns[1] * self.calf.offset + np.angle(self._lower / self._upper)
+        self._bend = math.copysign(1.0, math.remainder(bend, 2.0 * math.pi))
+
+    def foot(self, thigh: np.ndarray, calf: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return the foot's places forward and upward of the thigh joint, m."""
+        turn = np.exp(1j * self._turns[0] * thigh)
+        place = turn * (self._upper + self._lower * np.exp(1j * self._turns[1] * calf))
+        return place.imag, place.real
+
+    def angles(self, x: np.ndarray, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return thigh and calf angles, rad, that put the foot there, the knee bent as it is.
+
+        A place out of reach is taken to the nearest one along its line to the joint.
+        """
+        place = z + 1j * x
+        a, b = abs(self._upper), abs(self._lower)
+        cosine = np.clip((np.abs(place)**2 - a * a - b * b) / (2.0 * a * b), -1.0, 1.0)
+        calf = self._bend * np.arccos(cosine) - np.angle(self._lower / self._upper)
+        reached = self._upper + self._lower * np.exp(1j * calf)
+        thigh = np.angle(place / reached)
+        return self._turns[0] * thigh, self._wrapped(self._turns[1] * calf)
+
+    @staticmethod
+    def _wrapped(angle: np.ndarray) -> np.ndarray:
+        return (angle + math.pi) % (2.0 * math.pi) - math.pi
+
+
+def basis(orbit: Orbit, cell: int, harmonics: int) -> np.ndarray:
+    """Evaluate x, y, x^2, x y, x^3, x^2 y of a cell over its leg's cycle, shape (6, POINTS).
+
+    Args:
+        orbit: the gait.
+        cell: from 0.
+        harmonics: of a cell with two variables that joints follow.
+
+    """
+    cells, one = np.full(6, cell), np.array([cell])
+    if orbit.network.variables == 1:
+        psi = WaveReadout(orbit, cells, np.eye(6), one).angles
+    else:
+        psi = PhaseReadout(orbit, cells, np.eye(6), one, harmonics).angles
+    # Phase 0 of a leg is where x peaks.
+    return np.roll(psi, -int(psi[0].argmax()), axis=1)[:, ::psi.shape[1] // POINTS]
+
+
+def fit(curves: np.ndarray, psi: np.ndarray) -> tuple[float, np.ndarray, np.ndarray]:
+    """Fit a common offset and the weights of several curves, by least squares.
+
+    Args:
+        curves: of one joint, at full stride and in place, rad, shape (2, POINTS).
+        psi: the monomials, shape (6, POINTS).
+
+    Returns:
+        The offset, the weights of both curves, shape (2, 6), and what is left, rad, shape
+        (2, POINTS).
+
+    """
+    one, none = np.ones((psi.shape[1], 1)), np.zeros((psi.shape[1], 6))
+    table = np.block([[one, psi.T, none], [one, none, psi.T]])
+    found = np.linalg.lstsq(table, curves.ravel(), rcond=None)[0]
+    rest = (table @ found - curves.ravel()).reshape(curves.shape)
+    return float(found[0]), found[1:].reshape(2, 6), rest
+
+
+class Feet:
+    """The feet of a robot: what its joints have to do for given paths."""
+
+    def __init__(self, body: Body, parts: Anatomy) -> None:
+        """Look at all legs; errors as of Leg."""
+        self.robot = body.robot
+        self.legs = {leg: Leg(body, parts, leg) for leg in legs(body.robot)}
+
+    @property
+    def length(self) -> float:
+        """From thigh joint to foot in the stand, mean of all legs, m."""
+        return float(np.mean([np.hypot(*leg.foot(np.array(leg.thigh.offset),
+                                                 np.array(leg.calf.offset)))
+                              for leg in self.legs.values()]))
+
+    def joints(self, orbit: Orbit, paths: dict[str, Path]) -> dict[str, JointMotion]:
+        """Return what a gait makes of the joints that move the feet.
+
+        Args:
+            orbit: of the gait.
+            paths: leg -> the way of its foot.
+
+        """
+        phase = np.arange(POINTS) / POINTS
+        found = {}
+        for name, leg in self.legs.items():
+            path = paths[name]
+            curves = np.array([leg.angles(*one(phase))
+                               for one in (path, replace(path, stride=0.0))])
+            for joint, curve in zip((leg.thigh, leg.calf), curves.swapaxes(0, 1), strict=True):
+                psi = basis(orbit, joint.cell - 1, self.robot.harmonics)
+                offset, weights, _ = fit(curve, psi)
+                full, still = (tuple(float(w) for w in row) for row in weights.round(DIGITS))
+                found[joint.name] = JointMotion(round(offset, DIGITS), full, still)
+        return found

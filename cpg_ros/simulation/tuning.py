@@ -1,0 +1,172 @@
+"""Gaits for a robot's body: foot paths that walk far and stay upright, found in simulation.
+
+CMA-ES (Hansen) looks for the design of a gait with the lowest price over several runs on floors of
+different friction, with different loads and with pushes.
+"""
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from itertools import cycle
+from types import ModuleType
+
+import numpy as np
+
+from cpg_ros.dynamics.program import Program, Refused, gait_of, plan
+from cpg_ros.networks.registry import PRESETS
+from cpg_ros.robot import Motion, Robot
+from cpg_ros.simulation.batch import Batch, Scenario, targets
+from cpg_ros.simulation.design import AIMS, LENGTH, Aim, Design
+from cpg_ros.simulation.foot_path import Feet
+from cpg_ros.simulation.model import SimulationError
+from cpg_ros.simulation.trial import Trial
+
+#: Length of the runs that designs are compared by, and of the one that figures are of, s.
+SHORT, LONG = 6.0, 10.0
+#: What designs meet: a good floor, and slippery ones with more and less load and with pushes.
+SCENARIOS = (Scenario(),
+             Scenario(0.6, 1.05, ((2.5, 0.0, 50.0), (4.2, 50.0, 0.0))),
+             Scenario(0.8, 0.95, ((3.0, -50.0, 0.0), (4.5, 0.0, -50.0))))
+#: Price of a design that the joints cannot follow.
+REFUSED = 100.0
+#: Designs in a generation, and how far about the start the first ones are (1: all there is).
+GENERATION, SPREAD = 12, 0.22
+
+
+@dataclass(frozen=True)
+class Tuned:
+    """What was found for a gait.
+
+    Attributes:
+        gait: its name.
+        design: of the lowest price.
+        price: its price.
+        first: price of the design that the search started from.
+        motion: what it makes of the robot.
+        trial: LONG seconds of it on a good floor, nothing disturbing it.
+
+    """
+
+    gait: str
+    design: Design
+    price: float
+    first: float
+    motion: Motion
+    trial: Trial
+
+
+def price(trial: Trial, aim: Aim, duration: float) -> float:
+    """Weigh a run's figures; 0 would be perfect.
+
+    Slower or much faster than wanted, fewer hops or, where none are wanted, bobbing, turning,
+    leaning, drifting, sliding, torques at their limit and work all cost; a fall costs most.
+    """
+    fall = 0.0 if trial.upright else 15.0 + 25.0 * (1.0 - trial.fell / duration)
+    share = trial.speed / aim.speed
+    speed = 12.0 * max(0.0, 1.0 - share) + 3.0 * max(0.0, share - 1.2)
+    turning = 0.3 * min(abs(math.degrees(trial.turn)) / 0.5, 10.0)**2
+    leaning = (trial.sway / 5.0)**1.5
+    restless = 0.5 * trial.bob / 0.01
+    if aim.hops:
+        restless = 5.0 * max(0.0, 1.0 - trial.hops / (0.85 * aim.hops * duration))
+    return (fall + speed + turning + leaning + restless + 0.3 * (trial.drift / 0.4)**2
+            + 2.0 * min(trial.slip, 3.0) + 20.0 * trial.saturation + 0.6 * min(trial.cost, 5.0))
+
+
+class Tuner:
+    """Tunes one robot's gaits, one after the other."""
+
+    def __init__(self, robot: Robot, model: str) -> None:
+        """Load the model.
+
+        Raises:
+            SimulationError: MuJoCo or CMA-ES is missing, or the model cannot be used.
+
+        """
+        self._cma = _search()
+        self.robot = robot
+        self.batch = Batch(model, robot)
+        self.feet = Feet(self.batch.body, self.batch.parts)
+        self.scale = self.feet.length / LENGTH
+
+    def motion(self, gait: str, design: Design) -> Motion:
+        """Return what a design makes of the robot."""
+        preset = PRESETS[self.robot.networks[0]][gait]
+        paths = {leg: design.path(leg[1] == 'h', self.scale) for leg in self.robot.legs}
+        return Motion(round(design.frequency / math.sqrt(self.scale), 3),
+                      self.feet.joints(gait_of(preset, preset.network)[0], paths))
+
+    def program(self, gait: str, motion: Motion, network: int = 0) -> Program:
+        """Plan a gait with a motion on one of the robot's networks; errors as of plan."""
+        preset = PRESETS[self.robot.networks[network]][gait]
+        robot = replace(self.robot, motions={gait: motion})
+        return plan(robot, gait, preset, preset.network, motion.frequency or 0.0)
+
+    def prices(self, gait: str, designs: Sequence[Design]) -> np.ndarray:
+        """Return the price of each design: of its mean and its worst run.
+
+        The runs take the robot's networks by turns.
+        """
+        aim = AIMS[gait]
+        aim = replace(aim, speed=aim.speed * math.sqrt(self.scale),
+                      hops=aim.hops / math.sqrt(self.scale))
+        found, runs, runnable = np.full(len(designs), REFUSED), [], []
+        for k, design in enumerate(designs):
+            motion = self.motion(gait, design)
+            try:
+                angles = [targets(self.program(gait, motion, network), SHORT, self.batch.timestep)
+                          for network in range(len(self.robot.networks))]
+            except Refused:
+                continue
+            runs += list(zip(cycle(angles), SCENARIOS, strict=False))
+            runnable.append(k)
+        prices = [price(trial, aim, SHORT) for trial in self.batch.run(runs)]
+        for k, own in zip(runnable, np.reshape(prices, (-1, len(SCENARIOS))), strict=True):
+            found[k] = 0.6 * own.mean() + 0.4 * own.max()
+        return found
+
+    def tune(self, gait: str, evaluations: int, seed: int = 0,
+             update: Callable[[int], None] = lambda done: None) -> Tuned:
+        """Look for a gait's best design.
+
+        Args:
+            gait: one of AIMS.
+            evaluations: how many designs to try, about.
+            seed: the same one finds the same.
+            update: takes the number tried so far.
+
+        Raises:
+            SimulationError: no design can be run.
+
+        """
+        aim = AIMS[gait]
+        best, cheapest = aim.start, float(self.prices(gait, [aim.start])[0])
+        first = cheapest
+        search = self._cma.CMAEvolutionStrategy(
+            aim.place, SPREAD, {'bounds': [0.0, 1.0], 'seed': seed + 1, 'popsize': GENERATION,
+                                'verbose': -9})
+        tried = 1
+        while tried < evaluations:
+            places = search.ask()
+            designs = [aim.design(place) for place in places]
+            prices = self.prices(gait, designs)
+            search.tell(places, prices.tolist())
+            tried += len(places)
+            update(min(tried, evaluations))
+            if prices.min() < cheapest:
+                best, cheapest = designs[int(prices.argmin())], float(prices.min())
+        if cheapest >= REFUSED:
+            raise SimulationError(f"{gait}: no design keeps to the joints' limits")
+        motion = self.motion(gait, best)
+        angles = targets(self.program(gait, motion), LONG, self.batch.timestep)
+        return Tuned(gait, best, cheapest, first, motion,
+                     self.batch.run([(angles, Scenario())])[0])
+
+
+def _search() -> ModuleType:
+    try:
+        import cma
+    except ImportError as error:
+        raise SimulationError("tuning needs CMA-ES (pip install 'cpg-ros[sim]'): "
+                              f'{error}') from error
+    return cma
