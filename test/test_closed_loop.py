@@ -23,7 +23,7 @@ if any(importlib.util.find_spec(name) is None for name in ('mujoco', 'gym_quadru
 HERE = Path(__file__).parent
 ROBOT = HERE.parent / 'config' / 'unitree_go2.yaml'
 #: Way in m, headings in degrees, posture: the last line of robot_sim.
-ENDED = re.compile(r'\(x (-?[\d.]+), y (-?[\d.]+)\).* heading (-?\d+) degrees, (\w+), [\d.]+ times')
+ENDED = re.compile(r'\(x (-?[\d.]+), y (-?[\d.]+)\).* heading (-?\d+) degrees, (\w+), ')
 
 
 def walk(*parameters, seconds=10.0, bag=None):
