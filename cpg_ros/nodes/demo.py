@@ -15,12 +15,15 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import rclpy
+from ament_index_python.packages import get_package_prefix
 from nav_msgs.msg import Odometry
 from rcl_interfaces.srv import SetParametersAtomically
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.signals import SignalHandlerOptions
 
+from cpg_ros.simulation.camera import check_opengl
+from cpg_ros.simulation.model import SimulationError
 from cpg_ros.tools.arguments import Parser, say
 
 TOUR = ('trot', 'walk', 'pace', 'bound', 'jump', 'pronk', 'trot')
@@ -67,9 +70,9 @@ class Operator(Node):
 @contextmanager
 def running(*arguments: str) -> Iterator[subprocess.Popen]:
     """Run one of this package's nodes, out of reach of Ctrl-C, and interrupt it in the end."""
-    module, *ros = arguments
+    executable, *ros = arguments
     process = subprocess.Popen(
-        [sys.executable, '-m', f'cpg_ros.nodes.{module}', '--ros-args', *ros],
+        [f'{get_package_prefix("cpg_ros")}/lib/cpg_ros/{executable}', '--ros-args', *ros],
         # In a session of its own: a terminal's Ctrl-C would reach it beside our own signal.
         start_new_session=True, stdin=subprocess.DEVNULL)
     try:
@@ -108,7 +111,7 @@ def guide(operator: Operator, gaits: Sequence[str], every: float,
         say(f'{time.monotonic() - began:5.1f} s  {text:<10} at x {x:6.2f} m, y {y:6.2f} m')
 
     report(gaits[0])
-    while due is None or time.monotonic() < due or tour:
+    while tour or due is None or time.monotonic() < due:
         rclpy.spin_once(operator, timeout_sec=0.05)
         for node in nodes:
             if node.poll() is not None:
@@ -118,11 +121,10 @@ def guide(operator: Operator, gaits: Sequence[str], every: float,
             wanted, due = lines.get(), None
             if wanted == 'q':
                 return
-        elif due is not None and time.monotonic() >= due:
+        elif tour and due is not None and time.monotonic() >= due:
             wanted, due = tour.pop(0), due + every
         if wanted:
-            refused = operator.switch(wanted)
-            report(refused or wanted)
+            report(operator.switch(wanted) or wanted)
 
 
 def wait_for(operator: Operator, nodes: Sequence[subprocess.Popen]) -> None:
@@ -171,7 +173,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     operator = Operator()
     body = ['robot_sim', '-p', f'rate:={RATE}.0', '-p', f'footfalls:={footfalls}']
     if not chosen.no_film:
-        body += ['-p', f'film:={film}']
+        try:
+            check_opengl()
+            body += ['-p', f'film:={film}']
+        except SimulationError as error:
+            say(f'no film this time: {error}')
     try:
         with running(*body) as sim, running(
                 'generator', '-p', 'robot:=unitree_go2', '-p', f'gait:={chosen.gaits[0]}',

@@ -1,6 +1,9 @@
 """What a simulated robot publishes: built once, filled in place and published every period."""
 
+from importlib import import_module, util
+
 import numpy as np
+from geometry_msgs.msg import TransformStamped
 from nav_msgs.msg import Odometry
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
@@ -14,7 +17,7 @@ from cpg_ros.simulation.model import legs
 
 
 class Measurements:
-    """``joint_states``, ``odom`` and ``foot_contacts`` of one body."""
+    """``joint_states``, ``odom``, ``foot_contacts`` and, where tf2 is, ``/tf`` of one body."""
 
     def __init__(self, node: Node, body: Body) -> None:
         self._body = body
@@ -37,12 +40,17 @@ class Measurements:
         self._publish = [(publisher(JointState, 'joint_states'), self._joints),
                          (publisher(Odometry, 'odom'), self._odometry),
                          (publisher(Float64MultiArray, 'foot_contacts'), self._contacts)]
+        self._transform = TransformStamped(child_frame_id='base')
+        self._transform.header.frame_id = 'odom'
+        if util.find_spec('tf2_msgs'):
+            kind = import_module('tf2_msgs.msg').TFMessage
+            self._publish.append((publisher(kind, '/tf'), kind(transforms=[self._transform])))
 
     def publish(self, stamp: int) -> None:
         """Publish what the body does now; stamp in ns."""
         body, odometry = self._body, self._odometry
         seconds, nanoseconds = divmod(stamp, 1_000_000_000)
-        for header in (self._joints.header, odometry.header):
+        for header in (self._joints.header, odometry.header, self._transform.header):
             header.stamp.sec, header.stamp.nanosec = seconds, nanoseconds
         for view, values in zip(self._views, (body.position, body.velocity, body.torque),
                                 strict=True):
@@ -51,6 +59,8 @@ class Measurements:
         pose, twist = odometry.pose.pose, odometry.twist.twist
         _fill(pose.position, 'xyz', body.base)
         _fill(pose.orientation, 'wxyz', body.quaternion)
+        _fill(self._transform.transform.translation, 'xyz', body.base)
+        _fill(self._transform.transform.rotation, 'wxyz', body.quaternion)
         moving = body.twist
         _fill(twist.linear, 'xyz', moving[:3])
         _fill(twist.angular, 'xyz', moving[3:])

@@ -12,6 +12,12 @@ from cpg_ros.simulation.model import engine, legs, load
 FALLEN = math.radians(60.0)
 
 
+def yaw(quaternion: np.ndarray) -> float:
+    """Heading of an orientation (w x y z), rad, from -pi to pi."""
+    w, x, y, z = quaternion
+    return math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
+
+
 class Body:
     """One robot on a floor; joints in ``robot.order``, legs in the order of its network.
 
@@ -148,8 +154,7 @@ class Body:
     @property
     def yaw(self) -> float:
         """Heading, rad, from -pi to pi."""
-        w, x, y, z = self.quaternion
-        return math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
+        return yaw(self.quaternion)
 
     @property
     def fallen(self) -> bool:

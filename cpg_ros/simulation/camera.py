@@ -1,6 +1,7 @@
 """Pictures of a robot, drawn offscreen by OpenGL, and films of them."""
 
 import importlib
+import math
 import os
 import shutil
 import subprocess
@@ -13,6 +14,7 @@ import numpy as np
 from PIL import GifImagePlugin, Image
 
 from cpg_ros.dynamics.progress import progress_bar
+from cpg_ros.simulation.body import yaw
 from cpg_ros.simulation.model import SimulationError, engine
 
 #: Colours of a GIF; few, and no dithering, make it small.
@@ -21,13 +23,16 @@ COLOURS = 96
 AZIMUTH, ELEVATION = -125.0, -14.0
 #: Distance of the camera in heights of the base when it stands.
 DISTANCE = 4.7
-
+#: Share of a turn of the robot by which the camera follows from one picture to the next.
+FOLLOW = 0.1
+NO_OPENGL = ('pictures need OpenGL without a screen; on Debian and Ubuntu: apt install libegl1 '
+             'libgl1-mesa-dri, or libosmesa6')
 #: Resolution of shadows, and samples a pixel (0: edges are not smoothed).
 SHADOW, SAMPLES = 1024, 0
 
 
 class Camera:
-    """Looks at the base of a robot from the front quarter and goes along with it.
+    """Looks at the base of a robot from the front quarter, and goes and turns along with it.
 
     To be used in the thread that made it, and closed by it.
     """
@@ -46,7 +51,7 @@ class Camera:
         # Without a graphics card these two cost as much as all the rest.
         model.vis.quality.shadowsize, model.vis.quality.offsamples = SHADOW, SAMPLES
         free = int(np.argmax(model.jnt_type == int(mujoco.mjtJoint.mjJNT_FREE)))
-        self._base = slice(model.jnt_qposadr[free], model.jnt_qposadr[free] + 3)
+        self._base = slice(model.jnt_qposadr[free], model.jnt_qposadr[free] + 7)
         self._option, self._view = mujoco.MjvOption(), mujoco.MjvCamera()
         shown = self._option.geomgroup[model.geom_group] > 0
         if 2 * len(set(model.geom_bodyid[shown])) < len(set(model.geom_bodyid)):
@@ -59,7 +64,10 @@ class Camera:
         self._opengl = _opengl(width, height)
         self._opengl.make_current()
         self._scene = mujoco.MjvScene(model, maxgeom=2000)
-        self._context = mujoco.MjrContext(model, mujoco.mjtFontScale.mjFONTSCALE_100)
+        try:
+            self._context = mujoco.MjrContext(model, mujoco.mjtFontScale.mjFONTSCALE_100)
+        except mujoco.FatalError as error:
+            raise SimulationError(f'{NO_OPENGL} ({error})') from error
         mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN, self._context)
 
     def picture(self, pose: np.ndarray) -> np.ndarray:
@@ -72,10 +80,14 @@ class Camera:
         mujoco.mj_kinematics(self._model, self._data)
         mujoco.mj_comPos(self._model, self._data)
         mujoco.mj_camlight(self._model, self._data)
-        x, y, z = pose[self._base]
+        x, y, z, *turned = pose[self._base]
+        gap = AZIMUTH + math.degrees(yaw(np.array(turned))) - view.azimuth
+        gap -= 360.0 * round(gap / 360.0)
         if not view.distance:
             view.distance = DISTANCE * z
             view.lookat[2] = 0.6 * z
+            view.azimuth += gap
+        view.azimuth += FOLLOW * gap
         view.lookat[:2] = x, y
         mujoco.mjv_updateScene(self._model, self._data, self._option, None, view,
                                mujoco.mjtCatBit.mjCAT_ALL, self._scene)
@@ -95,6 +107,18 @@ class Camera:
         self.close()
 
 
+def check_opengl() -> None:
+    """Say now whether pictures can be drawn at all.
+
+    Raises:
+        SimulationError: there is no OpenGL.
+
+    """
+    anything = engine().MjModel.from_xml_string(
+        '<mujoco><worldbody><body><freejoint/><geom size="1"/></body></worldbody></mujoco>')
+    Camera(anything, 16, 16).close()
+
+
 def _opengl(width: int, height: int) -> Any:
     """Return a context of MUJOCO_GL's kind, or of the first that works without a screen."""
     given = os.environ.get('MUJOCO_GL', '').strip().lower()
@@ -111,8 +135,7 @@ def _opengl(width: int, height: int) -> Any:
             reasons.append(f'{kind}: {" ".join(str(error).split())[:120]}')
             if platform is None:
                 os.environ.pop('PYOPENGL_PLATFORM', None)
-    raise SimulationError('pictures need OpenGL without a screen; on Debian and Ubuntu: apt '
-                          f'install libegl1 libgl1-mesa-dri, or libosmesa6 ({"; ".join(reasons)})')
+    raise SimulationError(f'{NO_OPENGL} ({"; ".join(reasons)})')
 
 
 class Film(Protocol):

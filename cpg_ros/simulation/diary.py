@@ -13,7 +13,7 @@ from cpg_ros.simulation.model import SimulationError, legs, load
 #: How much of the end of a run is kept, s: a longer film or diagram nobody looks at.
 KEPT = 60.0
 #: Pictures of a film and samples of the footfalls a second.
-FRAMES, SAMPLES = 20.0, 200.0
+FRAMES, SAMPLES = 12.5, 200.0
 
 
 class Diary:
@@ -48,9 +48,9 @@ class Diary:
                 raise SimulationError(f'footfalls {footfalls}: there is no folder '
                                       f'{footfalls.parent}')
         if film is not None:
-            from cpg_ros.simulation.camera import Camera, check_film
+            from cpg_ros.simulation.camera import check_film, check_opengl
             check_film(film)
-            Camera(body.model).close()
+            check_opengl()
 
     def gait(self, name: str) -> None:
         """Note that a gait begins."""

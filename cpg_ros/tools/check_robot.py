@@ -1,0 +1,106 @@
+"""Executable ``check_robot``: does a robot file match the robot's URDF, and do its gaits fit?
+
+``check_robot my_robot.yaml --urdf my.urdf`` compares names, kinds and limits, and works out every
+gait. ``check_robot --urdf my.urdf --make my_robot.yaml`` writes a first robot file.
+"""
+
+import sys
+from argparse import RawDescriptionHelpFormatter
+from collections.abc import Sequence
+from math import isfinite
+from pathlib import Path
+
+from cpg_ros.networks.registry import PRESETS
+from cpg_ros.robot import Robot
+from cpg_ros.robot_file import find_robot, write_robot
+from cpg_ros.tools.arguments import Parser, as_json, number, say
+from cpg_ros.tools.robot_check import RobotCheck, checked
+from cpg_ros.tools.robot_template import robot_from
+from cpg_ros.urdf import load_urdf
+
+DESCRIPTION = '''\
+Compare a robot file with the robot's URDF: joints that the URDF does not have or that cannot
+be driven, limits wider than the URDF's, and gaits that would leave them. Works without ROS.'''
+EPILOG = '''\
+examples:
+  check_robot my_robot.yaml --urdf my.urdf
+  check_robot my_robot.yaml --urdf my.urdf --gaits trot --frequency 2.5 --amplitude 1.2
+  check_robot --urdf my.urdf --make my_robot.yaml
+
+exit codes: 0 all matches, 1 something does not, 2 wrong arguments or a file that cannot be
+used.'''
+COMMENT = '''\
+A first robot file, made from {urdf}: limits are those of the URDF, the stand and
+the small amplitudes are guesses to start from. Tune it in simulation before it moves a robot.
+{says}'''
+
+
+def _parser() -> Parser:
+    parser = Parser(prog='check_robot', description=DESCRIPTION, epilog=EPILOG,
+                    formatter_class=RawDescriptionHelpFormatter)
+    parser.add_argument('robot', nargs='?', metavar='ROBOT',
+                        help='robot file, or the name of a shipped one')
+    parser.add_argument('--urdf', required=True, type=Path, metavar='FILE',
+                        help='URDF of the robot (xacro has to be expanded first)')
+    parser.add_argument('--make', type=Path, metavar='FILE', help='write a first robot file from '
+                        'the URDF, legs being told from the names of its joints')
+    parser.add_argument('--gaits', nargs='+', default=[], metavar='GAIT', help='gaits or presets '
+                        "to work out (default: all gaits of the robot's networks)")
+    parser.add_argument('--frequency', type=number, metavar='HZ', help='strides per second; 0 for '
+                        "the model's own time (default: as the robot file says of the gait, or 1)")
+    parser.add_argument('--amplitude', type=number, default=1.0, metavar='FACTOR',
+                        help="factor on the robot file's amplitudes (default: %(default)g)")
+    parser.add_argument('--json', action='store_true', help='print JSON instead of tables')
+    return parser
+
+
+def _checked(chosen) -> RobotCheck:
+    if (chosen.robot is None) == (chosen.make is None):
+        raise ValueError('give either a robot file or --make FILE')
+    for option, value, highest in (('frequency', chosen.frequency, 10.0),
+                                   ('amplitude', chosen.amplitude, 3.0)):
+        if value is not None and not (isfinite(value) and 0.0 <= value <= highest):
+            raise ValueError(f'--{option}: {value:g} is not from 0 to {highest:g}')
+    urdf = load_urdf(chosen.urdf)
+    robot = find_robot(chosen.robot) if chosen.make is None else _made(chosen, urdf)
+    known = [name for network in robot.networks for name in PRESETS[network]]
+    for name in chosen.gaits:
+        if name not in known:
+            raise ValueError(f"--gaits: '{name}' is not one of "
+                             f'{", ".join(dict.fromkeys(known))}')
+    return checked(robot, urdf, (chosen.robot or str(chosen.make), str(chosen.urdf)),
+                   list(dict.fromkeys(chosen.gaits)), chosen.frequency, chosen.amplitude)
+
+
+def _made(chosen, urdf) -> Robot:
+    if chosen.make.suffix not in ('.yaml', '.yml'):
+        raise ValueError(f'--make: {chosen.make} is not called .yaml')
+    if chosen.make.exists():
+        raise ValueError(f'--make: {chosen.make} is there already')
+    robot, says = robot_from(urdf, chosen.make.stem)
+    write_robot(chosen.make, robot, COMMENT.format(urdf=chosen.urdf.name, says=says))
+    print(f'check_robot: wrote {chosen.make}, check what it takes each joint for:\n{says}',
+          file=sys.stderr)
+    return find_robot(str(chosen.make.absolute()))
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Check a robot file; return the exit code."""
+    chosen = _parser().parse_args(sys.argv[1:] if arguments is None else arguments)
+    try:
+        found = _checked(chosen)
+    except OSError as error:
+        print(f'check_robot: {error.filename}: {error.strerror}', file=sys.stderr)
+        return 2
+    except ValueError as error:
+        print(f'check_robot: {error}', file=sys.stderr)
+        return 2
+    except KeyboardInterrupt:
+        print('check_robot: stopped', file=sys.stderr)
+        return 130
+    say(as_json(found.as_dict()) if chosen.json else found.text())
+    return 1 if found.faults else 0
+
+
+if __name__ == '__main__':
+    sys.exit(main())

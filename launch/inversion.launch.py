@@ -1,0 +1,35 @@
+"""Fit what is on the joint topics: ros2 launch cpg_ros inversion.launch.py out:=fitted.yaml.
+
+Then ``ros2 service call /cpg_inversion/fit std_srvs/srv/Trigger``, or every:=10.
+"""
+
+from launch.actions import OpaqueFunction
+
+from cpg_ros.launching import declared, started
+from launch import LaunchDescription
+
+ARGUMENTS = {
+    'topics': ('[joint_states]', list[str], 'topics of sensor_msgs/JointState to listen to'),
+    'robot': ('', str, "robot file, or a shipped name; empty: legs are told from joints' names"),
+    'window': ('60.0', float, 'how much of the last joint states is fitted [s]; 0 for all'),
+    'every': ('0.0', float, 'time between fits without being asked [s]; 0 for none'),
+    'network': ('', str, "network to fit; empty: the robot's, or by the number of legs"),
+    'gait': ('', str, 'gait to fit; empty: as recognised'),
+    'preset': ('', str, "shipped set for parameters that are not free; empty: the gait's"),
+    'free': ('', list[str], "parameters to fit, as [c, tau]; empty: the network's usual ones"),
+    'order': ('3', int, 'order of the readout, 1 to 3'),
+    'out': ('', str, 'parameter file to write; empty for none'),
+    'report': ('', str, 'page to write; empty for none'),
+    'apply_to': ('', str, 'generator to set after a fit, as /cpg_generator; empty for none'),
+    'use_sim_time': ('false', bool, 'follow /clock'),
+}
+
+
+def inversion(context):
+    """Return the node with those arguments that are not empty."""
+    return [started(context, 'inversion', 'cpg_inversion', ARGUMENTS)]
+
+
+def generate_launch_description():
+    """One inversion node, optionally in a namespace."""
+    return LaunchDescription([*declared(ARGUMENTS), OpaqueFunction(function=inversion)])

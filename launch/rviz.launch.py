@@ -1,0 +1,63 @@
+"""See what the generator publishes: ros2 launch cpg_ros rviz.launch.py gait:=walk.
+
+All arguments of generator.launch.py, too. Another robot than the generic quadruped needs both
+its robot file and its URDF: robot:=$PWD/my_robot.yaml urdf:=$PWD/my.urdf.
+"""
+
+from pathlib import Path
+
+from ament_index_python.packages import PackageNotFoundError, get_package_prefix
+from launch.actions import DeclareLaunchArgument, IncludeLaunchDescription, OpaqueFunction
+from launch.launch_description_sources import PythonLaunchDescriptionSource
+from launch.substitutions import LaunchConfiguration
+from launch_ros.actions import Node
+from launch_ros.parameter_descriptions import ParameterValue
+
+from cpg_ros.urdf import load_urdf, root
+from launch import LaunchDescription
+
+SHARE = Path(__file__).resolve().parent.parent
+ARGUMENTS = {
+    'urdf': (str(SHARE / 'urdf' / 'quadruped.urdf'), 'URDF of the robot'),
+    'rviz': ('true', 'start rviz2; false for robot_state_publisher alone'),
+    'rviz_config': (str(SHARE / 'rviz' / 'cpg.rviz'), 'configuration of rviz2'),
+}
+
+
+def needed(package):
+    """Raise an error that says how to install a package that is not there."""
+    try:
+        get_package_prefix(package)
+    except PackageNotFoundError as error:
+        raise RuntimeError(f'rviz.launch.py needs the package {package}: sudo apt install '
+                           f'ros-$ROS_DISTRO-{package.replace("_", "-")}') from error
+
+
+def viewers(context):
+    """Return robot_state_publisher with the URDF's text, and rviz2."""
+    namespace, sim_time = LaunchConfiguration('namespace'), LaunchConfiguration('use_sim_time')
+    clock = {'use_sim_time': ParameterValue(sim_time, value_type=bool)}
+    urdf = Path(LaunchConfiguration('urdf').perform(context)).expanduser()
+    frame = root(load_urdf(urdf))
+    needed('robot_state_publisher')
+    nodes = [Node(package='robot_state_publisher', executable='robot_state_publisher',
+                  namespace=namespace, output='screen', parameters=[{
+                      'robot_description': ParameterValue(urdf.read_text(), value_type=str),
+                      'publish_frequency': 50.0, **clock}])]
+    if LaunchConfiguration('rviz').perform(context).lower() in ('true', '1'):
+        needed('rviz2')
+        # The configuration has the frame of the generic quadruped, and no namespace.
+        nodes.append(Node(package='rviz2', executable='rviz2', namespace=namespace,
+                          output='screen', parameters=[clock],
+                          arguments=['-d', LaunchConfiguration('rviz_config'), '-f', frame],
+                          remappings=[('/robot_description', 'robot_description')]))
+    return nodes
+
+
+def generate_launch_description():
+    """Generator, robot_state_publisher and rviz2, optionally in a namespace."""
+    generator = PythonLaunchDescriptionSource(str(SHARE / 'launch' / 'generator.launch.py'))
+    return LaunchDescription([
+        *(DeclareLaunchArgument(name, default_value=default, description=text)
+          for name, (default, text) in ARGUMENTS.items()),
+        IncludeLaunchDescription(generator), OpaqueFunction(function=viewers)])

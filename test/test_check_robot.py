@@ -1,0 +1,342 @@
+"""The executable check_robot: what it finds, as text and JSON, what it makes, what it refuses."""
+
+import json
+import math
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+from hypothesis import Phase, given, settings
+from hypothesis import strategies as st
+
+from cpg_ros.robot_file import load_robot
+from cpg_ros.tools.check_robot import main
+
+SOURCE = Path(__file__).resolve().parent.parent
+URDF = (SOURCE / 'urdf' / 'quadruped.urdf').read_text()
+LEGS = ('lh', 'rh', 'lf', 'rf')
+
+
+@pytest.fixture
+def check(tmp_path, capsys):
+    """Check the generic quadruped, or another robot file, against a URDF; return code and JSON."""
+    def one(urdf, *arguments, robot='quadruped'):
+        path = tmp_path / 'my.urdf'
+        path.write_text(urdf)
+        code = main([robot, '--urdf', str(path), '--json', *arguments])
+        return code, json.loads(capsys.readouterr().out)
+    return one
+
+
+def faults(said):
+    return {joint['name']: joint['faults'] for joint in said['joints'] if joint['faults']}
+
+
+def joint_of(name, kind='revolute', limit='lower="-1" upper="1" velocity="20"', axis='0 1 0',
+             parent='base', more=''):
+    return (f'<joint name="{name}" type="{kind}"><parent link="{parent}"/><child link="{name}_l"/>'
+            f'<axis xyz="{axis}"/><limit effort="1" {limit}/>{more}</joint>'
+            f'<link name="{name}_l"/>')
+
+
+def robot_of(*joints):
+    return f'<robot name="r"><link name="base"/>{"".join(joints)}</robot>'
+
+
+def test_the_shipped_quadruped_matches_its_urdf(check):
+    code, said = check(URDF)
+    assert code == 0 and said['matches'] and not said['notes']
+    assert len(said['joints']) == 12 and len(said['gaits']) == 12
+    for joint in said['joints']:
+        for key in ('lower', 'upper', 'velocity'):
+            assert joint['robot'][key] == joint['urdf'][key], joint['name']
+    assert all(gait['fits'] and gait['frequency'] == 1.0 for gait in said['gaits'])
+
+
+@pytest.mark.parametrize(('pattern', 'instead', 'joint', 'words'), [
+    ('lf_thigh_joint', 'lf_thing_joint', 'lf_thigh_joint',
+     "the URDF has no such joint, did you mean 'lf_thing_joint'?"),
+    ('lf_thigh_joint', 'FL_HFE', 'lf_thigh_joint', "did you mean 'FL_HFE'?"),
+    ('rf_calf_joint" type="revolute"', 'rf_calf_joint" type="fixed"', 'rf_calf_joint',
+     'cannot be driven, in the URDF it is fixed'),
+    ('rf_calf_joint" type="revolute"', 'rf_calf_joint" type="prismatic"', 'rf_calf_joint',
+     'cannot be driven, in the URDF it is prismatic'),
+    ('rf_calf_joint" type="revolute">', 'rf_calf_joint" type="revolute">\n'
+     '<mimic joint="lf_calf_joint"/>', 'rf_calf_joint', "it follows 'lf_calf_joint' (mimic)")])
+def test_names_and_kinds(check, pattern, instead, joint, words):
+    assert pattern in URDF
+    code, said = check(URDF.replace(pattern, instead), '--gaits', 'trot')
+    assert code == 1 and not said['matches']
+    assert list(faults(said)) == [joint] and words in faults(said)[joint][0]
+
+
+@pytest.mark.parametrize(('old', 'new', 'words'), [
+    ('lower="-0.6"', 'lower="-0.5"', "lower limit -0.6 rad is 0.1 rad below the URDF's -0.5"),
+    ('upper="2.2"', 'upper="1.7"', "upper limit 2.2 rad is 0.5 rad above the URDF's 1.7"),
+    ('velocity="20"', 'velocity="15"', "velocity limit 20 rad/s is 5 rad/s above the URDF's 15"),
+    ('upper="2.2"', 'upper="0.7"', "offset 0.8 rad is outside the URDF's limits -0.6 to 0.7")])
+def test_limits(check, old, new, words):
+    head, name, tail = URDF.partition('name="lf_thigh_joint"')
+    code, said = check(head + name + tail.replace(old, new, 1), '--gaits', 'trot')
+    assert code == 1 and list(faults(said)) == ['lf_thigh_joint']
+    assert words in ' / '.join(faults(said)['lf_thigh_joint'])
+
+
+def test_narrower_limits_in_the_file_and_rounding_are_fine(check):
+    code, said = check(URDF.replace('upper="2.2"', 'upper="2.19995"')
+                       .replace('lower="-0.8"', 'lower="-1.5"').replace('"20"', '"30"'))
+    assert code == 0 and said['matches']
+
+
+def test_continuous_joints_and_missing_velocities_limit_nothing(check):
+    urdf = re.sub(r'revolute(">\s*<origin[^>]*>\s*<axis[^>]*>\s*<parent link=".._hip)',
+                  r'continuous\1', URDF).replace(' velocity="20"', '')
+    assert urdf.count('continuous') == 4
+    code, said = check(urdf, '--gaits', 'walk')
+    assert code == 0 and said['joints'][1]['urdf'] == {'lower': None, 'upper': None,
+                                                       'velocity': None}
+    assert said['notes'] == ['the URDF has no velocity limit of any joint']
+
+
+def test_joints_that_no_leg_drives_are_noted(check):
+    code, said = check(URDF.replace('</robot>', joint_of('neck_joint') + joint_of('tail', 'fixed')
+                                    + '</robot>'), '--gaits', 'trot')
+    assert code == 0
+    assert said['notes'] == ['moving joints of the URDF that no leg drives: neck_joint']
+
+
+def test_gaits_that_leave_the_limits_are_told(check):
+    # The thigh swings by 0.25 x, x from -1 to 1: to 1.05 rad, and sin-like at 3 Hz.
+    narrow = URDF.replace('upper="2.2"', 'upper="1"')
+    code, said = check(narrow, '--gaits', 'trot')
+    (trot, _) = said['gaits']
+    assert code == 1 and trot['network'] == 'delayed' and not trot['fits']
+    assert trot['room'] == pytest.approx(-0.05, abs=1e-3) and 'thigh' in trot['room_at']
+    assert [fault for fault in trot['faults'] if 'lh_thigh_joint goes to 1.050 rad, above the '
+            "URDF's limit 1" in fault] and len(trot['faults']) == 4
+    assert check(narrow, '--gaits', 'trot', '--amplitude', '0.7')[1]['gaits'][0]['fits']
+    # Speeds are proportional to frequency and amplitude.
+    slow, fast = (check(URDF, '--gaits', 'trot', '--frequency', str(frequency), '--amplitude',
+                        str(amplitude))[1]['gaits'][0]['speed_share']
+                  for frequency, amplitude in ((1.0, 1.0), (4.0, 1.5)))
+    assert fast == pytest.approx(6.0 * slow, rel=1e-6)
+    fault = check(URDF, '--gaits', 'trot', '--frequency', '10')[1]['gaits'][0]['faults'][0]
+    assert re.search(r'calf_joint moves at 2\d\.\d\d rad/s, above the .* limit 20', fault)
+
+
+def test_a_gait_that_the_parameters_of_the_robot_file_speed_up(check, tmp_path):
+    tree = yaml.safe_load((SOURCE / 'config' / 'quadruped.yaml').read_text())
+    tree['gaits'] = {'trot': {'frequency': 9.5}}
+    path = tmp_path / 'fast.yaml'
+    path.write_text(yaml.safe_dump(tree))
+    code, said = check(URDF, '--gaits', 'trot', 'walk', robot=str(path))
+    assert code == 1 and [gait['frequency'] for gait in said['gaits']] == [9.5, 1.0, 9.5, 1.0]
+    assert not said['gaits'][0]['fits'] and said['gaits'][1]['fits']
+
+
+def test_as_text(tmp_path, capsys):
+    path = tmp_path / 'my.urdf'
+    path.write_text(URDF.replace('lf_thigh_joint', 'lf_thai_joint'))
+    assert main(['quadruped', '--urdf', str(path), '--gaits', 'trot']) == 1
+    said = capsys.readouterr().out
+    for words in ("- lf_thigh_joint: the URDF has no such joint, did you mean 'lf_thai_joint'?",
+                  'limits [rad]', '-0.8 to 0.8', 'nearest limit', 'fits',
+                  'note: moving joints of the URDF that no leg drives: lf_thai_joint',
+                  f'quadruped does not match {path}: 1 thing, see above'):
+        assert words in said
+    assert max(map(len, said.splitlines())) <= 140
+
+
+def test_prefixes_and_foreign_blocks_do_not_matter(check):
+    foreign = ('<gazebo reference="lf_calf"><mu1>1</mu1></gazebo><transmission name="t">'
+               '<joint name="lf_calf_joint"><hardwareInterface>x</hardwareInterface></joint>'
+               '</transmission><sensor:camera undeclared="yes"/><ros2_control><joint name="a">'
+               '<limit lower="x"/></joint></ros2_control></robot>')
+    prefixed = URDF.replace('<robot ', '<robot xmlns="http://somewhere" xmlns:xacro="http://x" ')
+    code, said = check(prefixed.replace('</robot>', foreign), '--gaits', 'trot')
+    assert code == 0 and said['matches']
+
+
+# -- making a robot file ----------------------------------------------------------------------
+
+def quadruped_urdf(calf='lower="-2.7" upper="-0.8" velocity="20"', axis='0 1 0', rpy='0 0 0',
+                   thigh='lower="-1" upper="3" velocity="20"', hip='lower="-0.8" upper="0.8"',
+                   roll='1 0 0'):
+    """A quadruped named as Unitree does, calves given before thighs."""
+    joints = []
+    for leg in ('FL', 'FR', 'RL', 'RR'):
+        joints += [joint_of(f'{leg}_calf_joint', limit=calf, axis=axis,
+                            parent=f'{leg}_thigh_joint_l'),
+                   joint_of(f'{leg}_thigh_joint', limit=thigh, axis=axis,
+                            parent=f'{leg}_hip_joint_l'),
+                   joint_of(f'{leg}_hip_joint', limit=hip, axis=roll,
+                            more=f'<origin rpy="{rpy}"/>')]
+    return robot_of(*joints, joint_of('neck_joint'))
+
+
+def made(tmp_path, urdf, code=0):
+    tmp_path.mkdir(exist_ok=True)
+    path, out = tmp_path / 'my.urdf', tmp_path / 'my_robot.yaml'
+    path.write_text(urdf)
+    out.unlink(missing_ok=True)
+    assert main(['--urdf', str(path), '--make', str(out)]) == code
+    assert main([str(out), '--urdf', str(path)]) == code
+    return load_robot(out)
+
+
+def feet(robot, thigh, calf, axis=1.0):
+    """Where a leg of two links of length 1 ends, forward and up from its hip."""
+    first, both = axis * thigh, axis * (thigh + calf)
+    return -math.sin(first) - math.sin(both), -math.cos(first) - math.cos(both)
+
+
+@pytest.mark.parametrize('axis', [1, -1])
+def test_a_quadruped_is_made_that_stands_and_steps(tmp_path, axis, capsys):
+    calf = 'lower="-2.7" upper="-0.8" velocity="20"' if axis > 0 else \
+        'lower="0.8" upper="2.7" velocity="20"'
+    thigh = 'lower="-1" upper="3"' if axis > 0 else 'lower="-3" upper="1"'
+    robot = made(tmp_path, quadruped_urdf(calf, f'0 {axis} 0', thigh=thigh))
+    assert 'FL_calf_joint bends in swing' in capsys.readouterr().err
+    assert robot.networks == ('delayed', 'quadruped') and list(robot.legs) == list(LEGS)
+    assert robot.order[:3] == ('FL_calf_joint', 'FL_thigh_joint', 'FL_hip_joint')
+    assert [joint.name[:2] for joint in robot.joints[::3]] == ['RL', 'RR', 'FL', 'FR']
+    for leg, cell in zip(LEGS, (1, 2, 3, 4), strict=True):
+        joints = {joint.name[3:-6]: joint for joint in robot.legs[leg]}
+        assert {joint.cell for joint in joints.values()} == {cell}
+        hip, thigh, calf = joints['hip'], joints['thigh'], joints['calf']
+        assert (hip.offset, hip.weights) == (0.0, (0.0,))
+        assert (hip.lower, hip.upper, hip.velocity) == (-0.8, 0.8, 10.0)
+        standing = feet(robot, thigh.offset, calf.offset, axis)
+        assert standing[0] == pytest.approx(0.0, abs=1e-9) and standing[1] < -1.2
+        # Furthest forward at x = 1, further up while y > 0.
+        forward = feet(robot, thigh.offset + thigh.weights[0], calf.offset, axis)
+        lifted = feet(robot, thigh.offset, calf.offset + calf.weights[1], axis)
+        assert forward[0] > standing[0] + 0.05 and lifted[1] > standing[1] + 0.02
+        assert calf.weights[0] == 0.0
+
+
+def test_a_frame_that_is_turned_turns_the_axes_with_it(tmp_path):
+    # A quarter turn about z at the hip: axes along -x point along -y of the root, -y along x.
+    robot = made(tmp_path, quadruped_urdf(axis='-1 0 0', rpy='0 0 1.5707963', roll='0 -1 0'))
+    swinging = {joint.name[3:-6]: joint.weights for joint in robot.legs['lf']}
+    assert swinging['thigh'][0] > 0.0 and swinging['hip'] == (0.0,)
+
+
+def test_a_biped_is_made(tmp_path):
+    joints = []
+    for side in ('left', 'right'):
+        above = 'base'
+        for name, axis, low, high in (('hip_yaw', '0 0 1', -1, 1), ('hip_pitch', '0 1 0', -2, 1),
+                                      ('knee', '0 1 0', 0, 2), ('ankle', '0 1 0', -1, 1)):
+            joints.append(joint_of(f'{side}_{name}', limit=f'lower="{low}" upper="{high}" '
+                                   'velocity="9"', axis=axis, parent=above))
+            above = f'{side}_{name}_l'
+    robot = made(tmp_path, robot_of(*joints))
+    assert robot.networks == ('biped',) and list(robot.legs) == ['left', 'right']
+    yaw, pitch, knee, ankle = robot.legs['right']
+    assert {joint.cell for joint in robot.legs['right']} == {2}
+    assert knee.offset > 0.2 and pitch.offset == pytest.approx(-knee.offset / 2)
+    assert pitch.offset + knee.offset + ankle.offset == pytest.approx(0.0, abs=2e-3)
+    assert yaw.weights == (0.0,) and pitch.weights[0] < 0.0 < knee.weights[1]
+
+
+limits = st.tuples(st.floats(-3.0, 3.0), st.floats(0.02, 6.0), st.floats(0.3, 40.0))
+
+
+# Each example takes its time: a failing one is not made smaller.
+@settings(max_examples=15, deadline=None, phases=(Phase.reuse, Phase.generate))
+@given(hip=limits, thigh=limits, calf=limits)
+def test_whatever_the_limits_what_is_made_fits(tmp_path_factory, hip, thigh, calf):
+    texts = [f'lower="{low:.5f}" upper="{low + width:.5f}" velocity="{speed:.4f}"'
+             for low, width, speed in (hip, thigh, calf)]
+    robot = made(tmp_path_factory.mktemp('made'),
+                 quadruped_urdf(hip=texts[0], thigh=texts[1], calf=texts[2]))
+    assert np.abs(robot.weights()).max() <= 0.15
+
+
+# -- refusals ---------------------------------------------------------------------------------
+
+REFUSED = [
+    ('', 'no element found'),
+    (URDF[:-200], 'line '),
+    (URDF.replace('<link name="base"/>', '<link name="base">'), 'mismatched tag'),
+    ('<mujoco/>', 'its root is <mujoco>, not <robot>: this is no URDF'),
+    ('<sdf version="1.9"/>', 'its root is <sdf>'),
+    ('<robot name="a"><link name="b"/></robot>', 'there is no joint in it'),
+    ('<robot name="a" xmlns:xacro="x"><xacro:macro name="leg"/></robot>',
+     'it is xacro, expand it first (xacro my.urdf > robot.urdf)'),
+    (robot_of(joint_of('a'), joint_of('a')), "the joint 'a' is there twice"),
+    (robot_of(joint_of('a').replace(' name="a"', '')), 'a joint has no name'),
+    (robot_of(joint_of('a').replace(' type="revolute"', '')), "the joint 'a' has no type"),
+    (robot_of(joint_of('a', limit='lower="low"')), 'limit lower="low" is not a number'),
+    (robot_of(joint_of('a', limit='lower="nan"')), 'limit lower="nan" is not a number'),
+    (robot_of(joint_of('a', axis='0 1')), 'axis xyz="0 1" is not 3 numbers'),
+    (robot_of('<joint name="a" type="revolute"/>'), "'a' is revolute, but has no <limit>"),
+    ('<!DOCTYPE robot [<!ENTITY a "b">]>' + URDF.partition('?>')[2], "the entity 'a'"),
+    ('<?xml version="1.0" encoding="klingon"?><robot/>', 'encoding'),
+    ('solid teapot\n', 'syntax error')]
+
+
+@pytest.mark.parametrize(('urdf', 'words'), REFUSED, ids=[words for _, words in REFUSED])
+def test_files_that_are_no_urdf_end_in_one_line(tmp_path, capsys, urdf, words):
+    path = tmp_path / 'my.urdf'
+    path.write_text(urdf)
+    assert main(['quadruped', '--urdf', str(path)]) == 2
+    said = capsys.readouterr()
+    assert said.out == '' and said.err.count('\n') == 1
+    assert said.err.startswith(f'check_robot: URDF {path}: ') and words in said.err
+
+
+@pytest.mark.parametrize(('arguments', 'words'), [
+    (('quadruped',), '--urdf'),
+    (('--urdf', 'URDF'), 'give either a robot file or --make FILE'),
+    (('quadruped', '--urdf', 'URDF', '--make', 'a.yaml'), 'give either'),
+    (('quadruped', '--urdf', 'nowhere.urdf'), 'nowhere.urdf: No such file'),
+    (('quadruped', '--urdf', '.'), 'Is a directory'),
+    (('hexapod', '--urdf', 'URDF'), "robot 'hexapod' is neither a .yaml file nor one of: biped"),
+    (('nowhere.yaml', '--urdf', 'URDF'), 'nowhere.yaml: No such file'),
+    (('quadruped', '--urdf', 'URDF', '--gaits', 'canter'), "'canter' is not one of walk, trot"),
+    (('quadruped', '--urdf', 'URDF', '--frequency', 'nan'), '--frequency: nan is not from 0'),
+    (('quadruped', '--urdf', 'URDF', '--amplitude', '-1'), '--amplitude: -1 is not from 0 to 3'),
+    (('--urdf', 'URDF', '--make', 'a.txt'), 'a.txt is not called .yaml'),
+    (('--urdf', 'URDF', '--make', 'URDF.yaml'), 'is there already'),
+    (('--urdf', 'URDF', '--make', 'nowhere/a.yaml'), 'No such file or directory'),
+    (('--urdf', 'NAMELESS', '--make', 'a.yaml'), 'no legs can be told from the joint names'),
+    (('--urdf', 'SIDEWAYS', '--make', 'a.yaml'), 'nothing would swing it'),
+    (('--urdf', 'STIFF', '--make', 'a.yaml'), 'no room to move'),
+    (('--urdf', 'ROUND', '--make', 'a.yaml'), 'go round in a circle')])
+def test_nonsense_ends_in_one_line(tmp_path, capsys, monkeypatch, arguments, words):
+    monkeypatch.chdir(tmp_path)
+    for name, content in {
+            'URDF': URDF, 'URDF.yaml': '', 'NAMELESS': robot_of(joint_of('one'), joint_of('two')),
+            'SIDEWAYS': quadruped_urdf(axis='1 0 0'),
+            'STIFF': quadruped_urdf(hip='lower="0" upper="0"'),
+            'ROUND': quadruped_urdf().replace('link="base"/><child', 'link="FL_calf_joint_l"/>'
+                                              '<child')}.items():
+        Path(name).write_text(content)
+    try:
+        code = main(list(arguments))
+    except SystemExit as ended:
+        code = ended.code
+    said = capsys.readouterr()
+    assert code == 2 and said.out == ''
+    assert words in said.err and said.err.startswith('check_robot: ')
+    assert said.err.count('\n') == 1 and not Path('a.yaml').exists()
+
+
+def test_as_a_process(tmp_path):
+    command = [sys.executable, '-m', 'cpg_ros.tools.check_robot']
+    urdf = SOURCE / 'urdf' / 'quadruped.urdf'
+    good = subprocess.run([*command, 'quadruped', '--urdf', urdf, '--gaits', 'trot', '--json'],
+                          capture_output=True, text=True, timeout=120)
+    assert good.returncode == 0 and json.loads(good.stdout)['matches'] and not good.stderr
+    bad = subprocess.run([*command, 'biped', '--urdf', urdf, '--gaits', 'walk'],
+                         capture_output=True, text=True, timeout=120)
+    assert bad.returncode == 1 and 'the URDF has no such joint' in bad.stdout
+    wrong = subprocess.run([*command, 'quadruped', '--urdf', tmp_path], capture_output=True,
+                           text=True, timeout=120)
+    assert wrong.returncode == 2 and wrong.stderr.count('\n') == 1

@@ -1,0 +1,271 @@
+"""Launch files: installed, startable, and true to the nodes they start."""
+
+import ast
+import contextlib
+import sys
+from pathlib import Path
+from types import ModuleType, SimpleNamespace
+
+import pytest
+import rclpy
+from ament_index_python.packages import get_package_share_directory
+from graph import free_domain
+from setuptools import find_packages
+
+from cpg_ros.networks.registry import NETWORKS, PRESETS
+from cpg_ros.nodes.inversion_node import Inversion
+from cpg_ros.nodes.settings import USUAL, Planner, specs
+from cpg_ros.robot_file import find_robot
+
+SOURCE = Path(__file__).resolve().parent.parent
+SHARE = Path(get_package_share_directory('cpg_ros'))
+FILES = ('generator', 'inversion', 'go2', 'rviz')
+
+
+def executables():
+    """Names of the entry points in setup.py, which cannot be imported without building."""
+    tree = ast.parse((SOURCE / 'setup.py').read_text())
+    (points,) = (ast.literal_eval(word.value) for call in ast.walk(tree)
+                 if isinstance(call, ast.Call) for word in call.keywords
+                 if word.arg == 'entry_points')
+    return {line.partition(' = ')[0] for line in points['console_scripts']}
+
+
+def of_generator(network):
+    """Parameters of the generator: name -> spec."""
+    robot, gait = USUAL[network]
+    planner = Planner(NETWORKS[network], PRESETS[network], find_robot(robot))
+    return specs(network) | planner.specs(gait)
+
+
+class Stub:
+    """Stands for an action or substitution; keeps what it was given."""
+
+    def __init__(self, *arguments, **options):
+        self.arguments, self.options = arguments, options
+
+    @property
+    def name(self):
+        return self.arguments[0]
+
+    def perform(self, context):
+        return context[self.name]
+
+
+@pytest.fixture
+def described(monkeypatch):
+    """Run a launch file with stand-ins for launch and launch_ros, which are not on PyPI."""
+    kinds = {name: type(name, (Stub,), {}) for name in (
+        'LaunchDescription', 'LaunchContext', 'DeclareLaunchArgument', 'OpaqueFunction',
+        'IncludeLaunchDescription', 'Shutdown', 'LaunchConfiguration', 'Node', 'ParameterValue',
+        'PythonLaunchDescriptionSource')}
+    for name in ('launch', 'launch.actions', 'launch.substitutions', 'launch.launch_context',
+                 'launch.launch_description_sources', 'launch_ros', 'launch_ros.actions',
+                 'launch_ros.parameter_descriptions'):
+        module = ModuleType(name)
+        vars(module).update(kinds)
+        monkeypatch.setitem(sys.modules, name, module)
+    monkeypatch.delitem(sys.modules, 'cpg_ros.launching', raising=False)
+
+    def run(name, **given):
+        space = {'__file__': str(SOURCE / 'launch' / f'{name}.launch.py')}
+        exec(compile(Path(space['__file__']).read_text(), space['__file__'], 'exec'), space)
+        if name == 'rviz':
+            space['get_package_prefix'] = lambda package: f'/opt/{package}'
+        described = SimpleNamespace(arguments={}, nodes=[], includes=[], space=space)
+        functions = []
+        for entity in space['generate_launch_description']().arguments[0]:
+            if isinstance(entity, kinds['DeclareLaunchArgument']):
+                described.arguments[entity.name] = entity.options['default_value']
+                assert entity.options['description']
+            elif isinstance(entity, kinds['OpaqueFunction']):
+                functions.append(entity.options['function'])
+            else:
+                described.includes.append(entity.arguments[0].arguments[0])
+        assert not set(given) - set(described.arguments) or name == 'rviz'
+        context = {'namespace': '', 'use_sim_time': 'false', **described.arguments, **given}
+        described.nodes = [node for function in functions for node in function(context)]
+        described.context = context
+        return described
+    yield run
+    sys.modules.pop('cpg_ros.launching', None)
+
+
+def parameters(described, node):
+    """Return what a node is given, as it will be after launch has typed it."""
+    types = {str: str, float: float, int: int, bool: lambda text: {'true': True,
+                                                                   'false': False}[text]}
+    (given,) = node.options['parameters']
+    values = {}
+    for name, value in given.items():
+        if isinstance(value, Stub):
+            (text,), kind = value.arguments, value.options['value_type']
+            text = text.perform(described.context) if isinstance(text, Stub) else text
+            value = types.get(kind, str)(text)
+        values[name] = value
+    return values
+
+
+def node_of(described, executable):
+    (node,) = (node for node in described.nodes if node.options['executable'] == executable)
+    return node
+
+
+@pytest.mark.parametrize('name', FILES)
+def test_every_launch_file_is_installed_and_compiles(name):
+    path = SHARE / 'launch' / f'{name}.launch.py'
+    compile(path.read_text(), str(path), 'exec')
+    assert {file.name.partition('.')[0] for file in (SOURCE / 'launch').iterdir()
+            if file.suffix == '.py'} == set(FILES)
+
+
+@pytest.mark.parametrize('name', FILES)
+def test_every_node_exists(described, name):
+    if name == 'go2' and 'robot_sim' not in executables():
+        pytest.skip('robot_sim is not part of this tree')
+    for node in described(name).nodes:
+        if node.options['package'] == 'cpg_ros':
+            assert node.options['executable'] in executables()
+        else:
+            assert node.options['package'] in ('robot_state_publisher', 'rviz2')
+    assert 'cpg_ros' in find_packages(str(SOURCE))
+
+
+@pytest.mark.parametrize('network', NETWORKS)
+def test_the_generator_gets_parameters_that_it_declares(described, network):
+    known = of_generator(network)
+    found = described('generator', network=network, gait='walk', presets='a.yaml', robot='goat',
+                      frequency='2.5')
+    (node,) = found.nodes
+    given = parameters(found, node)
+    assert node.options['name'] == 'cpg_generator'
+    assert given.pop('network') == network and given.pop('use_sim_time') is False
+    assert set(given) <= set(known) and given['frequency'] == 2.5 and given['gait'] == 'walk'
+    for name, value in given.items():
+        assert type(value) is type(known[name].default), name
+
+
+def test_what_is_empty_is_left_to_the_generator(described):
+    found = described('generator')
+    given = parameters(found, found.nodes[0])
+    assert not {'gait', 'presets', 'robot', 'frequency'} & set(given)
+    # What is given by default is the node's own default.
+    for name in set(given) - {'network', 'use_sim_time'}:
+        assert given[name] == of_generator('delayed')[name].default, name
+
+
+def test_the_inversion_gets_parameters_that_it_declares(described):
+    asked = {'topics': '[a, b]', 'robot': 'goat', 'free': '[c]', 'gait': 'trot', 'out': 'a.yaml',
+             'network': 'delayed', 'preset': 'trot', 'report': 'a.html', 'apply_to': '/a'}
+    found = described('inversion', **asked)
+    (node,) = found.nodes
+    given = parameters(found, node)
+    assert node.options['name'] == 'cpg_inversion'
+    rclpy.init(domain_id=free_domain())
+    try:
+        inversion = Inversion()
+        for name in given:
+            assert inversion.has_parameter(name), name
+        for name in ('window', 'every', 'order'):
+            value = inversion.get_parameter(name).value
+            assert given[name] == value and type(given[name]) is type(value)
+        names = inversion.list_parameters([], 0).names
+        assert {name for name in names if '.' not in name} - set(given) <= {
+            'start_type_description_service'}
+        inversion.destroy_node()
+    finally:
+        rclpy.shutdown()
+    # Lists are typed as such by launch; nothing else may be.
+    (raw,) = node.options['parameters']
+    assert {name for name, value in raw.items() if value.options['value_type'] == list[str]} == {
+        'topics', 'free'}
+    assert not set(asked) - {'topics'} & set(parameters(described('inversion'),
+                                                        described('inversion').nodes[0]))
+
+
+@pytest.mark.parametrize(('given', 'command', 'sim_time'), [
+    ({}, 'none', False), ({'command': 'joint_trajectory'}, 'joint_trajectory', False),
+    ({'command': 'forward_position', 'real_time_factor': '0.0'}, 'forward_position', True),
+    ({'real_time_factor': '0'}, 'none', True), ({'real_time_factor': '0.5'}, 'none', True)])
+def test_go2_speaks_one_command_and_follows_one_clock(described, given, command, sim_time):
+    found = described('go2', film='a.gif', gait='walk', cmd_vel='true', **given)
+    generator, simulation = (node_of(found, name) for name in ('generator', 'robot_sim'))
+    to_generator = parameters(found, generator)
+    known = of_generator('delayed')
+    assert set(to_generator) - {'network', 'use_sim_time'} <= set(known)
+    assert to_generator == {'network': 'delayed', 'gait': 'walk', 'robot': 'unitree_go2',
+                            'rate': 500.0, 'combined_topic': '', 'cmd_vel': True,
+                            'command': command, 'use_sim_time': sim_time}
+    to_simulation = parameters(found, simulation)
+    assert to_simulation == {
+        'clock': sim_time, 'robot': 'unitree_go2', 'model': 'go2', 'film': 'a.gif',
+        'duration': 0.0, 'command': given.get('command', 'joint_states'),
+        'real_time_factor': float(given.get('real_time_factor', 1.0))}
+    with contextlib.suppress(ModuleNotFoundError):
+        from cpg_ros.nodes.robot_sim import SPECS
+        for name, value in to_simulation.items():
+            assert type(value) is type(SPECS[name].default), name
+    assert 'on_exit' in simulation.options and 'on_exit' not in generator.options
+
+
+def test_rviz_shows_the_urdf_of_the_robot(described, tmp_path):
+    urdf = tmp_path / 'my.urdf'
+    text = ('<robot name="mine"><joint name="a" type="continuous"><parent link="trunk"/>'
+            '<child link="b"/></joint><joint name="c" type="fixed"><parent link="b"/>'
+            '<child link="d"/></joint></robot>')
+    urdf.write_text(text)
+    found = described('rviz', urdf=str(urdf), use_sim_time='true', namespace='dog')
+    assert found.includes == [str(SOURCE / 'launch' / 'generator.launch.py')]
+    publisher, viewer = found.nodes
+    assert parameters(found, publisher) == {
+        'robot_description': text, 'publish_frequency': 50.0, 'use_sim_time': True}
+    assert viewer.options['package'] == 'rviz2'
+    assert viewer.options['remappings'] == [('/robot_description', 'robot_description')]
+    display, config, fixed, frame = viewer.options['arguments']
+    assert display == '-d' and Path(config.perform(found.context)).is_file()
+    assert (fixed, frame) == ('-f', 'trunk')
+    assert Path(found.arguments['urdf']).is_file()
+    assert [node.options['package'] for node in described('rviz', rviz='false').nodes] == [
+        'robot_state_publisher']
+
+
+@pytest.mark.parametrize(('text', 'words'), [
+    ('<robot', 'line 1'), ('<robot name="a"/>', 'no joint'),
+    ('<robot><joint name="a" type="fixed"><parent link="a"/><child link="a"/></joint></robot>',
+     '0 root links')], ids=['malformed', 'empty', 'circle'])
+def test_rviz_refuses_what_is_no_urdf(described, tmp_path, text, words):
+    urdf = tmp_path / 'my.urdf'
+    urdf.write_text(text)
+    with pytest.raises(ValueError, match=words):
+        described('rviz', urdf=str(urdf))
+
+
+def test_rviz_says_which_package_is_missing(described):
+    from ament_index_python.packages import get_package_prefix
+    found = described('rviz', rviz='false')
+    found.space['get_package_prefix'] = get_package_prefix
+    with pytest.raises(RuntimeError, match='needs the package no_such_thing: sudo apt install '
+                                           r'ros-\$ROS_DISTRO-no-such-thing'):
+        found.space['needed']('no_such_thing')
+
+
+@pytest.mark.parametrize('name', FILES)
+def test_with_launch_itself(name):
+    pytest.importorskip('launch_ros')
+    from launch.actions import OpaqueFunction
+    from launch.launch_context import LaunchContext
+    from launch.launch_description_sources import PythonLaunchDescriptionSource
+    context = LaunchContext()
+    source = PythonLaunchDescriptionSource(str(SHARE / 'launch' / f'{name}.launch.py'))
+    description = source.get_launch_description(context)
+    names = {argument.name for argument in description.get_launch_arguments()}
+    assert 'namespace' in names and len(names) >= 10
+    if name in ('rviz', 'go2'):
+        return  # these start what may not be installed
+    for argument in description.get_launch_arguments():
+        argument.execute(context)
+    (node,) = (node for entity in description.entities
+               if isinstance(entity, OpaqueFunction)
+               for node in entity.execute(context))
+    node._perform_substitutions(context)
+    assert node.node_name == f'/cpg_{name}'
