@@ -199,8 +199,8 @@ def test_shipped_feet_go_where_a_foot_should(gait, network):
                 data.joint(name).qpos[0] = angles[joints.index(name), k]
             mujoco.mj_kinematics(feet.body.model, data)
             row[:] = (data.geom(foot).xpos - data.joint(f'{foot}_thigh_joint').xanchor)[[0, 2]]
-        assert 0.02 < np.ptp(ways[leg][:, 1]) < 0.13 and np.ptp(ways[leg][:, 0]) < 0.5
-        # Knees never straight, body never on the floor.
+        assert 0.02 < np.ptp(ways[leg][:, 1]) < 0.16 and np.ptp(ways[leg][:, 0]) < 0.5
+        # Knees never straight, feet never near the body.
         assert ways[leg][:, 1].min() > -0.36 and ways[leg][:, 1].max() < -0.12
     np.testing.assert_allclose(ways['lf'], ways['rf'], atol=1e-3)
     np.testing.assert_allclose(ways['lh'], ways['rh'], atol=1e-3)
