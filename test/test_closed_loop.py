@@ -61,7 +61,7 @@ def test_what_was_recorded_from_a_walk_walks(tmp_path, gait):
     done = subprocess.run([str(EXECUTABLE.with_name('inversion')), '--bag', str(bag), '--robot',
                            str(ROBOT), '--out', str(out)], capture_output=True, text=True)
     assert done.returncode == 0, done.stdout + done.stderr
-    fitted = yaml.safe_load(out.read_text())['/**/cpg_generator']['ros__parameters']
+    fitted = yaml.safe_load(out.read_text())['/**']['ros__parameters']
     asked = yaml.safe_load(ROBOT.read_text())['gaits'][gait]['frequency']
     assert fitted['gait'] == gait
     assert fitted['frequency'] == pytest.approx(asked, rel=5e-3)
