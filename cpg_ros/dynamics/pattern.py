@@ -22,6 +22,8 @@ SUBSTEP = 1e-3
 MOST_TRACKS = 4
 #: Jumps of the network's output are absorbed over this time (s).
 ABSORB = 0.3
+#: A joint may cover the shift between the stand and a gait at this many times it a second.
+SHIFTING = 2.0
 
 
 def ease(s: float) -> tuple[float, float]:
@@ -223,7 +225,8 @@ class Pattern:
             wanted = self._level * wanted
         if moving:
             # The pattern slows where it would outrun the gaits, now or at the next substep.
-            bound = np.minimum(np.max([t.program.speed for t in tracks], axis=0), self._limit)
+            bound = np.minimum(np.max([t.program.speed + SHIFTING * np.abs(t.program.shift)
+                                       for t in tracks], axis=0), self._limit)
             ahead = rate if self._last_rate is None else 2.0 * rate - self._last_rate
             fastest = np.maximum(np.abs(rate), np.abs(ahead))
             self._last_rate = rate

@@ -62,9 +62,10 @@ def targets(program: Program, duration: float, timestep: float,
 
     """
     robot = program.robot
-    drive = Drive(len(robot.legs)) if len(strides) else None
-    if drive is not None:
-        drive.ask(np.asarray(strides, dtype=float), pace, at_once=True)
+    drive, stride = None, np.ones(len(robot.legs))
+    if len(strides) or pace != 1.0:
+        drive, stride = Drive(stride.size), np.array(strides or stride, dtype=float)
+        drive.ask(stride, pace, at_once=True)
     pattern = Pattern(program, ramp, drive=drive)
     steps = round(duration / timestep)
     found = np.empty((steps, len(robot.order)))
@@ -76,11 +77,8 @@ def targets(program: Program, duration: float, timestep: float,
     if done < steps:
         ahead = (pattern.phases[0] - program.readout.start
                  + program.frequency * pace * timestep * np.arange(1, steps - done + 1))
-        stride = np.ones(len(robot.joints))
-        if drive is not None:
-            stride = drive.stride[robot.leg_of_joint]
-        angles = (program.in_place.angles
-                  + stride[:, None] * (program.readout.angles - program.in_place.angles))
+        still, stride = program.in_place.angles, stride[robot.leg_of_joint, None]
+        angles = still + stride * (program.readout.angles - still)
         base = robot.column('offset') + program.shift
         found[done:] = (base[:, None] + _periodic(angles, program, ahead)).T
     place = {joint.name: k for k, joint in enumerate(robot.joints)}

@@ -12,13 +12,14 @@ from cpg_ros.simulation.batch import Batch, Scenario, targets
 STRIDES = (-0.4, -0.2, 0.0, 0.2, 0.4, 0.6, 0.8, 1.0)
 SLOWER = 0.2
 #: Difference of stride between the legs of both sides, when turning is measured.
-DIFFERENCE = 0.3
+DIFFERENCE = 0.5
 #: Length of a run, s.
 DURATION = 8.0
 #: Floors that speeds and turns are means of.
 FLOORS = (Scenario(), Scenario(0.7))
-#: A gait counts as steered if its speeds rise by at least this much a row, m/s.
-RISE = 0.01
+#: A gait counts as steered if its speeds rise by at least this much a row, m/s, and if it turns at
+#: least so fast for a difference of 1, rad/s.
+RISE, TURN = 0.01, 0.2
 
 
 def measure(batch: Batch, program: Program,
@@ -49,7 +50,7 @@ def measure(batch: Batch, program: Program,
         n = len(FLOORS)
         turn = (np.mean(turns[n:2 * n]) - np.mean(turns[2 * n:])) / (2.0 * DIFFERENCE)
         rows.append((float(np.mean(speeds[:n])), stride, pace * program.frequency, float(turn),
-                     bool(turn > 0.0) and all(trial.upright for trial in trials)))
+                     bool(turn >= TURN) and all(trial.upright for trial in trials)))
         update(done + 1)
     return _rising(rows)
 

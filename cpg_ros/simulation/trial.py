@@ -38,6 +38,7 @@ class Trial:
         cost: * of transport: mechanical work of the motors, none regained, per weight and metre.
         saturation: share of time and motors at the limit of torque.
         slip: * way that feet slide on the floor per metre that the body goes.
+        lift: * height that a foot exceeds for a tenth of the time, least of all legs, m.
 
     """
 
@@ -57,6 +58,7 @@ class Trial:
     cost: float
     saturation: float
     slip: float
+    lift: float
 
     @property
     def upright(self) -> bool:
@@ -92,6 +94,8 @@ def judge(body: Body, parts: Anatomy, wanted: np.ndarray, mass: float, states: n
     fell = float(states[down.argmax(), 0]) if down.any() else math.inf
 
     later = slice(min(round(BEGINNING / dt), len(states) // 2), None)
+    every = max(1, round(LOOK / dt))
+    feet = _feet(body, parts.feet, place[later][::every])
     path = np.diff(pose[later, :2], axis=0)
     middle = 0.5 * (yaw[later][1:] + yaw[later][:-1])
     way = float((path[:, 0] * np.cos(middle) + path[:, 1] * np.sin(middle)).sum())
@@ -115,7 +119,8 @@ def judge(body: Body, parts: Anatomy, wanted: np.ndarray, mass: float, states: n
         fell=fell, hops=_hops(np.any(touching, axis=1), dt), duty=float(touching[later].mean()),
         cost=work / (weight * max(abs(way), 1e-3)),
         saturation=float((torque != applied).mean()),
-        slip=_slide(body, parts.feet, place[later], touching[later], dt) / max(abs(way), 1e-3))
+        slip=_slide(feet, touching[later][::every]) / max(abs(way), 1e-3),
+        lift=float(np.subtract(*np.percentile(feet[:, :, 2], [90.0, 10.0], axis=0)).min()))
 
 
 def _hops(touching: np.ndarray, dt: float) -> int:
@@ -124,16 +129,18 @@ def _hops(touching: np.ndarray, dt: float) -> int:
     return int((np.diff(edges)[::2] * dt >= AIRBORNE).sum())
 
 
-def _slide(body: Body, geoms: list[int], places: np.ndarray, touching: np.ndarray, dt: float
-           ) -> float:
-    """Sum the ways of the feet on the floor while they touch it, mean of all legs, m."""
-    mujoco, model = engine(), body.model
-    data, every = mujoco.MjData(model), max(1, round(LOOK / dt))
-    feet = np.empty((len(places[::every]), len(geoms), 3))
-    for row, place in zip(feet, places[::every], strict=True):
+def _feet(body: Body, geoms: list[int], places: np.ndarray) -> np.ndarray:
+    """Work out where the feet are, m, shape (places, legs, 3)."""
+    mujoco, data = engine(), engine().MjData(body.model)
+    feet = np.empty((len(places), len(geoms), 3))
+    for row, place in zip(feet, places, strict=True):
         data.qpos[:] = place
-        mujoco.mj_kinematics(model, data)
+        mujoco.mj_kinematics(body.model, data)
         row[:] = data.geom_xpos[geoms]
+    return feet
+
+
+def _slide(feet: np.ndarray, touching: np.ndarray) -> float:
+    """Sum the ways of the feet while they touch the floor, mean of all legs, m."""
     ways = np.linalg.norm(np.diff(feet[:, :, :2], axis=0), axis=2)
-    held = touching[::every]
-    return float((ways * (held[1:] & held[:-1])).sum()) / len(geoms)
+    return float((ways * (touching[1:] & touching[:-1])).sum()) / feet.shape[1]

@@ -14,7 +14,7 @@ import numpy as np
 
 from cpg_ros.dynamics.program import Program, Refused, gait_of, plan
 from cpg_ros.networks.registry import PRESETS
-from cpg_ros.robot import Motion, Robot
+from cpg_ros.robot import Motion, Robot, Steering
 from cpg_ros.simulation.batch import Batch, Scenario, targets
 from cpg_ros.simulation.design import AIMS, LENGTH, Aim, Design
 from cpg_ros.simulation.foot_path import Feet
@@ -23,14 +23,16 @@ from cpg_ros.simulation.trial import Trial
 
 #: Length of the runs that designs are compared by, and of the one that figures are of, s.
 SHORT, LONG = 6.0, 10.0
-#: What designs meet: a good floor, and slippery ones with more and less load and with pushes.
-SCENARIOS = (Scenario(),
+#: What designs meet: good floors, and slippery ones with more and less load and with pushes.
+SCENARIOS = (Scenario(), Scenario(0.9),
              Scenario(0.6, 1.05, ((2.5, 0.0, 50.0), (4.2, 50.0, 0.0))),
              Scenario(0.8, 0.95, ((3.0, -50.0, 0.0), (4.5, 0.0, -50.0))))
+#: Height that feet are to have for a tenth of the time, m.
+CLEAR = 0.02
 #: Price of a design that the joints cannot follow.
 REFUSED = 100.0
 #: Designs in a generation, and how far about the start the first ones are (1: all there is).
-GENERATION, SPREAD = 12, 0.22
+GENERATION, SPREAD = 12, 0.15
 
 
 @dataclass(frozen=True)
@@ -59,17 +61,20 @@ def price(trial: Trial, aim: Aim, duration: float) -> float:
     """Weigh a run's figures; 0 would be perfect.
 
     Slower or much faster than wanted, fewer hops or, where none are wanted, bobbing, turning,
-    leaning, drifting, sliding, torques at their limit and work all cost; a fall costs most.
+    leaning, dragging feet, drifting, sliding, torques at their limit and work all cost; a fall
+    costs most.
     """
     fall = 0.0 if trial.upright else 15.0 + 25.0 * (1.0 - trial.fell / duration)
     share = trial.speed / aim.speed
     speed = 12.0 * max(0.0, 1.0 - share) + 3.0 * max(0.0, share - 1.2)
-    turning = 0.3 * min(abs(math.degrees(trial.turn)) / 0.5, 10.0)**2
+    turning = (0.15 * min(abs(math.degrees(trial.turn)) / 0.5, 8.0)**2
+               + 0.1 * min(abs(trial.heading) / 4.0, 8.0)**2)
     leaning = (trial.sway / 5.0)**1.5
+    dragging = 6.0 * max(0.0, 1.0 - trial.lift / CLEAR)
     restless = 0.5 * trial.bob / 0.01
     if aim.hops:
         restless = 5.0 * max(0.0, 1.0 - trial.hops / (0.85 * aim.hops * duration))
-    return (fall + speed + turning + leaning + restless + 0.3 * (trial.drift / 0.4)**2
+    return (fall + speed + turning + leaning + dragging + restless + 0.3 * (trial.drift / 0.4)**2
             + 2.0 * min(trial.slip, 3.0) + 20.0 * trial.saturation + 0.6 * min(trial.cost, 5.0))
 
 
@@ -99,6 +104,10 @@ class Tuner:
     def program(self, gait: str, motion: Motion, network: int = 0) -> Program:
         """Plan a gait with a motion on one of the robot's networks; errors as of plan."""
         preset = PRESETS[self.robot.networks[network]][gait]
+        if motion.steering is None and not AIMS[gait].hops:
+            # To be steered: the joints must be able to follow strides of -1, too.
+            one = (1.0,)
+            motion = replace(motion, steering=Steering(one, one, one, one))
         robot = replace(self.robot, motions={gait: motion})
         return plan(robot, gait, preset, preset.network, motion.frequency or 0.0)
 

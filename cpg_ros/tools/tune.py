@@ -55,14 +55,14 @@ def figures(tuned: Sequence[Tuned]) -> list[str]:
     """Return a table of what was found, in lines."""
     rows: list[tuple[str, ...]] = [
         ('gait', 'distance [m]', 'heading [deg]', 'speed [m/s]', 'Hz', 'duty', 'hops',
-         'pitch [deg]', 'cost of transport', 'slip')]
+         'lift [cm]', 'pitch [deg]', 'cost of transport', 'slip')]
     for one in tuned:
         trial = one.trial
         rows.append((one.gait, f'{trial.distance:.2f}', f'{trial.heading:+.1f}',
                      f'{trial.speed:.2f}', f'{one.motion.frequency:.2f}', f'{trial.duty:.2f}',
-                     str(trial.hops), f'{trial.pitch:.1f}', f'{trial.cost:.2f}',
-                     f'{trial.slip:.2f}'))
-    return table(rows, '<>>>>>>>>>')
+                     str(trial.hops), f'{100.0 * trial.lift:.1f}', f'{trial.pitch:.1f}',
+                     f'{trial.cost:.2f}', f'{trial.slip:.2f}'))
+    return table(rows, '<>>>>>>>>>>')
 
 
 def _onward(bar: Callable[[int], None], begun: int, done: int) -> None:
