@@ -201,7 +201,8 @@ def test_go2_speaks_one_command_and_follows_one_clock(described, given, command,
     to_simulation = parameters(found, simulation)
     assert to_simulation == {
         'clock': sim_time, 'robot': 'unitree_go2', 'model': 'go2', 'film': 'a.gif',
-        'footfalls': 'out/footfalls.png', 'duration': 0.0, 'command': given.get('command', 'joint_states'),
+        'footfalls': 'out/footfalls.png', 'duration': 0.0,
+        'command': given.get('command', 'joint_states'),
         'real_time_factor': float(given.get('real_time_factor', 1.0))}
     assert (tmp_path / 'out').is_dir()
     with contextlib.suppress(ModuleNotFoundError):
