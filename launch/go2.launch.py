@@ -5,6 +5,8 @@ real_time_factor:=0, as fast as they can. Needs MuJoCo: pip install cpg-ros[sim]
 robot:=$PWD/my_robot.yaml model:=$PWD/my.urdf.
 """
 
+from pathlib import Path
+
 from launch.actions import OpaqueFunction, Shutdown
 from launch.substitutions import LaunchConfiguration
 
@@ -25,8 +27,8 @@ SIMULATION = {
     'command': ('joint_states', str, 'what moves the robot: joint_states, joint_trajectory or '
                 'forward_position'),
     'real_time_factor': ('1.0', float, 'speed of simulated time; 0 for as fast as it can'),
-    'film': ('', str, 'film to write, .gif or .mp4; empty for none'),
-    'footfalls': ('', str, 'picture of the footfalls to write; empty for none'),
+    'film': ('out/go2.gif', str, 'film to write, .gif or .mp4; empty for none'),
+    'footfalls': ('out/footfalls.png', str, 'picture of the footfalls to write; empty for none'),
     'duration': ('0.0', float, 'end after this much simulated time [s]; 0 for never'),
 }
 #: After Ctrl-C the film still has to be drawn: seconds until the simulation is ended.
@@ -38,6 +40,9 @@ COMMANDS = {'joint_states': 'none'}
 def nodes(context):
     """Return generator and simulation, which speak the same command and follow one clock."""
     command = LaunchConfiguration('command').perform(context)
+    for picture in ('film', 'footfalls'):
+        Path(LaunchConfiguration(picture).perform(context)).parent.mkdir(parents=True,
+                                                                         exist_ok=True)
     simulated = float(LaunchConfiguration('real_time_factor').perform(context)) != 1.0
     return [started(context, 'generator', 'cpg_generator', {**BOTH, **GENERATOR}, {
                 'rate': 500.0, 'combined_topic': '', 'command': COMMANDS.get(command, command),

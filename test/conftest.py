@@ -4,7 +4,17 @@ import os
 os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
 
 import pytest
-from graph import Process, Watcher
+from graph import EXECUTABLE, Process, Watcher
+
+
+def pytest_collection_modifyitems(items):
+    """Mark what runs on a graph in real time: such tests have the machine to themselves."""
+    for item in items:
+        known = vars(item.module).values()
+        given = set(getattr(item, 'callspec', item).__dict__.get('params', ()))
+        if {'start', 'running'} & set(item.fixturenames) - given or any(
+                thing is one for thing in known for one in (EXECUTABLE, Process, Watcher)):
+            item.add_marker('live')
 
 
 @pytest.fixture

@@ -301,6 +301,16 @@ def test_a_number_at_its_bound_is_said():
     assert any('c ends at its upper bound 6.2' in line for line in fit.warnings)
 
 
+def test_a_number_at_its_bound_beside_another_is_said():
+    recording, cells = trot(0, network=replace(TROT, c=8.0))
+    fit = invert(recording, cells, replace(TROT, c=6.0), 'trot', ('c', 'tau'),
+                 bounds={'c': (5.5, 6.2)})
+    one = fit.parameters['c']
+    assert one.value == pytest.approx(6.2) == one.high and one.low <= one.value
+    assert not one.bounded
+    assert fit.parameters['tau'].low <= fit.parameters['tau'].value <= fit.parameters['tau'].high
+
+
 def test_what_the_generator_runs_is_preferred(monkeypatch):
     recording, cells = trot(None, network=replace(TROT, tau=0.5))
     monkeypatch.setattr(inversion, 'refusal', lambda orbit, harmonics: (

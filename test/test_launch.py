@@ -187,7 +187,9 @@ def test_the_inversion_gets_parameters_that_it_declares(described):
     ({}, 'none', False), ({'command': 'joint_trajectory'}, 'joint_trajectory', False),
     ({'command': 'forward_position', 'real_time_factor': '0.0'}, 'forward_position', True),
     ({'real_time_factor': '0'}, 'none', True), ({'real_time_factor': '0.5'}, 'none', True)])
-def test_go2_speaks_one_command_and_follows_one_clock(described, given, command, sim_time):
+def test_go2_speaks_one_command_and_follows_one_clock(described, given, command, sim_time,
+                                                      monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
     found = described('go2', film='a.gif', gait='walk', cmd_vel='true', **given)
     generator, simulation = (node_of(found, name) for name in ('generator', 'robot_sim'))
     to_generator = parameters(found, generator)
@@ -199,8 +201,10 @@ def test_go2_speaks_one_command_and_follows_one_clock(described, given, command,
     to_simulation = parameters(found, simulation)
     assert to_simulation == {
         'clock': sim_time, 'robot': 'unitree_go2', 'model': 'go2', 'film': 'a.gif',
-        'duration': 0.0, 'command': given.get('command', 'joint_states'),
+        'footfalls': 'out/footfalls.png', 'duration': 0.0,
+        'command': given.get('command', 'joint_states'),
         'real_time_factor': float(given.get('real_time_factor', 1.0))}
+    assert (tmp_path / 'out').is_dir()
     with contextlib.suppress(ModuleNotFoundError):
         from cpg_ros.nodes.robot_sim import SPECS
         for name, value in to_simulation.items():

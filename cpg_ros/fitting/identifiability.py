@@ -26,6 +26,8 @@ ZERO, SHARE = 1e-7, 1e-3
 REGULAR, STEPS_NEARBY = (0.7, 1.43), 3
 #: Steps of a profile on either side, and its tolerance in standard errors.
 STEPS, CLOSE = 10, 0.03
+#: Closer to a bound than this share of a step is at the bound.
+NEGLIGIBLE = 1e-6
 #: A profile's descents: tolerance, evaluations, and how firmly its number is drawn.
 TOLERANCE, MOST, DRAWN = 1e-6, 30, 0.3
 
@@ -179,6 +181,9 @@ class Optimum:
 
     def _end(self, k: int, error: float, side: float) -> tuple[float, bool]:
         """One end of the interval, and whether the data set it."""
+        bound = self.free[k].high if side > 0.0 else self.free[k].low
+        if abs(bound - self.values[k]) <= NEGLIGIBLE * error:
+            return bound, False
         end = self._nearby(k, error, side)
         if end is not None:
             return end, True
@@ -228,6 +233,9 @@ class Optimum:
         place = best + side * step
         for _ in range(STEPS):
             place = limit if side * (place - limit) >= 0.0 else place
+            if abs(place - inside) <= NEGLIGIBLE * step:
+                # At its bound already.
+                return inside, False
             found = self._least(k, place, at, CLOSE * min(step, abs(place - inside)))
             rise, reached = self._rise(found), float(found[k])
             short = abs(reached - place) > CLOSE * abs(place - inside)

@@ -22,8 +22,6 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.signals import SignalHandlerOptions
 
-from cpg_ros.simulation.camera import check_opengl
-from cpg_ros.simulation.model import SimulationError
 from cpg_ros.tools.arguments import Parser, say
 
 TOUR = ('trot', 'walk', 'pace', 'bound', 'jump', 'pronk', 'trot')
@@ -173,11 +171,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     operator = Operator()
     body = ['robot_sim', '-p', f'rate:={RATE}.0', '-p', f'footfalls:={footfalls}']
     if not chosen.no_film:
-        try:
-            check_opengl()
-            body += ['-p', f'film:={film}']
-        except SimulationError as error:
-            say(f'no film this time: {error}')
+        body += ['-p', f'film:={film}']
     try:
         with running(*body) as sim, running(
                 'generator', '-p', 'robot:=unitree_go2', '-p', f'gait:={chosen.gaits[0]}',

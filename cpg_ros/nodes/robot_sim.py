@@ -26,6 +26,7 @@ from cpg_ros.nodes.starting import StartedNode, StartError, run
 from cpg_ros.nodes.ticker import Ticker
 from cpg_ros.robot_file import RobotError, find_robot
 from cpg_ros.simulation.body import Body
+from cpg_ros.simulation.camera import without_opengl
 from cpg_ros.simulation.diary import Diary, summary
 from cpg_ros.simulation.model import SimulationError
 
@@ -85,6 +86,9 @@ class RobotSim(StartedNode):
             robot = find_robot(self._value('robot'))
             self._body = Body(self._value('model'), robot, self._value('kp'), self._value('kd'),
                               timestep)
+            if film is not None and (missing := without_opengl()):
+                self.get_logger().warning(f'no film this time: {missing}')
+                film = None
             self._diary = Diary(self._body, self._rate, film, footfalls)
         except (RobotError, SimulationError) as error:
             raise StartError(str(error)) from error

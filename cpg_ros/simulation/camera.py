@@ -107,16 +107,15 @@ class Camera:
         self.close()
 
 
-def check_opengl() -> None:
-    """Say now whether pictures can be drawn at all.
-
-    Raises:
-        SimulationError: there is no OpenGL.
-
-    """
+def without_opengl() -> str:
+    """Say why no picture can be drawn, or ''."""
     anything = engine().MjModel.from_xml_string(
         '<mujoco><worldbody><body><freejoint/><geom size="1"/></body></worldbody></mujoco>')
-    Camera(anything, 16, 16).close()
+    try:
+        Camera(anything, 16, 16).close()
+    except SimulationError as error:
+        return str(error)
+    return ''
 
 
 def _opengl(width: int, height: int) -> Any:

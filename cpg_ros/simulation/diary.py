@@ -48,9 +48,8 @@ class Diary:
                 raise SimulationError(f'footfalls {footfalls}: there is no folder '
                                       f'{footfalls.parent}')
         if film is not None:
-            from cpg_ros.simulation.camera import check_film, check_opengl
+            from cpg_ros.simulation.camera import check_film
             check_film(film)
-            check_opengl()
 
     def gait(self, name: str) -> None:
         """Note that a gait begins."""
