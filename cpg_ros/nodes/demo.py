@@ -11,7 +11,7 @@ import sys
 import threading
 import time
 from collections.abc import Iterator, Sequence
-from contextlib import ExitStack, contextmanager, suppress
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 import rclpy
@@ -76,11 +76,46 @@ def running(*arguments: str) -> Iterator[subprocess.Popen]:
     try:
         yield process
     finally:
-        while process.poll() is None:
-            process.terminate()
-            # Whoever presses Ctrl-C again wants it to hurry, not to be left alone.
-            with suppress(KeyboardInterrupt):
-                process.wait()
+        process.terminate()
+        process.wait()
+
+
+class Interruption:
+    """What ends the demonstration from outside: a signal, or the end of a node.
+
+    A signal is only noted, and acted upon where that is safe: raised in the midst of starting a
+    node, an exception would leave that one behind.
+
+    Attributes:
+        nodes: to watch.
+
+    """
+
+    def __init__(self) -> None:
+        self.nodes: list[subprocess.Popen] = []
+        self._noted = False
+        for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+            signal.signal(number, self._note)
+
+    def _note(self, *_: object) -> None:
+        # Whoever presses Ctrl-C again wants the film to be cut short.
+        for node in self.nodes if self._noted else ():
+            node.terminate()
+        self._noted = True
+
+    def look(self) -> None:
+        """Go on if there is nothing.
+
+        Raises:
+            KeyboardInterrupt: there was a signal.
+            DemoError: a node ended.
+
+        """
+        if self._noted:
+            raise KeyboardInterrupt
+        for node in self.nodes:
+            if node.poll() is not None:
+                raise DemoError(f'a node ended with exit code {node.returncode}')
 
 
 def typed() -> queue.Queue:
@@ -100,7 +135,7 @@ def typed() -> queue.Queue:
 
 
 def guide(operator: Operator, gaits: Sequence[str], every: float,
-          nodes: Sequence[subprocess.Popen]) -> None:
+          interruption: Interruption) -> None:
     """Take the robot through the gaits; from the first line that is typed on, as typed.
 
     Where what is typed ends, as in ``echo walk | demo``, the last gait has its time, too.
@@ -119,9 +154,7 @@ def guide(operator: Operator, gaits: Sequence[str], every: float,
     report(gaits[0])
     while tour or due is None or time.monotonic() < due:
         rclpy.spin_once(operator, timeout_sec=0.05)
-        for node in nodes:
-            if node.poll() is not None:
-                raise DemoError(f'a node ended with exit code {node.returncode}')
+        interruption.look()
         wanted = None
         if not lines.empty():
             wanted = lines.get()
@@ -137,7 +170,7 @@ def guide(operator: Operator, gaits: Sequence[str], every: float,
             report(operator.switch(wanted) or wanted)
 
 
-def wait_for(operator: Operator, nodes: Sequence[subprocess.Popen]) -> None:
+def wait_for(operator: Operator, interruption: Interruption) -> None:
     """Wait until the robot stands in its simulation and the generator serves.
 
     Raises:
@@ -147,9 +180,7 @@ def wait_for(operator: Operator, nodes: Sequence[subprocess.Popen]) -> None:
     end = time.monotonic() + PATIENCE
     while operator.place is None or not operator._client.service_is_ready():
         rclpy.spin_once(operator, timeout_sec=0.1)
-        for node in nodes:
-            if node.poll() is not None:
-                raise DemoError(f'a node ended with exit code {node.returncode}')
+        interruption.look()
         if time.monotonic() > end:
             raise DemoError(f'the nodes were not ready after {PATIENCE:g} s')
     for topic, who in (('lh/joint_states', 'generator'), ('odom', 'robot')):
@@ -183,24 +214,22 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except OSError as error:
         print(f'demo: {chosen.out}: {error.strerror}', file=sys.stderr)
         return 2
-    # The nodes must not outlive this process, whoever ends it.
-    for number in (signal.SIGTERM, signal.SIGHUP):
-        signal.signal(number, signal.default_int_handler)
     body = ['robot_sim', '-p', f'rate:={RATE}.0', '-p', f'footfalls:={footfalls}']
     if not chosen.no_film:
         body += ['-p', f'film:={film}']
     generator = ['generator', '-p', 'robot:=unitree_go2', '-p', f'gait:={chosen.gaits[0]}',
                  '-p', f'rate:={RATE}.0', '-p', 'combined_topic:=""']
-    nodes: list[subprocess.Popen] = []
+    interruption = Interruption()
+    nodes = interruption.nodes
     try:
         rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
         operator = Operator()
         with ExitStack() as stack:
             for node in (body, generator):
                 nodes.append(stack.enter_context(running(*node)))
-            wait_for(operator, nodes)
+            wait_for(operator, interruption)
             say('the robot walks; type a gait and Enter to switch, q to end')
-            guide(operator, chosen.gaits, chosen.every, nodes)
+            guide(operator, chosen.gaits, chosen.every, interruption)
     except KeyboardInterrupt:
         pass
     except DemoError as error:
