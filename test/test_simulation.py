@@ -2,6 +2,7 @@
 
 import importlib.util
 import math
+import re
 from pathlib import Path
 
 import numpy as np
@@ -149,6 +150,18 @@ def test_other_models_stand_too(name):
     assert body.feet.sum() == pytest.approx(mass(body) * GRAVITY, rel=0.02)
 
 
+def test_physics_that_diverges_is_known_and_leaves_no_file(tmp_path, monkeypatch, body):
+    monkeypatch.chdir(tmp_path)
+    assert not body.diverged
+    body.push(np.array([1e30, 0.0, 0.0]), 0.1)
+    body.step()
+    body.step()
+    assert body.diverged
+    assert not list(tmp_path.iterdir())
+    body.reset()
+    assert not body.diverged
+
+
 LINK = """<link name="{name}"><inertial><mass value="{mass}"/>
 <inertia ixx="0.01" iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial>
 <collision><origin xyz="0 0 {z}"/><geometry><sphere radius="0.03"/></geometry></collision>
@@ -173,6 +186,13 @@ def urdf(path):
             parent = name
     path.write_text(f'<robot name="own">{"".join(parts)}</robot>')
     return str(path)
+
+
+def test_a_urdf_without_collision_shapes_says_so(tmp_path):
+    path = Path(urdf(tmp_path / 'own.urdf'))
+    path.write_text(re.sub('<collision>.*?</collision>', '', path.read_text()))
+    with pytest.raises(SimulationError, match='could touch the floor'):
+        Body(str(path), ROBOT)
 
 
 def test_a_urdf_stands_on_its_own_feet(tmp_path):
