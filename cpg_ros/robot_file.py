@@ -92,8 +92,8 @@ class _Reader(Reader):
             if not 0.01 <= frequency <= 10.0:
                 raise self.fail(f'{where}.frequency', f'{frequency:g} is not from 0.01 to 10 Hz')
         moved = {}
-        for name in (listed := tree.get('joints', {})) and self.keys(
-                listed, f'{where}.joints', set(), set(joints)):
+        listed = self.keys(tree.get('joints', {}), f'{where}.joints', set(), set(joints))
+        for name in listed:
             place, joint = f'{where}.joints.{name}', joints[name]
             entry = self.keys(listed[name], place, set(),
                               {'offset', 'amplitude', 'weights', 'in_place'})

@@ -185,6 +185,7 @@ def test_motions_survive_writing(robot, tmp_path):
     ('trot.pace', 1, 'gaits.trot.pace: unknown key'),
     ('trot.frequency', 0, 'gaits.trot.frequency: 0 is not from 0.01 to 10 Hz'),
     ('trot.frequency', 'fast', 'gaits.trot.frequency: must be a number'),
+    ('trot.joints', None, 'gaits.trot.joints: must be a mapping'),
     ('trot.joints', ['lh_calf_joint'], 'gaits.trot.joints: must be a mapping'),
     ('trot.joints.tail', {}, 'gaits.trot.joints.tail: unknown key'),
     ('trot.joints.lh_calf_joint.offset', 3.0, 'offset: 3 is outside the limits -2.6 to -0.7'),

@@ -190,7 +190,8 @@ def test_the_inversion_gets_parameters_that_it_declares(described):
 def test_go2_speaks_one_command_and_follows_one_clock(described, given, command, sim_time,
                                                       monkeypatch, tmp_path):
     monkeypatch.chdir(tmp_path)
-    found = described('go2', film='a.gif', gait='walk', cmd_vel='true', **given)
+    monkeypatch.setenv('HOME', str(tmp_path / 'home'))
+    found = described('go2', film='~/films/a.gif', gait='walk', cmd_vel='true', **given)
     generator, simulation = (node_of(found, name) for name in ('generator', 'robot_sim'))
     to_generator = parameters(found, generator)
     known = of_generator('delayed')
@@ -200,11 +201,11 @@ def test_go2_speaks_one_command_and_follows_one_clock(described, given, command,
                             'command': command, 'use_sim_time': sim_time}
     to_simulation = parameters(found, simulation)
     assert to_simulation == {
-        'clock': sim_time, 'robot': 'unitree_go2', 'model': 'go2', 'film': 'a.gif',
+        'clock': sim_time, 'robot': 'unitree_go2', 'model': 'go2', 'film': '~/films/a.gif',
         'footfalls': 'out/footfalls.png', 'duration': 0.0,
         'command': given.get('command', 'joint_states'),
         'real_time_factor': float(given.get('real_time_factor', 1.0))}
-    assert (tmp_path / 'out').is_dir()
+    assert (tmp_path / 'out').is_dir() and (tmp_path / 'home' / 'films').is_dir()
     with contextlib.suppress(ModuleNotFoundError):
         from cpg_ros.nodes.robot_sim import SPECS
         for name, value in to_simulation.items():

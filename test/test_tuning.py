@@ -249,7 +249,8 @@ def test_the_tool_writes_a_robot_file_that_can_be_read(quick, tmp_path, capsys, 
     (['--model', 'nothing'], 1, "model 'nothing'"),
     (['--gaits', 'trot', 'trot'], 2, 'trot is given twice'),
     (['--evaluations', '0'], 2, '0 is not positive'),
-    (['--out', 'no/where/file.yaml'], 2, 'no directory')])
+    (['--out', 'no/where/file.yaml'], 2, 'no directory'),
+    (['--out', '/'], 2, 'is a directory')])
 def test_the_tool_says_what_is_wrong_in_one_line(arguments, code, words, tmp_path, capsys):
     given = ['--robot', str(FILE), '--model', 'go2', '--out', str(tmp_path / 'a.yaml'),
              *arguments]

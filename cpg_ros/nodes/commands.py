@@ -1,6 +1,5 @@
 """Joint commands taken from topics, as a robot's controllers would take them."""
 
-import math
 from collections.abc import Sequence
 from functools import partial
 from typing import Any
@@ -16,6 +15,7 @@ from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 from cpg_ros.nodes.outputs import COMMAND_TOPICS
 from cpg_ros.robot import Robot
+from cpg_ros.robot_file import LARGEST
 
 KINDS = ('joint_states', *COMMAND_TOPICS)
 #: Least time between two warnings about commands, s.
@@ -166,6 +166,6 @@ class Commands:
     def _write(self, topic: str, names: Sequence[str], places: Any, values: Sequence[float]
                ) -> None:
         for name, value in zip(names, values, strict=True):
-            if not math.isfinite(value):
+            if not abs(value) <= LARGEST:
                 raise _Bad(f"{topic}: joint '{name}' at {value}")
         self.angles[places] = values

@@ -11,7 +11,7 @@ import sys
 import threading
 import time
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 import rclpy
@@ -67,7 +67,7 @@ class Operator(Node):
 
 @contextmanager
 def running(*arguments: str) -> Iterator[subprocess.Popen]:
-    """Run one of this package's nodes, out of reach of Ctrl-C, and interrupt it in the end."""
+    """Run one of this package's nodes, out of reach of Ctrl-C, and end it whatever happens."""
     executable, *ros = arguments
     process = subprocess.Popen(
         [f'{get_package_prefix("cpg_ros")}/lib/cpg_ros/{executable}', '--ros-args', *ros],
@@ -76,26 +76,69 @@ def running(*arguments: str) -> Iterator[subprocess.Popen]:
     try:
         yield process
     finally:
-        if process.poll() is None:
-            process.send_signal(signal.SIGINT)
+        process.terminate()
         process.wait()
 
 
+class Interruption:
+    """What ends the demonstration from outside: a signal, or the end of a node.
+
+    A signal is only noted, and acted upon where that is safe: raised in the midst of starting a
+    node, an exception would leave that one behind.
+
+    Attributes:
+        nodes: to watch.
+
+    """
+
+    def __init__(self) -> None:
+        self.nodes: list[subprocess.Popen] = []
+        self._noted = False
+        for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+            signal.signal(number, self._note)
+
+    def _note(self, *_: object) -> None:
+        # Whoever presses Ctrl-C again wants the film to be cut short.
+        for node in self.nodes if self._noted else ():
+            node.terminate()
+        self._noted = True
+
+    def look(self) -> None:
+        """Go on if there is nothing.
+
+        Raises:
+            KeyboardInterrupt: there was a signal.
+            DemoError: a node ended.
+
+        """
+        if self._noted:
+            raise KeyboardInterrupt
+        for node in self.nodes:
+            if node.poll() is not None:
+                raise DemoError(f'a node ended with exit code {node.returncode}')
+
+
 def typed() -> queue.Queue:
-    """Return a queue of the lines that are typed."""
+    """Return a queue of the lines that are typed, and None where they end."""
     lines: queue.Queue = queue.Queue()
 
     def read() -> None:
-        for line in sys.stdin:
-            lines.put(line.strip())
+        # There is none where it was closed; what is no text may come through a pipe.
+        if sys.stdin is not None:
+            sys.stdin.reconfigure(errors='replace')  # type: ignore[union-attr]
+            for line in sys.stdin:
+                lines.put(line.strip())
+        lines.put(None)
 
     threading.Thread(target=read, daemon=True).start()
     return lines
 
 
 def guide(operator: Operator, gaits: Sequence[str], every: float,
-          nodes: Sequence[subprocess.Popen]) -> None:
+          interruption: Interruption) -> None:
     """Take the robot through the gaits; from the first line that is typed on, as typed.
+
+    Where what is typed ends, as in ``echo walk | demo``, the last gait has its time, too.
 
     Raises:
         DemoError: a node ended, or does not answer.
@@ -111,21 +154,23 @@ def guide(operator: Operator, gaits: Sequence[str], every: float,
     report(gaits[0])
     while tour or due is None or time.monotonic() < due:
         rclpy.spin_once(operator, timeout_sec=0.05)
-        for node in nodes:
-            if node.poll() is not None:
-                raise DemoError(f'a node ended with exit code {node.returncode}')
+        interruption.look()
         wanted = None
         if not lines.empty():
-            wanted, due = lines.get(), None
+            wanted = lines.get()
             if wanted == 'q':
                 return
+            if wanted is not None:
+                tour, due = [], None
+            elif due is None:
+                due = time.monotonic() + every
         elif tour and due is not None and time.monotonic() >= due:
             wanted, due = tour.pop(0), due + every
         if wanted:
             report(operator.switch(wanted) or wanted)
 
 
-def wait_for(operator: Operator, nodes: Sequence[subprocess.Popen]) -> None:
+def wait_for(operator: Operator, interruption: Interruption) -> None:
     """Wait until the robot stands in its simulation and the generator serves.
 
     Raises:
@@ -135,11 +180,13 @@ def wait_for(operator: Operator, nodes: Sequence[subprocess.Popen]) -> None:
     end = time.monotonic() + PATIENCE
     while operator.place is None or not operator._client.service_is_ready():
         rclpy.spin_once(operator, timeout_sec=0.1)
-        for node in nodes:
-            if node.poll() is not None:
-                raise DemoError(f'a node ended with exit code {node.returncode}')
+        interruption.look()
         if time.monotonic() > end:
             raise DemoError(f'the nodes were not ready after {PATIENCE:g} s')
+    for topic, who in (('lh/joint_states', 'generator'), ('odom', 'robot')):
+        if operator.count_publishers(topic) > 1:
+            raise DemoError(f'there is another {who} in this ROS domain: end it, or set another '
+                            'ROS_DOMAIN_ID')
 
 
 def parser() -> Parser:
@@ -167,27 +214,31 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except OSError as error:
         print(f'demo: {chosen.out}: {error.strerror}', file=sys.stderr)
         return 2
-    rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
-    operator = Operator()
     body = ['robot_sim', '-p', f'rate:={RATE}.0', '-p', f'footfalls:={footfalls}']
     if not chosen.no_film:
         body += ['-p', f'film:={film}']
+    generator = ['generator', '-p', 'robot:=unitree_go2', '-p', f'gait:={chosen.gaits[0]}',
+                 '-p', f'rate:={RATE}.0', '-p', 'combined_topic:=""']
+    interruption = Interruption()
+    nodes = interruption.nodes
     try:
-        with running(*body) as sim, running(
-                'generator', '-p', 'robot:=unitree_go2', '-p', f'gait:={chosen.gaits[0]}',
-                '-p', f'rate:={RATE}.0', '-p', 'combined_topic:=""') as generator:
-            wait_for(operator, (sim, generator))
+        rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
+        operator = Operator()
+        with ExitStack() as stack:
+            for node in (body, generator):
+                nodes.append(stack.enter_context(running(*node)))
+            wait_for(operator, interruption)
             say('the robot walks; type a gait and Enter to switch, q to end')
-            guide(operator, chosen.gaits, chosen.every, (sim, generator))
+            guide(operator, chosen.gaits, chosen.every, interruption)
     except KeyboardInterrupt:
         pass
     except DemoError as error:
         print(f'demo: {error}', file=sys.stderr)
         return 1
     finally:
-        operator.destroy_node()
         rclpy.try_shutdown()
-    return 1 if sim.returncode or generator.returncode else 0
+    # One that was still starting, and was ended by our signal, did not fail.
+    return 1 if any(node.returncode not in (0, -signal.SIGTERM) for node in nodes) else 0
 
 
 if __name__ == '__main__':

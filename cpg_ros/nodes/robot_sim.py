@@ -100,6 +100,7 @@ class RobotSim(StartedNode):
         self._last = round(self._value('duration') * self._rate)
         self._now, self._began, self._since = 0, 0.0, 0
         self._fallen, self._upright_from = False, -1.0
+        self._time = 0.0
         self._clock_message = Clock()
         self._tell_time: Publisher | None = None
         if self._value('clock') or not factor:
@@ -140,10 +141,13 @@ class RobotSim(StartedNode):
         return response
 
     def _stand_up(self) -> None:
+        self._begin_again()
+        self.get_logger().info('standing at the origin')
+
+    def _begin_again(self) -> None:
         """Put it at the origin, at the angles that are commanded, so that nothing jerks."""
         self._body.reset(self._commands.angles)
         self._since, self._fallen, self._upright_from = self._now, False, -1.0
-        self.get_logger().info('standing at the origin')
 
     # -- the thread -----------------------------------------------------------------------
 
@@ -175,6 +179,13 @@ class RobotSim(StartedNode):
         for _ in range(self._steps):
             body.step()
         self._now += 1
+        # MuJoCo begins anew by itself then: time tells, and is cheap to look at.
+        if body.time <= self._time and body.diverged:
+            self.get_logger().error(
+                'the physics has diverged, from too hard a push, or because kp and kd do not go '
+                'with the timestep: standing at the origin again', throttle_duration_sec=1.0)
+            self._begin_again()
+        self._time = body.time
         self._measurements.publish(stamp)
         self._diary.look(self._now / self._rate)
         if body.fallen:

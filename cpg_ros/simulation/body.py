@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from cpg_ros.robot import Robot
-from cpg_ros.simulation.model import engine, legs, load
+from cpg_ros.simulation.model import SimulationError, engine, legs, load
 
 #: A base that leans more than this has fallen, rad.
 FALLEN = math.radians(60.0)
@@ -67,7 +67,11 @@ class Body:
     def reset(self, angles: np.ndarray | None = None) -> None:
         """Put the body upright at the origin, still, at these angles (rad) or in its stand.
 
-        The lowest of what the legs' last joints move just touches the floor.
+        Its lowest point just touches the floor.
+
+        Raises:
+            SimulationError: nothing of it could.
+
         """
         mujoco, data = engine(), self.data
         angles = self.stand if angles is None else np.asarray(angles, dtype=float)
@@ -88,6 +92,10 @@ class Body:
         own = [geom for geom in range(model.ngeom)
                if model.body_rootid[model.geom_bodyid[geom]] == self._base
                and (model.geom_contype[geom] or model.geom_conaffinity[geom])]
+        if not planes or not own:
+            raise SimulationError(f"the model of '{self.robot.name}' has no "
+                                  + ('shapes that could touch the floor (a URDF needs '
+                                     '<collision>)' if planes else 'floor'))
         return min(mujoco.mj_geomDistance(model, self.data, plane, geom, 100.0, None)
                    for plane in planes for geom in own)
 
@@ -112,6 +120,14 @@ class Body:
     def time(self) -> float:
         """Since the reset, s."""
         return self.data.time
+
+    @property
+    def diverged(self) -> bool:
+        """Whether the physics has run away since the reset; MuJoCo then begins anew by itself."""
+        mujoco, warning = engine(), self.data.warning
+        return any(warning[int(kind)].number for kind in (
+            mujoco.mjtWarning.mjWARN_BADQPOS, mujoco.mjtWarning.mjWARN_BADQVEL,
+            mujoco.mjtWarning.mjWARN_BADQACC))
 
     @property
     def position(self) -> np.ndarray:

@@ -34,6 +34,7 @@ class Diary:
 
         """
         self._body, self._film, self._footfalls = body, film, footfalls
+        self._fps = min(FRAMES, rate)
         self._frames = _Every(rate, FRAMES)
         self._samples = _Every(rate, SAMPLES)
         self._poses: deque[np.ndarray] = deque(maxlen=round(KEPT * FRAMES))
@@ -83,7 +84,7 @@ class Diary:
         if self._film is not None and self._poses:
             from cpg_ros.simulation.camera import shoot
             model = load(name, self._body.robot, visual=True)
-            shoot(self._film, model, self._poses, FRAMES, enough=enough)
+            shoot(self._film, model, self._poses, self._fps, enough=enough)
             written.append(self._film)
         return written
 

@@ -37,7 +37,13 @@ def engine() -> ModuleType:
     except ImportError as error:
         raise SimulationError("the simulation needs MuJoCo (pip install 'cpg-ros[sim]'): "
                               f'{error}') from error
+    # By default MuJoCo writes them into a file MUJOCO_LOG.TXT wherever one happens to be.
+    mujoco.set_mju_user_warning(_quietly)
     return mujoco
+
+
+def _quietly(_: str) -> None:
+    """Leave a warning to those who ask for it, see ``Body.diverged``."""
 
 
 def find_model(name: str) -> Path:

@@ -112,6 +112,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         # Now, and not when the work is done.
         if not chosen.out.parent.is_dir():
             parser.error(f'argument --out: there is no directory {chosen.out.parent}')
+        if chosen.out.is_dir():
+            parser.error(f'argument --out: {chosen.out} is a directory')
         robot, found = tune(robot, chosen.model, chosen.gaits, chosen.evaluations, chosen.seed)
         lines = figures(found)
         command = shlex.join(['ros2', 'run', 'cpg_ros', 'tune', *arguments])

