@@ -46,7 +46,7 @@ def nodes(context):
     simulated = float(LaunchConfiguration('real_time_factor').perform(context)) != 1.0
     return [started(context, 'generator', 'cpg_generator', {**BOTH, **GENERATOR}, {
                 'rate': 500.0, 'combined_topic': '', 'command': COMMANDS.get(command, command),
-                'use_sim_time': simulated}),
+                'use_sim_time': simulated}, on_exit=Shutdown()),
             started(context, 'robot_sim', 'robot_sim', {**BOTH, **SIMULATION}, {
                 'clock': simulated}, on_exit=Shutdown(), sigterm_timeout=DRAWING)]
 

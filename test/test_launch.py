@@ -210,7 +210,8 @@ def test_go2_speaks_one_command_and_follows_one_clock(described, given, command,
         from cpg_ros.nodes.robot_sim import SPECS
         for name, value in to_simulation.items():
             assert type(value) is type(SPECS[name].default), name
-    assert 'on_exit' in simulation.options and 'on_exit' not in generator.options
+    # Neither is of use without the other.
+    assert 'on_exit' in simulation.options and 'on_exit' in generator.options
 
 
 def test_rviz_shows_the_urdf_of_the_robot(described, tmp_path):

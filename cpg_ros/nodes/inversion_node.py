@@ -9,13 +9,10 @@ import traceback
 from functools import partial
 from pathlib import Path
 
-import rclpy
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
 from rcl_interfaces.srv import SetParametersAtomically
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.exceptions import NameValidationException, ParameterException
-from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
-from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.qos_overriding_options import QoSOverridingOptions
@@ -29,7 +26,8 @@ from std_srvs.srv import Trigger
 from cpg_ros.fitting.fitted import write_fitted
 from cpg_ros.fitting.inverted import Inverted, inverted
 from cpg_ros.fitting.live import Live
-from cpg_ros.nodes.ending import ended
+from cpg_ros.nodes import starting
+from cpg_ros.nodes.starting import StartedNode, StartError
 from cpg_ros.robot import Robot
 from cpg_ros.robot_file import find_robot
 from cpg_ros.tools.arguments import finite
@@ -40,7 +38,7 @@ NAME = 'cpg_inversion'
 PATIENCE = 3.0
 
 
-class Inversion(Node):
+class Inversion(StartedNode):
     """Joint states in; on ~/fit parameters, files, and a running generator set."""
 
     def __init__(self) -> None:
@@ -96,7 +94,6 @@ class Inversion(Node):
         self.create_service(Trigger, '~/fit', self._fit, callback_group=self._group)
         self._timer: Timer | None = None
         self._busy = False
-        self.thread: threading.Thread | None = None
         self._often(self._value('every'))
         self.add_post_set_parameters_callback(self._changed)
         self.get_logger().info(f'listening to {", ".join(topics)}; call ~/fit')
@@ -225,22 +222,13 @@ def _summary(found: Inverted) -> str:
             f'{100 * fit.mean_rms_share:.1f} % of range')
 
 
-def run(args: list[str] | None = None) -> int:
-    """Run the node until it is interrupted; return the exit code."""
-    rclpy.init(args=args)
+def _started() -> Inversion:
     try:
-        node = Inversion()
+        return Inversion()
     except (ValueError, ParameterException, NameValidationException) as error:
-        rclpy.logging.get_logger(NAME).fatal(' '.join(str(error).split()))
-        rclpy.try_shutdown()
-        return 1
-    executor = SingleThreadedExecutor()
-    executor.add_node(node)
-    try:
-        executor.spin()
-    except (KeyboardInterrupt, ExternalShutdownException):
-        pass
-    finally:
-        executor.shutdown(timeout_sec=1.0)
-        rclpy.try_shutdown()
-    return ended(0, node.thread)
+        raise StartError(' '.join(str(error).split())) from error
+
+
+def run(args: list[str] | None = None) -> int:
+    """Run the node until SIGINT or SIGTERM; return the exit code."""
+    return starting.run(_started, NAME, args)

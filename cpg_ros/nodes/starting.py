@@ -30,6 +30,7 @@ class StartedNode(Node):
     Attributes:
         stop: set when the node is to end.
         failure: what ended the thread, if anything did.
+        thread: one that may be at work when the node ends, and need not come to its end.
 
     """
 
@@ -38,6 +39,7 @@ class StartedNode(Node):
         self._parameter_service = StrictParameterService(self)
         self._doubles: set[str] = set()
         self.failure: BaseException | None = None
+        self.thread: threading.Thread | None = None
         self.stop = threading.Event()
 
     def _declare(self, name: str, spec: Spec) -> None:
@@ -125,4 +127,5 @@ def run(make: Callable[[], StartedNode], name: str, args: list[str] | None) -> i
     node.finish()
     executor.shutdown(timeout_sec=0.1)
     rclpy.shutdown()
-    return ended(0 if node.failure is None else 1, serving)
+    code = 0 if node.failure is None else 1
+    return ended(ended(code, node.thread), serving)
