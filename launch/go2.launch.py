@@ -27,8 +27,8 @@ SIMULATION = {
     'command': ('joint_states', str, 'what moves the robot: joint_states, joint_trajectory or '
                 'forward_position'),
     'real_time_factor': ('1.0', float, 'speed of simulated time; 0 for as fast as it can'),
-    'film': ('out/go2.gif', str, "film to write, .gif or .mp4; none: film:=\"''\""),
-    'footfalls': ('out/footfalls.png', str, "picture of the footfalls to write; none: \"''\""),
+    'film': ('out/go2.gif', str, 'film to write, .gif or .mp4, or none'),
+    'footfalls': ('out/footfalls.png', str, 'picture of the footfalls to write, or none'),
     'duration': ('0.0', float, 'end after this much simulated time [s]; 0 for never'),
 }
 #: After Ctrl-C the film still has to be drawn: seconds until the simulation is ended.
@@ -40,15 +40,19 @@ COMMANDS = {'joint_states': 'none'}
 def nodes(context):
     """Return generator and simulation, which speak the same command and follow one clock."""
     command = LaunchConfiguration('command').perform(context)
+    unwanted = {}
     for picture in ('film', 'footfalls'):
         path = Path(LaunchConfiguration(picture).perform(context)).expanduser()
-        path.parent.mkdir(parents=True, exist_ok=True)
+        if str(path) == 'none':
+            unwanted[picture] = ''
+        else:
+            path.parent.mkdir(parents=True, exist_ok=True)
     simulated = float(LaunchConfiguration('real_time_factor').perform(context)) != 1.0
     return [started(context, 'generator', 'cpg_generator', {**BOTH, **GENERATOR}, {
                 'rate': 500.0, 'combined_topic': '', 'command': COMMANDS.get(command, command),
                 'use_sim_time': simulated}, on_exit=Shutdown()),
             started(context, 'robot_sim', 'robot_sim', {**BOTH, **SIMULATION}, {
-                'clock': simulated}, on_exit=Shutdown(), sigterm_timeout=DRAWING)]
+                'clock': simulated, **unwanted}, on_exit=Shutdown(), sigterm_timeout=DRAWING)]
 
 
 def generate_launch_description():

@@ -214,6 +214,14 @@ def test_go2_speaks_one_command_and_follows_one_clock(described, given, command,
     assert 'on_exit' in simulation.options and 'on_exit' in generator.options
 
 
+def test_go2_without_pictures(described, monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    found = described('go2', film='none', footfalls='none')
+    to_simulation = parameters(found, node_of(found, 'robot_sim'))
+    assert to_simulation['film'] == to_simulation['footfalls'] == ''
+    assert not list(tmp_path.iterdir())
+
+
 def test_rviz_shows_the_urdf_of_the_robot(described, tmp_path):
     urdf = tmp_path / 'my.urdf'
     text = ('<robot name="mine"><joint name="a" type="continuous"><parent link="trunk"/>'

@@ -125,6 +125,9 @@ def run(make: Callable[[], StartedNode], name: str, args: list[str] | None) -> i
     while not node.stop.wait(0.2):
         pass
     node.finish()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        # It ends already: a second one, while the interpreter winds up, would kill it.
+        signal.signal(number, signal.SIG_IGN)
     executor.shutdown(timeout_sec=0.1)
     rclpy.shutdown()
     code = 0 if node.failure is None else 1
