@@ -20,7 +20,7 @@ def robot(tmp_path_factory):
 @pytest.fixture
 def walker(start, robot):
     process, watcher = start('-p', f'robot:={robot}', '-p', 'cmd_vel:=true', '-p', f'rate:={RATE}',
-                             '-p', 'ramp:=0.3', '-p', 'cmd_vel_timeout:=0.4',
+                             '-p', 'ramp:=0.3', '-p', 'cmd_vel_timeout:=0.8',
                              '-p', 'transition:=0.3')
     publisher = watcher.node.create_publisher(Twist, 'cmd_vel', 10)
     until(publisher.get_subscription_count, 'the generator listening')
@@ -80,7 +80,6 @@ def test_it_walks_as_asked_and_stands_otherwise(walker):
     ask(0.0, 0.0, 0.3)
     recent = np.array([sample[1] for sample in watcher.samples[-20:]])
     assert np.ptp(recent, axis=0).max() == 0.0
-    assert process.log.count('stopping') == 1
 
 
 def test_enable_comes_before_cmd_vel(walker):
@@ -89,7 +88,7 @@ def test_enable_comes_before_cmd_vel(walker):
     assert answer.success
     ask(0.3, 0.0, 1.0)
     assert still(watcher)
-    time.sleep(0.5)
+    time.sleep(1.2)
     answer = watcher.call(SetBool, '/cpg_generator/enable', SetBool.Request(data=True))
     assert answer.message == 'enabled: standing until cmd_vel asks for motion'
     ask(0.3, 0.0, 0.8)
@@ -152,4 +151,4 @@ def test_the_timeout_has_a_range(walker):
     _, watcher, _, _ = walker
     refused = watcher.set(cmd_vel_timeout=0.0)[0]
     assert not refused.successful and 'cmd_vel_timeout' in refused.reason
-    assert watcher.get('cmd_vel_timeout') == [0.4]
+    assert watcher.get('cmd_vel_timeout') == [0.8]
