@@ -5,18 +5,19 @@ Usage: python recorder.py BAG TOPIC...
 
 import signal
 import sys
-from contextlib import suppress
 from functools import partial
 
 import rclpy
 from bags import JOINT_STATE, STORE
-from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.signals import SignalHandlerOptions
 from rosbags.rosbag2 import StoragePlugin, Writer
 from sensor_msgs.msg import JointState
 
 
 def main(path, *topics):
-    rclpy.init()
+    # The context stays valid while the executor builds its next wait on it.
+    rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
     node = rclpy.create_node('recorder')
     with Writer(path, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
         for topic in topics:
@@ -27,14 +28,15 @@ def main(path, *topics):
 
             node.create_subscription(JointState, topic, partial(write, connection), 5000,
                                      raw=True)
-        signal.signal(signal.SIGINT, lambda *_: rclpy.try_shutdown())
+        ending = []
+        signal.signal(signal.SIGINT, lambda *_: ending.append(True))
         print('recording', flush=True)
         executor = SingleThreadedExecutor()
         executor.add_node(node)
-        with suppress(KeyboardInterrupt, ExternalShutdownException):
-            while rclpy.ok():
-                # In vain waits end: a signal that comes in one is seen at its end only.
-                executor.spin_once(timeout_sec=0.2)
+        while not ending:
+            # In vain waits end: a signal that comes in one is seen at its end only.
+            executor.spin_once(timeout_sec=0.2)
+    rclpy.shutdown()
 
 
 if __name__ == '__main__':
