@@ -13,17 +13,14 @@ import time
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
-from typing import Any
 
 import rclpy
 from ament_index_python.packages import get_package_prefix
 from nav_msgs.msg import Odometry
 from rcl_interfaces.srv import SetParametersAtomically
-from rclpy.client import Client
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.signals import SignalHandlerOptions
-from std_srvs.srv import SetBool
 
 from cpg_ros.tools.arguments import Parser, say
 
@@ -46,7 +43,6 @@ class Operator(Node):
         self.place: tuple[float, float] | None = None
         self._client = self.create_client(SetParametersAtomically,
                                           'cpg_generator/set_parameters_atomically')
-        self._enable = self.create_client(SetBool, 'cpg_generator/enable')
         self.create_subscription(Odometry, 'odom', self._odom, 1)
 
     def _odom(self, message: Odometry) -> None:
@@ -61,31 +57,17 @@ class Operator(Node):
         """
         request = SetParametersAtomically.Request(
             parameters=[Parameter('gait', value=gait).to_parameter_msg()])
-        result = self._answer(self._client, request).result
-        return '' if result.successful else result.reason
-
-    def begin(self) -> None:
-        """Let the robot walk: it stands until the body is there, and ramps in from the stand.
-
-        Raises:
-            DemoError: the generator does not answer.
-
-        """
-        self._answer(self._enable, SetBool.Request(data=True))
+        answer = self._client.call_async(request)
+        rclpy.spin_until_future_complete(self, answer, timeout_sec=10.0)
+        response = answer.result()
+        if response is None:
+            raise DemoError('the generator does not answer')
+        return '' if response.result.successful else response.result.reason
 
     @property
     def ready(self) -> bool:
         """Whether the body is there and the generator serves."""
-        return self.place is not None and all(
-            client.service_is_ready() for client in (self._client, self._enable))
-
-    def _answer(self, client: Client, request: Any) -> Any:
-        answer = client.call_async(request)
-        rclpy.spin_until_future_complete(self, answer, timeout_sec=10.0)
-        result = answer.result()
-        if result is None:
-            raise DemoError('the generator does not answer')
-        return result
+        return self.place is not None and self._client.service_is_ready()
 
 
 @contextmanager
@@ -241,7 +223,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if not chosen.no_film:
         body += ['-p', f'film:={film}']
     generator = ['generator', '-p', 'robot:=unitree_go2', '-p', f'gait:={chosen.gaits[0]}',
-                 '-p', f'rate:={RATE}.0', '-p', 'combined_topic:=""', '-p', 'autostart:=false']
+                 '-p', f'rate:={RATE}.0', '-p', 'combined_topic:=""']
     interruption = Interruption()
     nodes = interruption.nodes
     try:
@@ -251,7 +233,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
             for node in (body, generator):
                 nodes.append(stack.enter_context(running(*node)))
             wait_for(operator, interruption)
-            operator.begin()
             say('the robot walks; type a gait and Enter to switch, q to end')
             guide(operator, chosen.gaits, chosen.every, interruption)
     except KeyboardInterrupt:

@@ -25,6 +25,7 @@ from cpg_ros.nodes.settings import Spec
 from cpg_ros.nodes.starting import StartedNode, StartError, run
 from cpg_ros.nodes.ticker import Ticker
 from cpg_ros.robot_file import RobotError, find_robot
+from cpg_ros.simulation.approach import Approach
 from cpg_ros.simulation.body import Body
 from cpg_ros.simulation.camera import without_opengl
 from cpg_ros.simulation.diary import Diary, summary
@@ -33,8 +34,12 @@ from cpg_ros.simulation.model import SimulationError
 NAME = 'robot_sim'
 #: How long the force of one message on ~/push acts, s of simulated time.
 PUSH = 0.1
+#: Least real_time_factor but 0.
+SLOWEST = 1e-3
 #: A robot is up again after a fall once it has not been down for this long, s.
 BOUNCE = 1.0
+#: From the stand to commands that are elsewhere, s of simulated time.
+APPROACH = 1.0
 
 SPECS = {
     'robot': Spec('unitree_go2', 'robot file, or the name of a shipped one',
@@ -48,8 +53,9 @@ SPECS = {
                  '[Hz]', 1.0, 2000.0),
     'timestep': Spec(0.002, 'of the physics [s]; a period of the rate holds a whole number of '
                      'them', 1e-5, 0.02),
-    'real_time_factor': Spec(1.0, 'simulated time by real time; 0 runs as fast as it can, in '
-                             'lockstep with a generator that uses simulated time', 0.0, 100.0),
+    'real_time_factor': Spec(1.0, 'simulated time by real time, from 0.001; 0 runs as fast as it '
+                             'can, in lockstep with a generator that uses simulated time',
+                             0.0, 100.0),
     'clock': Spec(False, 'publish /clock, and stamp by it; so it is, too, where '
                   'real_time_factor is 0'),
     'film': Spec('', 'film to leave (.gif or .mp4) of the last minute; empty for none'),
@@ -80,6 +86,8 @@ class RobotSim(StartedNode):
             raise StartError(f'rate {self._rate:g} Hz and timestep {timestep:g} s do not fit: '
                              f'a period of {1.0 / self._rate:g} s must hold a whole number '
                              'of time steps')
+        if 0.0 < factor < SLOWEST:
+            raise StartError(f'real_time_factor {factor:g} is neither 0 nor from {SLOWEST:g} on')
         film, footfalls = (Path(name).expanduser() if name else None
                            for name in map(self._value, ('film', 'footfalls')))
         try:
@@ -95,6 +103,7 @@ class RobotSim(StartedNode):
 
         self._commands = Commands(self, robot, self._value('command'), 1.0 / self._rate,
                                   self._body.stand)
+        self._approach = Approach(max(1, round(APPROACH * self._rate)), self._body.stand)
         self._measurements = Measurements(self, self._body)
         self._requests: deque = deque()
         self._last = round(self._value('duration') * self._rate)
@@ -145,8 +154,9 @@ class RobotSim(StartedNode):
         self.get_logger().info('standing at the origin')
 
     def _begin_again(self) -> None:
-        """Put it at the origin, at the angles that are commanded, so that nothing jerks."""
-        self._body.reset(self._commands.angles)
+        """Put it at the origin, in its stand, from where it approaches what is commanded."""
+        self._body.reset()
+        self._approach.begin(self._body.stand)
         self._since, self._fallen, self._upright_from = self._now, False, -1.0
 
     # -- the thread -----------------------------------------------------------------------
@@ -175,7 +185,7 @@ class RobotSim(StartedNode):
         body = self._body
         while self._requests:
             self._requests.popleft()()
-        body.command(self._commands.angles)
+        body.command(self._approach.towards(self._commands.angles))
         for _ in range(self._steps):
             body.step()
         self._now += 1

@@ -64,8 +64,8 @@ class Body:
         self._turn, self._twist = np.zeros(9), np.zeros(6)
         self.reset()
 
-    def reset(self, angles: np.ndarray | None = None) -> None:
-        """Put the body upright at the origin, still, at these angles (rad) or in its stand.
+    def reset(self) -> None:
+        """Put the body upright at the origin, still, in its stand.
 
         Its lowest point just touches the floor.
 
@@ -74,14 +74,13 @@ class Body:
 
         """
         mujoco, data = engine(), self.data
-        angles = self.stand if angles is None else np.asarray(angles, dtype=float)
         mujoco.mj_resetData(self.model, data)
         self._pushed = 0
-        data.qpos[self._angles] = angles
+        data.qpos[self._angles] = self.stand
         self._pose[:] = 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0
         mujoco.mj_kinematics(self.model, data)
         self._pose[2] = -self._clearance()
-        self.command(angles)
+        self.command(self.stand)
         mujoco.mj_forward(self.model, data)
 
     def _clearance(self) -> float:
