@@ -18,6 +18,9 @@ ARGUMENTS = {
     'preset': ('', str, "shipped set for parameters that are not free; empty: the gait's"),
     'free': ('', list[str], "parameters to fit, as [c, tau]; empty: the network's usual ones"),
     'order': ('3', int, 'order of the readout, 1 to 3'),
+    'kp': ('0.0', float, 'gain of the joints [N m/rad], to fit what they were told; 0 fits what '
+           'they did'),
+    'kd': ('0.0', float, 'damping gain of the joints [N m s/rad]'),
     'out': ('', str, 'parameter file to write; empty for none'),
     'report': ('', str, 'page to write; empty for none'),
     'apply_to': ('', str, 'generator to set after a fit, as /cpg_generator; empty for none'),

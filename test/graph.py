@@ -1,5 +1,6 @@
 """Real processes on a real ROS graph: a generator in a domain of its own, and its watcher."""
 
+import itertools
 import os
 import re
 import signal
@@ -23,12 +24,16 @@ from std_msgs.msg import Float64MultiArray, String
 EXECUTABLE = Path(get_package_prefix('cpg_ros')) / 'lib' / 'cpg_ros' / 'generator'
 #: Long enough for a loaded machine; nothing waits that long when all is well.
 PATIENCE = 60.0
-_domains = iter(range(100, 230))
+#: Which of the processes that share the tests this one is, and how many there are.
+WORKER = int(os.environ.get('PYTEST_XDIST_WORKER', 'gw0')[2:])
+WORKERS = int(os.environ.get('PYTEST_XDIST_WORKER_COUNT', '1'))
+_domains = itertools.count(WORKER, WORKERS)
 
 
 def free_domain() -> int:
     """Give every test a ROS domain of its own, apart from other test runs on the machine."""
-    return 100 + (next(_domains) + 7 * os.getpid()) % 130
+    run = os.getpid() if WORKERS == 1 else os.getppid()
+    return 100 + (next(_domains) + 7 * run) % 130
 
 
 class Process:

@@ -51,21 +51,26 @@ def batches(draw):
 def by_the_library(message):
     decoded = STORE.deserialize_cdr(message, JOINT_STATE)
     stamp = decoded.header.stamp
-    return stamp.sec * 10**9 + stamp.nanosec, tuple(decoded.name), decoded.position
+    return (stamp.sec * 10**9 + stamp.nanosec, tuple(decoded.name), decoded.position,
+            decoded.velocity, decoded.effort)
 
 
 def assert_decoded_as_by_the_library(batch):
-    found = {}
-    for block in decode(batch):
-        for row, stamp, position in zip(block.rows, block.stamps, block.positions, strict=True):
-            assert row not in found
-            found[int(row)] = (int(stamp), block.names, position)
-    assert sorted(found) == list(range(len(batch)))
-    for row, message in enumerate(batch):
-        stamp, own, position = by_the_library(message)
-        assert found[row][:2] == (stamp, own)
-        # The bits, so that signs of zero and what is no number count too.
-        assert found[row][2].tobytes() == np.ascontiguousarray(position, float).tobytes()
+    for efforts in (False, True):
+        found = {}
+        for block in decode(batch, efforts):
+            fields = (block.positions, block.velocities, block.efforts)[:3 if efforts else 1]
+            for row, stamp, *numbers in zip(block.rows, block.stamps, *fields, strict=True):
+                assert row not in found
+                found[int(row)] = (int(stamp), block.names, *numbers)
+        assert sorted(found) == list(range(len(batch)))
+        for row, message in enumerate(batch):
+            known = by_the_library(message)
+            assert found[row][:2] == known[:2]
+            # The bits, so that signs of zero and what is no number count too.
+            assert [one.tobytes() for one in found[row][2:]] == [
+                np.ascontiguousarray(one, float).tobytes()
+                for one in known[2:5 if efforts else 3]]
 
 
 @given(batches())
@@ -177,7 +182,7 @@ def test_partial_messages_of_one_topic_are_merged_by_name(tmp_path, storage):
     messages, angles = walk(50)
     halves = []
     for topic, received, data in messages:
-        stamp, own, position = by_the_library(data)
+        stamp, own, position = by_the_library(data)[:3]
         halves.append((topic, received, joint_state(stamp, own[:6], position[:6])))
         halves.append((topic, received + 1, joint_state(stamp, own[6:], position[6:])))
     recording = read_bag(write_bag(tmp_path / 'walk', halves, storage))
@@ -286,7 +291,7 @@ def test_a_bag_of_anything_is_read_as_the_library_reads_it_or_refused(batch, tmp
         return
     # Each finite position of each joint at its stamp, the first one.
     with Reader(path) as reader:
-        read = [by_the_library(data) for _, _, data in reader.messages()]
+        read = [by_the_library(data)[:3] for _, _, data in reader.messages()]
     stamps = [stamp for stamp, own, position in read if len(own) == len(position)]
     stamped = any(stamps)
     dated = max(stamps) > 10**17

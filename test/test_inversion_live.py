@@ -143,6 +143,13 @@ def test_live_fits_on_call_written_and_applied(ending, tmp_path):
                      Parameter('apply_to', value='').to_parameter_msg()]))
     answer = watcher.call(Trigger, '/cpg_inversion/fit', Trigger.Request())
     assert answer.success and 'trot at 2.0' in answer.message
+    # A generator's joint states have no efforts. Whole numbers are doubles, too.
+    assert watcher.call(SetParametersAtomically, '/cpg_inversion/set_parameters_atomically',
+                        SetParametersAtomically.Request(parameters=[
+                            Parameter('kp', value=60).to_parameter_msg()])).result.successful
+    answer = watcher.call(Trigger, '/cpg_inversion/fit', Trigger.Request())
+    assert not answer.success
+    assert 'no message with positions, velocities and efforts' in answer.message
     node.signal(signal.SIGINT)
     assert node.wait() == 0
     assert 'Traceback' not in node.log

@@ -223,6 +223,11 @@ def test_what_is_no_gait_is_refused_and_not_fitted(tmp_path, capsys, signals):
     (('--bag', '{bag}', '--free', 'c', '--start', 'tau=1'), 'tau'),
     (('--bag', '{bag}', '--out', 'nowhere/a.yaml'), 'there is no folder nowhere'),
     (('--bag', '{bag}', '--out', 'a.txt'), 'does not end in .yaml'),
+    (('--csv', '{csv}', '--kp', '60'), '--kp: a CSV file has no efforts'),
+    (('--bag', '{bag}', '--kp', '60'), 'no message with positions, velocities and efforts'),
+    (('--bag', '{bag}', '--kp', '-3'), 'kp -3 must be positive'),
+    (('--bag', '{bag}', '--kp', 'nan'), 'kp nan must be positive'),
+    (('--bag', '{bag}', '--kd', '2'), '--kd: without --kp'),
     (('--csv', '{csv}', '--unit', 'grad'), '--unit')])
 def test_nonsense_ends_in_one_line(bag, tmp_path, capsys, arguments, words):
     table = table_of(tmp_path / 'walk.csv', *walked(seconds=3.0))

@@ -1,12 +1,11 @@
 """The Morris-Lecar networks in the generator: as the delayed one, by the same services."""
 
-from itertools import pairwise
 from pathlib import Path
 
-import numpy as np
 import pytest
 from ament_index_python.packages import get_package_share_directory
 from graph import Process, Watcher, until
+from switches import check_all_switches, off
 
 from cpg_ros.dynamics.program import plan
 from cpg_ros.networks.presets import write_presets
@@ -34,48 +33,12 @@ def live(request):
     process.end()
 
 
-def tour(names):
-    """Visit every ordered pair of names once, one after the other."""
-    edges = {name: [other for other in names if other != name] for name in names}
-    path, stack = [], [names[0]]
-    while stack:
-        if edges[stack[-1]]:
-            stack.append(edges[stack[-1]].pop())
-        else:
-            path.append(stack.pop())
-    return path[::-1]
-
-
 def test_all_ordered_pairs_switch_without_a_jerk(live):
     network, _, watcher = live
     robot = load_robot(CONFIG / f'{network}.yaml')
-    gaits = [name for name, preset in PRESETS[network].items() if name == preset.gait]
-    programs = {gait: plan(robot, gait, PRESETS[network][gait], PRESETS[network][gait].network,
-                           3.0) for gait in gaits}
-    offset = robot.column('offset')
-    way = tour(gaits)
-    assert len(set(pairwise(way))) == len(gaits) * (len(gaits) - 1)
-    watcher.set(gait=way[0])
-    watcher.record(0.6)
-    for old, new in pairwise(way):
-        first = len(watcher.samples)
-        assert watcher.set(gait=new)[0].successful
-        watcher.record(0.5)
-        times, positions, _ = (np.array(part) for part in
-                               zip(*watcher.samples[first:], strict=True))
-        positions = positions[:, [watcher.names.index(j.name) for j in robot.joints]]
-        assert np.abs(np.diff(times) - 0.005).max() < 1e-3, 'a message is missing'
-        speed = np.maximum(programs[old].speed, programs[new].speed)
-        steps = np.abs(np.diff(positions, axis=0))
-        assert (steps <= 0.005 * speed * 1.001 + 1e-9).all(), (old, new)
-        low = np.minimum(programs[old].span[0], programs[new].span[0]) + offset
-        high = np.maximum(programs[old].span[1], programs[new].span[1]) + offset
-        assert (positions >= low - 1e-5).all() and (positions <= high + 1e-5).all(), (old, new)
-        if new in PHASES[network]:
-            seen = watcher.next_phases(20)
-            late = (seen - seen[:, :1] - PHASES[network][new] + 0.5) % 1.0 - 0.5
-            assert np.abs(late).max() < 0.02, (old, new)
-        assert watcher.gaits[-1] == new
+    programs = {name: plan(robot, name, preset, preset.network, 3.0)
+                for name, preset in PRESETS[network].items() if name == preset.gait}
+    check_all_switches(watcher, robot, programs, PHASES[network], 0.5)
 
 
 def test_every_gait_comes_to_its_phases_and_stays_healthy(live):
@@ -86,7 +49,7 @@ def test_every_gait_comes_to_its_phases_and_stays_healthy(live):
         assert watcher.set(gait=gait)[0].successful
         watcher.record(1.0)
         seen = watcher.next_phases(20)
-        assert np.abs((seen - seen[:, :1] - expected + 0.5) % 1.0 - 0.5).max() < 1e-3, gait
+        assert off(seen, expected) < 1e-3, gait
         begin = len(watcher.diagnostics)
         health = until(lambda begin=begin: watcher.diagnostics[begin + 1:], 'diagnostics')[-1]
         values = {pair.key: pair.value for pair in health.values}

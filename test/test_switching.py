@@ -1,6 +1,5 @@
 """Gaits and parameters changed while the robot moves, through the real parameter services."""
 
-import itertools
 from pathlib import Path
 
 import numpy as np
@@ -8,6 +7,7 @@ import pytest
 from ament_index_python.packages import get_package_share_directory
 from graph import until
 from std_srvs.srv import SetBool
+from switches import by_leg, check_all_switches, off
 
 from cpg_ros.dynamics.program import plan
 from cpg_ros.networks.delayed import GAITS, PRESETS
@@ -20,43 +20,13 @@ PHASES = {'pronk': (0, 0, 0, 0), 'pace': (0, .5, 0, .5), 'bound': (0, 0, .5, .5)
           'trot': (0, .5, .5, 0), 'jump': (0, 0, .75, .75), 'walk': (0, .5, .75, .25)}
 
 
-def by_leg(watcher, table):
-    """Reorder recorded joints from the declared order to that of the robot's legs."""
-    return table[:, [watcher.names.index(joint.name) for joint in ROBOT.joints]]
-
-
-def off(measured, expected):
-    """Distance of leg phases from a gait's, in cycles."""
-    return np.abs((measured - measured[:, :1] - expected + 0.5) % 1.0 - 0.5).max()
-
-
 @pytest.fixture(scope='module')
 def programs():
     return {gait: plan(ROBOT, gait, PRESETS[gait], PRESETS[gait].network, 2.0) for gait in GAITS}
 
 
 def test_all_ordered_pairs_switch_without_a_jerk(running, programs):
-    _, watcher = running
-    pairs = list(itertools.permutations(GAITS, 2))
-    assert len(pairs) == 30
-    for old, new in pairs:
-        assert watcher.set(gait=old)[0].successful
-        watcher.record(0.6)
-        first = len(watcher.samples)
-        assert watcher.set(gait=new)[0].successful
-        watcher.record(0.6)
-        times, positions, _ = (np.array(part) for part in
-                               zip(*watcher.samples[first:], strict=True))
-        positions = by_leg(watcher, positions)
-        assert np.abs(np.diff(times) - 0.005).max() < 1e-3, 'a message is missing'
-        speed = np.maximum(programs[old].speed, programs[new].speed)
-        steps = np.abs(np.diff(positions, axis=0))
-        assert (steps <= 0.005 * speed * 1.001 + 1e-9).all(), (old, new)
-        low = np.minimum(programs[old].span[0], programs[new].span[0]) + OFFSET
-        high = np.maximum(programs[old].span[1], programs[new].span[1]) + OFFSET
-        assert (positions >= low - 1e-6).all() and (positions <= high + 1e-6).all(), (old, new)
-        assert off(watcher.next_phases(40), PHASES[new]) < 0.02, (old, new)
-        assert watcher.gaits[-1] == new
+    check_all_switches(running[1], ROBOT, programs, PHASES, 0.6)
 
 
 def test_gait_loads_its_preset_and_the_batch_overrides_it(running):
@@ -122,7 +92,7 @@ def test_enable_ramps_to_the_stand_and_back(running):
     answer = watcher.call(SetBool, '/cpg_generator/enable', SetBool.Request(data=False))
     assert answer.success and 'down' in answer.message
     until(lambda: not np.any(watcher.samples[-1][2]), 'the stand')
-    assert by_leg(watcher, np.array([watcher.samples[-1][1]]))[0] == pytest.approx(OFFSET)
+    assert by_leg(watcher, ROBOT, np.array([watcher.samples[-1][1]]))[0] == pytest.approx(OFFSET)
     watcher.call(SetBool, '/cpg_generator/enable', SetBool.Request(data=True))
     watcher.record(1.5)
     positions = np.array([sample[1] for sample in watcher.samples[first:]])
@@ -140,7 +110,7 @@ def test_a_transition_of_zero_leaves_it_to_the_network(running):
     first = len(watcher.samples)
     assert watcher.set(gait='walk')[0].successful
     watcher.record(6.0)
-    positions = by_leg(watcher, np.array([sample[1] for sample in watcher.samples[first:]]))
+    positions = by_leg(watcher, ROBOT, np.array([sample[1] for sample in watcher.samples[first:]]))
     limit = ROBOT.column('velocity')
     assert (np.abs(np.diff(positions, axis=0)) <= 0.005 * limit).all()
     assert off(watcher.next_phases(40), PHASES['walk']) < 0.02

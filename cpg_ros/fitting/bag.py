@@ -9,12 +9,14 @@ from pathlib import Path
 
 from cpg_ros.dynamics.progress import progress_bar
 from cpg_ros.fitting.recording import Recording
+from cpg_ros.fitting.servo import Servo
 from cpg_ros.fitting.storage import opened
 from cpg_ros.fitting.streams import BATCH, Stream, recorded
 
 
 def read_bag(path: str | Path, topics: Sequence[str] = (), joints: Sequence[str] = (),
-             progress: bool = True, some: bool = False) -> Recording:
+             progress: bool = True, some: bool = False, servo: Servo | None = None
+             ) -> Recording:
     """Read the joint states of a bag.
 
     See `recorded` for joints that are on several topics, and for stamps.
@@ -28,15 +30,16 @@ def read_bag(path: str | Path, topics: Sequence[str] = (), joints: Sequence[str]
         joints: which joints to take, in this order; all of them, if empty.
         progress: show a progress bar.
         some: joints that are not there are passed over, unless none is.
+        servo: of the joints, if the angles that they were driven to are wanted.
 
     Raises:
-        RecordingError: see `merged`; a bag that cannot be read, a topic that is not there or of
+        RecordingError: see `recorded`; a bag that cannot be read, a topic that is not there or of
             another type.
 
     """
     path = Path(path)
     with opened(path) as bag:
-        streams = {topic: Stream(topic, joints) for topic in bag.choose(topics)}
+        streams = {topic: Stream(topic, joints, servo) for topic in bag.choose(topics)}
         expected = bag.expected()
         total = max(1, sum(expected[topic] for topic in streams))
         with progress_bar(f'reading {path.name}', total, enabled=progress) as bar:

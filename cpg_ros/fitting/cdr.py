@@ -8,7 +8,7 @@ is not initialised and never compared. Messages of rare layouts are left to the 
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -20,6 +20,8 @@ JOINT_STATE = 'sensor_msgs/msg/JointState'
 STORE = get_typestore(Stores.ROS2_JAZZY)
 #: Layouts of a batch that are decoded in bulk; what is left goes one by one.
 LAYOUTS = 8
+#: Numbers of a message, in its order.
+FIELDS = ('position', 'velocity', 'effort')
 #: Bytes before the body: representation, of which the library reads two bytes, and options.
 HEADER = 4
 
@@ -41,6 +43,7 @@ class Block:
         stamps: of the headers, ns, shape (n,), int64.
         names: of the joints, as in the messages.
         positions: shape (n, positions); a message may have more or fewer than names.
+        velocities, efforts: likewise, rad/s and N m; empty where they were not asked for.
 
     """
 
@@ -48,15 +51,22 @@ class Block:
     stamps: np.ndarray
     names: tuple[str, ...]
     positions: np.ndarray
+    velocities: np.ndarray = field(default_factory=lambda: np.empty((0, 0)))
+    efforts: np.ndarray = field(default_factory=lambda: np.empty((0, 0)))
 
 
-def decode(messages: Sequence[bytes]) -> Iterator[Block]:
+def decode(messages: Sequence[bytes], efforts: bool = False) -> Iterator[Block]:
     """Decode a batch of serialised JointState messages.
+
+    Args:
+        messages: as they were received.
+        efforts: whether velocities and efforts are wanted, too.
 
     Raises:
         UndecodableError: a message is damaged or of another type.
 
     """
+    fields = FIELDS if efforts else FIELDS[:1]
     left = np.arange(len(messages))
     lengths = np.fromiter(map(len, messages), np.intp, len(messages))
     for _ in range(LAYOUTS):
@@ -68,18 +78,19 @@ def decode(messages: Sequence[bytes]) -> Iterator[Block]:
         joined = b''.join(messages if len(same) == len(messages) else
                           [messages[k] for k in same])
         fits = layout.fits(joined)
-        stamps, positions = layout.read(joined)
+        stamps, numbers = layout.read(joined, fields)
         if fits.all():
             left = left[~alike]
         else:
-            same, stamps, positions = same[fits], stamps[fits], positions[fits]
+            same, stamps, numbers = same[fits], stamps[fits], [one[fits] for one in numbers]
             left = np.setdiff1d(left, same, assume_unique=True)
-        yield Block(same, stamps, layout.names, positions)
+        yield Block(same, stamps, layout.names, *numbers)
     for k in left.tolist():
         message = _decoded(messages, k)
         stamp = message.header.stamp
         yield Block(np.array([k]), np.array([stamp.sec * 10**9 + stamp.nanosec]),
-                    tuple(message.name), np.array(message.position, float)[None])
+                    tuple(message.name), *(np.array(getattr(message, which), float)[None]
+                                           for which in fields))
 
 
 def _decoded(messages: Sequence[bytes], index: int) -> Any:
@@ -96,7 +107,6 @@ class _Layout:
         message, first = _decoded(messages, index), messages[index]
         self.length = len(first)
         self.names = tuple(message.name)
-        self.count = len(message.position)
         self.order = '<' if first[1] else '>'
         fixed = np.zeros(self.length, bool)
         fixed[:2] = True
@@ -118,13 +128,15 @@ class _Layout:
         number()
         for name in self.names:
             text(name)
-        self.positions = 0
-        for values in (message.position, message.velocity, message.effort):
+        #: Field -> where its numbers are, and how many.
+        self.places: dict[str, tuple[int, int]] = {}
+        for which in FIELDS:
             number()
-            if len(values):
+            count = len(getattr(message, which))
+            if count:
                 end += (HEADER - end) % 8
-                self.positions = self.positions or end
-                end += 8 * len(values)
+            self.places[which] = end, count
+            end += 8 * count
         # Bytes are compared as words of four, which all of these but the first fill or pad.
         words = self.length // 4
         mask = np.where(fixed[:4 * words], 255, 0).astype(np.uint8).view(np.uint32)
@@ -143,9 +155,10 @@ class _Layout:
         words = self._array(joined, '=u4', 0, self.length // 4)[:, self.words]
         return ((words & self.mask) == self.value).all(axis=1)
 
-    def read(self, joined: bytes) -> tuple[np.ndarray, np.ndarray]:
-        """Return stamps and positions, copied."""
+    def read(self, joined: bytes, fields: Sequence[str]) -> tuple[np.ndarray, list[np.ndarray]]:
+        """Return stamps and the numbers of some fields, copied."""
         seconds = self._array(joined, self.order + 'i4', HEADER, 1)[:, 0].astype(np.int64)
         nanoseconds = self._array(joined, self.order + 'u4', HEADER + 4, 1)[:, 0]
-        positions = self._array(joined, self.order + 'f8', self.positions, self.count)
-        return seconds * 10**9 + nanoseconds, positions.astype(np.float64)
+        return seconds * 10**9 + nanoseconds, [
+            self._array(joined, self.order + 'f8', *self.places[which]).astype(np.float64)
+            for which in fields]

@@ -4,6 +4,7 @@ from collections import deque
 from collections.abc import Sequence
 
 from cpg_ros.fitting.recording import Recording, RecordingError
+from cpg_ros.fitting.servo import Servo
 from cpg_ros.fitting.streams import BATCH, Stream, recorded
 
 
@@ -36,12 +37,14 @@ class Live:
             other._kept[topic].extend(kept)
         return other
 
-    def recording(self, joints: Sequence[str] = (), some: bool = False) -> Recording:
+    def recording(self, joints: Sequence[str] = (), some: bool = False,
+                  servo: Servo | None = None) -> Recording:
         """Decode what is kept.
 
         Args:
             joints: which to take; all of them, if empty.
             some: joints that are not there are passed over, unless none is.
+            servo: of the joints, if the angles that they were driven to are wanted.
 
         Raises:
             RecordingError: nothing, or nothing that can be used, came in.
@@ -51,7 +54,7 @@ class Live:
             raise RecordingError(f'{", ".join(self._kept)}: no joint states came in')
         streams = []
         for topic, kept in self._kept.items():
-            stream = Stream(topic, joints)
+            stream = Stream(topic, joints, servo)
             for received, message in kept:
                 stream.add(received, message)
                 if len(stream.messages) == BATCH:

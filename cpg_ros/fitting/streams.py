@@ -5,8 +5,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from cpg_ros.fitting.cdr import JOINT_STATE, UndecodableError, decode
+from cpg_ros.fitting.cdr import JOINT_STATE, Block, UndecodableError, decode
 from cpg_ros.fitting.recording import Chunk, Recording, RecordingError, few, merged, named, require
+from cpg_ros.fitting.servo import Servo
 from cpg_ros.fitting.storage import line
 
 #: Messages of a topic that are decoded together; a few MB.
@@ -16,10 +17,17 @@ DATED = 10**17
 
 
 class Stream:
-    """What a topic delivered."""
+    """What a topic delivered.
 
-    def __init__(self, topic: str, joints: Sequence[str]) -> None:
-        self.topic = topic
+    Args:
+        topic: its name.
+        joints: that are wanted; all of them, if empty.
+        servo: of the joints, if what they were told is wanted instead of what they did.
+
+    """
+
+    def __init__(self, topic: str, joints: Sequence[str], servo: Servo | None = None) -> None:
+        self.topic, self.servo = topic, servo
         self.wanted = set(joints)
         self.taken: set[str] = set()
         #: What is not decoded yet, and the times of receipt in ns.
@@ -28,13 +36,14 @@ class Stream:
         #: Header stamps and receive times in ns, names, positions.
         self.parts: list[tuple[np.ndarray, np.ndarray, tuple[str, ...], np.ndarray]] = []
         self.joints: dict[str, None] = {}
-        self.count = self.mute = self.odd = self.unstamped = 0
+        self.count = self.mute = self.odd = self.slack = self.unstamped = 0
+        self.pulled = False
         self.dated = False
 
     @property
     def stamped(self) -> bool:
         """Whether any message has a header stamp."""
-        return self.unstamped < self.count - self.mute - self.odd
+        return self.unstamped < self.count - self.mute - self.odd - self.slack
 
     def add(self, received: int, message: bytes) -> None:
         """Take a serialised message, received at a time in ns."""
@@ -50,8 +59,8 @@ class Stream:
         """
         received = np.array(self.received, np.int64)
         try:
-            for block in decode(self.messages):
-                self._keep(block.stamps, received[block.rows], block.names, block.positions)
+            for block in decode(self.messages, self.servo is not None):
+                self._keep(block, received[block.rows])
         except UndecodableError as error:
             raise RecordingError(
                 f'{source}{self.topic}: message {self.count + error.index + 1} is no '
@@ -59,13 +68,18 @@ class Stream:
         self.count += len(self.messages)
         self.messages, self.received = [], []
 
-    def _keep(self, stamps: np.ndarray, received: np.ndarray, names: tuple[str, ...],
-              positions: np.ndarray) -> None:
+    def _keep(self, block: Block, received: np.ndarray) -> None:
+        stamps, names, positions = block.stamps, block.names, block.positions
         if not positions.shape[1]:
             self.mute += len(stamps)
         elif positions.shape[1] != len(names):
             self.odd += len(stamps)
+        elif self.servo and not positions.shape == block.velocities.shape == block.efforts.shape:
+            self.slack += len(stamps)
         else:
+            if self.servo:
+                self.pulled = self.pulled or bool(block.efforts.any())
+                positions = self.servo.command(positions, block.velocities, block.efforts)
             self.joints.update(dict.fromkeys(names))
             self.unstamped += int((stamps == 0).sum())
             self.dated = self.dated or bool((stamps > DATED).any())
@@ -78,6 +92,7 @@ class Stream:
         """Say what is left out."""
         counts = ((self.mute, 'without positions'),
                   (self.odd, 'with more or fewer positions than names'),
+                  (self.slack, 'without a velocity and an effort for each position'),
                   (self.unstamped if headers and self.dated else 0, 'without a stamp'))
         return [f'{self.topic}: {count} of {self.count} messages {what}, left out'
                 for count, what in counts if count]
@@ -128,13 +143,17 @@ def recorded(streams: Sequence[Stream], joints: Sequence[str], source: str,
         some: joints that are not there are passed over, unless none is.
 
     Raises:
-        RecordingError: see `merged`; no message with positions.
+        RecordingError: see `merged`; no message with positions, or, where the joints' servo is
+            known, none with efforts.
 
     """
     there = list(dict.fromkeys(name for stream in streams for name in stream.joints))
     whole = f'{source}{", ".join(stream.topic for stream in streams)}'
     if not there:
-        raise RecordingError('; '.join((f'{whole}: no message with positions', *notes)))
+        what = 'positions'
+        if any(stream.slack for stream in streams):
+            what += ', velocities and efforts, which kp needs'
+        raise RecordingError('; '.join((f'{whole}: no message with {what}', *notes)))
     found = [name for name in joints if name in there]
     joints = found if some and found else joints
     require(joints, there, whole)
@@ -146,6 +165,11 @@ def recorded(streams: Sequence[Stream], joints: Sequence[str], source: str,
         unset = [stream.topic for stream in read if not stream.stamped]
         notes.append(f'no header stamps on {few(unset)}: the times are those of receipt')
     for stream in read:
+        if stream.servo and not stream.pulled:
+            raise RecordingError(f'{source}{stream.topic}: all efforts are 0, and kp needs them')
+        if stream.servo:
+            notes.append(f'{stream.topic}: what the joints were told, by kp {stream.servo.kp:g} '
+                         f'and kd {stream.servo.kd:g}')
         notes += stream.notes(headers)
     chunks = (chunk for stream in read for chunk in stream.chunks(headers))
     recording = merged(chunks, whole, joints)

@@ -85,7 +85,6 @@ class Generator(StartedNode):
         self.create_service(SetBool, '~/enable', self._enable)
         self.ticker = Ticker(self, self._value('rate'), self._tick, self._restart, self._fail)
         self._diagnostics = Diagnostics(self, self.pattern, self.ticker, self._cmd_vel)
-        self.add_pre_set_parameters_callback(self._complete)
         self.add_on_set_parameters_callback(self._judge)
         self.add_post_set_parameters_callback(self._apply)
         self._warn_of_unknown()
@@ -115,7 +114,7 @@ class Generator(StartedNode):
         return values
 
     def _complete(self, parameters: list[Parameter]) -> list[Parameter]:
-        return self._planner.complete(as_doubles(parameters, self._doubles), self._values())
+        return self._planner.complete(super()._complete(parameters), self._values())
 
     def _judge(self, parameters: list[Parameter]) -> SetParametersResult:
         """Say whether a batch can run as a whole; changes nothing."""

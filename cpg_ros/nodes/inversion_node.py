@@ -9,7 +9,7 @@ import traceback
 from functools import partial
 from pathlib import Path
 
-from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
+from rcl_interfaces.msg import ParameterDescriptor
 from rcl_interfaces.srv import SetParametersAtomically
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.exceptions import NameValidationException, ParameterException
@@ -26,7 +26,9 @@ from std_srvs.srv import Trigger
 from cpg_ros.fitting.fitted import write_fitted
 from cpg_ros.fitting.inverted import Inverted, inverted
 from cpg_ros.fitting.live import Live
+from cpg_ros.fitting.servo import Servo
 from cpg_ros.nodes import starting
+from cpg_ros.nodes.settings import Spec
 from cpg_ros.nodes.starting import StartedNode, StartError
 from cpg_ros.robot import Robot
 from cpg_ros.robot_file import find_robot
@@ -37,44 +39,37 @@ NAME = 'cpg_inversion'
 #: Seconds that a generator gets to answer.
 PATIENCE = 3.0
 
+SPECS = {
+    'topics': Spec(['joint_states'], 'topics of type sensor_msgs/JointState to listen to',
+                   read_only=True),
+    'robot': Spec('', 'robot file or the name of a shipped one; empty: legs are told from the '
+                  'names of the joints', read_only=True),
+    'window': Spec(60.0, 'how much of the last joint states is kept and fitted [s]; 0 for all',
+                   0.0, 3600.0),
+    'every': Spec(0.0, 'time between fits without being asked [s]; 0 for none', 0.0, 3600.0),
+    'network': Spec('', "network to fit; empty: the robot's, or by the number of legs"),
+    'gait': Spec('', 'gait to fit; empty: as recognised'),
+    'preset': Spec('', 'shipped set that parameters which are not free are taken from; empty: '
+                   "the gait's"),
+    'order': Spec(3, 'order of the readout', 1, 3),
+    'kp': Spec(0.0, 'gain of the controllers of the joints [N m/rad]: fits what they were told, '
+               'position + (effort + kd velocity) / kp; 0 fits what they did', 0.0, 1e5),
+    'kd': Spec(0.0, 'damping gain of the controllers of the joints [N m s/rad]', 0.0, 1e4),
+    'out': Spec('', 'parameter file to write; empty for none'),
+    'report': Spec('', 'page to write; empty for none'),
+    'apply_to': Spec('', 'generator to set after a fit, such as /cpg_generator; empty for none')}
+
 
 class Inversion(StartedNode):
     """Joint states in; on ~/fit parameters, files, and a running generator set."""
 
     def __init__(self) -> None:
         super().__init__(NAME)
-        text = ParameterDescriptor
-
-        def range_of(low: float, high: float, what: str) -> ParameterDescriptor:
-            return ParameterDescriptor(description=what, floating_point_range=[
-                FloatingPointRange(from_value=low, to_value=high)])
-
-        self.declare_parameter('topics', ['joint_states'], text(
-            description='topics of type sensor_msgs/JointState to listen to', read_only=True))
-        self.declare_parameter('robot', '', text(
-            description='robot file or the name of a shipped one; empty: legs are told from the '
-            'names of the joints', read_only=True))
-        self.declare_parameter('window', 60.0, range_of(
-            0.0, 3600.0, 'how much of the last joint states is kept and fitted [s]; 0 for all'))
-        self.declare_parameter('every', 0.0, range_of(
-            0.0, 3600.0, 'time between fits without being asked [s]; 0 for none'))
-        self.declare_parameter('network', '', text(
-            description="network to fit; empty: the robot's, or by the number of legs"))
-        self.declare_parameter('gait', '', text(description='gait to fit; empty: as recognised'))
-        self.declare_parameter('preset', '', text(
-            description="shipped set that parameters which are not free are taken from; empty: "
-            "the gait's"))
-        self.declare_parameter('free', Parameter.Type.STRING_ARRAY, text(
+        for name, spec in SPECS.items():
+            self._declare(name, spec)
+        # Not set is not the same as none.
+        self.declare_parameter('free', Parameter.Type.STRING_ARRAY, ParameterDescriptor(
             description="parameters to fit; not set: the network's usual ones"))
-        self.declare_parameter('order', 3, ParameterDescriptor(
-            description='order of the readout', integer_range=[
-                IntegerRange(from_value=1, to_value=3, step=1)]))
-        self.declare_parameter('out', '', text(
-            description='parameter file to write; empty for none'))
-        self.declare_parameter('report', '', text(description='page to write; empty for none'))
-        self.declare_parameter('apply_to', '', text(
-            description='generator to set after a fit, such as /cpg_generator; empty for none'))
-
         name = self._value('robot')
         self._robot: Robot | None = find_robot(name) if name else None
         for topic in self._value('topics'):
@@ -96,6 +91,7 @@ class Inversion(StartedNode):
         self._busy = False
         self._often(self._value('every'))
         self.add_post_set_parameters_callback(self._changed)
+        self._warn_of_unknown()
         self.get_logger().info(f'listening to {", ".join(topics)}; call ~/fit')
 
     def _value(self, name: str):
@@ -164,9 +160,10 @@ class Inversion(StartedNode):
             free = self.get_parameter_or('free').value or ()
             robot = self._robot
             names = () if robot is None else [joint.name for joint in robot.joints]
-            found = inverted(heard.recording(names, some=True), robot, self._value('network'),
-                             self._value('gait'), tuple(free), self._value('order'),
-                             self._value('preset'))
+            kp, kd = self._value('kp'), self._value('kd')
+            recording = heard.recording(names, True, Servo(kp, kd) if kp else None)
+            found = inverted(recording, robot, self._value('network'), self._value('gait'),
+                             tuple(free), self._value('order'), self._value('preset'))
             work.set_result(('; '.join([_summary(found), *self._written(found)]), found))
         except (ValueError, OSError) as error:
             work.set_result((str(error), None))

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
-from rcl_interfaces.msg import FloatingPointRange, ParameterDescriptor
+from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
 from rclpy.parameter import Parameter
 
 from cpg_ros.dynamics.program import Program, Refused, gait_of, plan
@@ -33,12 +33,16 @@ class Spec:
 
     def descriptor(self) -> ParameterDescriptor:
         """Return it as a ROS descriptor."""
-        ranges = []
-        if self.low is not None and self.high is not None:
-            ranges = [FloatingPointRange(from_value=self.low, to_value=self.high)]
-        return ParameterDescriptor(description=self.text, read_only=self.read_only,
-                                   floating_point_range=ranges,
+        made = ParameterDescriptor(description=self.text, read_only=self.read_only,
                                    additional_constraints=self.constraints)
+        if self.low is not None and self.high is not None:
+            if isinstance(self.default, int):
+                made.integer_range = [IntegerRange(from_value=int(self.low),
+                                                   to_value=int(self.high), step=1)]
+            else:
+                made.floating_point_range = [FloatingPointRange(from_value=self.low,
+                                                                to_value=self.high)]
+        return made
 
 
 NETWORK = Spec('delayed', 'network of cells that makes the rhythm', read_only=True,

@@ -38,6 +38,7 @@ class StartedNode(Node):
         super().__init__(name, start_parameter_services=False, **options)
         self._parameter_service = StrictParameterService(self)
         self._doubles: set[str] = set()
+        self.add_pre_set_parameters_callback(self._complete)
         self.failure: BaseException | None = None
         self.thread: threading.Thread | None = None
         self.stop = threading.Event()
@@ -57,6 +58,10 @@ class StartedNode(Node):
         except InvalidParameterValueException as error:
             raise StartError(f'parameter {name}: {self._parameter_overrides[name].value} is not '
                              f'from {spec.low:g} to {spec.high:g}') from error
+
+    def _complete(self, parameters: list[Parameter]) -> list[Parameter]:
+        """Return what a batch of changes stands for."""
+        return as_doubles(parameters, self._doubles)
 
     def _value(self, name: str):
         return self.get_parameter(name).value

@@ -17,6 +17,7 @@ from cpg_ros.fitting.fitted import write_fitted
 from cpg_ros.fitting.inverted import Inverted, inverted, preset_of
 from cpg_ros.fitting.paper_fit import PaperFit, paper_fits
 from cpg_ros.fitting.recording import Recording
+from cpg_ros.fitting.servo import Servo
 from cpg_ros.fitting.table import read_csv
 from cpg_ros.networks.delayed import CELLS, Delayed
 from cpg_ros.networks.registry import NETWORKS
@@ -56,6 +57,10 @@ def _parser() -> Parser:
                         '(default: what its head says, or rad)')
     parser.add_argument('--time', choices=('s', 'ms', 'us', 'ns'), help='unit of the time in the '
                         'CSV file (default: what its head says, or s)')
+    parser.add_argument('--kp', type=float, metavar='KP', help='fit what the joints of the bag '
+                        'were told, not what they did: position + (effort + kd velocity) / kp, '
+                        'with the gains of their controllers, in N m/rad')
+    parser.add_argument('--kd', type=float, metavar='KD', help='in N m s/rad (default: 0)')
     parser.add_argument('--robot', metavar='FILE', help='robot file, or the name of a shipped '
                         'one: which joints belong to which legs and cells, and their limits '
                         '(default: told from the names of the joints)')
@@ -85,10 +90,11 @@ def _parser() -> Parser:
 def _recording(chosen, robot: Robot | None) -> Recording:
     if chosen.csv is not None:
         return read_csv(chosen.csv, unit=chosen.unit, time=chosen.time, joints=chosen.joints)
+    servo = None if chosen.kp is None else Servo(chosen.kp, chosen.kd or 0.0)
     if robot is None or chosen.joints:
-        return read_bag(chosen.bag, chosen.topics, chosen.joints)
+        return read_bag(chosen.bag, chosen.topics, chosen.joints, servo=servo)
     names = [joint.name for joint in robot.joints]
-    return read_bag(chosen.bag, chosen.topics, names, some=True)
+    return read_bag(chosen.bag, chosen.topics, names, some=True, servo=servo)
 
 
 def _checked(parser: Parser, chosen) -> None:
@@ -99,6 +105,10 @@ def _checked(parser: Parser, chosen) -> None:
         parser.error('argument --unit: joint states are in rad')
     if chosen.bag is not None and chosen.time:
         parser.error('argument --time: joint states have their stamps')
+    if chosen.csv is not None and chosen.kp is not None:
+        parser.error('argument --kp: a CSV file has no efforts')
+    if chosen.kp is None and chosen.kd is not None:
+        parser.error('argument --kd: without --kp')
     for option in ('out', 'report'):
         path = getattr(chosen, option)
         if path is not None and not path.absolute().parent.is_dir():

@@ -1,0 +1,61 @@
+"""A generator that is taken from every gait to every other, and what must hold on the way."""
+
+from itertools import pairwise
+
+import numpy as np
+
+
+def tour(names):
+    """Visit every ordered pair of names once, one after the other."""
+    edges = {name: [other for other in names if other != name] for name in names}
+    path, stack = [], [names[0]]
+    while stack:
+        if edges[stack[-1]]:
+            stack.append(edges[stack[-1]].pop())
+        else:
+            path.append(stack.pop())
+    return path[::-1]
+
+
+def off(measured, expected):
+    """Distance of leg phases from a gait's, in cycles."""
+    return np.abs((measured - measured[:, :1] - expected + 0.5) % 1.0 - 0.5).max()
+
+
+def by_leg(watcher, robot, table):
+    """Reorder recorded joints from the declared order to that of the robot's legs."""
+    return table[:, [watcher.names.index(joint.name) for joint in robot.joints]]
+
+
+def check_all_switches(watcher, robot, programs, phases, lasting):
+    """Switch between all ordered pairs of gaits and hold every message against their orbits.
+
+    Args:
+        watcher: of a generator at 200 Hz.
+        robot: that it moves.
+        programs: gait -> its program at the generator's settings.
+        phases: gait -> those of the legs, where its symmetry says them.
+        lasting: seconds that a switch takes at most, and a little more.
+
+    """
+    offset, way = robot.column('offset'), tour(list(programs))
+    assert len(set(pairwise(way))) == len(way) - 1 == len(programs) * (len(programs) - 1)
+    assert watcher.set(gait=way[0])[0].successful
+    watcher.record(lasting)
+    for old, new in pairwise(way):
+        first = len(watcher.samples)
+        assert watcher.set(gait=new)[0].successful
+        watcher.record(lasting)
+        times, positions, _ = (np.array(part) for part in
+                               zip(*watcher.samples[first:], strict=True))
+        positions = by_leg(watcher, robot, positions)
+        assert np.abs(np.diff(times) - 0.005).max() < 1e-3, 'a message is missing'
+        speed = np.maximum(programs[old].speed, programs[new].speed)
+        steps = np.abs(np.diff(positions, axis=0))
+        assert (steps <= 0.005 * speed * 1.001 + 1e-9).all(), (old, new)
+        low = np.minimum(programs[old].span[0], programs[new].span[0]) + offset
+        high = np.maximum(programs[old].span[1], programs[new].span[1]) + offset
+        assert (positions >= low - 1e-5).all() and (positions <= high + 1e-5).all(), (old, new)
+        if new in phases:
+            assert off(watcher.next_phases(20), phases[new]) < 0.02, (old, new)
+        assert watcher.gaits[-1] == new

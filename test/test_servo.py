@@ -1,0 +1,72 @@
+"""What joints were told, out of what they did and how hard they pulled."""
+
+import numpy as np
+import pytest
+from bags import JOINTS, START, STEP, joint_state, write_bag
+from hypothesis import given
+from hypothesis import strategies as st
+
+from cpg_ros.fitting.bag import read_bag
+from cpg_ros.fitting.recording import RecordingError
+from cpg_ros.fitting.servo import Servo
+
+NUMBERS = st.floats(-50.0, 50.0)
+
+
+@given(NUMBERS, NUMBERS, NUMBERS, st.floats(0.1, 500.0), st.floats(0.0, 20.0))
+def test_the_law_of_the_controller_is_undone(command, position, velocity, kp, kd):
+    effort = kp * (command - position) - kd * velocity
+    assert Servo(kp, kd).command(position, velocity, effort) == pytest.approx(command, abs=1e-6)
+
+
+@pytest.mark.parametrize('gains', [(0.0, 1.0), (-1.0, 1.0), (np.nan, 1.0), (1.0, -1.0),
+                                   (1.0, np.inf)])
+def test_gains_that_are_none_are_refused(gains):
+    with pytest.raises(ValueError, match='must'):
+        Servo(*gains)
+
+
+def messages(told, effort=None, count=300):
+    """Joints that lag behind what they are told, and the efforts of their controllers."""
+    t = STEP * np.arange(count) / 1e9
+    angles, speeds = 0.9 * told(t - 0.02), 0.9 * np.gradient(told(t - 0.02), t, axis=0)
+    pulls = 40.0 * (told(t) - angles) - 1.5 * speeds if effort is None else effort(t)
+    stamps = START + STEP * np.arange(count)
+    return [('/joint_states', int(stamp), joint_state(int(stamp), JOINTS, *numbers))
+            for stamp, *numbers in zip(stamps, angles, speeds, pulls, strict=True)], t
+
+
+def told(t):
+    return np.sin(2.0 * np.pi * (2.0 * t[:, None] + np.arange(len(JOINTS)) / 7))
+
+
+def test_a_bag_tells_what_the_joints_were_told(tmp_path):
+    recorded, t = messages(told)
+    bag = write_bag(tmp_path / 'walk', recorded)
+    recording = read_bag(bag, servo=Servo(40.0, 1.5))
+    assert recording.positions == pytest.approx(told(t), abs=1e-9)
+    assert recording.notes == ('/joint_states: what the joints were told, by kp 40 and kd 1.5',)
+    assert np.abs(read_bag(bag).positions - told(t)).max() > 0.2
+
+
+def test_messages_without_efforts_are_left_out_and_counted(tmp_path):
+    recorded, t = messages(told)
+    for k in (3, 77):
+        stamp = START + STEP * k
+        recorded[k] = '/joint_states', stamp, joint_state(stamp, JOINTS, told(t)[k], told(t)[k])
+    recording = read_bag(write_bag(tmp_path / 'walk', recorded), servo=Servo(40.0, 1.5))
+    assert len(recording.times) == len(t) - 2
+    assert recording.positions == pytest.approx(np.delete(told(t), (3, 77), axis=0), abs=1e-9)
+    assert any('2 of 300 messages without a velocity and an effort' in note
+               for note in recording.notes)
+
+
+def test_efforts_that_are_not_there_are_missed(tmp_path):
+    recorded, t = messages(told, effort=lambda t: np.zeros((len(t), len(JOINTS))))
+    with pytest.raises(RecordingError, match='all efforts are 0'):
+        read_bag(write_bag(tmp_path / 'zero', recorded), servo=Servo(40.0))
+    recorded = [('/joint_states', stamp, joint_state(stamp, JOINTS, row))
+                for stamp, row in zip(START + STEP * np.arange(300), told(t), strict=True)]
+    recorded = [(topic, int(stamp), message) for topic, stamp, message in recorded]
+    with pytest.raises(RecordingError, match='no message with positions, velocities and efforts'):
+        read_bag(write_bag(tmp_path / 'none', recorded), servo=Servo(40.0))
