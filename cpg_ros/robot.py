@@ -123,6 +123,12 @@ class Robot:
         return tuple(joint for leg in self.legs.values() for joint in leg)
 
     @property
+    def places(self) -> np.ndarray:
+        """Index into ``joints`` of each name in ``order``, shape (joints,)."""
+        names = [joint.name for joint in self.joints]
+        return np.array([names.index(name) for name in self.order])
+
+    @property
     def cells(self) -> np.ndarray:
         """Index from 0 of the cell behind each joint, shape (joints,)."""
         return np.array([joint.cell - 1 for joint in self.joints])

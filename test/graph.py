@@ -103,7 +103,7 @@ def until(condition, what: str):
         result = condition()
         if result:
             return result
-        time.sleep(0.01)
+        time.sleep(0.002)
     raise AssertionError(f'waited {PATIENCE} s in vain for {what}')
 
 

@@ -4,22 +4,23 @@ import importlib.util
 
 import numpy as np
 import pytest
+from go2 import DT, GO2, program
 from hypothesis import given
 from hypothesis import strategies as st
 
 from cpg_ros.dynamics.pattern import Pattern
-from cpg_ros.dynamics.program import plan
-from cpg_ros.networks.registry import PRESETS
-from cpg_ros.robot_file import find_robot
 from cpg_ros.simulation.approach import NEAR, Approach
 from cpg_ros.simulation.body import Body
 
 ANGLES = st.lists(st.floats(-3.0, 3.0), min_size=2, max_size=2).map(np.array)
 
 
+LEGS = np.array([0, 0])
+
+
 @given(ANGLES, ANGLES, st.integers(1, 500))
 def test_it_is_there_in_time_and_never_hurries(start, wanted, periods):
-    approach, way = Approach(periods, start), np.abs(wanted - start).max()
+    approach, way = Approach(periods, start, LEGS), np.abs(wanted - start).max()
     assert np.array_equal(approach.towards(start), start)
     path = np.array([start] + [approach.towards(wanted).copy() for _ in range(periods)])
     assert path[-1] == pytest.approx(wanted, abs=1e-12)
@@ -33,8 +34,20 @@ def test_it_is_there_in_time_and_never_hurries(start, wanted, periods):
         assert np.array_equal(approach.towards(wanted + 1.0), wanted + 1.0)
 
 
+@given(ANGLES, st.integers(1, 60))
+def test_a_leg_that_is_told_late_has_its_own_time(wanted, late):
+    approach = Approach(50, np.zeros(2), np.array([0, 1]))
+    path = np.array([np.zeros(2)] + [approach.towards(
+        wanted * (1.0, k >= late)).copy() for k in range(120)])
+    alone = Approach(50, np.zeros(1), np.array([0]))
+    one = np.array([0.0] + [alone.towards(wanted[1:])[0] for _ in range(120)])
+    assert np.array_equal(path[late:, 1], one[:121 - late])
+    assert not path[:late + 1, 1].any()
+    assert np.array_equal(path[-1], wanted)
+
+
 def test_it_begins_anew_where_it_is_put():
-    approach = Approach(100, np.zeros(2))
+    approach = Approach(100, np.zeros(2), LEGS)
     for _ in range(200):
         approach.towards(np.ones(2))
     approach.begin(np.full(2, 0.5))
@@ -46,21 +59,16 @@ def test_it_begins_anew_where_it_is_put():
                     reason='the extra [sim] is not installed')
 @pytest.mark.parametrize('gait', ['walk', 'trot', 'pace', 'bound', 'jump', 'pronk'])
 def test_a_gait_in_full_swing_is_taken_up_at_any_moment(gait):
-    robot = find_robot('unitree_go2')
-    body, preset = Body('go2', robot), PRESETS['delayed'][gait]
-    program = plan(robot, gait, preset, preset.network,
-                   frequency=robot.motion(gait, preset.gait).frequency)
-    place = {joint.name: k for k, joint in enumerate(robot.joints)}
-    order = [place[name] for name in robot.order]
+    body, running = Body('go2', GO2), program(gait)
     for part in np.arange(5) / 5:
-        pattern = Pattern(program, 0.0, True)
-        for _ in range(round(500 * (1.0 + part / program.frequency))):
-            pattern.advance(0.002)
+        pattern = Pattern(running, 0.0, True)
+        for _ in range(round((1.0 + part / running.frequency) / DT)):
+            pattern.advance(DT)
         body.reset()
-        approach = Approach(500, body.stand)
+        approach = Approach(round(1.0 / DT), body.stand, GO2.leg_of_joint[GO2.places])
         for _ in range(1500):
-            pattern.advance(0.002)
-            body.command(approach.towards(pattern.position[order]))
+            pattern.advance(DT)
+            body.command(approach.towards(pattern.position[GO2.places]))
             body.step()
             assert not body.fallen, (part, body.time)
         assert body.base[0] > 0.3

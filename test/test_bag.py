@@ -129,6 +129,18 @@ def test_messages_of_one_length_and_other_names_are_told_apart():
     assert_decoded_as_by_the_library(batch)
 
 
+def test_messages_of_several_layouts_are_in_their_order(tmp_path):
+    messages, angles = walk(90)
+    for k in range(0, 90, 3):
+        topic, received, _ = messages[k]
+        stamp, frame = START + STEP * k, 'base' if k % 2 else ''
+        messages[k] = topic, received, joint_state(stamp, JOINTS, angles[k], frame=frame,
+                                                   little=k % 4 > 1)
+    recording = read_bag(write_bag(tmp_path / 'walk', messages))
+    assert np.array_equal(recording.positions, angles)
+    assert recording.notes == ()
+
+
 @pytest.mark.parametrize('version', [8, 9])
 @pytest.mark.parametrize(('storage', 'compression'), KINDS)
 def test_every_storage_and_compression_is_read_exactly(tmp_path, storage, compression, version):

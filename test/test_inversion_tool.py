@@ -156,6 +156,27 @@ def test_a_robot_file_keeps_its_cells_and_limits(tmp_path, capsys):
         assert joint.weights == (0.1,) if 'gripper' in joint.name else len(joint.weights) == 6
 
 
+@pytest.mark.parametrize(('limits', 'words'), [
+    ((-1.7, 0.2, 40.0), 'robot robot cannot do this: amplitude 1 takes'),
+    ((-3.0, 3.0, 0.5), 'robot robot cannot do this: frequency'),
+    ((2.0, 3.0, 40.0), "rad, outside the robot file's limits 2 to 3")])
+def test_what_a_robots_limits_forbid_is_not_written(tmp_path, capsys, limits, words):
+    names, t, angles = walked()
+    tree = {'network': 'delayed', 'legs': {
+        leg: {'joints': [{'name': name, 'cell': cell, 'offset': limits[1], 'amplitude': 0.0,
+                          **dict(zip(('lower', 'upper', 'velocity'), limits, strict=True))}
+                         for name in names if name.startswith(leg)]}
+        for leg, cell in LEGS.items()}}
+    file = tmp_path / 'robot.yaml'
+    file.write_text(yaml.safe_dump(tree))
+    path = bag_of(tmp_path / 'bag', names, t, angles)
+    assert main(['--bag', str(path), '--robot', str(file), '--out',
+                 str(tmp_path / 'fitted.yaml'), '--report', str(tmp_path / 'a.html')]) == 2
+    said = capsys.readouterr()
+    assert words in said.err and said.err.count('\n') == 1, said.err
+    assert sorted(one.name for one in tmp_path.iterdir()) == ['bag', 'robot.yaml']
+
+
 def test_the_papers_own_procedure(tmp_path, capsys):
     # Eight joints that are the cells of a trot with c = 6.43, about their offsets; section 4.1.
     network = replace(PRESETS['delayed']['goat_trot'].network)
@@ -224,9 +245,9 @@ def test_what_is_no_gait_is_refused_and_not_fitted(tmp_path, capsys, signals):
     (('--bag', '{bag}', '--out', 'nowhere/a.yaml'), 'there is no folder nowhere'),
     (('--bag', '{bag}', '--out', 'a.txt'), 'does not end in .yaml'),
     (('--csv', '{csv}', '--kp', '60'), '--kp: a CSV file has no efforts'),
-    (('--bag', '{bag}', '--kp', '60'), 'no message with positions, velocities and efforts'),
-    (('--bag', '{bag}', '--kp', '-3'), 'kp -3 must be positive'),
-    (('--bag', '{bag}', '--kp', 'nan'), 'kp nan must be positive'),
+    (('--bag', '{bag}', '--kp', '60'), 'no effort of joints'),
+    (('--bag', '{bag}', '--kp', '-3'), 'kp -3 is not from 0.001'),
+    (('--bag', '{bag}', '--kp', 'nan'), 'kp nan is not from 0.001'),
     (('--bag', '{bag}', '--kd', '2'), '--kd: without --kp'),
     (('--csv', '{csv}', '--unit', 'grad'), '--unit')])
 def test_nonsense_ends_in_one_line(bag, tmp_path, capsys, arguments, words):

@@ -4,10 +4,10 @@ import importlib.util
 import math
 from dataclasses import replace
 from functools import cache
-from pathlib import Path
 
 import numpy as np
 import pytest
+from go2 import DT, FILE, GO2, program
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -33,16 +33,7 @@ from cpg_ros.simulation.trial import _hops  # noqa: E402
 from cpg_ros.simulation.tuning import Tuner  # noqa: E402
 from cpg_ros.tools import tune as tool  # noqa: E402
 
-FILE = Path(__file__).parent.parent / 'config' / 'unitree_go2.yaml'
-GO2 = load_robot(FILE)
-DT = 0.002
 FEET = {'lh': 'RL', 'rh': 'RR', 'lf': 'FL', 'rf': 'FR'}
-
-
-@cache
-def program(gait, network='delayed'):
-    preset = PRESETS[network][gait]
-    return plan(GO2, gait, preset, preset.network, GO2.motion(gait, gait).frequency)
 
 
 @pytest.fixture(scope='module')
@@ -56,8 +47,7 @@ def feet(batch):
 
 
 def in_order(pattern):
-    place = {joint.name: k for k, joint in enumerate(GO2.joints)}
-    return pattern.position[[place[name] for name in GO2.order]]
+    return pattern.position[GO2.places]
 
 
 @settings(max_examples=10, deadline=None)

@@ -7,8 +7,8 @@ the places; every other message is compared with it in all bytes that make up th
 is not initialised and never compared. Messages of rare layouts are left to the library.
 """
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -43,7 +43,7 @@ class Block:
         stamps: of the headers, ns, shape (n,), int64.
         names: of the joints, as in the messages.
         positions: shape (n, positions); a message may have more or fewer than names.
-        velocities, efforts: likewise, rad/s and N m; empty where they were not asked for.
+        velocities, efforts: likewise, rad/s and N m; none where they were not asked for.
 
     """
 
@@ -51,8 +51,8 @@ class Block:
     stamps: np.ndarray
     names: tuple[str, ...]
     positions: np.ndarray
-    velocities: np.ndarray = field(default_factory=lambda: np.empty((0, 0)))
-    efforts: np.ndarray = field(default_factory=lambda: np.empty((0, 0)))
+    velocities: np.ndarray
+    efforts: np.ndarray
 
 
 def decode(messages: Sequence[bytes], efforts: bool = False) -> Iterator[Block]:
@@ -89,8 +89,29 @@ def decode(messages: Sequence[bytes], efforts: bool = False) -> Iterator[Block]:
         message = _decoded(messages, k)
         stamp = message.header.stamp
         yield Block(np.array([k]), np.array([stamp.sec * 10**9 + stamp.nanosec]),
-                    tuple(message.name), *(np.array(getattr(message, which), float)[None]
-                                           for which in fields))
+                    tuple(message.name), *(
+                        np.array(getattr(message, which) if which in fields else (), float)[None]
+                        for which in FIELDS))
+
+
+def in_order(blocks: Iterable[Block]) -> Iterator[Block]:
+    """Join blocks of equal names and widths, their messages in the order of the batch again.
+
+    They can differ in what is no number: byte order, or the frame's name.
+    """
+    alike: dict[tuple, list[Block]] = {}
+    for block in blocks:
+        widths = (one.shape[1] for one in (block.positions, block.velocities, block.efforts))
+        alike.setdefault((block.names, *widths), []).append(block)
+    for same in alike.values():
+        if len(same) == 1:
+            yield same[0]
+            continue
+        order = np.argsort(np.concatenate([block.rows for block in same]))
+        rows, stamps, *numbers = (np.concatenate([getattr(block, name) for block in same])[order]
+                                  for name in ('rows', 'stamps', 'positions', 'velocities',
+                                               'efforts'))
+        yield Block(rows, stamps, same[0].names, *numbers)
 
 
 def _decoded(messages: Sequence[bytes], index: int) -> Any:
@@ -156,9 +177,9 @@ class _Layout:
         return ((words & self.mask) == self.value).all(axis=1)
 
     def read(self, joined: bytes, fields: Sequence[str]) -> tuple[np.ndarray, list[np.ndarray]]:
-        """Return stamps and the numbers of some fields, copied."""
+        """Return stamps and the numbers of all fields, copied; none of a field not asked for."""
         seconds = self._array(joined, self.order + 'i4', HEADER, 1)[:, 0].astype(np.int64)
         nanoseconds = self._array(joined, self.order + 'u4', HEADER + 4, 1)[:, 0]
         return seconds * 10**9 + nanoseconds, [
-            self._array(joined, self.order + 'f8', *self.places[which]).astype(np.float64)
-            for which in fields]
+            self._array(joined, self.order + 'f8', place, count if which in fields else 0)
+            .astype(np.float64) for which, (place, count) in self.places.items()]

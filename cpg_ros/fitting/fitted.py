@@ -6,8 +6,9 @@ from typing import Any
 import numpy as np
 import yaml
 
+from cpg_ros.dynamics.program import Refused, plan
 from cpg_ros.fitting.inverted import Inverted
-from cpg_ros.networks.registry import NETWORKS
+from cpg_ros.networks.registry import NETWORKS, PRESETS
 from cpg_ros.robot import Joint, Robot
 from cpg_ros.robot_file import write_robot
 from cpg_ros.whole import write_whole
@@ -31,15 +32,23 @@ def fitted_robot(found: Inverted, robot: Robot | None) -> Robot:
             as they are. Without one, limits are taken from the recording.
 
     Raises:
-        ValueError: a leg of the network has no recorded joint.
+        ValueError: a leg of the network has no recorded joint, or the robot's limits do not
+            let a joint move so.
 
     """
     fit = found.fit
     if robot is not None:
         legs = {leg: tuple(_moved(joint, found) for joint in joints)
                 for leg, joints in robot.legs.items()}
-        return Robot(robot.name, (fit.network.name,), robot.assignment, fit.harmonics, legs,
-                     robot.order)
+        moved = Robot(robot.name, (fit.network.name,), robot.assignment, fit.harmonics, legs,
+                      robot.order)
+        preset = PRESETS[fit.network.name][fit.gait]
+        try:
+            plan(moved, fit.gait, preset, fit.network, found.stride.frequency)
+        except Refused as error:
+            raise ValueError(f'{found.recording.source}: robot {robot.name} cannot do this: '
+                             f'{error}') from error
+        return moved
     network = NETWORKS[fit.network.name]
     assignment = next(iter(network.legs))
     for leg in network.legs[assignment]:
@@ -57,6 +66,10 @@ def _moved(joint: Joint, found: Inverted) -> Joint:
     if joint.name not in found.fit.readouts:
         return joint
     offset, weights = found.fit.readouts[joint.name]
+    if not joint.lower <= offset <= joint.upper:
+        raise ValueError(f'{found.recording.source}: joint {joint.name!r} swings about '
+                         f"{offset:.4g} rad, outside the robot file's limits {joint.lower:g} to "
+                         f'{joint.upper:g}')
     return Joint(joint.name, joint.leg, joint.cell, offset, weights, joint.lower, joint.upper,
                  joint.velocity)
 

@@ -4,17 +4,20 @@ from dataclasses import dataclass
 
 import numpy as np
 
+#: Gains beyond these are mistakes, and would make numbers overflow.
+SMALLEST, LARGEST = 1e-3, 1e5
+
 
 @dataclass(frozen=True)
 class Servo:
     """The controller of a robot's joints: effort = kp (command - position) - kd velocity.
 
     Attributes:
-        kp: N m / rad.
-        kd: N m s / rad.
+        kp: N m / rad, from SMALLEST to LARGEST.
+        kd: N m s / rad, from 0 to LARGEST.
 
     Raises:
-        ValueError: kp is not positive, or kd is negative.
+        ValueError: a gain is out of its range.
 
     """
 
@@ -22,12 +25,26 @@ class Servo:
     kd: float = 0.0
 
     def __post_init__(self) -> None:
-        if not 0.0 < self.kp < np.inf:
-            raise ValueError(f'kp {self.kp:g} must be positive')
-        if not 0.0 <= self.kd < np.inf:
-            raise ValueError(f'kd {self.kd:g} must not be negative')
+        if not SMALLEST <= self.kp <= LARGEST:
+            raise ValueError(f'kp {self.kp:g} is not from {SMALLEST:g} to {LARGEST:g} N m/rad')
+        if not 0.0 <= self.kd <= LARGEST:
+            raise ValueError(f'kd {self.kd:g} is not from 0 to {LARGEST:g} N m s/rad')
+
+    @property
+    def needs(self) -> str:
+        """What joint states must have besides positions."""
+        return 'velocity and effort' if self.kd else 'effort'
 
     def command(self, position: np.ndarray, velocity: np.ndarray, effort: np.ndarray
                 ) -> np.ndarray:
-        """Return the angles that joints were driven to, rad; arguments in rad, rad/s, N m."""
-        return position + (effort + self.kd * velocity) / self.kp
+        """Return the angles that joints were driven to, rad.
+
+        Args:
+            position: rad.
+            velocity: rad/s, of the same shape; not looked at where kd is 0.
+            effort: N m, of the same shape.
+
+        """
+        if self.kd:
+            effort = effort + self.kd * velocity
+        return position + effort / self.kp

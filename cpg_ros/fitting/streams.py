@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from cpg_ros.fitting.cdr import JOINT_STATE, Block, UndecodableError, decode
+from cpg_ros.fitting.cdr import JOINT_STATE, Block, UndecodableError, decode, in_order
 from cpg_ros.fitting.recording import Chunk, Recording, RecordingError, few, merged, named, require
 from cpg_ros.fitting.servo import Servo
 from cpg_ros.fitting.storage import line
@@ -37,7 +37,10 @@ class Stream:
         self.parts: list[tuple[np.ndarray, np.ndarray, tuple[str, ...], np.ndarray]] = []
         self.joints: dict[str, None] = {}
         self.count = self.mute = self.odd = self.slack = self.unstamped = 0
-        self.pulled = False
+        #: Joints with a position, but not what the servo needs besides; and those whose effort
+        #: was ever a number but 0.
+        self.lacking: dict[str, None] = {}
+        self.pulled: set[str] = set()
         self.dated = False
 
     @property
@@ -59,7 +62,7 @@ class Stream:
         """
         received = np.array(self.received, np.int64)
         try:
-            for block in decode(self.messages, self.servo is not None):
+            for block in in_order(decode(self.messages, self.servo is not None)):
                 self._keep(block, received[block.rows])
         except UndecodableError as error:
             raise RecordingError(
@@ -74,11 +77,14 @@ class Stream:
             self.mute += len(stamps)
         elif positions.shape[1] != len(names):
             self.odd += len(stamps)
-        elif self.servo and not positions.shape == block.velocities.shape == block.efforts.shape:
+        elif self.servo and not (positions.shape == block.efforts.shape and (
+                not self.servo.kd or positions.shape == block.velocities.shape)):
             self.slack += len(stamps)
+            self.lacking.update(dict.fromkeys(names))
         else:
             if self.servo:
-                self.pulled = self.pulled or bool(block.efforts.any())
+                pulling = (np.isfinite(block.efforts) & (block.efforts != 0.0)).any(axis=0)
+                self.pulled.update(np.array(names)[pulling].tolist())
                 positions = self.servo.command(positions, block.velocities, block.efforts)
             self.joints.update(dict.fromkeys(names))
             self.unstamped += int((stamps == 0).sum())
@@ -92,7 +98,7 @@ class Stream:
         """Say what is left out."""
         counts = ((self.mute, 'without positions'),
                   (self.odd, 'with more or fewer positions than names'),
-                  (self.slack, 'without a velocity and an effort for each position'),
+                  (self.slack, f'without {self.servo.needs} of each joint' if self.servo else ''),
                   (self.unstamped if headers and self.dated else 0, 'without a stamp'))
         return [f'{self.topic}: {count} of {self.count} messages {what}, left out'
                 for count, what in counts if count]
@@ -127,6 +133,13 @@ def _once_each(streams: list[Stream], wanted: Sequence[str]) -> list[str]:
     return notes
 
 
+def _refuse_lacking(where: str, what: str, joints: list[str], but: str = '') -> None:
+    """Refuse joints whose servo cannot be undone."""
+    if joints:
+        raise RecordingError(f'{where}: no {what} {but}{" " if but else ""}of {named(joints)}, '
+                             'and kp needs it; name the joints to take to do without')
+
+
 def recorded(streams: Sequence[Stream], joints: Sequence[str], source: str,
              notes: Sequence[str] = (), some: bool = False) -> Recording:
     """Make one recording of what topics delivered.
@@ -144,16 +157,18 @@ def recorded(streams: Sequence[Stream], joints: Sequence[str], source: str,
 
     Raises:
         RecordingError: see `merged`; no message with positions, or, where the joints' servo is
-            known, none with efforts.
+            known, a joint without efforts, or with none but 0.
 
     """
     there = list(dict.fromkeys(name for stream in streams for name in stream.joints))
     whole = f'{source}{", ".join(stream.topic for stream in streams)}'
+    for stream in streams:
+        idle = [name for name in stream.lacking if name not in there
+                and (not joints or name in joints)]
+        if stream.servo:
+            _refuse_lacking(f'{source}{stream.topic}', stream.servo.needs, idle)
     if not there:
-        what = 'positions'
-        if any(stream.slack for stream in streams):
-            what += ', velocities and efforts, which kp needs'
-        raise RecordingError('; '.join((f'{whole}: no message with {what}', *notes)))
+        raise RecordingError('; '.join((f'{whole}: no message with positions', *notes)))
     found = [name for name in joints if name in there]
     joints = found if some and found else joints
     require(joints, there, whole)
@@ -165,9 +180,9 @@ def recorded(streams: Sequence[Stream], joints: Sequence[str], source: str,
         unset = [stream.topic for stream in read if not stream.stamped]
         notes.append(f'no header stamps on {few(unset)}: the times are those of receipt')
     for stream in read:
-        if stream.servo and not stream.pulled:
-            raise RecordingError(f'{source}{stream.topic}: all efforts are 0, and kp needs them')
         if stream.servo:
+            _refuse_lacking(f'{source}{stream.topic}', 'effort', sorted(
+                stream.taken - stream.pulled), 'but 0')
             notes.append(f'{stream.topic}: what the joints were told, by kp {stream.servo.kp:g} '
                          f'and kd {stream.servo.kd:g}')
         notes += stream.notes(headers)

@@ -48,6 +48,18 @@ class Operator(Node):
     def _odom(self, message: Odometry) -> None:
         self.place = message.pose.pose.position.x, message.pose.pose.position.y
 
+    def alone(self) -> None:
+        """Go on if these are the only robot and the only generator.
+
+        Raises:
+            DemoError: there is another one; it may have been there before ours.
+
+        """
+        for topic, who in (('lh/joint_states', 'generator'), ('odom', 'robot')):
+            if self.count_publishers(topic) > 1:
+                raise DemoError(f'there is another {who} in this ROS domain: end it, or set '
+                                'another ROS_DOMAIN_ID')
+
     def switch(self, gait: str) -> str:
         """Set the gait; return why that was refused, or ''.
 
@@ -146,7 +158,7 @@ def guide(operator: Operator, gaits: Sequence[str], every: float,
     Where what is typed ends, as in ``echo walk | demo``, the last gait has its time, too.
 
     Raises:
-        DemoError: a node ended, or does not answer.
+        DemoError: a node ended, does not answer, or is not the only one.
 
     """
     lines, tour, began = typed(), list(gaits[1:]), time.monotonic()
@@ -160,6 +172,7 @@ def guide(operator: Operator, gaits: Sequence[str], every: float,
     while tour or due is None or time.monotonic() < due:
         rclpy.spin_once(operator, timeout_sec=0.05)
         interruption.look()
+        operator.alone()
         wanted = None
         if not lines.empty():
             wanted = lines.get()
@@ -188,10 +201,6 @@ def wait_for(operator: Operator, interruption: Interruption) -> None:
         interruption.look()
         if time.monotonic() > end:
             raise DemoError(f'the nodes were not ready after {PATIENCE:g} s')
-    for topic, who in (('lh/joint_states', 'generator'), ('odom', 'robot')):
-        if operator.count_publishers(topic) > 1:
-            raise DemoError(f'there is another {who} in this ROS domain: end it, or set another '
-                            'ROS_DOMAIN_ID')
 
 
 def parser() -> Parser:

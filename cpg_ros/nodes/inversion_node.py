@@ -72,6 +72,8 @@ class Inversion(StartedNode):
             description="parameters to fit; not set: the network's usual ones"))
         name = self._value('robot')
         self._robot: Robot | None = find_robot(name) if name else None
+        if not self.get_parameter_or('topics').value:
+            raise ValueError('parameter topics must not be empty')
         for topic in self._value('topics'):
             validate_topic_name(topic)
         topics = tuple(self.resolve_topic_name(topic) for topic in self._value('topics'))
@@ -174,14 +176,14 @@ class Inversion(StartedNode):
 
     def _written(self, found: Inverted) -> list[str]:
         written = []
+        if self._value('out'):
+            written += write_fitted(Path(self._value('out')).expanduser(), found, self._robot)
         if self._value('report'):
             # matplotlib takes half a second, and only pages need it.
             from cpg_ros.tools.inversion_report import as_html
             path = Path(self._value('report')).expanduser()
             write_whole(path, as_html(found))
             written.append(path)
-        if self._value('out'):
-            written += write_fitted(Path(self._value('out')).expanduser(), found, self._robot)
         return [f'written: {", ".join(map(str, written))}'] if written else []
 
     async def _applied(self, target: str, found: Inverted) -> str:

@@ -33,7 +33,7 @@ class Outputs:
 
     def __init__(self, node: Node, robot: Robot, combined_topic: str, command: str) -> None:
         joints = [joint.name for joint in robot.joints]
-        self._order = np.array([joints.index(name) for name in robot.order])
+        self._order = robot.places
         self._stamps: list = []
         self._publish: list = []
         # Views of the messages' memory, and which joints go there.

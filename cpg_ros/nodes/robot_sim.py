@@ -103,7 +103,8 @@ class RobotSim(StartedNode):
 
         self._commands = Commands(self, robot, self._value('command'), 1.0 / self._rate,
                                   self._body.stand)
-        self._approach = Approach(max(1, round(APPROACH * self._rate)), self._body.stand)
+        self._approach = Approach(round(APPROACH / timestep), self._body.stand,
+                                  robot.leg_of_joint[robot.places])
         self._measurements = Measurements(self, self._body)
         self._requests: deque = deque()
         self._last = round(self._value('duration') * self._rate)
@@ -185,8 +186,8 @@ class RobotSim(StartedNode):
         body = self._body
         while self._requests:
             self._requests.popleft()()
-        body.command(self._approach.towards(self._commands.angles))
         for _ in range(self._steps):
+            body.command(self._approach.towards(self._commands.angles))
             body.step()
         self._now += 1
         # MuJoCo begins anew by itself then: time tells, and is cheap to look at.

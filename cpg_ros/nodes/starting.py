@@ -19,6 +19,10 @@ from cpg_ros.nodes.ending import ended
 from cpg_ros.nodes.parameter_services import StrictParameterService
 from cpg_ros.nodes.settings import Spec, as_doubles
 
+#: What a parameter of a type is called.
+KINDS = {bool: 'a bool', int: 'an integer', float: 'a double', str: 'a string',
+         list: 'a list of strings'}
+
 
 class StartError(RuntimeError):
     """The node cannot start; the message is one line for the user."""
@@ -52,8 +56,7 @@ class StartedNode(Node):
         try:
             self.declare_parameter(name, spec.default, spec.descriptor())
         except InvalidParameterTypeException as error:
-            kind = type(spec.default).__name__
-            raise StartError(f'parameter {name} must be a {kind}, not '
+            raise StartError(f'parameter {name} must be {KINDS[type(spec.default)]}, not '
                              f'{self._parameter_overrides[name].value!r}') from error
         except InvalidParameterValueException as error:
             raise StartError(f'parameter {name}: {self._parameter_overrides[name].value} is not '

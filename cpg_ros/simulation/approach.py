@@ -7,43 +7,42 @@ NEAR = 0.05
 
 
 class Approach:
-    """Leads the joints from where they stand to what is commanded, in a smooth step.
+    """Leads joints from where they stand to what is commanded, each leg in a smooth step.
 
     So a driver does that is switched on under a running controller: nothing jerks, and a gait
-    that is in full swing grows out of the stand. What begins where the joints are, as a
-    generator that ramps in from the stand, is followed from the first instant on.
+    that is in full swing grows out of the stand. What begins where a leg is, as with a generator
+    that ramps in from the stand, is followed from the first instant on. A leg may be commanded
+    earlier than another.
     """
 
-    def __init__(self, periods: int, angles: np.ndarray) -> None:
+    def __init__(self, steps: int, angles: np.ndarray, legs: np.ndarray) -> None:
         """Be ready at the angles where the joints are.
 
         Args:
-            periods: calls of ``towards`` that the approach takes, at least one.
+            steps: calls of ``towards`` that an approach takes, at least one.
             angles: rad, shape (joints,).
+            legs: index from 0 of each joint's leg, shape (joints,).
 
         """
-        self._periods = periods
-        self._target = np.empty(len(angles))
+        self._steps, self._legs = steps, legs
         self.begin(angles)
 
     def begin(self, angles: np.ndarray) -> None:
         """Be at these angles, rad; the next ones that differ are approached."""
         self._start = np.array(angles, dtype=float)
-        self._done = 0
+        self._done = np.zeros(self._legs.max() + 1, dtype=int)
+        self._there = False
 
     def towards(self, commanded: np.ndarray) -> np.ndarray:
-        """Return what the joints should be driven to in this period, rad, shape (joints,)."""
-        if self._done == self._periods:
+        """Return what the joints should be driven to in this step, rad, shape (joints,)."""
+        if self._there:
             return commanded
-        way = np.subtract(commanded, self._start, out=self._target)
-        if not self._done:
-            if not way.any():
-                return commanded
-            if np.abs(way).max() <= NEAR:
-                self._done = self._periods
-                return commanded
-        self._done += 1
-        s = self._done / self._periods
-        way *= s * s * (3.0 - 2.0 * s)
-        way += self._start
-        return way
+        way, done, steps = commanded - self._start, self._done, self._steps
+        far = np.zeros(len(done))
+        np.maximum.at(far, self._legs, np.abs(way))
+        done[(done == 0) & (far > 0.0) & (far <= NEAR)] = steps
+        done[((done > 0) | (far > 0.0)) & (done < steps)] += 1
+        self._there = bool((done == steps).all())
+        s = done / steps
+        return np.where((done == steps)[self._legs], commanded,
+                        self._start + (s * s * (3.0 - 2.0 * s))[self._legs] * way)

@@ -81,8 +81,7 @@ def targets(program: Program, duration: float, timestep: float,
         angles = still + stride * (program.readout.angles - still)
         base = robot.column('offset') + program.shift
         found[done:] = (base[:, None] + _periodic(angles, program, ahead)).T
-    place = {joint.name: k for k, joint in enumerate(robot.joints)}
-    return found[:, [place[name] for name in robot.order]]
+    return found[:, robot.places]
 
 
 def _periodic(angles: np.ndarray, program: Program, theta: np.ndarray) -> np.ndarray:

@@ -44,8 +44,7 @@ class Body:
         self.model: Any = load(name, robot, kp, kd, timestep)
         self.data: Any = mujoco.MjData(self.model)
         self._step = mujoco.mj_step
-        offsets = {joint.name: joint.offset for joint in robot.joints}
-        self.stand = np.array([offsets[name] for name in robot.order])
+        self.stand = robot.column('offset')[robot.places]
         joints = self.model.actuator_trnid[:, 0]
         self._angles = self.model.jnt_qposadr[joints]
         self._speeds = self.model.jnt_dofadr[joints]

@@ -22,8 +22,7 @@ class Follow:
     def __init__(self, body: Body, pattern: Pattern) -> None:
         """Reset the body; the pattern starts at the stand, too."""
         self.body, self.pattern = body, pattern
-        place = {joint.name: k for k, joint in enumerate(pattern.robot.joints)}
-        self._order = [place[name] for name in pattern.robot.order]
+        self._places = pattern.robot.places
         body.reset()
         self.track = np.zeros((1, 3))
 
@@ -38,7 +37,7 @@ class Follow:
         rows = np.empty((round(duration / dt), 3))
         for row in rows:
             pattern.advance(dt)
-            body.command(pattern.position[self._order])
+            body.command(pattern.position[self._places])
             body.step()
             row[:2], row[2] = body.base[:2], body.yaw
             if body.fallen:

@@ -176,14 +176,12 @@ def _paper(chosen, found: Inverted, starts: list[dict[str, float]]) -> list[Pape
 
 
 def _written(chosen, found: Inverted, robot) -> list[Path]:
-    written = []
+    written = [] if chosen.out is None else write_fitted(chosen.out, found, robot)
     if chosen.report is not None:
         # matplotlib takes half a second, and only pages need it.
         from cpg_ros.tools.inversion_report import as_html
         write_whole(chosen.report, as_html(found))
         written.append(chosen.report)
-    if chosen.out is not None:
-        written += write_fitted(chosen.out, found, robot)
     return written
 
 
