@@ -21,6 +21,21 @@ def declared(arguments: Arguments) -> list[DeclareLaunchArgument]:
             for name, (default, _, text) in known.items()]
 
 
+def number(context: LaunchContext, name: str, kind: type = float) -> float:
+    """Return a number that an argument was given.
+
+    Raises:
+        RuntimeError: it is none; one line for the user.
+
+    """
+    text = LaunchConfiguration(name).perform(context)
+    try:
+        return kind(text)
+    except ValueError:
+        what = 'a whole number' if kind is int else 'a number'
+        raise RuntimeError(f"{name}:={text} is not {what}") from None
+
+
 def started(context: LaunchContext, executable: str, name: str, arguments: Arguments,
             fixed: Mapping[str, Any] | None = None, **options: Any) -> Node:
     """Return a node of this package with those arguments that are not empty.
@@ -33,10 +48,17 @@ def started(context: LaunchContext, executable: str, name: str, arguments: Argum
         fixed: parameters that no argument gives.
         options: further ones of the action Node.
 
+    Raises:
+        RuntimeError: an argument is not the number that it should be.
+
     """
+    given = {key: kind for key, (_, kind, _) in arguments.items()
+             if LaunchConfiguration(key).perform(context)}
+    for key, kind in given.items():
+        if kind in (int, float):
+            number(context, key, kind)
     parameters = {key: ParameterValue(LaunchConfiguration(key), value_type=kind)
-                  for key, (_, kind, _) in arguments.items()
-                  if LaunchConfiguration(key).perform(context)}
+                  for key, kind in given.items()}
     return Node(package='cpg_ros', executable=executable, name=name, output='screen',
                 namespace=LaunchConfiguration('namespace'),
                 parameters=[{**parameters, **(fixed or {})}], **options)

@@ -10,7 +10,7 @@ from pathlib import Path
 from launch.actions import OpaqueFunction, Shutdown
 from launch.substitutions import LaunchConfiguration
 
-from cpg_ros.launching import declared, started
+from cpg_ros.launching import declared, number, started
 from launch import LaunchDescription
 
 BOTH = {
@@ -47,7 +47,7 @@ def nodes(context):
             unwanted[picture] = ''
         else:
             path.parent.mkdir(parents=True, exist_ok=True)
-    simulated = float(LaunchConfiguration('real_time_factor').perform(context)) != 1.0
+    simulated = number(context, 'real_time_factor') != 1.0
     return [started(context, 'generator', 'cpg_generator', {**BOTH, **GENERATOR}, {
                 'rate': 500.0, 'combined_topic': '', 'command': COMMANDS.get(command, command),
                 'use_sim_time': simulated}, on_exit=Shutdown()),

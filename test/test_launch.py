@@ -154,6 +154,15 @@ def test_what_is_empty_is_left_to_the_generator(described):
         assert given[name] == of_generator('delayed')[name].default, name
 
 
+@pytest.mark.parametrize(('name', 'given', 'words'), [
+    ('generator', {'frequency': 'fast'}, 'frequency:=fast is not a number'),
+    ('inversion', {'order': '2.5'}, 'order:=2.5 is not a whole number'),
+    ('go2', {'real_time_factor': 'half'}, 'real_time_factor:=half is not a number')])
+def test_an_argument_that_is_no_number_is_named(described, name, given, words):
+    with pytest.raises(RuntimeError, match=words):
+        described(name, **given)
+
+
 def test_the_inversion_gets_parameters_that_it_declares(described):
     asked = {'topics': '[a, b]', 'robot': 'goat', 'free': '[c]', 'gait': 'trot', 'out': 'a.yaml',
              'network': 'delayed', 'preset': 'trot', 'report': 'a.html', 'apply_to': '/a'}
