@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from itertools import compress
 
 import numpy as np
 
@@ -84,7 +85,7 @@ class Stream:
         else:
             if self.servo:
                 pulling = (np.isfinite(block.efforts) & (block.efforts != 0.0)).any(axis=0)
-                self.pulled.update(np.array(names)[pulling].tolist())
+                self.pulled.update(compress(names, pulling))
                 positions = self.servo.command(positions, block.velocities, block.efforts)
             self.joints.update(dict.fromkeys(names))
             self.unstamped += int((stamps == 0).sum())
@@ -133,11 +134,11 @@ def _once_each(streams: list[Stream], wanted: Sequence[str]) -> list[str]:
     return notes
 
 
-def _refuse_lacking(where: str, what: str, joints: list[str], but: str = '') -> None:
+def _refuse_lacking(where: str, what: str, joints: list[str]) -> None:
     """Refuse joints whose servo cannot be undone."""
     if joints:
-        raise RecordingError(f'{where}: no {what} {but}{" " if but else ""}of {named(joints)}, '
-                             'and kp needs it; name the joints to take to do without')
+        raise RecordingError(f'{where}: no {what} of {named(joints)}, and kp needs it; name the '
+                             'joints to take to do without')
 
 
 def recorded(streams: Sequence[Stream], joints: Sequence[str], source: str,
@@ -181,8 +182,8 @@ def recorded(streams: Sequence[Stream], joints: Sequence[str], source: str,
         notes.append(f'no header stamps on {few(unset)}: the times are those of receipt')
     for stream in read:
         if stream.servo:
-            _refuse_lacking(f'{source}{stream.topic}', 'effort', sorted(
-                stream.taken - stream.pulled), 'but 0')
+            _refuse_lacking(f'{source}{stream.topic}', 'effort but 0',
+                            sorted(stream.taken - stream.pulled))
             notes.append(f'{stream.topic}: what the joints were told, by kp {stream.servo.kp:g} '
                          f'and kd {stream.servo.kd:g}')
         notes += stream.notes(headers)
