@@ -136,7 +136,7 @@ def test_a_bad_robot_file_is_refused_at_start(start, tmp_path, change, key):
 
 @pytest.mark.parametrize('argument, reason', [
     ('gait:=gallop', "gait 'gallop' is not one of"),
-    ('frequency:=fast', 'frequency must be a float'),
+    ('frequency:=fast', 'frequency must be a double'),
     ('delayed.tau:=0.1', 'critical delay 0.2852'),
     ('rate:=0.0', 'rate: 0.0 is not from 1 to 2000'),
     ('robot:=cow', "robot 'cow' is neither"),
