@@ -10,6 +10,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from go2 import DT, GO2, program
+from switches import tour
 
 from cpg_ros.dynamics.drive import Drive
 from cpg_ros.dynamics.pattern import Pattern
@@ -69,26 +70,14 @@ def test_no_push_makes_trot_fall(batch, force):
 
 def test_a_tour_of_all_switches_does_not_make_it_fall(body):
     """An Eulerian circuit: every ordered pair of gaits once, 2.5 s each."""
-    tour = circuit(sorted(FAR))
-    assert len(set(pairwise(tour))) == 30 == len(tour) - 1
-    walk = Follow(body, Pattern(program(tour[0])))
+    way = tour(sorted(FAR))
+    assert len(set(pairwise(way))) == 30 == len(way) - 1
+    walk = Follow(body, Pattern(program(way[0])))
     walk.go(2.5)
-    for gait in tour[1:]:
+    for gait in way[1:]:
         walk.pattern.apply(program(gait), 1.0)
         walk.go(2.5)
     assert walk.pattern.faults == 0
-
-
-def circuit(names):
-    """Visit every ordered pair of names once (Hierholzer)."""
-    left = {name: [other for other in names if other != name] for name in names}
-    way, found = [names[0]], []
-    while way:
-        if left[way[-1]]:
-            way.append(left[way[-1]].pop())
-        else:
-            found.append(way.pop())
-    return found[::-1]
 
 
 def asked(body, gait, forward, turn):
