@@ -27,7 +27,7 @@ def by_leg(watcher, robot, table):
     return table[:, [watcher.names.index(joint.name) for joint in robot.joints]]
 
 
-def check_all_switches(watcher, robot, programs, phases, lasting):
+def check_all_switches(watcher, robot, programs, phases, lasting, slack=1e-5):
     """Switch between all ordered pairs of gaits and hold every message against their orbits.
 
     Args:
@@ -36,6 +36,7 @@ def check_all_switches(watcher, robot, programs, phases, lasting):
         programs: gait -> its program at the generator's settings.
         phases: gait -> those of the legs, where its symmetry says them.
         lasting: seconds that a switch takes at most, and a little more.
+        slack: that joints may leave the gaits' spans by, rad.
 
     """
     offset, way = robot.column('offset'), tour(list(programs))
@@ -55,7 +56,7 @@ def check_all_switches(watcher, robot, programs, phases, lasting):
         assert (steps <= 0.005 * speed * 1.001 + 1e-9).all(), (old, new)
         low = np.minimum(programs[old].span[0], programs[new].span[0]) + offset
         high = np.maximum(programs[old].span[1], programs[new].span[1]) + offset
-        assert (positions >= low - 1e-5).all() and (positions <= high + 1e-5).all(), (old, new)
+        assert (positions >= low - slack).all() and (positions <= high + slack).all(), (old, new)
         if new in phases:
             assert off(watcher.next_phases(20), phases[new]) < 0.02, (old, new)
         assert watcher.gaits[-1] == new

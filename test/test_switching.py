@@ -26,7 +26,7 @@ def programs():
 
 
 def test_all_ordered_pairs_switch_without_a_jerk(running, programs):
-    check_all_switches(running[1], ROBOT, programs, PHASES, 0.6)
+    check_all_switches(running[1], ROBOT, programs, PHASES, 0.6, slack=1e-6)
 
 
 def test_gait_loads_its_preset_and_the_batch_overrides_it(running):

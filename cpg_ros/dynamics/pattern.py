@@ -12,6 +12,7 @@ from collections import deque
 import numpy as np
 
 from cpg_ros.dynamics.drive import Drive
+from cpg_ros.dynamics.ease import ease
 from cpg_ros.dynamics.program import Program
 from cpg_ros.dynamics.readout import confine
 from cpg_ros.dynamics.track import Track
@@ -24,11 +25,6 @@ MOST_TRACKS = 4
 ABSORB = 0.3
 #: A joint may cover the shift between the stand and a gait at this many times it a second.
 SHIFTING = 2.0
-
-
-def ease(s: float) -> tuple[float, float]:
-    """Smooth step from 0 to 1 and its derivative: 3 s^2 - 2 s^3."""
-    return s * s * (3.0 - 2.0 * s), 6.0 * s * (1.0 - s)
 
 
 class Pattern:

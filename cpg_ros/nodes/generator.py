@@ -23,7 +23,8 @@ from cpg_ros.networks.registry import NETWORKS, PRESETS
 from cpg_ros.nodes.cmd_vel import CmdVel
 from cpg_ros.nodes.diagnostics import Diagnostics
 from cpg_ros.nodes.outputs import Outputs
-from cpg_ros.nodes.settings import COMMANDS, NETWORK, Planner, as_doubles, specs
+from cpg_ros.nodes.settings import COMMANDS, NETWORK, Planner, specs
+from cpg_ros.nodes.spec import as_doubles
 from cpg_ros.nodes.starting import StartedNode, StartError, run
 from cpg_ros.nodes.ticker import Ticker
 from cpg_ros.robot_file import RobotError, find_robot

@@ -28,7 +28,7 @@ from cpg_ros.fitting.inverted import Inverted, inverted
 from cpg_ros.fitting.live import Live
 from cpg_ros.fitting.servo import Servo
 from cpg_ros.nodes import starting
-from cpg_ros.nodes.settings import Spec
+from cpg_ros.nodes.spec import Spec
 from cpg_ros.nodes.starting import StartedNode, StartError
 from cpg_ros.robot import Robot
 from cpg_ros.robot_file import find_robot

@@ -21,7 +21,7 @@ from std_srvs.srv import Trigger
 from cpg_ros.nodes.commands import KINDS, Commands
 from cpg_ros.nodes.lockstep import Lockstep
 from cpg_ros.nodes.measurements import Measurements
-from cpg_ros.nodes.settings import Spec
+from cpg_ros.nodes.spec import Spec
 from cpg_ros.nodes.starting import StartedNode, StartError, run
 from cpg_ros.nodes.ticker import Ticker
 from cpg_ros.robot_file import RobotError, find_robot

@@ -6,43 +6,18 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
-from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
 from rclpy.parameter import Parameter
 
 from cpg_ros.dynamics.program import Program, Refused, gait_of, plan
 from cpg_ros.networks.network import Network, Preset
 from cpg_ros.networks.registry import NETWORKS, PRESETS
+from cpg_ros.nodes.spec import Spec
 from cpg_ros.robot import Robot
 
 COMMANDS = ('none', 'joint_trajectory', 'forward_position')
 #: Network -> the robot file and the gait it starts with.
 USUAL = {'delayed': ('quadruped', 'trot'), 'quadruped': ('quadruped', 'trot'),
          'biped': ('biped', 'walk')}
-
-
-@dataclass(frozen=True)
-class Spec:
-    """One parameter: default, what it is, its range if it is a number, whether it is fixed."""
-
-    default: Any
-    text: str
-    low: float | None = None
-    high: float | None = None
-    read_only: bool = False
-    constraints: str = ''
-
-    def descriptor(self) -> ParameterDescriptor:
-        """Return it as a ROS descriptor."""
-        made = ParameterDescriptor(description=self.text, read_only=self.read_only,
-                                   additional_constraints=self.constraints)
-        if self.low is not None and self.high is not None:
-            if isinstance(self.default, int):
-                made.integer_range = [IntegerRange(from_value=int(self.low),
-                                                   to_value=int(self.high), step=1)]
-            else:
-                made.floating_point_range = [FloatingPointRange(from_value=self.low,
-                                                                to_value=self.high)]
-        return made
 
 
 NETWORK = Spec('delayed', 'network of cells that makes the rhythm', read_only=True,
@@ -210,13 +185,3 @@ class Planner:
                 wanted[prefix + group] = math.fsum(parts) / len(parts)
         return [Parameter(name, Parameter.Type.DOUBLE, value)
                 for name, value in wanted.items()] + parameters
-
-
-def as_doubles(parameters: list[Parameter], doubles: set[str]) -> list[Parameter]:
-    """Turn whole numbers given for floating-point parameters into doubles.
-
-    ``ros2 param set /cpg_generator frequency 2`` sends an integer; refusing it would be pedantry.
-    """
-    return [Parameter(p.name, Parameter.Type.DOUBLE, float(p.value))
-            if p.name in doubles and p.type_ == Parameter.Type.INTEGER else p
-            for p in parameters]

@@ -17,7 +17,7 @@ from rclpy.signals import SignalHandlerOptions
 
 from cpg_ros.nodes.ending import ended
 from cpg_ros.nodes.parameter_services import StrictParameterService
-from cpg_ros.nodes.settings import Spec, as_doubles
+from cpg_ros.nodes.spec import Spec, as_doubles
 
 #: What a parameter of a type is called.
 KINDS = {bool: 'a bool', int: 'an integer', float: 'a double', str: 'a string',

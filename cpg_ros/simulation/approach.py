@@ -2,6 +2,8 @@
 
 import numpy as np
 
+from cpg_ros.dynamics.ease import ease
+
 #: Angles this close are followed at once, rad.
 NEAR = 0.05
 
@@ -43,6 +45,6 @@ class Approach:
         done[(done == 0) & (far > 0.0) & (far <= NEAR)] = steps
         done[((done > 0) | (far > 0.0)) & (done < steps)] += 1
         self._there = bool((done == steps).all())
-        s = done / steps
+        share, _ = ease(done / steps)
         return np.where((done == steps)[self._legs], commanded,
-                        self._start + (s * s * (3.0 - 2.0 * s))[self._legs] * way)
+                        self._start + share[self._legs] * way)

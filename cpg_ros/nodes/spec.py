@@ -1,0 +1,42 @@
+"""What a node's parameters are, and the numbers that they are given."""
+
+from dataclasses import dataclass
+from typing import Any
+
+from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
+from rclpy.parameter import Parameter
+
+
+@dataclass(frozen=True)
+class Spec:
+    """One parameter: default, what it is, its range if it is a number, whether it is fixed."""
+
+    default: Any
+    text: str
+    low: float | None = None
+    high: float | None = None
+    read_only: bool = False
+    constraints: str = ''
+
+    def descriptor(self) -> ParameterDescriptor:
+        """Return it as a ROS descriptor."""
+        made = ParameterDescriptor(description=self.text, read_only=self.read_only,
+                                   additional_constraints=self.constraints)
+        if self.low is not None and self.high is not None:
+            if isinstance(self.default, int):
+                made.integer_range = [IntegerRange(from_value=int(self.low),
+                                                   to_value=int(self.high), step=1)]
+            else:
+                made.floating_point_range = [FloatingPointRange(from_value=self.low,
+                                                                to_value=self.high)]
+        return made
+
+
+def as_doubles(parameters: list[Parameter], doubles: set[str]) -> list[Parameter]:
+    """Turn whole numbers given for floating-point parameters into doubles.
+
+    ``ros2 param set /cpg_generator frequency 2`` sends an integer; refusing it would be pedantry.
+    """
+    return [Parameter(p.name, Parameter.Type.DOUBLE, float(p.value))
+            if p.name in doubles and p.type_ == Parameter.Type.INTEGER else p
+            for p in parameters]
