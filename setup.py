@@ -32,7 +32,7 @@ setup(
         'generator = cpg_ros.nodes.generator:main',
         'robot_sim = cpg_ros.nodes.robot_sim:main',
         'inversion = cpg_ros.nodes.inversion:main',
-        'demo = cpg_ros.nodes.demo:main',
+        'demo = cpg_ros.tools.demo:main',
         'analyze = cpg_ros.tools.analyze:main',
         'check_robot = cpg_ros.tools.check_robot:main',
         'optimize = cpg_ros.tools.optimize:main',

@@ -20,7 +20,7 @@ from cpg_ros.dynamics.continuation import Branch, follow
 from cpg_ros.dynamics.delayed_orbit import equations
 from cpg_ros.dynamics.mesh_newton import Reduced
 from cpg_ros.dynamics.orbit import solve_preset
-from cpg_ros.networks.along import Along
+from cpg_ros.networks.parameter_line import ParameterLine
 from cpg_ros.networks.registry import NETWORKS, PRESETS
 
 POINTS = 40
@@ -87,7 +87,8 @@ def main() -> None:
     rows = {}
     for name, preset, text, end in BRANCHES:
         log(f'{name} {preset} along {text}')
-        orbit, line = solve_preset(PRESETS[name][preset]), Along.parse(text, NETWORKS[name])
+        orbit = solve_preset(PRESETS[name][preset])
+        line = ParameterLine.parse(text, NETWORKS[name])
         value = line.value(orbit.network)
         low, high = min(value, end), max(value, end)
         # Towards the end of the range: the branch's other half has no points.

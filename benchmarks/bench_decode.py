@@ -17,8 +17,8 @@ import numpy as np
 from common import by_turns, emit, log
 from rosbags.rosbag2 import Reader, StoragePlugin, Writer
 
-from cpg_ros.fitting.bag import read_bag
-from cpg_ros.fitting.cdr import JOINT_STATE, STORE
+from cpg_ros.recordings.bag_reader import read_bag
+from cpg_ros.recordings.cdr import JOINT_STATE, STORE
 
 MESSAGES, STEP = 100_000, 2_000_000
 JOINTS = [f'{leg}_{joint}' for leg in ('lh', 'rh', 'lf', 'rf')

@@ -12,7 +12,7 @@ from common import by_turns, emit, log
 
 from cpg_ros.dynamics.floquet import multipliers, smallest_gain
 from cpg_ros.dynamics.orbit import solve_preset
-from cpg_ros.dynamics.simulate import simulate
+from cpg_ros.integration.simulate import simulate
 from cpg_ros.networks.delayed import PRESETS
 
 ROUNDS, STEPS = 20, 400

@@ -13,7 +13,7 @@ from common import emit, log
 from processes import Listener, enter_workspace, start_node
 
 from cpg_ros.nodes.generator import find_robot
-from cpg_ros.nodes.settings import USUAL
+from cpg_ros.nodes.generator_parameters import USUAL
 
 RATE = 1000.0
 SETTLE = 4.0

@@ -13,15 +13,15 @@ import time
 import numpy as np
 from common import ROOT, emit, log
 
-from cpg_ros.dynamics.drive import Drive
-from cpg_ros.dynamics.pattern import Pattern
-from cpg_ros.dynamics.program import Program, plan
+from cpg_ros.motion.pattern import Pattern
+from cpg_ros.motion.plan import Program, plan
+from cpg_ros.motion.steering import Drive
 from cpg_ros.networks.registry import PRESETS
-from cpg_ros.robot_file import load_robot
+from cpg_ros.robots.robot_file import load_robot
 from cpg_ros.simulation.batch import Batch, Scenario, targets
 from cpg_ros.simulation.body import Body
-from cpg_ros.simulation.follow import Fallen, Follow, speed
-from cpg_ros.simulation.trial import Trial
+from cpg_ros.simulation.pattern_follower import Fallen, Follow, speed
+from cpg_ros.simulation.run_metrics import RunMetrics
 
 DT, DURATION = 0.002, 10.0
 GAITS = ('walk', 'trot', 'pace', 'bound', 'jump', 'pronk')
@@ -89,7 +89,7 @@ def steered(body: Body, made: Program, forward: float, turn: float) -> tuple[flo
     return speed(track, DT), float(track[-1, 2] - track[0, 2]) / 8.0
 
 
-def figures(trial: Trial) -> dict[str, float | bool]:
+def figures(trial: RunMetrics) -> dict[str, float | bool]:
     return {'distance_m': trial.distance, 'heading_deg': trial.heading, 'speed_m_s': trial.speed,
             'duty': trial.duty, 'hops': trial.hops, 'pitch_deg': trial.pitch,
             'cost_of_transport': trial.cost, 'slip': trial.slip, 'upright': trial.upright}

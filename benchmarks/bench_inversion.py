@@ -23,14 +23,14 @@ sys.path.append(str(ROOT / 'test'))
 from made_up import record, weights_of
 
 from cpg_ros.dynamics.orbit import solve_orbit
-from cpg_ros.dynamics.readout import TURN, monomials
-from cpg_ros.fitting.free import free_numbers
-from cpg_ros.fitting.inversion import TOLERANCE, invert
-from cpg_ros.fitting.joints import joints_of
-from cpg_ros.fitting.problem import Problem
-from cpg_ros.fitting.trials import descend
+from cpg_ros.inversion.fit_data import joints_of
+from cpg_ros.inversion.free_parameters import free_numbers
+from cpg_ros.inversion.invert import TOLERANCE, invert
+from cpg_ros.inversion.least_squares import Problem
+from cpg_ros.inversion.trust_region import descend
+from cpg_ros.motion.readout import TURN, monomials
 from cpg_ros.networks.delayed import PRESETS, Delayed
-from cpg_ros.robot import HARMONICS
+from cpg_ros.robots.robot import HARMONICS
 
 CELLS = (1, 1, 7, 2, 2, 8, 3, 3, 5, 4, 4, 6)
 TRUTH, GAIT, FREE = PRESETS['trot'].network, PRESETS['trot'].gait, ('c', 'tau')

@@ -17,11 +17,11 @@ from common import by_turns, emit, log
 from numba import njit
 from scipy.integrate import solve_ivp
 
-from cpg_ros.dynamics.simulate import Trajectory
-from cpg_ros.fitting.search_space import search_space
-from cpg_ros.fitting.steady_state import COARSER, SPAN, last_cycle, population_run, start_states
-from cpg_ros.fitting.weights import optimise
+from cpg_ros.integration.simulate import Trajectory
 from cpg_ros.networks.biped import CELL, CELLS, PARTNERS, PRIMARY, Biped
+from cpg_ros.search.nsga2 import optimise
+from cpg_ros.search.search_space import search_space
+from cpg_ros.search.settled_cycle import COARSER, SPAN, last_cycle, population_run, start_states
 
 GAIT, SETS, ROUNDS = 'walk', 16, 3
 TARGETS = {'speedup_per_network': 20.0, 'search_s': 60.0}

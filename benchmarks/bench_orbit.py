@@ -14,7 +14,7 @@ from scipy.optimize import brentq, root
 
 from cpg_ros.dynamics.hopf import hopf_point
 from cpg_ros.dynamics.orbit import Orbit, solve_orbit
-from cpg_ros.dynamics.simulate import simulate
+from cpg_ros.integration.simulate import simulate
 from cpg_ros.networks.delayed import PRESETS, Preset, default_symmetry_gain
 
 #: Preset -> period, to eight decimals. The legs' phases differ, the waveforms are two.

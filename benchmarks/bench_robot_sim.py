@@ -41,7 +41,7 @@ def bare(robot: str, seconds: float) -> float:
     """Steps a second of MuJoCo alone, marching on the spot."""
     import mujoco
 
-    from cpg_ros.robot_file import find_robot
+    from cpg_ros.robots.robot_file import find_robot
     from cpg_ros.simulation.body import Body
     body = Body('go2', find_robot(robot))
     offsets, step, data = body.stand, mujoco.mj_step, body.data

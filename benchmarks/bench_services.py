@@ -17,7 +17,7 @@ from common import emit, log
 from processes import Process, enter_workspace, start_node
 
 from cpg_ros.networks.registry import PRESETS
-from cpg_ros.nodes.settings import USUAL
+from cpg_ros.nodes.generator_parameters import USUAL
 
 TARGETS = {'answer_ms_max': 100.0, 'end_s_max': 1.0}
 

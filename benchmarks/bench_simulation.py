@@ -17,7 +17,7 @@ import numpy as np
 from common import ROOT, by_turns, emit, log
 from peers import END, OUTPUT, START, TAU, A, B, C, D, InC, Jitcdde
 
-from cpg_ros.dynamics.simulate import simulate
+from cpg_ros.integration.simulate import simulate
 from cpg_ros.networks.delayed import Delayed
 
 ERROR = 1e-6

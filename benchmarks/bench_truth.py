@@ -16,7 +16,7 @@ sys.path.append(str(ROOT / 'test'))
 from made_up import record, weights_of
 
 from cpg_ros.dynamics.orbit import solve_preset
-from cpg_ros.fitting.inversion import invert
+from cpg_ros.inversion.invert import invert
 from cpg_ros.networks.registry import PRESETS
 
 SEEDS, GOAL = 100, 0.9

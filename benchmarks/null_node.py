@@ -18,10 +18,10 @@ from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 from std_srvs.srv import SetBool
 
+from cpg_ros.nodes.deadline_thread import Ticker
 from cpg_ros.nodes.diagnostics import Diagnostics
 from cpg_ros.nodes.generator import find_robot
-from cpg_ros.nodes.outputs import Outputs
-from cpg_ros.nodes.ticker import Ticker
+from cpg_ros.nodes.joint_publishers import Outputs
 
 
 def main() -> None:

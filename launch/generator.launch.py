@@ -2,7 +2,7 @@
 
 from launch.actions import OpaqueFunction
 
-from cpg_ros.launching import declared, started
+from cpg_ros.nodes.launch_arguments import declared, started
 from launch import LaunchDescription
 
 ARGUMENTS = {

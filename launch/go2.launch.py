@@ -10,7 +10,7 @@ from pathlib import Path
 from launch.actions import OpaqueFunction, Shutdown
 from launch.substitutions import LaunchConfiguration
 
-from cpg_ros.launching import declared, number, started
+from cpg_ros.nodes.launch_arguments import declared, number, started
 from launch import LaunchDescription
 
 BOTH = {

@@ -5,7 +5,7 @@ Then ``ros2 service call /cpg_inversion/fit std_srvs/srv/Trigger``, or every:=10
 
 from launch.actions import OpaqueFunction
 
-from cpg_ros.launching import declared, started
+from cpg_ros.nodes.launch_arguments import declared, started
 from launch import LaunchDescription
 
 ARGUMENTS = {

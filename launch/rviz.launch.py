@@ -13,7 +13,7 @@ from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
 from launch_ros.parameter_descriptions import ParameterValue
 
-from cpg_ros.urdf import load_urdf, root
+from cpg_ros.robots.urdf import load_urdf, root
 from launch import LaunchDescription
 
 SHARE = Path(__file__).resolve().parent.parent

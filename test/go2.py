@@ -3,9 +3,9 @@
 from functools import cache
 from pathlib import Path
 
-from cpg_ros.dynamics.program import plan
+from cpg_ros.motion.plan import plan
 from cpg_ros.networks.registry import PRESETS
-from cpg_ros.robot_file import load_robot
+from cpg_ros.robots.robot_file import load_robot
 
 FILE = Path(__file__).parent.parent / 'config' / 'unitree_go2.yaml'
 GO2 = load_robot(FILE)

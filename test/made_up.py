@@ -4,9 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cpg_ros.dynamics.phase_readout import PhaseReadout
-from cpg_ros.dynamics.readout import WaveReadout
-from cpg_ros.robot import HARMONICS
+from cpg_ros.motion.phase_readout import PhaseReadout
+from cpg_ros.motion.readout import WaveReadout
+from cpg_ros.robots.robot import HARMONICS
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from hypothesis import strategies as st
 
-from cpg_ros.networks.pairs import symmetries
+from cpg_ros.networks.hk_theorem import symmetries
 from cpg_ros.networks.symmetry import D2, Z4_Z2, Group, Symmetry
 
 Z6 = Group(6, (('w', (1, 2, 3, 4, 5, 0)),))

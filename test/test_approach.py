@@ -8,9 +8,9 @@ from go2 import DT, GO2, program
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cpg_ros.dynamics.pattern import Pattern
-from cpg_ros.simulation.approach import NEAR, Approach
+from cpg_ros.motion.pattern import Pattern
 from cpg_ros.simulation.body import Body
+from cpg_ros.simulation.soft_start import NEAR, Approach
 
 ANGLES = st.lists(st.floats(-3.0, 3.0), min_size=2, max_size=2).map(np.array)
 

@@ -11,9 +11,9 @@ from hypothesis import strategies as st
 from rosbags.rosbag2 import Reader
 from rosbags.typesys import Stores, get_typestore
 
-from cpg_ros.fitting.bag import read_bag
-from cpg_ros.fitting.cdr import UndecodableError, decode
-from cpg_ros.fitting.recording import RecordingError
+from cpg_ros.recordings.bag_reader import read_bag
+from cpg_ros.recordings.cdr import UndecodableError, decode
+from cpg_ros.recordings.recording import RecordingError
 
 STORE = get_typestore(Stores.ROS2_JAZZY)
 KINDS = [('sqlite3', 'none'), ('sqlite3', 'file'), ('sqlite3', 'message'),
@@ -325,7 +325,7 @@ def test_a_bag_of_anything_is_read_as_the_library_reads_it_or_refused(batch, tmp
 
 def test_progress_is_shown_on_long_reads_and_can_be_silenced(tmp_path, monkeypatch, capsys):
     path = write_bag(tmp_path / 'walk', walk(9000, JOINTS[:2])[0])
-    monkeypatch.setattr('cpg_ros.dynamics.progress.PATIENCE', -1.0)
+    monkeypatch.setattr('cpg_ros.files.progress_bar.PATIENCE', -1.0)
     read_bag(path)
     assert capsys.readouterr().err.startswith('reading walk [')
     read_bag(path, progress=False)

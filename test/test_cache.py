@@ -4,10 +4,10 @@ import os
 import subprocess
 import sys
 
-WARM = 'from cpg_ros.dynamics.warm import warm; warm({network!r})'
+WARM = 'from cpg_ros.motion.precompile import precompile; precompile({network!r})'
 CHECK = '''
 import numpy as np
-from cpg_ros.dynamics.stepper import Stepper
+from cpg_ros.integration.stepper import Stepper
 from cpg_ros.networks.registry import PRESETS
 for name in ('biped', 'quadruped', 'biped'):
     network = PRESETS[name]['walk'].network

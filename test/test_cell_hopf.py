@@ -7,15 +7,15 @@ import pytest
 
 from cpg_ros.dynamics import cell_hopf
 from cpg_ros.dynamics.cell_hopf import cell_hopf_points
-from cpg_ros.dynamics.crossings import crossings
+from cpg_ros.dynamics.equilibrium import NoStand, everywhere, stand
 from cpg_ros.dynamics.floquet import multipliers
 from cpg_ros.dynamics.mesh_newton import collocate
-from cpg_ros.dynamics.simulate import simulate
-from cpg_ros.dynamics.stand import NoStand, everywhere, stand
-from cpg_ros.dynamics.theorem_4_2 import theorem_4_2
-from cpg_ros.networks.along import Along
+from cpg_ros.dynamics.sign_changes import crossings
+from cpg_ros.integration.simulate import simulate
 from cpg_ros.networks.biped import Biped
+from cpg_ros.networks.parameter_line import ParameterLine
 from cpg_ros.networks.quadruped import Quadruped
+from cpg_ros.papers.theorem_4_2 import theorem_4_2
 
 WALK = Biped.symmetric(0.229, 0.254, 0.390, -0.681, 0.489)
 PACE, JUMP = Quadruped(0.3, 0.3, -0.32, -0.32), Quadruped(0.01, -0.01, 0.2, 0.2)
@@ -29,7 +29,7 @@ EVERY = pytest.mark.parametrize('line', range(len(LINES)))
 @cache
 def found(line):
     network, text, low, high = LINES[line]
-    return cell_hopf_points(network, Along.parse(text, type(network)), low, high)
+    return cell_hopf_points(network, ParameterLine.parse(text, type(network)), low, high)
 
 
 def spectrum(point, value):
@@ -78,7 +78,7 @@ def test_points_lie_where_the_whole_linearisation_crosses(line):
 def test_no_crossing_is_missed(line):
     # Between the points the number of eigenvalues to the right changes by real ones only.
     network, text, low, high = LINES[line]
-    points, along = found(line), Along.parse(text, type(network))
+    points, along = found(line), ParameterLine.parse(text, type(network))
     grid = np.linspace(low, high, 161)
     counts = []
     for value in grid:
@@ -189,7 +189,7 @@ def test_lyapunov_coefficient_of_a_single_cell():
     (Quadruped(-0.15, -0.15, -0.16, -0.16, 0.31, 0.31), 'trot', 'xi=eta', 7.3e-5)])
 def test_table_12(network, gait, text, distance):
     # Printed points are near exact ones, stable in the paper's sense; trot as in the erratum.
-    along = Along.parse(text, Quadruped)
+    along = ParameterLine.parse(text, Quadruped)
     value = along.value(network)
     point, = (point for point in cell_hopf_points(network, along, value - 0.04, value + 0.04)
               if point.gait == gait)
@@ -201,7 +201,7 @@ def test_table_12(network, gait, text, distance):
 
 def test_hopf_points_where_the_stand_does_not_move():
     # Proof of theorem 4.3: with gamma = -alpha pace and bound branch off at alpha = -+ nu0/4.
-    along = Along.parse('alpha=beta=-gamma=-delta', Quadruped)
+    along = ParameterLine.parse('alpha=beta=-gamma=-delta', Quadruped)
     bound, pace = cell_hopf_points(Quadruped(0, 0, 0, 0), along, -0.5, 0.5)
     assert (bound.gait, pace.gait) == ('bound', 'pace')
     assert pace.value == pytest.approx(1.240676187 / 4.0, abs=1e-9)
@@ -213,7 +213,7 @@ def test_hopf_points_where_the_stand_does_not_move():
 @pytest.mark.parametrize('alpha', [-0.45, -0.05, 0.01, 0.2])
 def test_theorem_4_2_against_the_roots(sign, alpha):
     network = Quadruped(alpha, float(f'{sign}1') * alpha, 0.0, 0.0)
-    along = Along.parse('gamma=delta', Quadruped)
+    along = ParameterLine.parse('gamma=delta', Quadruped)
     judged = 0
     for point in cell_hopf_points(network, along, -1.3, 0.4):
         verdict = theorem_4_2(point.network, point.gait)
@@ -228,7 +228,7 @@ def test_theorem_4_2_against_the_roots(sign, alpha):
     (0.1, 'walk', -0.8306, 'the real blocks have complex eigenvalues'),
     (0.01, 'jump', 0.1276, 'the critical pair is the rightmost of its class')])
 def test_theorem_4_2_fails_where_its_proof_does(alpha, gait, gamma, words):
-    along = Along.parse('gamma=delta', Quadruped)
+    along = ParameterLine.parse('gamma=delta', Quadruped)
     points = cell_hopf_points(Quadruped(alpha, -alpha, 0.0, 0.0), along, gamma - 0.01,
                               gamma + 0.01)
     point = min(points, key=lambda point: (point.gait != gait, abs(point.value - gamma)))
@@ -254,7 +254,7 @@ def test_crossings_come_in_pairs_between_points_of_the_grid():
 
 def test_refusals(monkeypatch):
     monkeypatch.setattr(cell_hopf, 'GRID', 5)
-    along = Along.parse('gamma=delta', Quadruped)
+    along = ParameterLine.parse('gamma=delta', Quadruped)
     with pytest.raises(ValueError, match='low 1 must be less than high 0'):
         cell_hopf_points(PACE, along, 1, 0)
     with pytest.raises(NoStand, match='fold'):

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
 from cpg_ros.dynamics.orbit import NoOrbit, solve_orbit, solve_preset
-from cpg_ros.dynamics.simulate import simulate
+from cpg_ros.integration.simulate import simulate
 from cpg_ros.networks.biped import Biped
 from cpg_ros.networks.network import Preset
 from cpg_ros.networks.quadruped import Quadruped

@@ -13,7 +13,7 @@ import yaml
 from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 
-from cpg_ros.robot_file import load_robot
+from cpg_ros.robots.robot_file import load_robot
 from cpg_ros.tools.check_robot import main
 
 SOURCE = Path(__file__).resolve().parent.parent

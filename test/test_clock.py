@@ -9,7 +9,7 @@ import pytest
 from graph import until
 from rosgraph_msgs.msg import Clock
 
-from cpg_ros.nodes import ticker as ticker_module
+from cpg_ros.nodes import deadline_thread as ticker_module
 
 
 class SimulatedTime:

@@ -16,15 +16,15 @@ from cpg_ros.dynamics.continuation import follow, from_hopf
 from cpg_ros.dynamics.floquet import multipliers
 from cpg_ros.dynamics.mesh_newton import collocate
 from cpg_ros.dynamics.orbit import NoOrbit, solve_orbit, solve_preset
-from cpg_ros.dynamics.simulate import simulate
-from cpg_ros.networks.along import Along
+from cpg_ros.integration.simulate import simulate
 from cpg_ros.networks.biped import Biped
 from cpg_ros.networks.delayed import GAITS, Delayed, Mode
+from cpg_ros.networks.parameter_line import ParameterLine
 from cpg_ros.networks.quadruped import Quadruped
 from cpg_ros.networks.registry import NETWORKS, PRESETS
 
 EXAMPLE = Delayed(-4.5, 1.0, 6.5, -2.0, 0.4)
-TAU = Along.parse('tau', Delayed)
+TAU = ParameterLine.parse('tau', Delayed)
 SWAP = [1, 0, 3, 2, 5, 4, 7, 6]
 # Subcritical Hopf points: parameters, mode, sign of the root and n of DESIGN 2.1.
 SUBCRITICAL = {'pace': (Delayed(-3.4, 3.9, -6.2, 5.4, 1.0), Mode(0, 1), 1, 0),
@@ -90,7 +90,7 @@ def subcritical(name):
 def pace():
     """The quadruped's pace coexists with rest: its Hopf point must be subcritical."""
     return follow(solve_preset(PRESETS['quadruped']['pace']),
-                  Along.parse('alpha=beta', Quadruped), 0.0, 0.25)
+                  ParameterLine.parse('alpha=beta', Quadruped), 0.0, 0.25)
 
 
 class Cubic:
@@ -210,7 +210,7 @@ def test_there_and_back(a, b, d, more, gait, text):
     sign = 1.0 if GAITS[gait] in ((0, 1), (2, 1), (1, 1)) else -1.0
     network = Delayed(a, b, sign * (abs(a + b) + abs(d) + more), d, 1.0)
     network = replace(network, tau=1.4 * hopf(network, network.symmetry(gait), 1, 0)[1])
-    orbit, line = solve_orbit(network, gait), Along.parse(text, Delayed)
+    orbit, line = solve_orbit(network, gait), ParameterLine.parse(text, Delayed)
     value = line.value(network)
     there = follow(orbit, line, value - 0.1, value + 0.1, both=False, first_step=0.1)
     back = follow(there.points[-1].orbit, line, value, value + 0.1)
@@ -294,7 +294,8 @@ def test_both_orbits_of_pace_are_those_of_solve_bvp():
 
 def test_a_branch_ends_at_an_orbit_of_more_symmetry():
     # The biped's walk ends where the hop doubles its period: a multiplier of -1.
-    branch = follow(solve_preset(PRESETS['biped']['walk']), Along.parse('w_a', Biped), -1.0, 0.4)
+    branch = follow(solve_preset(PRESETS['biped']['walk']), ParameterLine.parse('w_a', Biped),
+                    -1.0, 0.4)
     assert [end.why for end in branch.ends] == ['symmetry', 'bound']
     last = branch.points[0].orbit
     hop = collocate(last.network, last.network.symmetry('two_legged_hop'),
@@ -309,7 +310,7 @@ def test_a_start_at_a_lower_extreme_is_moved_to_the_peak():
     # The same orbits from a trough, and from the lower one of two peaks.
     orbit = solve_orbit(EXAMPLE, 'trot')
     trough = follow(replace(orbit, values=-orbit.values), TAU, 0.39, 0.41)
-    line = Along.parse('w_a', Biped)
+    line = ParameterLine.parse('w_a', Biped)
     (two_peaks,) = follow(solve_preset(PRESETS['biped']['walk']), line, -0.3, 0.4).at(-0.2)
     theta = np.linspace(0.4, 0.6, 2001)
     late = theta[two_peaks.waveform(theta).argmax()]
@@ -327,7 +328,7 @@ def test_a_start_at_a_lower_extreme_is_moved_to_the_peak():
 
 def test_a_branch_ends_where_its_period_has_grown():
     preset = PRESETS['quadruped']['pronk']
-    line = Along.parse('alpha=beta', Quadruped)
+    line = ParameterLine.parse('alpha=beta', Quadruped)
     branch = follow(solve_preset(preset), line, 0.0, 1.0, longest=3.0, both=False)
     assert branch.ends[1].why == 'period'
     assert branch.periods[-2] <= 3.0 * branch.periods[0] < branch.periods[-1]
@@ -350,12 +351,12 @@ def test_refusals(name, text, low, high, words):
     network = 'biped' if 'w_' in text else 'quadruped'
     orbit = solve_preset(PRESETS[network][name])
     with pytest.raises(ValueError, match=words):
-        follow(orbit, Along.parse(text, NETWORKS[network]), low, high)
+        follow(orbit, ParameterLine.parse(text, NETWORKS[network]), low, high)
 
 
 def test_a_hopf_point_needs_its_eigenvector():
     network, state, root, vector = stand_of_pace(0.2448)
-    line = Along.parse('alpha=beta', Quadruped)
+    line = ParameterLine.parse('alpha=beta', Quadruped)
     for gait, wrong, words in (('bound', vector, 'does not have the symmetry: '),
                                ('pace', None, 'needs the stand and the eigenvector')):
         with pytest.raises(ValueError, match=words):
@@ -364,4 +365,5 @@ def test_a_hopf_point_needs_its_eigenvector():
     # Far from any Hopf point there is no small orbit.
     network = replace(EXAMPLE, tau=0.05)
     with pytest.raises(NoOrbit, match=r'no orbit of amplitude 0.02 was found near tau 0.05'):
-        from_hopf(network, network.symmetry('trot'), 6.3, Along.parse('tau', Delayed), 0.0, 0.1)
+        from_hopf(network, network.symmetry('trot'), 6.3, ParameterLine.parse('tau', Delayed),
+                  0.0, 0.1)

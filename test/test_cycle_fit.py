@@ -8,8 +8,8 @@ from scipy.optimize import minimize_scalar
 
 from cpg_ros.dynamics.delayed_orbit import solve
 from cpg_ros.dynamics.periodic import NoOrbit
-from cpg_ros.dynamics.simulate import simulate
-from cpg_ros.fitting.cycle_fit import cycle_samples, fit_cycle
+from cpg_ros.integration.simulate import simulate
+from cpg_ros.inversion.cycle_fit import cycle_samples, fit_cycle
 from cpg_ros.networks.delayed import Delayed
 
 TROT = Delayed(-2.0, 1.0, 6.43, -2.0, 0.25)

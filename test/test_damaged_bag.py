@@ -14,8 +14,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from rosbags.rosbag2 import Reader
 
-from cpg_ros.fitting.bag import read_bag
-from cpg_ros.fitting.recording import RecordingError
+from cpg_ros.recordings.bag_reader import read_bag
+from cpg_ros.recordings.recording import RecordingError
 
 #: Storage and compression of the bags that are cut and scratched.
 KINDS = [('sqlite3', 'none'), ('sqlite3', 'file'), ('mcap', 'none'), ('mcap', 'file'),

@@ -13,8 +13,8 @@ from cpg_ros.dynamics.floquet import multipliers, smallest_gain
 from cpg_ros.dynamics.hopf import hopf_point
 from cpg_ros.dynamics.orbit import solve_orbit, solve_preset
 from cpg_ros.dynamics.periodic import Orbit
-from cpg_ros.dynamics.simulate import simulate
 from cpg_ros.dynamics.stability import stability
+from cpg_ros.integration.simulate import simulate
 from cpg_ros.networks.delayed import MODES, PRESETS, Delayed, default_symmetry_gain
 
 EVERY = pytest.mark.parametrize('name', PRESETS)

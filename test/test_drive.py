@@ -6,12 +6,12 @@ import steered
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from cpg_ros.dynamics.drive import Drive
-from cpg_ros.dynamics.pattern import Pattern
-from cpg_ros.dynamics.program import Refused, plan
+from cpg_ros.motion.pattern import Pattern
+from cpg_ros.motion.plan import Refused, plan
+from cpg_ros.motion.steering import Drive
 from cpg_ros.networks.registry import PRESETS
-from cpg_ros.robot import Steering
-from cpg_ros.robot_file import RobotError, load_robot, write_robot
+from cpg_ros.robots.robot import Steering
+from cpg_ros.robots.robot_file import RobotError, load_robot, write_robot
 
 TURN = 2.0 * np.pi
 TABLE = Steering(**{key: tuple(value) for key, value in steered.STEERING.items()})

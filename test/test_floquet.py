@@ -8,9 +8,9 @@ from scipy.integrate import solve_ivp
 
 from cpg_ros.dynamics.floquet import multipliers, smallest_gain
 from cpg_ros.dynamics.orbit import solve_preset
-from cpg_ros.dynamics.phase_readout import PhaseReadout
-from cpg_ros.dynamics.simulate import simulate
 from cpg_ros.dynamics.stability import RATE, stability
+from cpg_ros.integration.simulate import simulate
+from cpg_ros.motion.phase_readout import PhaseReadout
 from cpg_ros.networks.biped import Biped
 from cpg_ros.networks.network import Preset
 from cpg_ros.networks.registry import PRESETS

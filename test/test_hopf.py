@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from cpg_ros.dynamics.characteristic import characteristic_roots, leading_roots
 from cpg_ros.dynamics.hopf import hopf_point, hopf_points
 from cpg_ros.dynamics.orbit import solve_orbit
-from cpg_ros.dynamics.simulate import simulate
+from cpg_ros.integration.simulate import simulate
 from cpg_ros.networks.delayed import MODES, PRESETS, Delayed, Mode
 
 EXAMPLE_1, EXAMPLE_2 = Delayed(-4.5, 1.0, 6.5, -2.0, 0.4), Delayed(-3.0, 0.1, 4.0, 1.0, 0.7)

@@ -9,18 +9,18 @@ from hypothesis import strategies as st
 from made_up import joint_angles, record, weights_of
 
 from cpg_ros.dynamics.orbit import NoOrbit, solve_orbit, solve_preset
-from cpg_ros.fitting import inversion
-from cpg_ros.fitting.cycle_fit import cycle_samples, fit_cycle
-from cpg_ros.fitting.free import free_numbers, within_hopf_set
-from cpg_ros.fitting.identifiability import correlation_length
-from cpg_ros.fitting.inversion import invert
-from cpg_ros.fitting.joints import Joints, cells_of
-from cpg_ros.fitting.problem import Period, Problem
-from cpg_ros.fitting.runnable import refusal
+from cpg_ros.inversion import invert as inversion
+from cpg_ros.inversion.cycle_fit import cycle_samples, fit_cycle
+from cpg_ros.inversion.fit_data import Joints, cells_of
+from cpg_ros.inversion.free_parameters import free_numbers, within_hopf_set
+from cpg_ros.inversion.identifiability import correlation_length
+from cpg_ros.inversion.invert import invert
+from cpg_ros.inversion.least_squares import Period, Problem
+from cpg_ros.motion.runnable import refusal
 from cpg_ros.networks.delayed import Delayed
 from cpg_ros.networks.quadruped import Quadruped
 from cpg_ros.networks.registry import PRESETS
-from cpg_ros.robot import HARMONICS
+from cpg_ros.robots.robot import HARMONICS
 
 TROT = PRESETS['delayed']['trot'].network
 CELLS = (1, 1, 7, 2, 3, 4)

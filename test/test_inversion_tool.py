@@ -14,7 +14,7 @@ from bags import START, joint_state, storage_file, write_bag
 
 from cpg_ros.dynamics.orbit import solve_orbit, solve_preset
 from cpg_ros.networks.registry import PRESETS
-from cpg_ros.robot_file import load_robot
+from cpg_ros.robots.robot_file import load_robot
 from cpg_ros.tools.inversion import main
 
 LEGS = {'lh': 1, 'rh': 2, 'lf': 3, 'rf': 4}

@@ -13,9 +13,9 @@ from graph import free_domain
 from setuptools import find_packages
 
 from cpg_ros.networks.registry import NETWORKS, PRESETS
+from cpg_ros.nodes.generator_parameters import USUAL, Planner, specs
 from cpg_ros.nodes.inversion_node import Inversion
-from cpg_ros.nodes.settings import USUAL, Planner, specs
-from cpg_ros.robot_file import find_robot
+from cpg_ros.robots.robot_file import find_robot
 
 SOURCE = Path(__file__).resolve().parent.parent
 SHARE = Path(get_package_share_directory('cpg_ros'))
@@ -65,7 +65,7 @@ def described(monkeypatch):
         module = ModuleType(name)
         vars(module).update(kinds)
         monkeypatch.setitem(sys.modules, name, module)
-    monkeypatch.delitem(sys.modules, 'cpg_ros.launching', raising=False)
+    monkeypatch.delitem(sys.modules, 'cpg_ros.nodes.launch_arguments', raising=False)
 
     def run(name, **given):
         space = {'__file__': str(SOURCE / 'launch' / f'{name}.launch.py')}
@@ -88,7 +88,7 @@ def described(monkeypatch):
         described.context = context
         return described
     yield run
-    sys.modules.pop('cpg_ros.launching', None)
+    sys.modules.pop('cpg_ros.nodes.launch_arguments', None)
 
 
 def parameters(described, node):

@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cpg_ros.fitting.legs import LegsError, legs_of, role_of
+from cpg_ros.gaits.leg_names import LegsError, legs_of, role_of
 
 LEGS = ('lf', 'rf', 'lh', 'rh')
 #: How the four legs are called.

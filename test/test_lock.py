@@ -7,8 +7,8 @@ from hypothesis import strategies as st
 from scipy.special import lambertw
 
 from cpg_ros.dynamics.orbit import solve_orbit
-from cpg_ros.dynamics.simulate import simulate
-from cpg_ros.dynamics.stepper import Stepper
+from cpg_ros.integration.simulate import simulate
+from cpg_ros.integration.stepper import Stepper
 from cpg_ros.networks.delayed import GAITS, MODES, PRESETS, Delayed, Mode, default_symmetry_gain
 
 SWAP = [1, 0, 3, 2, 5, 4, 7, 6]

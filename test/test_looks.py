@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 import yaml
 
-from cpg_ros.nodes.outputs import COMMAND_TOPICS
-from cpg_ros.robot_file import find_robot
+from cpg_ros.nodes.joint_publishers import COMMAND_TOPICS
+from cpg_ros.robots.robot_file import find_robot
 from cpg_ros.tools.check_robot import main
 
 SOURCE = Path(__file__).resolve().parent.parent

@@ -7,10 +7,10 @@ from ament_index_python.packages import get_package_share_directory
 from graph import Process, Watcher, until
 from switches import check_all_switches, off
 
-from cpg_ros.dynamics.program import plan
-from cpg_ros.networks.presets import write_presets
+from cpg_ros.motion.plan import plan
+from cpg_ros.networks.preset_files import write_presets
 from cpg_ros.networks.registry import NETWORKS, PRESETS
-from cpg_ros.robot_file import load_robot
+from cpg_ros.robots.robot_file import load_robot
 
 CONFIG = Path(get_package_share_directory('cpg_ros')) / 'config'
 # DESIGN 2.1 and 2.3: phases of the legs, where the gait's symmetry prescribes them.

@@ -12,15 +12,17 @@ import pytest
 from cpg_ros.dynamics.cell_orbit import richer
 from cpg_ros.dynamics.floquet import multipliers
 from cpg_ros.dynamics.orbit import solve_preset
-from cpg_ros.dynamics.phase_readout import PhaseReadout
-from cpg_ros.fitting import objectives, polish, search_space, weights
-from cpg_ros.fitting.waveforms import lag, shape_difference, shifted, steadiness
+from cpg_ros.gaits.waveform_comparison import lag, shape_difference, shifted, steadiness
+from cpg_ros.motion.phase_readout import PhaseReadout
 from cpg_ros.networks.biped import GAITS, PRESETS, PRIMARY, WEIGHTS, Biped
-from cpg_ros.networks.presets import read_presets
+from cpg_ros.networks.preset_files import read_presets
 from cpg_ros.networks.quadruped import Quadruped
 from cpg_ros.networks.registry import PRESETS as ALL_PRESETS
+from cpg_ros.search import nsga2 as weights
+from cpg_ros.search import objectives, search_space
+from cpg_ros.search import verification as polish
+from cpg_ros.search.pareto_front import write_front
 from cpg_ros.tools import optimize
-from cpg_ros.tools.front import write_front
 
 SECONDARY = tuple(gait for gait in GAITS if gait not in PRIMARY)
 FIXED = {'current': 0.229, 'phi': 0.254}

@@ -7,12 +7,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cpg_ros.dynamics.pattern import Pattern
-from cpg_ros.dynamics.program import Refused, plan
-from cpg_ros.dynamics.stepper import Stepper
+from cpg_ros.integration.stepper import Stepper
+from cpg_ros.motion.pattern import Pattern
+from cpg_ros.motion.plan import Refused, plan
 from cpg_ros.networks.delayed import GAITS, PRESETS, Delayed
-from cpg_ros.robot import JointMotion, Motion
-from cpg_ros.robot_file import load_robot
+from cpg_ros.robots.robot import JointMotion, Motion
+from cpg_ros.robots.robot_file import load_robot
 
 ROBOTS = {name: load_robot(Path(__file__).parents[1] / 'config' / f'{name}.yaml')
           for name in ('goat', 'quadruped')}

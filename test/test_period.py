@@ -6,9 +6,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from rhythm import BIPED, QUADRUPED, Rhythm, around, recordings, seeds
 
-from cpg_ros.fitting.cycle import mean_cycle
-from cpg_ros.fitting.period import find_period
-from cpg_ros.fitting.recognise import recognise
+from cpg_ros.gaits.mean_cycle import mean_cycle
+from cpg_ros.gaits.period import find_period
+from cpg_ros.gaits.recognition import recognise
 from cpg_ros.networks.symmetry import D2, Z4_Z2
 
 

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from cpg_ros.dynamics.orbit import solve_preset
-from cpg_ros.dynamics.pattern import Pattern
-from cpg_ros.dynamics.phase_readout import PhaseReadout
-from cpg_ros.dynamics.program import plan
+from cpg_ros.motion.pattern import Pattern
+from cpg_ros.motion.phase_readout import PhaseReadout
+from cpg_ros.motion.plan import plan
 from cpg_ros.networks.registry import PRESETS
-from cpg_ros.robot_file import load_robot
+from cpg_ros.robots.robot_file import load_robot
 
 ROBOTS = {name: load_robot(Path(__file__).parents[1] / 'config' / f'{name}.yaml')
           for name in ('quadruped', 'biped')}

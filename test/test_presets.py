@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from cpg_ros.networks.biped import Biped
 from cpg_ros.networks.network import Preset
-from cpg_ros.networks.presets import PresetError, read_presets, write_presets
+from cpg_ros.networks.preset_files import PresetError, read_presets, write_presets
 from cpg_ros.networks.registry import NETWORKS, PRESETS
 
 CONFIG = Path(__file__).parents[1] / 'config' / 'presets'

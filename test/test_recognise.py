@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from rhythm import BIPED, EVERY, NAMED, QUADRUPED, Rhythm, around, phase_error, recordings, seeds
 
-from cpg_ros.fitting.recognise import nearest_gait, recognise
+from cpg_ros.gaits.recognition import nearest_gait, recognise
 from cpg_ros.networks.symmetry import D2, Z4_Z2, Symmetry
 
 

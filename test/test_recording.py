@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from cpg_ros.fitting.recording import Recording, RecordingError, merged
+from cpg_ros.recordings.recording import Recording, RecordingError, merged
 
 JOINTS = ('lf_hip', 'lf_knee', 'rf_hip', 'rf_knee')
 START = 1_700_000_000_000_000_000

@@ -14,12 +14,12 @@ import pytest
 from cpg_ros.dynamics.hopf import hopf_point
 from cpg_ros.networks.quadruped import Quadruped
 from cpg_ros.papers import buono_blocks, buono_groups, liu_zhang, rashidi
+from cpg_ros.papers.catalogue import PAPERS
 from cpg_ros.papers.errata import ERRATA
-from cpg_ros.papers.registry import PAPERS
-from cpg_ros.papers.row import Place
+from cpg_ros.papers.row import Citation
 from cpg_ros.tools import reproduce
 
-AT = Place('Somebody 2000', 'Table 1')
+AT = Citation('Somebody 2000', 'Table 1')
 KEYS = {'paper': str, 'place': str, 'quantity': str, 'published': str, 'computed': str,
         'agrees': bool, 'compared': str, 'verdict': str, 'note': str, 'corrected': str,
         'explained': bool}

@@ -9,7 +9,7 @@ import yaml
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from cpg_ros.robot_file import RobotError, load_robot, write_robot
+from cpg_ros.robots.robot_file import RobotError, load_robot, write_robot
 
 CONFIG = Path(__file__).resolve().parent.parent / 'config'
 GOAT = yaml.safe_load((CONFIG / 'goat.yaml').read_text())

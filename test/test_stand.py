@@ -8,11 +8,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import fsolve
 
-from cpg_ros.dynamics.blocks import blocks
-from cpg_ros.dynamics.buono_tables import Tables, square_root
-from cpg_ros.dynamics.stand import NoStand, everywhere, stand, stands
+from cpg_ros.dynamics.equilibrium import NoStand, everywhere, stand, stands
+from cpg_ros.dynamics.isotypic import blocks
 from cpg_ros.networks.biped import Biped
 from cpg_ros.networks.quadruped import CELL, PHI, Quadruped
+from cpg_ros.papers.buono_tables import Tables, square_root
 
 COUPLINGS = st.builds(Quadruped, *[st.floats(-0.4, 0.4)] * 6)
 BIPEDS = st.builds(Biped.symmetric, st.floats(0.15, 0.6), st.floats(0.05, 1.0),

@@ -8,8 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from cpg_ros.dynamics.orbit import solve_orbit
-from cpg_ros.dynamics.simulate import simulate
-from cpg_ros.dynamics.stepper import Stepper
+from cpg_ros.integration.simulate import simulate
+from cpg_ros.integration.stepper import Stepper
 from cpg_ros.networks.delayed import STEP, Delayed, Mode
 
 WALK = Delayed(-4.5, 1.0, 6.5, -2.0, 0.4)

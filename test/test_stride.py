@@ -6,8 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from motion import BY_LEG, GAITS, NAMES, Driven, Recorded, leg, noisy, quadruped, stamps
 
-from cpg_ros.fitting.legs import legs_of
-from cpg_ros.fitting.stride import NoSteadyGait, find_stride
+from cpg_ros.gaits.leg_names import legs_of
+from cpg_ros.gaits.stride import NoSteadyGait, find_stride
 from cpg_ros.networks.biped import Biped
 from cpg_ros.networks.delayed import Delayed
 from cpg_ros.networks.quadruped import Quadruped

@@ -9,9 +9,9 @@ from graph import until
 from std_srvs.srv import SetBool
 from switches import by_leg, check_all_switches, off
 
-from cpg_ros.dynamics.program import plan
+from cpg_ros.motion.plan import plan
 from cpg_ros.networks.delayed import GAITS, PRESETS
-from cpg_ros.robot_file import load_robot
+from cpg_ros.robots.robot_file import load_robot
 
 ROBOT = load_robot(Path(get_package_share_directory('cpg_ros')) / 'config' / 'quadruped.yaml')
 OFFSET, LOWER, UPPER = (ROBOT.column(key) for key in ('offset', 'lower', 'upper'))

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from rhythm import BIPED, GROUPS, QUADRUPED, Z6, seeds
 
-from cpg_ros.networks.pairs import admissible_pairs, label, subgroups, symmetries
+from cpg_ros.networks.hk_theorem import admissible_pairs, label, subgroups, symmetries
 from cpg_ros.networks.symmetry import D2, Z4_Z2, Group, Symmetry
 
 

@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from cpg_ros.fitting.recording import RecordingError
-from cpg_ros.fitting.table import read_csv
+from cpg_ros.recordings.csv_reader import read_csv
+from cpg_ros.recordings.recording import RecordingError
 
 
 @pytest.fixture

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numba import njit
 
-from cpg_ros.networks.jit import OPTIONS, tanh
+from cpg_ros.integration.jit import OPTIONS, tanh
 
 SPECIAL = [0.0, -0.0, math.inf, -math.inf, 5e-324, -5e-324, 2.2250738585072014e-308,
            -2.2250738585072009e-308, 1e-160, 1e-8, 0.5 * math.log(2.0), 19.06, 19.07, 20.0,

@@ -12,7 +12,7 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray
 from trajectory_msgs.msg import JointTrajectory
 
-from cpg_ros.robot_file import load_robot
+from cpg_ros.robots.robot_file import load_robot
 
 CONFIG = Path(get_package_share_directory('cpg_ros')) / 'config'
 QUADRUPED = load_robot(CONFIG / 'quadruped.yaml')

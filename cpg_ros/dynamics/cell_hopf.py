@@ -16,10 +16,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from cpg_ros.dynamics.blocks import Block, blocks, characters, rightmost_first
-from cpg_ros.dynamics.crossings import crossings
-from cpg_ros.dynamics.normal_form import NormalForm
-from cpg_ros.dynamics.stand import (
+from cpg_ros.dynamics.equilibrium import (
     NoStand,
     cell_jacobian,
     cell_rates,
@@ -27,8 +24,11 @@ from cpg_ros.dynamics.stand import (
     everywhere,
     stand,
 )
-from cpg_ros.networks.along import Along
+from cpg_ros.dynamics.isotypic import Block, blocks, characters, rightmost_first
+from cpg_ros.dynamics.normal_form import NormalForm
+from cpg_ros.dynamics.sign_changes import crossings
 from cpg_ros.networks.biped import Biped
+from cpg_ros.networks.parameter_line import ParameterLine
 from cpg_ros.networks.quadruped import Quadruped
 
 #: Values of the parameters at which the stand is looked at before the crossings are refined.
@@ -60,7 +60,7 @@ class CellHopf:
     """
 
     block: Block
-    along: Along
+    along: ParameterLine
     value: float
     network: Quadruped | Biped
     stand: np.ndarray
@@ -147,7 +147,7 @@ class CellHopf:
         return everywhere(network, stand(network)) + 2.0 * swing.real
 
 
-def cell_hopf_points(network: Quadruped | Biped, along: Along, low: float, high: float
+def cell_hopf_points(network: Quadruped | Biped, along: ParameterLine, low: float, high: float
                      ) -> list[CellHopf]:
     """Find all Hopf points of the stand between two values of parameters, by rising value.
 
@@ -216,7 +216,7 @@ def _with_edges(grid: list[float], exists: Callable[[float], bool]) -> list[floa
     return whole
 
 
-def hopf_at(network: Quadruped | Biped, along: Along, mode: tuple[int, int], omega: float
+def hopf_at(network: Quadruped | Biped, along: ParameterLine, mode: tuple[int, int], omega: float
             ) -> CellHopf:
     """Reduce to the normal form at a Hopf point that is known.
 

@@ -14,7 +14,7 @@ import numpy as np
 from cpg_ros.dynamics.mesh_newton import collocate, predicted
 from cpg_ros.dynamics.mesh_orbit import MeshOrbit
 from cpg_ros.dynamics.periodic import NoOrbit
-from cpg_ros.dynamics.simulate import simulate
+from cpg_ros.integration.simulate import simulate
 from cpg_ros.networks.network import Network, Preset
 from cpg_ros.networks.registry import PRESETS
 from cpg_ros.networks.symmetry import Symmetry

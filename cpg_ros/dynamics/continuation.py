@@ -17,9 +17,9 @@ from cpg_ros.dynamics.delayed_orbit import NODES, DelayedOrbit
 from cpg_ros.dynamics.mesh_newton import Reduced, Solution, sampled
 from cpg_ros.dynamics.mesh_orbit import MeshOrbit
 from cpg_ros.dynamics.periodic import NoOrbit
-from cpg_ros.networks.along import Along
 from cpg_ros.networks.delayed import Delayed, Mode
 from cpg_ros.networks.network import Network
+from cpg_ros.networks.parameter_line import ParameterLine
 from cpg_ros.networks.symmetry import Symmetry
 
 #: Below this amplitude an orbit is as good as its Hopf point.
@@ -81,7 +81,7 @@ class Branch:
 
     """
 
-    along: Along
+    along: ParameterLine
     points: tuple[BranchPoint, ...]
     turns: tuple[int, ...]
     ends: tuple[End, End]
@@ -130,7 +130,7 @@ class Branch:
         return tuple(found)
 
 
-def follow(orbit: DelayedOrbit | MeshOrbit, along: Along, low: float, high: float, *,
+def follow(orbit: DelayedOrbit | MeshOrbit, along: ParameterLine, low: float, high: float, *,
            first_step: float = arclength.FIRST, longest_step: float = arclength.LONGEST,
            most: int = 200, both: bool = True, longest: float = 20.0) -> Branch:
     """Follow a gait's orbit along a line of parameters, past folds.
@@ -186,8 +186,9 @@ def follow(orbit: DelayedOrbit | MeshOrbit, along: Along, low: float, high: floa
                   (begin, end))
 
 
-def from_hopf(network: Network, symmetry: Mode | Symmetry, omega: float, along: Along, low: float,
-              high: float, *, stand: np.ndarray | None = None, vector: np.ndarray | None = None,
+def from_hopf(network: Network, symmetry: Mode | Symmetry, omega: float,
+              along: ParameterLine, low: float, high: float, *,
+              stand: np.ndarray | None = None, vector: np.ndarray | None = None,
               amplitude: float = 0.02, first_step: float = arclength.FIRST,
               longest_step: float = arclength.LONGEST, most: int = 200, longest: float = 20.0
               ) -> Branch:
@@ -302,8 +303,8 @@ def _run(start: Place, limits: tuple[float, float, float], steps: dict
     return points, turns, End(why, value, period)
 
 
-def _check(network: Network, symmetry: Mode | Symmetry, along: Along, low: float, high: float
-           ) -> None:
+def _check(network: Network, symmetry: Mode | Symmetry, along: ParameterLine, low: float,
+           high: float) -> None:
     value = along.value(network)
     if along.at(network, value) != network:
         raise ValueError(f'the network is not on the line {along}')

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from cpg_ros.dynamics import collocation
+from cpg_ros.dynamics import fourier as collocation
 from cpg_ros.dynamics.delayed_orbit import (
     MOST_NODES,
     RESOLVED,
@@ -32,13 +32,13 @@ from cpg_ros.dynamics.mesh_newton import (
 )
 from cpg_ros.dynamics.mesh_orbit import MeshOrbit
 from cpg_ros.dynamics.periodic import NoOrbit
-from cpg_ros.networks.along import Along
 from cpg_ros.networks.delayed import Delayed, Mode
 from cpg_ros.networks.network import Network
+from cpg_ros.networks.parameter_line import ParameterLine
 from cpg_ros.networks.symmetry import Symmetry
 
 
-def _direction(along: Along, network: Network) -> np.ndarray:
+def _direction(along: ParameterLine, network: Network) -> np.ndarray:
     """Derivative of the network's parameters by the value on the line, shape (parameters,)."""
     signs = dict(zip(along.names, along.signs, strict=True))
     return np.array([signs.get(name, 0.0) for name in network.parameters()])
@@ -58,7 +58,7 @@ class FourierCurve:
 
     network: Delayed
     symmetry: Mode
-    along: Along
+    along: ParameterLine
     scales: tuple[float, float]
 
     def product(self, one: np.ndarray, other: np.ndarray) -> float:
@@ -126,7 +126,7 @@ class MeshCurve:
 
     network: Network
     symmetry: Symmetry
-    along: Along
+    along: ParameterLine
     scales: tuple[float, float]
     mesh: np.ndarray
 

@@ -11,7 +11,7 @@ from dataclasses import astuple, dataclass, replace
 import numpy as np
 from scipy.optimize import brentq
 
-from cpg_ros.dynamics import collocation
+from cpg_ros.dynamics import fourier as collocation
 from cpg_ros.dynamics.hopf import hopf_point, weakened
 from cpg_ros.dynamics.periodic import NoOrbit, Orbit
 from cpg_ros.networks.delayed import Delayed, Mode

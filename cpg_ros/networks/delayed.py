@@ -11,7 +11,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from cpg_ros.networks.jit import tanh
+from cpg_ros.integration.jit import tanh
 from cpg_ros.networks.network import Network, Preset, Range, known
 from cpg_ros.networks.symmetry import GAITS
 

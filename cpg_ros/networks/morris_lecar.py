@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cpg_ros.networks.jit import exp
+from cpg_ros.integration.jit import exp
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ import numpy as np
 
 from cpg_ros.networks import morris_lecar
 from cpg_ros.networks.network import Network, Range, known
-from cpg_ros.networks.presets import shipped
+from cpg_ros.networks.preset_files import shipped
 from cpg_ros.networks.symmetry import GAITS, Z4_Z2, Symmetry
 
 CELLS = 8

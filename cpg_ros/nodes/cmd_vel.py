@@ -11,8 +11,8 @@ from rclpy.node import Node
 from rclpy.qos import QoSProfile
 from rclpy.qos_overriding_options import QoSOverridingOptions
 
-from cpg_ros.dynamics.pattern import Pattern
-from cpg_ros.dynamics.program import Program
+from cpg_ros.motion.pattern import Pattern
+from cpg_ros.motion.plan import Program
 
 #: How often it is seen whether the last command is too old, s.
 LOOK = 0.05

@@ -5,9 +5,9 @@ from rclpy.clock import Clock
 from rclpy.clock_type import ClockType
 from rclpy.node import Node
 
-from cpg_ros.dynamics.pattern import Pattern
+from cpg_ros.motion.pattern import Pattern
 from cpg_ros.nodes.cmd_vel import CmdVel
-from cpg_ros.nodes.ticker import Ticker
+from cpg_ros.nodes.deadline_thread import Ticker
 
 
 class Diagnostics:

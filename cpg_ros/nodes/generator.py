@@ -13,21 +13,21 @@ from rclpy.qos_overriding_options import QoSOverridingOptions
 from std_msgs.msg import String
 from std_srvs.srv import SetBool
 
-from cpg_ros.dynamics.drive import Drive
-from cpg_ros.dynamics.pattern import Pattern
-from cpg_ros.dynamics.program import Refused
-from cpg_ros.dynamics.warm import warm
+from cpg_ros.motion.pattern import Pattern
+from cpg_ros.motion.plan import Refused
+from cpg_ros.motion.precompile import precompile
+from cpg_ros.motion.steering import Drive
 from cpg_ros.networks.network import Network, Preset
-from cpg_ros.networks.presets import PresetError, read_presets
+from cpg_ros.networks.preset_files import PresetError, read_presets
 from cpg_ros.networks.registry import NETWORKS, PRESETS
 from cpg_ros.nodes.cmd_vel import CmdVel
+from cpg_ros.nodes.deadline_thread import Ticker
 from cpg_ros.nodes.diagnostics import Diagnostics
-from cpg_ros.nodes.outputs import Outputs
-from cpg_ros.nodes.settings import COMMANDS, NETWORK, Planner, specs
-from cpg_ros.nodes.spec import as_doubles
-from cpg_ros.nodes.starting import StartedNode, StartError, run
-from cpg_ros.nodes.ticker import Ticker
-from cpg_ros.robot_file import RobotError, find_robot
+from cpg_ros.nodes.generator_parameters import COMMANDS, NETWORK, Planner, specs
+from cpg_ros.nodes.joint_publishers import Outputs
+from cpg_ros.nodes.node_base import StartedNode, StartError, run
+from cpg_ros.nodes.parameter_spec import as_doubles
+from cpg_ros.robots.robot_file import RobotError, find_robot
 
 NAME = 'cpg_generator'
 #: On SIGINT or SIGTERM the ramp takes this long, and the node ends by the later time, s.
@@ -207,7 +207,7 @@ def compile_kernels(network: str) -> None:
                                                 'first start needs this (10 to 20 s)'])
     notice.daemon = True
     notice.start()
-    warm(network)
+    precompile(network)
     notice.cancel()
     if time.monotonic() - began > 1.0:
         logger.info(f'compiled in {time.monotonic() - began:.1f} s')

@@ -23,17 +23,17 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
-from cpg_ros.fitting.fitted import write_fitted
-from cpg_ros.fitting.inverted import Inverted, inverted
-from cpg_ros.fitting.live import Live
-from cpg_ros.fitting.servo import Servo
-from cpg_ros.nodes import starting
-from cpg_ros.nodes.spec import Spec
-from cpg_ros.nodes.starting import StartedNode, StartError
-from cpg_ros.robot import Robot
-from cpg_ros.robot_file import find_robot
+from cpg_ros.files.atomic_write import write_atomically
+from cpg_ros.inversion.parameter_files import write_fitted
+from cpg_ros.inversion.recording_fit import Inverted, inverted
+from cpg_ros.nodes import node_base as starting
+from cpg_ros.nodes.node_base import StartedNode, StartError
+from cpg_ros.nodes.parameter_spec import Spec
+from cpg_ros.recordings.live_buffer import Live
+from cpg_ros.recordings.servo import Servo
+from cpg_ros.robots.robot import Robot
+from cpg_ros.robots.robot_file import find_robot
 from cpg_ros.tools.arguments import finite
-from cpg_ros.whole import write_whole
 
 NAME = 'cpg_inversion'
 #: Seconds that a generator gets to answer.
@@ -182,7 +182,7 @@ class Inversion(StartedNode):
             # matplotlib takes half a second, and only pages need it.
             from cpg_ros.tools.inversion_report import as_html
             path = Path(self._value('report')).expanduser()
-            write_whole(path, as_html(found))
+            write_atomically(path, as_html(found))
             written.append(path)
         return [f'written: {", ".join(map(str, written))}'] if written else []
 

@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 from rclpy.node import Node
 
-from cpg_ros.nodes.commands import Commands
+from cpg_ros.nodes.command_topics import Commands
 
 #: How long an answer to an instant is waited for, s: at first, and while none comes.
 PATIENCE, IMPATIENCE = 1.0, 0.02

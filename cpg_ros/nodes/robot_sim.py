@@ -18,18 +18,18 @@ from rosgraph_msgs.msg import Clock
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
-from cpg_ros.nodes.commands import KINDS, Commands
+from cpg_ros.nodes.command_topics import KINDS, Commands
+from cpg_ros.nodes.deadline_thread import Ticker
 from cpg_ros.nodes.lockstep import Lockstep
-from cpg_ros.nodes.measurements import Measurements
-from cpg_ros.nodes.spec import Spec
-from cpg_ros.nodes.starting import StartedNode, StartError, run
-from cpg_ros.nodes.ticker import Ticker
-from cpg_ros.robot_file import RobotError, find_robot
-from cpg_ros.simulation.approach import Approach
+from cpg_ros.nodes.node_base import StartedNode, StartError, run
+from cpg_ros.nodes.parameter_spec import Spec
+from cpg_ros.nodes.sensor_publishers import Measurements
+from cpg_ros.robots.robot_file import RobotError, find_robot
 from cpg_ros.simulation.body import Body
 from cpg_ros.simulation.camera import without_opengl
-from cpg_ros.simulation.diary import Diary, summary
-from cpg_ros.simulation.model import SimulationError
+from cpg_ros.simulation.robot_model import SimulationError
+from cpg_ros.simulation.run_recorder import Diary, summary
+from cpg_ros.simulation.soft_start import Approach
 
 NAME = 'robot_sim'
 #: How long the force of one message on ~/push acts, s of simulated time.

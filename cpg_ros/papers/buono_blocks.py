@@ -10,12 +10,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from cpg_ros.dynamics.blocks import Block, blocks
-from cpg_ros.dynamics.buono_tables import Tables, square_root
-from cpg_ros.dynamics.stand import everywhere
+from cpg_ros.dynamics.equilibrium import everywhere
+from cpg_ros.dynamics.isotypic import Block, blocks
 from cpg_ros.networks.quadruped import CELL, PHI, Quadruped
 from cpg_ros.papers.buono_gaits import AUTHORS
-from cpg_ros.papers.row import Picture, Place, Row
+from cpg_ros.papers.buono_tables import Tables, square_root
+from cpg_ros.papers.row import Citation, Picture, Row
 
 #: Table 5: phases of cells 1 to 8, upper and lower signs, by (j, k).
 TABLE_5 = {(0, 0): ('pronk', '0 0 0 0 0 0 0 0'), (0, 1): ('pace', '0 1/2 0 1/2 0 1/2 0 1/2'),
@@ -83,11 +83,11 @@ def phases() -> Iterator[Row | Picture]:
     values, vectors = np.linalg.eig(whole)
     found = np.concatenate([one.eigenvalues for one in sample.blocks.values()])
     gap = max(np.abs(values - one).min() for one in found)
-    yield Place(AUTHORS, 'section 5.2').holds(
+    yield Citation(AUTHORS, 'section 5.2').holds(
         'the eight blocks hold all eigenvalues of L',
         gap < 1e-9 and max(np.abs(found - one).min() for one in values) < 1e-9,
         note=f'largest difference {gap:.1e}')
-    at = Place(AUTHORS, 'Table 5')
+    at = Citation(AUTHORS, 'Table 5')
     for (j, k), (gait, printed) in TABLE_5.items():
         eigenvalue = sample.blocks[f'L_{j}{k}'].eigenvalues[0]
         vector = vectors[:8, np.abs(values - eigenvalue).argmin()]
@@ -107,27 +107,27 @@ def tables() -> Iterator[Row | Picture]:
     sample = drawn()
     printed, parts = sample.tables, sample.blocks
     for name, text in TABLE_6.items():
-        yield Place(AUTHORS, 'Table 6').formula(name, text, printed.block(*parts[name].mode),
+        yield Citation(AUTHORS, 'Table 6').formula(name, text, printed.block(*parts[name].mode),
                                                 parts[name].matrix)
     for name, signs in SIGNS.items():
         wrong, n = name == 'L_21', sample.network
         text = '(a + d) ' + _signed(signs if not wrong else '---', '+')
-        yield Place(AUTHORS, 'Table 7').formula(
+        yield Citation(AUTHORS, 'Table 7').formula(
             f'trace of {name}', text, (trace := printed.trace(*parts[name].mode)),
             sample.trace(name).real,
             erratum=(12, trace + 2.0 * (n.xi + n.eta)) if wrong else None)
     for name, signs in SIGNS.items():
-        yield Place(AUTHORS, 'Table 8').formula(
+        yield Citation(AUTHORS, 'Table 8').formula(
             f'D of {name}', f'((a - d) {_signed(signs, "-")})^2 + 4bc',
             printed.discriminant(*parts[name].mode), sample.discriminant(name).real)
     for name in ('L_10', 'L_30', 'L_11', 'L_31'):
         mode, whole = parts[name].mode, sample.discriminant(name)
-        yield Place(AUTHORS, 'Table 9').formula(f'Phi of {name}', 'as printed',
+        yield Citation(AUTHORS, 'Table 9').formula(f'Phi of {name}', 'as printed',
                                                 printed.phi(*mode), whole.real)
-        yield Place(AUTHORS, 'Table 10').formula(f'Psi of {name}', 'as printed',
+        yield Citation(AUTHORS, 'Table 10').formula(f'Psi of {name}', 'as printed',
                                                  printed.psi(*mode), whole.imag)
         root = square_root(whole.real, whole.imag)
-        yield Place(AUTHORS, 'eq. 5.3').formula(
+        yield Citation(AUTHORS, 'eq. 5.3').formula(
             f'square of the root of Phi + i Psi, {name}', 'Phi + i Psi', whole, root**2,
             erratum=(24, whole.conjugate()),
             note=f'Psi is {"positive" if whole.imag > 0.0 else "negative"}')
@@ -135,19 +135,19 @@ def tables() -> Iterator[Row | Picture]:
         real = sorted((value.real for value in parts[f'L_1{k}'].eigenvalues), reverse=True)
         for text, theirs, ours in zip(('eq. 5.4', 'eq. 5.5'), printed.real_parts(k), real,
                                       strict=True):
-            yield Place(AUTHORS, 'Proposition 5.2').formula(
+            yield Citation(AUTHORS, 'Proposition 5.2').formula(
                 f'real part of an eigenvalue in U_1{k}', text, theirs, ours,
                 erratum=(13, theirs / 2.0))
-            yield Place(AUTHORS, 'Proposition 5.2').formula(
+            yield Citation(AUTHORS, 'Proposition 5.2').formula(
                 f'twice the real part of an eigenvalue in U_1{k}', text, theirs, 2.0 * ours)
-        yield Place(AUTHORS, 'Corollary 5.4').holds(
+        yield Citation(AUTHORS, 'Corollary 5.4').holds(
             f'in U_1{k} one pair lies to the right of the other', real[0] > real[1])
 
 
 def coupled_variable() -> Iterator[Row | Picture]:
     """Equation 4.4: what delta multiplies."""
     sample = drawn()
-    network, at = sample.network, Place(AUTHORS, 'eq. 4.4')
+    network, at = sample.network, Citation(AUTHORS, 'eq. 4.4')
     theirs = sample.tables.trace(0, 0)
     # Seen by all cells alike, delta acts on w by way of w; or, as printed, by way of v.
     printed = sample.blocks['L_00'].matrix + network.delta * np.array([[0, 0], [1, -1]])
@@ -161,14 +161,14 @@ def equal_couplings() -> Iterator[Row | Picture]:
     """Table 11 and Lemma 5.8: alpha = beta, gamma = delta, xi = eta."""
     sample = drawn(equal=True)
     printed, parts = sample.tables, sample.blocks
-    at = Place(AUTHORS, 'Table 11')
+    at = Citation(AUTHORS, 'Table 11')
     for name, text in TABLE_11.items():
         value = printed.sigma(*parts[name].mode)
         yield at.formula(f'real part of the eigenvalues of {name}', text, value,
                          sample.largest(name), erratum=(13, value / 2.0))
         yield at.formula(f'twice the real part of the eigenvalues of {name}', text, value,
                          2.0 * sample.largest(name))
-    at, n = Place(AUTHORS, 'Lemma 5.8'), sample.network
+    at, n = Citation(AUTHORS, 'Lemma 5.8'), sample.network
     # nu enters each trace once: take it for which tr L_21 vanishes.
     critical = printed.nu - sample.trace('L_21').real
     yield at.formula('nu at which the trace of L_21 vanishes', '2 alpha + 2 gamma - xi',

@@ -9,7 +9,7 @@ from itertools import permutations
 
 from cpg_ros.networks.symmetry import Z4_Z2, Permutation
 from cpg_ros.papers.buono_gaits import AUTHORS, LEGS
-from cpg_ros.papers.row import Picture, Place, Row
+from cpg_ros.papers.row import Citation, Picture, Row
 
 Subgroup = frozenset[Permutation]
 
@@ -90,7 +90,7 @@ def solutions() -> list[tuple[Subgroup, Subgroup]]:
 
 def dihedral() -> Iterator[Row | Picture]:
     """Section 2.3, and what the proof of Theorem 3.2 takes from it."""
-    at = Place(AUTHORS, 'section 2.3')
+    at = Citation(AUTHORS, 'section 2.3')
     classes = {frozenset(conjugate(g, one) for g in D4) for one in all_subgroups(D4)}
     yield at.number('conjugacy classes of subgroups of D4', '8', len(classes))
     types = {frozenset((conjugate(g, k), conjugate(g, h)) for g in D4)
@@ -102,7 +102,7 @@ def dihedral() -> Iterator[Row | Picture]:
     quarter = {f'{_name(k)} in {_name(h)}' for k, h in solutions() if len(h) == 4 * len(k)}
     yield at.word('those with a quarter-period phase shift', '1 in Z4',
                   ', '.join(sorted(quarter)))
-    at = Place(AUTHORS, 'Theorem 3.2')
+    at = Citation(AUTHORS, 'Theorem 3.2')
     yield at.holds('kappa omega = omega^3 kappa',
                    after(KAPPA, OMEGA) == after(after(HALF, OMEGA), KAPPA))
     half = [(k, h) for k, h in solutions()
@@ -120,7 +120,7 @@ def dihedral() -> Iterator[Row | Picture]:
 
 def four_cells() -> Iterator[Row | Picture]:
     """Theorem 3.1: conjugation by the walk's four-cycle."""
-    at = Place(AUTHORS, 'Theorem 3.1')
+    at = Citation(AUTHORS, 'Theorem 3.1')
     turn = cycles('(1 3 2 4)', 4)
     for one, other in (('(1 4)(2 3)', '(1 3)(2 4)'), ('(1 3)(2 4)', '(1 4)(2 3)'),
                        ('(1 2)(3 4)', '(1 2)(3 4)')):
@@ -178,14 +178,14 @@ TABLE_3 = 'LH RH LF RF LF RF LH RH'
 
 def legs() -> Iterator[Row | Picture]:
     """Theorem 3.3, Tables 3 and 4."""
-    at = Place(AUTHORS, 'Theorem 3.3')
+    at = Citation(AUTHORS, 'Theorem 3.3')
     allowed = assignments()
     yield at.number('assignments with F(1) = LH and eq. 3.2, no more asked', '2', len(allowed),
                     erratum=(16, '18'))
     proven = [' '.join(F) for F in allowed if F[1:4] == LEGS[1:]]
     yield at.number('assignments if also F(2) = RH, F(3) = LF, F(4) = RF, as in the proof', '2',
                     len(proven))
-    at = Place(AUTHORS, 'Table 4')
+    at = Citation(AUTHORS, 'Table 4')
     names = dict(zip(TABLE_4, sorted(proven, key=lambda F: F.split()[4] != 'LH'), strict=True))
     for name, printed in TABLE_4.items():
         yield at.word(f'legs of cells 1 to 8, {name} network', printed, names[name])
@@ -193,5 +193,5 @@ def legs() -> Iterator[Row | Picture]:
     pairs = {frozenset(i for i in range(8) if shared[i] == leg) for leg in LEGS}
     kept = all(frozenset(g[i] for i in pair) in pairs
                for g in Z4_Z2.elements.values() for pair in pairs)
-    yield Place(AUTHORS, 'Table 3').holds('the assignment of Table 3 is none that eq. 3.2 allows',
-                                          not kept)
+    yield Citation(AUTHORS, 'Table 3').holds(
+        'the assignment of Table 3 is none that eq. 3.2 allows', not kept)

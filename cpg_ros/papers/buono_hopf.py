@@ -6,13 +6,13 @@ import numpy as np
 from scipy.optimize import brentq
 
 from cpg_ros.dynamics.cell_hopf import CellHopf, hopf_at
-from cpg_ros.dynamics.stand import stand
-from cpg_ros.networks.along import Along
+from cpg_ros.dynamics.equilibrium import stand
 from cpg_ros.networks.biped import Biped
+from cpg_ros.networks.parameter_line import ParameterLine
 from cpg_ros.networks.quadruped import GAITS, Quadruped
 from cpg_ros.papers.buono_blocks import Sample
 from cpg_ros.papers.buono_gaits import AUTHORS
-from cpg_ros.papers.row import Picture, Place, Row
+from cpg_ros.papers.row import Citation, Picture, Row
 
 UNCOUPLED = Quadruped(0.0, 0.0, 0.0, 0.0)
 #: Section 6.
@@ -48,13 +48,13 @@ def hopf(network: Quadruped, line: str, gait: str, low: float, high: float) -> C
 
     Args:
         network: the other parameters.
-        line: the parameters that move, as in ``Along``.
+        line: the parameters that move, as in ``ParameterLine``.
         gait: one of the six.
         low: value on one side of the point.
         high: value on the other side.
 
     """
-    along, (j, k) = Along.parse(line, Quadruped), GAITS[gait]
+    along, (j, k) = ParameterLine.parse(line, Quadruped), GAITS[gait]
 
     def largest(value: float) -> float:
         return _sample(along.at(network, value)).largest(f'L_{j}{k}')
@@ -77,7 +77,7 @@ def _turns(network: Quadruped, mode: tuple[int, int], rank: int) -> float:
 
 def the_stand() -> Iterator[Row | Picture]:
     """Section 6: the stand of the uncoupled cells, and hypothesis 4.6."""
-    at = Place(AUTHORS, 'section 6')
+    at = Citation(AUTHORS, 'section 6')
     sample = _sample(UNCOUPLED)
     for name, printed, value in zip(('v_0', 'w_0'), STAND, sample.state, strict=True):
         yield at.number(f'{name} of the stand', printed, float(value))
@@ -96,7 +96,7 @@ def existence() -> Iterator[Row | Picture]:
             ('Theorem 4.3', 'pace', 'alpha=beta=-gamma=-delta', '-nu_0/4', -nu / 4.0, None),
             ('Theorem 4.3', 'bound', 'alpha=beta=-gamma=-delta', 'nu_0/4', nu / 4.0, None)):
         point = hopf(UNCOUPLED, line, gait, value - 0.1, value + 0.1)
-        at = Place(AUTHORS, place)
+        at = Citation(AUTHORS, place)
         yield at.formula(f'{gait}: {line.split("=")[0]} at the Hopf point, {line}', text, value,
                          point.value)
         if speed:
@@ -106,14 +106,14 @@ def existence() -> Iterator[Row | Picture]:
     # On xi = -(alpha + gamma) with gamma fixed, nu - 2 (alpha + gamma) + 2 xi by xi is 4, of
     # which the proof takes the part by xi alone.
     point = hopf(UNCOUPLED, 'xi=eta=-alpha=-beta', 'trot', 0.2, 0.4)
-    yield Place(AUTHORS, 'Theorem 4.1').formula(
+    yield Citation(AUTHORS, 'Theorem 4.1').formula(
         'trot: speed at which the eigenvalues cross, xi = -(alpha + gamma)', '2', 2.0,
         point.normal_form.k1.real, note='2 is E_xi at fixed alpha + gamma; along the line E '
         'grows by 4, the real part by 2')
     walk = hopf(UNCOUPLED, 'gamma=delta=-alpha=-beta', 'walk', nu / 2.0 - 0.1, nu / 2.0 + 0.1)
     sample = _sample(walk.network)
     alpha = sample.network.alpha
-    at = Place(AUTHORS, 'Proposition 5.6')
+    at = Citation(AUTHORS, 'Proposition 5.6')
     zero = [name for name in ('L_10', 'L_11') if abs(sample.trace(name).real) < 1e-9]
     yield at.word('block whose trace vanishes (real part) where nu = 2 gamma', 'L_10',
                   ', '.join(zero), erratum=(21, 'L_11'))
@@ -124,7 +124,7 @@ def existence() -> Iterator[Row | Picture]:
 
 def table_12() -> Iterator[Row | Picture]:
     """Table 12: Hopf points to pace, bound and trot, and what branches off."""
-    at = Place(AUTHORS, 'Table 12')
+    at = Citation(AUTHORS, 'Table 12')
     points = {}
     for gait, name, line, (alpha, gamma) in (
             ('pace', 'gamma = delta', 'gamma=delta', (0.3, 0.0)),
@@ -152,7 +152,7 @@ def table_12() -> Iterator[Row | Picture]:
         yield at.word(f'{gait}: Hopf bifurcation, by the other eigenvalues', 'stable',
                       'stable' if point.stable else 'unstable',
                       note=f'leading one {point.others[0]:.4f}')
-        yield Place(AUTHORS, 'Proposition 5.5' if gait != 'trot' else 'Lemma 5.8').word(
+        yield Citation(AUTHORS, 'Proposition 5.5' if gait != 'trot' else 'Lemma 5.8').word(
             f'{gait}: the solution that branches off at Table 12', 'stable',
             'stable' if point.stable and point.supercritical else 'unstable',
             erratum=(22, 'unstable'),
@@ -165,7 +165,7 @@ def theorem_4_2() -> Iterator[Row | Picture]:
     for clause, gait, alpha, sign, (low, high), stable in THEOREM:
         point = hopf(Quadruped(alpha, sign * alpha, 0.0, 0.0), 'gamma=delta', gait, low, high)
         found.setdefault(gait, point)
-        yield Place(AUTHORS, f'Theorem 4.2 ({clause})').word(
+        yield Citation(AUTHORS, f'Theorem 4.2 ({clause})').word(
             f'Hopf bifurcation to the {gait}, alpha {alpha:g}, beta {sign * alpha:g}, gamma '
             f'{point.value:.4f}', 'stable' if stable else 'unstable',
             'stable' if point.stable else 'unstable',
@@ -174,7 +174,7 @@ def theorem_4_2() -> Iterator[Row | Picture]:
     trot = found['trot']
     sample = _sample(trot.network)
     n = sample.network
-    at = Place(AUTHORS, 'Proposition 5.5')
+    at = Citation(AUTHORS, 'Proposition 5.5')
     for name, text, value in (
             ('L_00', '4(alpha + gamma)', 4.0 * (n.alpha + n.gamma)),
             ('L_01', '4 alpha', 4.0 * n.alpha), ('L_20', '4 gamma', 4.0 * n.gamma),
@@ -182,7 +182,7 @@ def theorem_4_2() -> Iterator[Row | Picture]:
             ('L_11', '2 alpha', 2.0 * n.alpha)):
         yield at.formula(f'trace of {name} (real part) at the Hopf point to the trot', text,
                          value, sample.trace(name).real)
-    at = Place(AUTHORS, 'Proposition 5.7')
+    at = Citation(AUTHORS, 'Proposition 5.7')
     for gait, other, sign in (('jump', 'L_11', -1.0), ('walk', 'L_10', 1.0)):
         sample = _sample(found[gait].network)
         gamma = sample.network.gamma

@@ -6,7 +6,7 @@ every constant follows from rates at a few states, whatever the code was given.
 
 import numpy as np
 
-from cpg_ros.dynamics.simulate import simulate
+from cpg_ros.integration.simulate import simulate
 from cpg_ros.networks.biped import Biped
 from cpg_ros.networks.quadruped import Quadruped
 

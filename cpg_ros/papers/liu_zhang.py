@@ -8,12 +8,12 @@ import numpy as np
 from cpg_ros.dynamics import delayed_orbit
 from cpg_ros.dynamics.floquet import multipliers
 from cpg_ros.dynamics.hopf import HopfPoint, hopf_point
-from cpg_ros.fitting.cycle_fit import CycleFit, cycle_samples, fit_cycle
+from cpg_ros.inversion.cycle_fit import CycleFit, cycle_samples, fit_cycle
 from cpg_ros.networks.delayed import Delayed
 from cpg_ros.networks.symmetry import Z4_Z2
 from cpg_ros.papers.figures import trajectories
 from cpg_ros.papers.rhythm import primary_gaits, rhythm
-from cpg_ros.papers.row import Paper, Picture, Place, Row
+from cpg_ros.papers.row import Citation, Paper, Picture, Row
 
 AUTHORS = 'Liu & Zhang 2024'
 #: Model time that a gait gets to develop, and that is drawn.
@@ -91,7 +91,7 @@ ONE_MINIMUM = 1e-4
 
 def _coefficients(example: Example, point: HopfPoint) -> Iterator[Row]:
     """Normal form: by the formula that is printed, and by the right one."""
-    at = Place(AUTHORS, example.place)
+    at = Citation(AUTHORS, example.place)
     printed, right = point.published, point.normal_form
     for name, wrong_value, value in (
             ('k1', printed.k1.real, right.k1.real), ('k2', printed.k2.real, right.k2.real),
@@ -108,7 +108,7 @@ def _coefficients(example: Example, point: HopfPoint) -> Iterator[Row]:
 
 def _example(example: Example) -> Iterator[Row | Picture]:
     network, gait = example.network, example.gait
-    at = Place(AUTHORS, example.place)
+    at = Citation(AUTHORS, example.place)
     point = hopf_point(network, network.symmetry(gait))
     if point is None:
         raise ValueError(f'{example.place}: no Hopf point of the {gait}')
@@ -148,7 +148,7 @@ def _example(example: Example) -> Iterator[Row | Picture]:
 def _simulated(example: Example) -> Iterator[Row | Picture]:
     """The gait that the printed start values lead to."""
     gait, place = example.gait, f'Figure {example.figure}'
-    at = Place(AUTHORS, place)
+    at = Citation(AUTHORS, place)
     gaits = primary_gaits(variables=1)
     seen = rhythm(example.network, example.start, DEVELOPED, Z4_Z2, gaits)
     phases = f'phases of cells 1 to 4: {np.round(seen.found.phases[:4], 4) % 1.0}'
@@ -177,7 +177,7 @@ def conditions() -> Iterator[Row | Picture]:
     for place, name, key, sign in (('Example 1', 'H1', 'walk', 1.0),
                                    ('Example 2', 'H2', 'pace', -1.0)):
         a, b, c, d, _ = EXAMPLES[key].network.as_dict().values()
-        yield Place(AUTHORS, place).holds(
+        yield Citation(AUTHORS, place).holds(
             f'the parameters satisfy ({name})',
             sign * (a + b) * d > 0.0 and abs(c) > abs(a + b + sign * d))
 
@@ -227,7 +227,7 @@ def recording(example: Example, name: str) -> tuple[np.ndarray, np.ndarray]:
 
 def _inversion(place: str, example: Example, name: str, starts: dict[str, str]
                ) -> Iterator[Row | Picture]:
-    at = Place(AUTHORS, place)
+    at = Citation(AUTHORS, place)
     samples, theta = recording(example, name)
 
     def fitted(start: float) -> CycleFit:

@@ -8,15 +8,15 @@ from scipy.integrate import solve_ivp
 
 from cpg_ros.dynamics.floquet import multipliers
 from cpg_ros.dynamics.orbit import solve_orbit
-from cpg_ros.fitting.cycle import mean_cycle
-from cpg_ros.fitting.waveforms import lag, shape_difference
+from cpg_ros.gaits.mean_cycle import mean_cycle
+from cpg_ros.gaits.waveform_comparison import lag, shape_difference
 from cpg_ros.networks.biped import GAITS, PRESETS, PRIMARY, Biped
-from cpg_ros.networks.pairs import admissible_pairs
+from cpg_ros.networks.hk_theorem import admissible_pairs
 from cpg_ros.networks.symmetry import D2, Symmetry
 from cpg_ros.papers.cell_constants import cell_constants
 from cpg_ros.papers.figures import trajectories
 from cpg_ros.papers.rhythm import Rhythm, rhythm
-from cpg_ros.papers.row import PHASE, Paper, Picture, Place, Row
+from cpg_ros.papers.row import PHASE, Citation, Paper, Picture, Row
 
 AUTHORS = 'Rashidi et al. 2016'
 NAMES = ('left flexor', 'right flexor', 'left extensor', 'right extensor')
@@ -138,14 +138,14 @@ def cell() -> Iterator[Row | Picture]:
     """Table 1, and equations 1 and 2."""
     network = printed('walk')
     found = cell_constants(network, network.current)
-    at = Place(AUTHORS, 'Table 1')
+    at = Citation(AUTHORS, 'Table 1')
     for name, value in TABLE_1.items():
         yield at.number(name, value, found[name], within=1e-8,
                         note='read off the compiled rates')
-    yield Place(AUTHORS, 'eq. 2').formula('tau ten widths V4 from V3, over its least',
+    yield Citation(AUTHORS, 'eq. 2').formula('tau ten widths V4 from V3, over its least',
                                           '(1 + cosh(5))/2', (1.0 + np.cosh(5.0)) / 2.0,
                                           found['tau_far'])
-    at = Place(AUTHORS, 'eq. 1')
+    at = Citation(AUTHORS, 'eq. 1')
     yield at.holds("the walk's cells oscillate with u' = -phi tau(v) (n(v) - u), as printed",
                    _oscillates(-1.0), erratum=8, note='u runs away')
     yield at.holds("they do with u' = phi tau(v) (n(v) - u)", _oscillates(1.0))
@@ -173,14 +173,14 @@ def primary() -> Iterator[Row | Picture]:
     for gait in PRIMARY:
         seen = settled(gait)
         name, phases = named(gait), seen.found.phases
-        at = Place(AUTHORS, 'Table 2')
+        at = Citation(AUTHORS, 'Table 2')
         yield at.word('gait with I, phi and w_a, w_b, w_c of the ' + name, name, named(seen.gait),
                       note=f'period {seen.found.period:.4f}')
         found = multipliers(solve_orbit(printed(gait), gait))
         yield at.word(f'the {name} attracts', 'stable',
                       'stable' if found.leading < 1.0 else 'unstable',
                       note=f'leading Floquet multiplier {found.leading:.3g} a cycle')
-        at = Place(AUTHORS, 'Figure 2')
+        at = Citation(AUTHORS, 'Figure 2')
         for text, cell_a, cell_b, value in (
                 ('right against left flexor', 1, 0, FIGURE_2[gait][0]),
                 ('right against left extensor', 3, 2, FIGURE_2[gait][0]),
@@ -190,20 +190,20 @@ def primary() -> Iterator[Row | Picture]:
         place, wanted = EQUATIONS[gait]
         for n, (degrees, phase) in enumerate(zip(wanted, phases[1:], strict=True), 1):
             off = abs((360.0 * phase - degrees + 180.0) % 360.0 - 180.0)
-            yield Place(AUTHORS, place).number(
+            yield Citation(AUTHORS, place).number(
                 f'objective z_{n} of the {name} [degrees], which is to vanish', '0.00', off,
                 within=CLOSE, erratum=(8, '180'),
                 note=f'phase of cell {n + 1} {360.0 * phase:.2f}')
         yield from _table_5(gait, seen)
         start = simulated(printed(gait), tuple(np.ravel(TABLE_3[gait]).tolist()))
-        yield Place(AUTHORS, 'Table 3').word(
+        yield Citation(AUTHORS, 'Table 3').word(
             f'gait from the initial values of the {name}', name, named(start.gait),
             note=ODD.get(gait, ''))
         yield _drawn(f'Figure {FIGURES[gait]}', name, start, 'From the initial values of Table 3.')
 
 
 def _table_5(gait: str, seen: Rhythm) -> Iterator[Row]:
-    at, name = Place(AUTHORS, 'Table 5'), named(gait)
+    at, name = Citation(AUTHORS, 'Table 5'), named(gait)
     h, k, response = TABLE_5[gait]
     yield at.word(f'H of the {name}', h, _written(seen.found.h))
     yield at.word(f'K of the {name}', k, _written(seen.found.k))
@@ -225,7 +225,7 @@ def secondary() -> Iterator[Row | Picture]:
     for gait in TABLE_4:
         seen, name = settled(gait), named(gait)
         one, two, three, four = signals(seen)
-        yield Place(AUTHORS, 'Table 4').word(
+        yield Citation(AUTHORS, 'Table 4').word(
             f'signals in the {name}, left and right leg', TABLE_4[gait],
             f'({one}, {three}), ({two}, {four})', note='weights are ours: none are printed')
         if gait in TABLE_5:
@@ -233,7 +233,7 @@ def secondary() -> Iterator[Row | Picture]:
         if gait in NOT_REACHED:
             found = multipliers(solve_orbit(PRESETS[gait].network, gait))
             reached = seen.gait == gait and found.leading < 1.0
-            yield Place(AUTHORS, 'section 5').word(
+            yield Citation(AUTHORS, 'section 5').word(
                 f'the {name} in this network', 'not reached',
                 'reached' if reached else 'not reached', erratum=(18, 'reached'),
                 note=f'leading Floquet multiplier {found.leading:.3g} a cycle')
@@ -241,7 +241,7 @@ def secondary() -> Iterator[Row | Picture]:
         network = PRESETS[gait].network
         assert isinstance(network, Biped)
         seen = simulated(network, disturbed(before))
-        yield Place(AUTHORS, f'Figure {number}').word(
+        yield Citation(AUTHORS, f'Figure {number}').word(
             f'gait that follows the {named(before)} with other weights', named(gait),
             named(seen.gait), note='weights are ours: none are printed')
         yield _drawn(f'Figure {number}', f'{named(gait)}, from the {named(before)}', seen,
@@ -250,14 +250,14 @@ def secondary() -> Iterator[Row | Picture]:
 
 def kinds() -> Iterator[Row | Picture]:
     """Section 5: the eleven kinds of rhythm, and what Table 5 calls H and K."""
-    at = Place(AUTHORS, 'section 5')
+    at = Citation(AUTHORS, 'section 5')
     waveforms = [pair.waveforms for pair in admissible_pairs(D2)]
     yield at.number('kinds of rhythm that D2 allows', '11', len(waveforms))
     for count, number, what in (('4', 1, 'one waveform'), ('6', 2, 'two waveforms'),
                                 ('1', 4, 'four waveforms')):
         yield at.number(f'of these with {what}', count, waveforms.count(number))
     gaits = [gait for gait in GAITS if settled(gait).gait == gait]
-    yield Place(AUTHORS, 'Table 5').number('gaits of the paper with their H and K',
+    yield Citation(AUTHORS, 'Table 5').number('gaits of the paper with their H and K',
                                            str(len(TABLE_5)), len(gaits), erratum=(11, '9'))
     in_phase = [gait for gait in gaits if gait not in PRIMARY and len(settled(gait).found.k) > 1]
     yield at.holds('cells are equal at all times in primary gaits only', not in_phase,
@@ -267,7 +267,7 @@ def kinds() -> Iterator[Row | Picture]:
                                            ('H', walk.h, 'spatial', 'spatio-temporal')):
         # On the elements the walk's best shifts: all of them 0, or not.
         h = max(abs((walk.distances[name][0] + 0.5) % 1.0 - 0.5) for name in elements)
-        yield Place(AUTHORS, 'Table 5').word(
+        yield Citation(AUTHORS, 'Table 5').word(
             f'the symmetries in {letter} are', wrong,
             'spatio-temporal' if h > PHASE else 'spatial', erratum=(17, right))
 

@@ -7,8 +7,8 @@ from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass
 from io import BytesIO
 
+from cpg_ros.papers.catalogue import PAPERS
 from cpg_ros.papers.errata import ERRATA
-from cpg_ros.papers.registry import PAPERS
 from cpg_ros.papers.row import Paper, Picture, Row
 
 #: Dots per inch of a figure.

@@ -6,8 +6,8 @@ from fractions import Fraction
 
 import numpy as np
 
-from cpg_ros.dynamics.simulate import Trajectory, simulate
-from cpg_ros.fitting.recognise import Recognised, recognise
+from cpg_ros.gaits.recognition import Recognised, recognise
+from cpg_ros.integration.simulate import Trajectory, simulate
 from cpg_ros.networks.network import Network
 from cpg_ros.networks.symmetry import Z4_Z2, Group, Symmetry
 

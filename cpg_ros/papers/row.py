@@ -90,7 +90,7 @@ class Paper:
 
 
 @dataclass(frozen=True)
-class Place:
+class Citation:
     """A place in a paper, from where rows are quoted.
 
     An erratum is given with what it says is right: a computed value that is neither that nor the

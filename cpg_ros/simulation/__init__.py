@@ -1,1 +1,4 @@
-"""Physics: a robot's body in MuJoCo, pictures of it and of its footfalls. Knows nothing of ROS."""
+"""Physics: a robot's body in MuJoCo, tuned gaits, pictures of it and of its footfalls.
+
+Imports ``motion``, ``robots`` and what is below; knows nothing of ROS.
+"""

@@ -12,14 +12,14 @@ from typing import Any
 
 import numpy as np
 
-from cpg_ros.dynamics.drive import Drive
-from cpg_ros.dynamics.pattern import Pattern
-from cpg_ros.dynamics.program import Program
-from cpg_ros.robot import Robot
-from cpg_ros.simulation.anatomy import Anatomy
+from cpg_ros.motion.pattern import Pattern
+from cpg_ros.motion.plan import Program
+from cpg_ros.motion.steering import Drive
+from cpg_ros.robots.robot import Robot
 from cpg_ros.simulation.body import Body
-from cpg_ros.simulation.model import engine
-from cpg_ros.simulation.trial import Trial, judge
+from cpg_ros.simulation.model_indices import Anatomy
+from cpg_ros.simulation.robot_model import engine
+from cpg_ros.simulation.run_metrics import RunMetrics, judge
 
 #: A push lasts this long, s.
 PUSH = 0.1
@@ -124,7 +124,7 @@ class Batch:
         self._start = np.empty(mujoco.mj_stateSize(self.body.model, full))
         mujoco.mj_getState(self.body.model, self.body.data, self._start, full)
 
-    def run(self, runs: Sequence[tuple[np.ndarray, Scenario]]) -> list[Trial]:
+    def run(self, runs: Sequence[tuple[np.ndarray, Scenario]]) -> list[RunMetrics]:
         """Let bodies follow targets from the stand, and judge each run.
 
         Args:

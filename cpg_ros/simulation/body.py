@@ -5,8 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from cpg_ros.robot import Robot
-from cpg_ros.simulation.model import SimulationError, engine, legs, load
+from cpg_ros.robots.robot import Robot
+from cpg_ros.simulation.robot_model import SimulationError, engine, legs, load
 
 #: A base that leans more than this has fallen, rad.
 FALLEN = math.radians(60.0)

@@ -13,9 +13,9 @@ from typing import Any, BinaryIO, Protocol
 import numpy as np
 from PIL import GifImagePlugin, Image
 
-from cpg_ros.dynamics.progress import progress_bar
+from cpg_ros.files.progress_bar import progress_bar
 from cpg_ros.simulation.body import yaw
-from cpg_ros.simulation.model import SimulationError, engine
+from cpg_ros.simulation.robot_model import SimulationError, engine
 
 #: Colours of a GIF; few, and no dithering, make it small.
 COLOURS = 96

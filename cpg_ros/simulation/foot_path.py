@@ -10,12 +10,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from cpg_ros.dynamics.periodic import Orbit
-from cpg_ros.dynamics.phase_readout import PhaseReadout
-from cpg_ros.dynamics.readout import WaveReadout
-from cpg_ros.robot import JointMotion
-from cpg_ros.simulation.anatomy import Anatomy
+from cpg_ros.motion.phase_readout import PhaseReadout
+from cpg_ros.motion.readout import WaveReadout
+from cpg_ros.robots.robot import JointMotion
 from cpg_ros.simulation.body import Body
-from cpg_ros.simulation.model import SimulationError, engine, legs
+from cpg_ros.simulation.model_indices import Anatomy
+from cpg_ros.simulation.robot_model import SimulationError, engine, legs
 
 #: Points of a cycle that the fit looks at.
 POINTS = 128

@@ -12,14 +12,14 @@ from types import ModuleType
 
 import numpy as np
 
-from cpg_ros.dynamics.program import Program, Refused, gait_of, plan
+from cpg_ros.motion.plan import Program, Refused, gait_of, plan
 from cpg_ros.networks.registry import PRESETS
-from cpg_ros.robot import Motion, Robot, Steering
+from cpg_ros.robots.robot import Motion, Robot, Steering
 from cpg_ros.simulation.batch import Batch, Scenario, targets
-from cpg_ros.simulation.design import AIMS, LENGTH, Aim, Design
 from cpg_ros.simulation.foot_path import Feet
-from cpg_ros.simulation.model import SimulationError
-from cpg_ros.simulation.trial import Trial
+from cpg_ros.simulation.gait_design import AIMS, LENGTH, Aim, Design
+from cpg_ros.simulation.robot_model import SimulationError
+from cpg_ros.simulation.run_metrics import RunMetrics
 
 #: Length of the runs that designs are compared by, and of the one that figures are of, s.
 SHORT, LONG = 6.0, 10.0
@@ -54,10 +54,10 @@ class Tuned:
     price: float
     first: float
     motion: Motion
-    trial: Trial
+    trial: RunMetrics
 
 
-def price(trial: Trial, aim: Aim, duration: float) -> float:
+def price(trial: RunMetrics, aim: Aim, duration: float) -> float:
     """Weigh a run's figures; 0 would be perfect.
 
     Slower or much faster than wanted, fewer hops or, where none are wanted, bobbing, turning,

@@ -14,15 +14,15 @@ from cpg_ros.dynamics.cell_hopf import CellHopf
 from cpg_ros.dynamics.characteristic import characteristic_roots
 from cpg_ros.dynamics.continuation import Branch, follow, from_hopf
 from cpg_ros.dynamics.delayed_orbit import DelayedOrbit
+from cpg_ros.dynamics.equilibrium import everywhere
 from cpg_ros.dynamics.floquet import ATTRACTS, multipliers
 from cpg_ros.dynamics.hopf import HopfPoint
 from cpg_ros.dynamics.mesh_orbit import MeshOrbit
 from cpg_ros.dynamics.orbit import NoOrbit, Orbit
-from cpg_ros.dynamics.progress import progress_bar
-from cpg_ros.dynamics.stand import everywhere
+from cpg_ros.files.progress_bar import progress_bar
 from cpg_ros.networks.delayed import MODES, Delayed
-from cpg_ros.tools import footfall
-from cpg_ros.tools.analysis import Analysis, CellAnalysis
+from cpg_ros.tools import gait_diagram as footfall
+from cpg_ros.tools.analysis_report import Analysis, CellAnalysis
 
 COLOURS = {'pronk': '#805ad5', 'pace': '#2f855a', 'bound': '#b7791f', 'trot': '#c53030',
            'jump': '#00838f', 'walk': '#2b6cb0', 'run': '#c53030', 'two_legged_jump': '#00838f',

@@ -13,12 +13,13 @@ from pathlib import Path
 
 import numpy as np
 
-from cpg_ros.dynamics.progress import progress_bar
-from cpg_ros.dynamics.verdict import verdicts
-from cpg_ros.networks.along import Along
+from cpg_ros.dynamics.gait_assessment import verdicts
+from cpg_ros.files.atomic_write import write_atomically
+from cpg_ros.files.progress_bar import progress_bar
 from cpg_ros.networks.network import Network
+from cpg_ros.networks.parameter_line import ParameterLine
 from cpg_ros.networks.registry import NETWORKS, PRESETS, USUAL
-from cpg_ros.tools.analysis import CellAnalysis, DelayAnalysis, analysed
+from cpg_ros.tools.analysis_report import CellAnalysis, DelayAnalysis, analysed
 from cpg_ros.tools.arguments import (
     Parser,
     as_json,
@@ -28,7 +29,6 @@ from cpg_ros.tools.arguments import (
     say,
     twice,
 )
-from cpg_ros.whole import write_whole
 
 DESCRIPTION = '''\
 Tell what a parameter set does before it runs on a robot: the rest state and its Hopf points, the
@@ -118,7 +118,7 @@ def _analysed(chosen) -> DelayAnalysis | CellAnalysis:
         raise ValueError(f'--longest-delay: {longest:g} is not from 0 to {LONGEST:g}')
     text, span = ALONG.get(network.name, ('tau', (0.0, max(longest, 1.01 * network.delay))))
     try:
-        along = Along.parse(chosen.along or text, type(network))
+        along = ParameterLine.parse(chosen.along or text, type(network))
     except ValueError as error:
         raise ValueError(f'--along: {error}') from error
     if chosen.range is not None:
@@ -140,7 +140,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if chosen.plot is not None:
             # matplotlib takes half a second, and only pictures need it.
             from cpg_ros.tools.analysis_plot import picture
-            write_whole(chosen.plot, picture(found, chosen.plot.suffix))
+            write_atomically(chosen.plot, picture(found, chosen.plot.suffix))
         said = as_json(found.as_dict()) if chosen.json else found.text()
     except (ValueError, OSError) as error:
         print(f'analyze: {error}', file=sys.stderr)

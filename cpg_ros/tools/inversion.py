@@ -10,21 +10,21 @@ from argparse import RawDescriptionHelpFormatter
 from collections.abc import Sequence
 from pathlib import Path
 
-from cpg_ros.checked import shown
-from cpg_ros.dynamics.progress import progress_bar
-from cpg_ros.fitting.bag import read_bag
-from cpg_ros.fitting.fitted import write_fitted
-from cpg_ros.fitting.inverted import Inverted, inverted, preset_of
-from cpg_ros.fitting.paper_fit import PaperFit, paper_fits
-from cpg_ros.fitting.recording import Recording
-from cpg_ros.fitting.servo import Servo
-from cpg_ros.fitting.table import read_csv
+from cpg_ros.files.atomic_write import write_atomically
+from cpg_ros.files.progress_bar import progress_bar
+from cpg_ros.files.yaml_reader import shown
+from cpg_ros.inversion.paper_fit import PaperFit, paper_fits
+from cpg_ros.inversion.parameter_files import write_fitted
+from cpg_ros.inversion.recording_fit import Inverted, inverted, preset_of
 from cpg_ros.networks.delayed import CELLS, Delayed
 from cpg_ros.networks.registry import NETWORKS
-from cpg_ros.robot import Robot
-from cpg_ros.robot_file import find_robot
+from cpg_ros.recordings.bag_reader import read_bag
+from cpg_ros.recordings.csv_reader import read_csv
+from cpg_ros.recordings.recording import Recording
+from cpg_ros.recordings.servo import Servo
+from cpg_ros.robots.robot import Robot
+from cpg_ros.robots.robot_file import find_robot
 from cpg_ros.tools.arguments import Parser, as_json, assignment, say, twice
-from cpg_ros.whole import write_whole
 
 DESCRIPTION = '''\
 Find the steady gait of a recording and the parameters of a network that move a robot like it.
@@ -124,7 +124,7 @@ def _checked(parser: Parser, chosen) -> None:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Invert a recording; return the exit code."""
-    from cpg_ros.fitting.stride import NoSteadyGait
+    from cpg_ros.gaits.stride import NoSteadyGait
     parser = _parser()
     chosen = parser.parse_args(sys.argv[1:] if arguments is None else arguments)
     _checked(parser, chosen)
@@ -180,7 +180,7 @@ def _written(chosen, found: Inverted, robot) -> list[Path]:
     if chosen.report is not None:
         # matplotlib takes half a second, and only pages need it.
         from cpg_ros.tools.inversion_report import as_html
-        write_whole(chosen.report, as_html(found))
+        write_atomically(chosen.report, as_html(found))
         written.append(chosen.report)
     return written
 

@@ -4,7 +4,7 @@ import matplotlib
 import numpy as np
 from matplotlib.figure import Figure
 
-from cpg_ros.fitting.inverted import Inverted
+from cpg_ros.inversion.recording_fit import Inverted
 
 RECORDED, FITTED, BAND = '#1a202c', '#c53030', '#cbd5e0'
 LINES = ('#2b6cb0', '#c53030', '#2f855a', '#b7791f', '#805ad5', '#00838f')

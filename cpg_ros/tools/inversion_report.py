@@ -6,11 +6,11 @@ from html import escape
 
 from matplotlib.figure import Figure
 
-from cpg_ros.fitting.inverted import Inverted
-from cpg_ros.fitting.paper_fit import PaperFit
+from cpg_ros.inversion.paper_fit import PaperFit
+from cpg_ros.inversion.recording_fit import Inverted
 from cpg_ros.tools import inversion_figures
 from cpg_ros.tools.arguments import table
-from cpg_ros.tools.report import STYLE
+from cpg_ros.tools.reproduction_report import STYLE
 
 FIGURES = (('Recorded and fitted', inversion_figures.joints),
            ('Error over the cycle', inversion_figures.errors),

@@ -11,11 +11,11 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from cpg_ros.fitting.search_space import NETWORKS
-from cpg_ros.fitting.weights import Front, NothingFound, NotInstalled, optimise
-from cpg_ros.networks.presets import write_presets
+from cpg_ros.networks.preset_files import write_presets
+from cpg_ros.search.nsga2 import Front, NothingFound, NotInstalled, optimise
+from cpg_ros.search.pareto_front import draw_front, write_front
+from cpg_ros.search.search_space import NETWORKS
 from cpg_ros.tools.arguments import Parser, assignment, interval, say, twice
-from cpg_ros.tools.front import draw_front, write_front
 
 DESCRIPTION = '''\
 Look for weights that give a network a gait, by NSGA-II. What is minimised: the phase errors of

@@ -10,12 +10,12 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from cpg_ros.dynamics.progress import progress_bar
-from cpg_ros.papers.registry import PAPERS
+from cpg_ros.files.atomic_write import write_atomically
+from cpg_ros.files.progress_bar import progress_bar
+from cpg_ros.papers.catalogue import PAPERS
 from cpg_ros.papers.reproduction import parts, reproduce
 from cpg_ros.tools.arguments import Parser, say
-from cpg_ros.tools.report import as_html, as_json, table
-from cpg_ros.whole import write_whole
+from cpg_ros.tools.reproduction_report import as_html, as_json, table
 
 DESCRIPTION = '''\
 Compute every quantity that the three papers print, and hold it against the printed one. What
@@ -72,9 +72,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         with progress_bar('reproducing', parts(names)) as progress:
             found = reproduce(names, chosen.jobs, chosen.html is not None, progress)
         if json is not None:
-            write_whole(json, as_json(found))
+            write_atomically(json, as_json(found))
         if chosen.html is not None:
-            write_whole(chosen.html, as_html(found))
+            write_atomically(chosen.html, as_html(found))
     except OSError as error:
         print(f'reproduce: {error}', file=sys.stderr)
         return 2

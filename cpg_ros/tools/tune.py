@@ -12,13 +12,13 @@ from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
-from cpg_ros.dynamics.progress import progress_bar
+from cpg_ros.files.progress_bar import progress_bar
 from cpg_ros.networks.registry import PRESETS
-from cpg_ros.robot import Robot
-from cpg_ros.robot_file import RobotError, find_robot, write_robot
-from cpg_ros.simulation.design import AIMS
-from cpg_ros.simulation.model import SimulationError
-from cpg_ros.simulation.steering import STRIDES, measure
+from cpg_ros.robots.robot import Robot
+from cpg_ros.robots.robot_file import RobotError, find_robot, write_robot
+from cpg_ros.simulation.gait_design import AIMS
+from cpg_ros.simulation.robot_model import SimulationError
+from cpg_ros.simulation.steering_table import STRIDES, measure
 from cpg_ros.simulation.tuning import LONG, Tuned, Tuner
 from cpg_ros.tools.arguments import Parser, say, table, twice
 

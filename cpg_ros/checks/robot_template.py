@@ -1,0 +1,128 @@
+"""A first robot file from a URDF: legs by the joints' names, what each joint does by its axis.
+
+x forward, y left, z up (REP 103). In each leg the joints that turn about y are, down the leg,
+the one that swings it, the knee and the ankle; others hold still. The stand has the knees bent
+and the end of the leg below its hip, if upper and lower leg are equally long.
+"""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from math import copysign, inf, pi
+
+import numpy as np
+
+from cpg_ros.checks.urdf_match import unlimited
+from cpg_ros.gaits.leg_names import Legs, legs_of
+from cpg_ros.motion.plan import plan
+from cpg_ros.networks.registry import NETWORKS, PRESETS
+from cpg_ros.robots.robot import HARMONICS, Joint, Robot
+from cpg_ros.robots.robot_file import LARGEST
+from cpg_ros.robots.urdf import UrdfError, UrdfJoint, chain, direction
+
+#: How far the knees are bent at the stand, rad, by the number of legs.
+BEND = {2: 0.5, 4: 1.4}
+#: How far legs swing and knees bend at first, rad.
+SWING, LIFT = 0.15, 0.15
+#: Angles and speeds where the URDF has no limits, rad and rad/s.
+UNBOUNDED, SPEED = pi, 10.0
+#: Share of a joint's range that the stand keeps from either end, and of the room that gaits take.
+MARGIN, USED = 0.1, 0.8
+
+
+def robot_from(urdf: Mapping[str, UrdfJoint], name: str) -> tuple[Robot, str]:
+    """Make a robot file's content out of a URDF; also say how its joints were understood.
+
+    Raises:
+        LegsError: the joints' names do not tell two or four legs.
+        UrdfError: the links make no tree, a leg has no joint that could swing it, or a joint
+            has no room to move.
+
+    """
+    legs = legs_of([joint.name for joint in urdf.values() if not joint.flaw])
+    networks = ('delayed', 'quadruped') if len(legs) == 4 else ('biped',)
+    assignment, cells = next(iter(NETWORKS[networks[0]].legs.items()))
+    joints, says = {}, []
+    for leg in legs:
+        joints[leg], said = _leg(urdf, legs, leg, cells[leg][0])
+        says.append(said)
+    driven = {joint.name for one in joints.values() for joint in one}
+    robot = Robot(name, networks, assignment, HARMONICS, joints,
+                  tuple(joint for joint in urdf if joint in driven))
+    return _fitting(robot), '\n'.join(says)
+
+
+def _leg(urdf: Mapping[str, UrdfJoint], legs: Legs, leg: str, cell: int
+         ) -> tuple[tuple[Joint, ...], str]:
+    known = dict(urdf)
+    names = sorted(legs[leg], key=lambda joint: len(chain(known, joint)))
+    # About y: positive angles of an axis along +y swing what is below backward.
+    turns = {joint: float(direction(known, joint)[1]) for joint in names}
+    pitching = [joint for joint in names if abs(turns[joint]) > 0.7]
+    if not pitching:
+        raise UrdfError(f"no joint of the leg {leg} turns about the y axis of the URDF's root, "
+                        'which points to the left (REP 103): nothing would swing it')
+    stand = {joint: _inside(urdf[joint], 0.0) for joint in names}
+    weights: dict[str, tuple[float, ...]] = dict.fromkeys(names, (0.0,))
+    roles = dict.fromkeys(names, 'holds still')
+    ways = {joint: copysign(1.0, turns[joint]) for joint in pitching}
+    swings, knee, ankle = (*pitching[:3], '', '')[:3]
+    if knee:
+        bend = _bend(urdf[knee], ways[knee], len(legs))
+        stand[knee] = _inside(urdf[knee], ways[knee] * bend)
+        # Half of the bend the other way: the end of the leg is below the hip.
+        stand[swings] = _inside(urdf[swings], -0.5 * ways[swings] * ways[knee] * stand[knee])
+        weights[knee] = (0.0, copysign(LIFT, ways[knee] * bend))
+        roles[knee] = 'bends in swing'
+    weights[swings] = (-SWING * ways[swings],)
+    roles[swings] = 'swings'
+    if ankle:
+        tilt = ways[swings] * stand[swings] + ways[knee] * stand[knee]
+        stand[ankle] = _inside(urdf[ankle], -ways[ankle] * tilt)
+        roles[ankle] = 'keeps the foot level'
+    speed = {joint: min(urdf[joint].velocity, LARGEST) if urdf[joint].velocity < inf else SPEED
+             for joint in names}
+    made = tuple(Joint(joint, leg, cell, stand[joint], weights[joint], *_range(urdf[joint]),
+                       speed[joint]) for joint in legs[leg])
+    return made, f'{leg}: ' + ', '.join(f'{joint} {roles[joint]}' for joint in names)
+
+
+def _range(joint: UrdfJoint) -> tuple[float, float]:
+    lower, upper = max(joint.lower, -UNBOUNDED), min(joint.upper, UNBOUNDED)
+    if upper - lower < 0.01:
+        raise UrdfError(f"the joint '{joint.name}' has no room to move: its limits are "
+                        f'{joint.lower:g} to {joint.upper:g} rad')
+    return lower, upper
+
+
+def _inside(joint: UrdfJoint, angle: float) -> float:
+    """Return the nearest angle that keeps a margin from the joint's limits."""
+    lower, upper = _range(joint)
+    margin = MARGIN * (upper - lower)
+    return round(float(np.clip(angle, lower + margin, upper - margin)), 3)
+
+
+def _bend(knee: UrdfJoint, way: float, legs: int) -> float:
+    """Return how far about y a knee is bent at the stand: the way that its limits leave room."""
+    middle = 0.5 * way * sum(_range(knee))
+    if abs(middle) > 0.1:
+        return copysign(BEND[legs], middle)
+    # Where both ways do, the end of the leg goes forward on four legs and backward on two.
+    return -BEND[legs] if legs == 4 else BEND[legs]
+
+
+def _fitting(robot: Robot) -> Robot:
+    """Make each joint's weights small enough for all gaits at 1 Hz."""
+    share = np.full(len(robot.joints), 1.0)
+    low, high, fast = (robot.column(key) for key in ('lower', 'upper', 'velocity'))
+    offset = robot.column('offset')
+    for network in robot.networks:
+        for gait in NETWORKS[network].gaits():
+            preset = PRESETS[network][gait]
+            program = plan(unlimited(robot), gait, preset, preset.network, 1.0)
+            room = np.stack([offset - low, high - offset, fast])
+            needed = np.stack([-program.span[0], program.span[1], program.speed])
+            share = np.minimum(share, (USED * room / np.maximum(needed, 1e-9)).min(axis=0))
+    shares = dict(zip((joint.name for joint in robot.joints), share, strict=True))
+    return replace(robot, legs={leg: tuple(replace(joint, weights=tuple(
+        round(float(weight * shares[joint.name]), 4) for weight in joint.weights))
+        for joint in joints) for leg, joints in robot.legs.items()})

@@ -1,0 +1,252 @@
+"""A robot file held against a URDF: names, kinds, limits, and whether each gait fits."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from difflib import get_close_matches
+from math import inf, nan
+from typing import Any
+
+from cpg_ros.gaits.leg_names import LegsError, legs_of, role_of
+from cpg_ros.motion.plan import Refused, plan
+from cpg_ros.networks.registry import NETWORKS, PRESETS
+from cpg_ros.robots.robot import Joint, Motion, Robot
+from cpg_ros.robots.urdf import UrdfJoint
+from cpg_ros.tools.arguments import table
+
+#: Files have limits rounded: differences up to this many rad (rad/s) are none.
+ROUNDING = 1e-4
+#: Strides per second where neither the command line nor the robot file says (Hz).
+USUAL_FREQUENCY = 1.0
+
+
+@dataclass(frozen=True)
+class JointCheck:
+    """A joint of the robot file beside its namesake in the URDF, and what does not match."""
+
+    joint: Joint
+    urdf: UrdfJoint | None
+    faults: tuple[str, ...]
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return it as plain types; limits in rad and rad/s."""
+        keys = ('lower', 'upper', 'velocity')
+        return {'name': self.joint.name, 'leg': self.joint.leg, 'matches': not self.faults,
+                'kind': self.urdf.kind if self.urdf else None,
+                'robot': {key: getattr(self.joint, key) for key in (*keys, 'offset')},
+                'urdf': {key: getattr(self.urdf, key) for key in keys} if self.urdf else None,
+                'faults': list(self.faults)}
+
+
+@dataclass(frozen=True)
+class GaitCheck:
+    """A gait on the robot.
+
+    Attributes:
+        network, name: which.
+        frequency: strides per second (Hz), nan where there is no such gait.
+        room: least distance in rad of any joint from a limit; negative beyond it.
+        share: largest speed of any joint as a share of its limit.
+        room_at, share_at: the joints of these two.
+        faults: what does not fit.
+
+    """
+
+    network: str
+    name: str
+    frequency: float
+    room: float
+    room_at: str
+    share: float
+    share_at: str
+    faults: tuple[str, ...]
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return it as plain types."""
+        return {'network': self.network, 'gait': self.name, 'fits': not self.faults,
+                'frequency': self.frequency, 'room': self.room, 'room_at': self.room_at,
+                'speed_share': self.share, 'speed_share_at': self.share_at,
+                'faults': list(self.faults)}
+
+
+@dataclass(frozen=True)
+class RobotCheck:
+    """All that was compared; it matches if nothing has a fault."""
+
+    robot: str
+    urdf: str
+    joints: tuple[JointCheck, ...]
+    gaits: tuple[GaitCheck, ...]
+    notes: tuple[str, ...]
+
+    @property
+    def faults(self) -> list[str]:
+        """What does not match, one line each."""
+        return [f'{joint.joint.name}: {fault}' for joint in self.joints for fault in joint.faults
+                ] + [f'{gait.network} {gait.name}: {fault}' for gait in self.gaits
+                     for fault in gait.faults]
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return it as plain types."""
+        return {'robot': self.robot, 'urdf': self.urdf, 'matches': not self.faults,
+                'joints': [joint.as_dict() for joint in self.joints],
+                'gaits': [gait.as_dict() for gait in self.gaits], 'notes': list(self.notes)}
+
+    def text(self) -> str:
+        """Return it as tables, then what does not match, then notes."""
+        rows: list[tuple[str, ...]] = [
+            ('joint', 'leg', 'kind', 'limits [rad]', 'URDF', 'speed [rad/s]', 'URDF', '')]
+        for one in self.joints:
+            joint, urdf = one.joint, one.urdf
+            rows.append((joint.name, joint.leg, urdf.kind if urdf else '-', _span(joint),
+                         _span(urdf) if urdf else '-', f'{joint.velocity:.4g}',
+                         _limit(urdf.velocity) if urdf else '-',
+                         'does not match' if one.faults else 'ok'))
+        said = table(rows, '<<<<<>><')
+        rows = [('gait', 'network', 'stride [Hz]', 'nearest limit', 'fastest joint', '')]
+        for gait in self.gaits:
+            known = gait.frequency == gait.frequency
+            rows.append((gait.name, gait.network, f'{gait.frequency:.3g}' if known else '-',
+                         f'{_room(gait.room)} ({gait.room_at})' if known else '-',
+                         f'{100 * gait.share:.0f} % of its limit ({gait.share_at})'
+                         if known else '-', 'does not fit' if gait.faults else 'fits'))
+        said += ['', *table(rows, '<<><<<'), '']
+        faults = self.faults
+        said += [f'- {fault}' for fault in faults] + [f'note: {note}' for note in self.notes]
+        said.append(f'{self.robot} matches {self.urdf}' if not faults else
+                    f'{self.robot} does not match {self.urdf}: {len(faults)} '
+                    f'thing{"s" if len(faults) > 1 else ""}, see above')
+        return '\n'.join(said)
+
+
+def checked(robot: Robot, urdf: Mapping[str, UrdfJoint], names: tuple[str, str],
+            gaits: Sequence[str] = (), frequency: float | None = None, amplitude: float = 1.0
+            ) -> RobotCheck:
+    """Hold a robot file against a URDF.
+
+    Args:
+        robot: what the file says.
+        urdf: joints by name.
+        names: of the two files, for messages.
+        gaits: gaits or presets; by default all gaits of the robot's networks.
+        frequency: strides per second (Hz), 0 for the model's own time; None takes what the
+            robot file says of the gait, or else 1 Hz.
+        amplitude: factor on the readout weights.
+
+    """
+    near = _nearest(robot, urdf)
+    joints = tuple(JointCheck(joint, urdf.get(joint.name), tuple(
+        _faults(joint, urdf.get(joint.name), near.get(joint.name, '')))) for joint in robot.joints)
+    chosen = [(network, name) for network in robot.networks for name in
+              (gaits or NETWORKS[network].gaits()) if name in PRESETS[network]]
+    return RobotCheck(*names, joints, tuple(
+        _gait(robot, urdf, network, name, frequency, amplitude) for network, name in chosen),
+        tuple(_notes(robot, urdf)))
+
+
+def _faults(joint: Joint, urdf: UrdfJoint | None, near: str) -> Iterator[str]:
+    if urdf is None:
+        yield 'the URDF has no such joint' + (f", did you mean '{near}'?" if near else '')
+        return
+    if urdf.flaw:
+        yield f'cannot be driven, in the URDF it {urdf.flaw}'
+        return
+    if joint.lower < urdf.lower - ROUNDING:
+        yield (f"lower limit {joint.lower:g} rad is {urdf.lower - joint.lower:.4g} rad below the "
+               f"URDF's {urdf.lower:g}")
+    if joint.upper > urdf.upper + ROUNDING:
+        yield (f"upper limit {joint.upper:g} rad is {joint.upper - urdf.upper:.4g} rad above the "
+               f"URDF's {urdf.upper:g}")
+    if not urdf.lower - ROUNDING <= joint.offset <= urdf.upper + ROUNDING:
+        yield (f"offset {joint.offset:g} rad is outside the URDF's limits {urdf.lower:g} to "
+               f'{urdf.upper:g}: the robot could not stand')
+    if joint.velocity > urdf.velocity + ROUNDING:
+        yield (f"velocity limit {joint.velocity:g} rad/s is {joint.velocity - urdf.velocity:.4g} "
+               f"rad/s above the URDF's {urdf.velocity:g}")
+
+
+def _gait(robot: Robot, urdf: Mapping[str, UrdfJoint], network: str, name: str,
+          frequency: float | None, amplitude: float) -> GaitCheck:
+    preset = PRESETS[network][name]
+    if frequency is None:
+        frequency = _fastest(robot.motion(name, preset.gait))
+    try:
+        program = plan(unlimited(robot), name, preset, preset.network, frequency, amplitude)
+    except Refused as error:
+        return GaitCheck(network, name, nan, nan, '', nan, '', (str(error),))
+    faults, rooms, shares = [], [], []
+    for joint, low, high, speed in zip(robot.joints, *program.span, program.speed, strict=True):
+        limits = [("the robot file's", joint), *(
+            ("the URDF's", known) for known in [urdf.get(joint.name)] if known and not known.flaw)]
+        lower, below = max((one.lower, whose) for whose, one in limits)
+        upper, above = min((one.upper, whose) for whose, one in limits)
+        fastest, slower = min((one.velocity, whose) for whose, one in limits)
+        low, high = joint.offset + low, joint.offset + high
+        rooms.append((min(low - lower, upper - high), joint.name))
+        shares.append((speed / fastest, joint.name))
+        if low < lower - ROUNDING:
+            faults.append(f'{joint.name} goes to {low:.3f} rad, below {below} limit {lower:g}')
+        if high > upper + ROUNDING:
+            faults.append(f'{joint.name} goes to {high:.3f} rad, above {above} limit {upper:g}')
+        if speed > fastest + ROUNDING:
+            faults.append(f'{joint.name} moves at {speed:.2f} rad/s, above {slower} limit '
+                          f'{fastest:g}')
+    return GaitCheck(network, name, program.frequency, *min(rooms), *max(shares), tuple(faults))
+
+
+def unlimited(robot: Robot) -> Robot:
+    """Return a robot whose joints have no limits: a plan for it tells of all of them."""
+    return replace(robot, legs={leg: tuple(replace(
+        joint, lower=-inf, upper=inf, velocity=inf) for joint in joints)
+        for leg, joints in robot.legs.items()})
+
+
+def _fastest(motion: Motion) -> float:
+    steered = motion.steering.frequency if motion.steering else ()
+    return max(motion.frequency or 0.0, *steered, 0.0) or USUAL_FREQUENCY
+
+
+def _nearest(robot: Robot, urdf: Mapping[str, UrdfJoint]) -> dict[str, str]:
+    """Return for joints that the URDF does not have the likeliest of those it has."""
+    there = {joint.name for joint in robot.joints}
+    able = [name for name, joint in urdf.items() if not joint.flaw]
+    free = [name for name in able if name not in there]
+    try:
+        legs: Mapping[str, Sequence[str]] = legs_of(able).joints
+    except LegsError:
+        legs = {}
+    near = {}
+    for joint in robot.joints:
+        # The same joint of another leg is spelt like it, too: the robot file knows the leg.
+        same = {role_of(name): name for name in legs.get(joint.leg, ()) if name in free}
+        asked, known = ((role_of(joint.name), same) if same else
+                        (joint.name.lower(), {name.lower(): name for name in free}))
+        likely = get_close_matches(asked, list(known), 1) or (list(same) if len(same) == 1 else [])
+        if likely:
+            near[joint.name] = known[likely[0]]
+    return near
+
+
+def _notes(robot: Robot, urdf: Mapping[str, UrdfJoint]) -> Iterator[str]:
+    driven = [joint.name for joint in robot.joints]
+    idle = [joint.name for joint in urdf.values()
+            if (not joint.flaw or joint.kind == 'prismatic') and joint.name not in driven]
+    if idle:
+        yield 'moving joints of the URDF that no leg drives: ' + ', '.join(idle)
+    unbounded = [name for name in driven if name in urdf and urdf[name].velocity == inf]
+    if unbounded:
+        yield 'the URDF has no velocity limit of ' + (
+            'any joint' if len(unbounded) == len(driven) else ', '.join(unbounded))
+
+
+def _span(limits: Joint | UrdfJoint) -> str:
+    if limits.lower == -inf and limits.upper == inf:
+        return 'none'
+    return f'{limits.lower:.4g} to {limits.upper:.4g}'
+
+
+def _limit(value: float) -> str:
+    return 'none' if value == inf else f'{value:.4g}'
+
+
+def _room(room: float) -> str:
+    return f'{room:.2f} rad away' if room >= 0.0 else f'{-room:.2g} rad beyond'

@@ -1,0 +1,173 @@
+"""What a parameter set does, gait by gait: whether there is one, how large, how fast, how stable.
+
+And what stands nearest where there is none: the threshold at which rest gives way.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+from cpg_ros.dynamics.continuation import from_hopf
+from cpg_ros.dynamics.floquet import Multipliers, multipliers, smallest_gain
+from cpg_ros.dynamics.hopf import hopf_point, hopf_points
+from cpg_ros.dynamics.orbit import NoOrbit, Orbit, solve_orbit
+from cpg_ros.dynamics.stability import stability
+from cpg_ros.networks.delayed import Delayed
+from cpg_ros.networks.network import Network
+from cpg_ros.networks.parameter_line import ParameterLine
+
+#: Hopf points are looked at up to this many times the delay, and so many turns more than the
+#: first of their kind.
+FURTHEST, TURNS = 4.0, 1
+#: Cells of the biped, by what they drive.
+MUSCLES = ('left_flexor', 'right_flexor', 'left_extensor', 'right_extensor')
+
+
+@dataclass(frozen=True)
+class GaitAssessment:
+    """One gait of one parameter set.
+
+    Attributes:
+        gait: one of the network's gaits.
+        orbit: its orbit, or None.
+        why: why there is none, or ''.
+
+    """
+
+    gait: str
+    orbit: Orbit | None
+    why: str = ''
+
+    @property
+    def _orbit(self) -> Orbit:
+        if self.orbit is None:
+            raise ValueError(f'there is no {self.gait}: {self.why}')
+        return self.orbit
+
+    @property
+    def amplitude(self) -> float:
+        """Half the range of cell 1's first variable."""
+        return float(self._orbit.levels[0, 0, 1])
+
+    @property
+    def phases(self) -> dict[str, float]:
+        """Phase of each leg's first cell, or of each of a biped's muscles, in cycles."""
+        orbit = self._orbit
+        network = type(orbit.network)
+        if network.cells == len(MUSCLES):
+            places = dict(zip(MUSCLES, range(network.cells), strict=True))
+        else:
+            legs = next(iter(network.legs.values()))
+            places = {leg: cells[0] - 1 for leg, cells in legs.items()}
+        return {name: float(orbit.phases[cell]) for name, cell in places.items()}
+
+    @cached_property
+    def multipliers(self) -> Multipliers:
+        """Floquet multipliers without a symmetry lock."""
+        return multipliers(self._orbit)
+
+    @property
+    def stable(self) -> bool:
+        """Whether the gait attracts in the full network, without a lock."""
+        return self.multipliers.attracts
+
+    @cached_property
+    def smallest_gain(self) -> float:
+        """Symmetry gain above which every transverse disturbance decays, 1/model time."""
+        return smallest_gain(self._orbit)
+
+    @cached_property
+    def default_gain(self) -> float:
+        """The gain the generator would choose, 1/model time."""
+        return stability(self._orbit).chosen
+
+    @cached_property
+    def stable_with_default_gain(self) -> bool:
+        """Whether the gait attracts with the gain the generator would choose."""
+        return multipliers(self._orbit, self.default_gain).attracts
+
+    def as_dict(self) -> dict[str, Any]:
+        """Everything in plain types, for JSON."""
+        if self.orbit is None:
+            return {'exists': False, 'why': self.why}
+        return {'exists': True, 'period': self.orbit.period, 'amplitude': self.amplitude,
+                'phases': self.phases, 'waveforms': int(self.orbit.waves.max()) + 1,
+                'floquet_leading': self.multipliers.leading_within,
+                'floquet_leading_transverse': self.multipliers.leading_transverse,
+                'stable': self.stable, 'min_symmetry_gain': self.smallest_gain,
+                'default_symmetry_gain': self.default_gain,
+                'stable_with_default_gain': self.stable_with_default_gain}
+
+
+def verdicts(network: Network, done: Callable[[int], None] = lambda count: None
+             ) -> dict[str, GaitAssessment]:
+    """Judge every gait of a network.
+
+    Args:
+        network: parameters, all finite.
+        done: told how many gaits are done.
+
+    Raises:
+        ValueError: a parameter that is not finite, or a delay that is not positive.
+
+    """
+    found = {}
+    for count, gait in enumerate(network.gaits()):
+        done(count)
+        try:
+            found[gait] = GaitAssessment(gait, solve_orbit(network, gait))
+        except NoOrbit as error:
+            found[gait] = (_beyond(network, gait, str(error)) if isinstance(network, Delayed)
+                           else GaitAssessment(gait, None, str(error)))
+    done(len(found))
+    return found
+
+
+def _beyond(network: Delayed, gait: str, why: str) -> GaitAssessment:
+    """Look for an orbit that the solver does not reach from the first onset.
+
+    Those born with unstable roots in their own class, and those beyond a fold, lie on the
+    branches of the gait's Hopf points.
+    """
+    points = [point for point in hopf_points(network, FURTHEST * network.tau)
+              if point.mode == network.symmetry(gait)]
+    along = ParameterLine.parse('tau', Delayed)
+    for point in points:
+        if (point.tau < network.tau) != (point.normal_form.side > 0) or point.n > TURNS:
+            continue
+        low, high = sorted((0.9 * point.tau, network.tau)) if point.normal_form.side > 0 else (
+            0.5 * network.tau, 1.1 * point.tau)
+        try:
+            branch = from_hopf(point.network, point.mode, point.omega, along, low, high, most=80)
+            orbits = branch.at(network.tau)
+        except NoOrbit:
+            continue
+        if orbits:
+            return GaitAssessment(gait, orbits[-1])
+    first = hopf_point(network, network.symmetry(gait))
+    if first is not None and first.tau > network.tau:
+        why = f"tau {network.tau:g} is below the {gait}'s critical delay {first.tau:.4f}"
+    return GaitAssessment(gait, None, why)
+
+
+def nearest_threshold(network: Delayed) -> str:
+    """Name what would have to change for a gait, of a delayed network that has none.
+
+    The critical delay that is nearest above the delay; where no delay has one, the |c| that is
+    nearest.
+    """
+    points = {gait: hopf_point(network, network.symmetry(gait)) for gait in network.gaits()}
+    ahead = {gait: point.tau for gait, point in points.items()
+             if point is not None and point.tau >= network.tau}
+    if ahead:
+        gait = min(ahead, key=lambda name: ahead[name])
+        return (f"the nearest threshold is the {gait}'s critical delay {ahead[gait]:.4f} (tau is "
+                f'{network.tau:g})')
+    needed = {gait: abs(network.symmetry(gait).eigenvalue_terms(network)[0].real)
+              for gait, point in points.items() if point is None}
+    if needed:
+        gait = min(needed, key=lambda name: needed[name])
+        return (f'the nearest threshold is |c| {needed[gait]:.4f}, above which the {gait} has a '
+                f'critical delay (|c| is {abs(network.c):g})')
+    return 'every critical delay is below tau, but no orbit was found this far from onset'

@@ -1,1 +1,0 @@
-"""From signals to what they are: period, mean cycle and symmetry. No ROS in here."""

@@ -1,0 +1,230 @@
+"""Phases between legs from their mean cycles, and the gait that they make.
+
+A leg is ahead of another by the shift at which the same joints of both are most alike (circular
+cross-correlation of all of them). An angle may be counted in the opposite sense in another leg,
+as abduction is; by the mean angles, or by which sense makes the waveforms more alike, that is
+told. Legs with other joints, such as an animal's fore and hind ones, are compared by the first
+harmonic of the joint that moves most: half a cycle is then uncertain, as nothing says which sense
+of an elbow corresponds to that of a knee.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from cpg_ros.gaits.leg_names import role_of
+from cpg_ros.gaits.recognition import nearest_gait, recognise
+from cpg_ros.networks.network import Network
+from cpg_ros.networks.registry import PRESETS
+
+#: Largest distance of a gait that is one, RMS over the legs in cycles. A quarter of the way from
+#: one gait to the next has about 0.05.
+TOLERANCE = 0.06
+#: Places at which shifts are tried.
+GRID = 1024
+#: Joints whose mean angles are this much larger than what they move by RMS have a sign.
+SIGNED = 1.0
+#: Correlations that differ by more tell the sense of a joint.
+CLEARER = 0.2
+#: Largest violation of a symmetry, over the cells' RMS, and samples a cycle for it.
+BY_CELLS, SAMPLES = 0.2, 128
+
+
+@dataclass(frozen=True)
+class Named:
+    """Which gait it is.
+
+    Attributes:
+        gait: None if no gait is near enough.
+        nearest: the nearest one.
+        distance: of that, in cycles: RMS over the legs after the best common shift.
+        margin: how much further the next gait is that is told apart, cycles.
+        alike: gaits that the nearest cannot be told from, itself among them.
+        notes: one line each.
+
+    """
+
+    gait: str | None
+    nearest: str
+    distance: float
+    margin: float
+    alike: tuple[str, ...]
+    notes: tuple[str, ...]
+
+
+def _cross(ahead: np.ndarray, behind: np.ndarray) -> np.ndarray:
+    """Return the terms of the cross-correlation of two joints, shape (n + 1,)."""
+    terms = ahead * behind.conj()
+    terms[0] = 0.0
+    return terms
+
+
+def _peak(terms: np.ndarray) -> tuple[float, float]:
+    """Return the shift by which the first is ahead, in cycles, and the correlation there."""
+    turn = 2j * np.pi * np.arange(terms.size)
+    theta = float(np.argmax(np.fft.ifft(terms.conj(), GRID).real)) / GRID
+    at = theta
+    for _ in range(8):
+        there = terms * np.exp(-turn * theta)
+        slope, bend = -np.sum(turn * there).real, np.sum(turn * turn * there).real
+        if bend < 0.0:
+            theta = float(np.clip(theta - slope / bend, at - 1.0 / GRID, at + 1.0 / GRID))
+    return theta, float(np.sum(terms * np.exp(-turn * theta)).real)
+
+
+def _power(c: np.ndarray) -> float:
+    return float(np.sum(np.abs(c[1:])**2))
+
+
+def _sense(a: np.ndarray, b: np.ndarray) -> float:
+    """Tell whether two joints count angles in the same sense, 1 or -1; 0 if nothing tells."""
+    levels, sizes = (a[0].real, b[0].real), np.sqrt([2.0 * _power(a), 2.0 * _power(b)])
+    if all(abs(level) > SIGNED * size for level, size in zip(levels, sizes, strict=True)):
+        return float(np.sign(levels[0] * levels[1]))
+    terms = _cross(a, b)
+    gain = (_peak(terms)[1] - _peak(-terms)[1]) / max(np.sqrt(_power(a) * _power(b)), 1e-300)
+    return float(np.sign(gain)) if abs(gain) > CLEARER else 0.0
+
+
+def _pairs(first: Sequence[str], other: Sequence[str]) -> list[tuple[str, str]]:
+    """Pair joints of two legs: by what they are called but for the leg, or by number."""
+    roles = {role_of(name): name for name in first}
+    found = [(roles[role_of(name)], name) for name in other if role_of(name) in roles]
+    bare = {''.join(sign for sign in role_of(name) if sign.isalpha() or sign == ' ').strip()
+            for name in (*first, *other)}
+    if not found and len(bare) == 1 and len(first) == len(other):
+        return list(zip(first, other, strict=True))
+    return found
+
+
+def leg_phases(legs: Mapping[str, Sequence[str]], c: Mapping[str, np.ndarray]
+               ) -> tuple[dict[str, float], tuple[str, ...]]:
+    """Find by how much each leg is ahead of the first one.
+
+    Args:
+        legs: leg -> its joints, the first leg first.
+        c: joint -> Fourier coefficients of its mean cycle, complex, shape (n + 1,).
+
+    Returns:
+        Leg -> phase in cycles, [0, 1): x_leg(t) = x_first(t + phase T); and notes.
+
+    """
+    phases: dict[str, float] = {}
+    notes, opposite = [], []
+    for leg, joints in legs.items():
+        if not phases:
+            phases[leg] = 0.0
+            continue
+        # The first leg that has the same joints; or else the first one.
+        base, pairs = next(((known, found) for known in phases
+                            if (found := _pairs(legs[known], joints))), ('', []))
+        if pairs:
+            ahead, mirrored = _shift(pairs, c)
+            opposite += mirrored
+        else:
+            base = next(iter(phases))
+            most = [max(names, key=lambda name: np.abs(c[name][1]))
+                    for names in (legs[base], joints)]
+            ahead = float(np.angle(c[most[1]][1] / c[most[0]][1])) / (2.0 * np.pi)
+            notes.append(f'{leg} has no joint named like one of {base}: its phase is that of '
+                         f'{most[1]} against {most[0]}, half a cycle off if their senses differ')
+        # What is hardly below a whole cycle is none.
+        phases[leg] = round((phases[base] + ahead) % 1.0, 9) % 1.0
+    if opposite:
+        notes.append(f'taken to count angles in the opposite sense of {next(iter(legs))}: '
+                     f'{", ".join(opposite)}')
+    return phases, tuple(notes)
+
+
+def _shift(pairs: list[tuple[str, str]], c: Mapping[str, np.ndarray]
+           ) -> tuple[float, list[str]]:
+    """Return by how much the second of each pair is ahead of the first, all together."""
+    pairs = sorted(pairs, key=lambda pair: -_power(c[pair[0]]) * _power(c[pair[1]]))
+    total: np.ndarray | None = None
+    mirrored = []
+    for first, other in pairs:
+        terms = _cross(c[other], c[first])
+        sense = _sense(c[first], c[other])
+        if total is None:
+            sense = sense or 1.0
+            total = np.zeros_like(terms)
+        elif not sense:
+            # As agrees with those that move more.
+            turn = np.exp(-2j * np.pi * np.arange(terms.size) * _peak(total)[0])
+            sense = 1.0 if np.sum(terms * turn).real >= 0.0 else -1.0
+        if sense < 0.0:
+            mirrored.append(other)
+        total = total + sense * terms
+    assert total is not None
+    return _peak(total)[0], mirrored
+
+
+def _symmetry(network: type[Network], gait: str) -> Any:
+    return PRESETS[network.name][gait].network.symmetry(gait)
+
+
+def _apart(phases: np.ndarray, wanted: np.ndarray, waves: np.ndarray) -> float:
+    """Distance of leg phases; between different waveforms any phase will do."""
+    squares = [nearest_gait(phases[waves == wave], {'': wanted[waves == wave]})[1]**2
+               * np.count_nonzero(waves == wave) for wave in np.unique(waves)]
+    return float(np.sqrt(sum(squares) / phases.size))
+
+
+def named(phases: Mapping[str, float], network: type[Network]) -> Named:
+    """Name the gait of leg phases.
+
+    Of several gaits within the tolerance the most symmetric is meant: every walk is a skip, too.
+
+    Args:
+        phases: leg -> cycles, in the order of the network's legs.
+        network: whose gaits.
+
+    """
+    own = np.array(list(phases.values()))
+    cells = [listed[0] - 1 for listed in next(iter(network.legs.values())).values()]
+    apart, size = {}, {}
+    for gait in network.gaits():
+        symmetry = _symmetry(network, gait)
+        wanted, waves = symmetry.phases[cells], symmetry.waves[cells]
+        # A wave that runs round may do so in both senses.
+        apart[gait] = min(_apart(own, wanted, waves), _apart(own, -wanted, waves))
+        size[gait] = -symmetry.waves.max()
+    fits = [gait for gait in apart if apart[gait] <= max(TOLERANCE, min(apart.values()))]
+    nearest = min(fits, key=lambda gait: (-size[gait], round(apart[gait], 9)))
+    # Others that ask the same of the legs; those that ask less fit no worse, which says nothing.
+    same = [gait for gait in fits if size[gait] == size[nearest]
+            and abs(apart[gait] - apart[nearest]) < 1e-9]
+    margin = min((apart[gait] for gait in apart if gait not in same
+                  and size[gait] >= size[nearest]), default=np.inf) - apart[nearest]
+    notes = []
+    if len(same) > 1:
+        notes.append(f"the legs move alike in {', '.join(same)}: only which of a leg's cells "
+                     'drives which joint tells them apart')
+    order = [leg for leg, _ in sorted(phases.items(), key=lambda item: -item[1] % 1.0)]
+    if nearest == 'walk' and len(order) == 4:
+        kind = 'lateral' if order[1] == order[0][0] + 'f' else 'diagonal'
+        notes.append(f'{kind} sequence: {", ".join(order).upper()}')
+    return Named(nearest if apart[nearest] <= TOLERANCE else None, nearest, apart[nearest],
+                 margin, tuple(same), tuple(notes))
+
+
+def named_by_cells(c: np.ndarray, network: type[Network]) -> Named:
+    """Name the gait of the signals of all cells, by their symmetry.
+
+    Args:
+        c: Fourier coefficients of the cells' mean cycles, complex, shape (n + 1, cells).
+        network: whose gaits.
+
+    """
+    table = {gait: _symmetry(network, gait) for gait in network.gaits()}
+    places = np.arange(2 * SAMPLES + 1) / SAMPLES
+    turned = np.exp(2j * np.pi * np.outer(places, np.arange(len(c))))
+    turned[:, 1:] *= 2.0
+    group = next(iter(table.values())).group
+    found = recognise(places, (turned @ c).real, group, table, 1.0, BY_CELLS)
+    # What a wave is off from itself that is early by the distance.
+    distance, second = (float(np.arcsin(min(0.5 * size, 1.0)) / np.pi)
+                        for size in (found.distance, found.distance + found.margin))
+    return Named(found.name, found.nearest, distance, second - distance, (found.nearest,), ())

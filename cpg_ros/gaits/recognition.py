@@ -1,0 +1,228 @@
+"""Which gait is this? The spatio-temporal symmetry of a recorded or simulated rhythm.
+
+A symmetry g with shift theta asks ``x_{g(i)}(t) = x_i(t + theta T)`` of every cell (Buono &
+Golubitsky 2001, section 2.1). Here its violation is measured, for every g and theta, on the
+mean cycle; H and K are what is violated by less than the tolerance and forms a homomorphism.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from fractions import Fraction
+
+import numpy as np
+
+from cpg_ros.gaits.mean_cycle import mean_cycle
+from cpg_ros.gaits.period import find_period, holds_two
+from cpg_ros.networks.hk_theorem import symmetries
+from cpg_ros.networks.symmetry import Group, Permutation, Symmetry
+
+#: Grid for the best shift, per cycle; a mean cycle has far fewer harmonics.
+GRID = 1024
+#: Fewest samples that can be told from noise.
+FEWEST = 8
+
+
+@dataclass(frozen=True)
+class Recognised:
+    """What a rhythm is.
+
+    Distances are the RMS violation of a symmetry over cells and cycle, in units of the
+    signals' RMS about their means: 0 where it holds, 1.4 where nothing does.
+
+    Attributes:
+        name: the gait, or None if no named one is within the tolerance.
+        nearest: the gait; if there is none, the one with the smallest distance, or one that
+            includes its symmetry at a distance larger by no more than the tolerance.
+        distance: of the nearest gait, the largest over the elements of its H.
+        margin: how much larger the distance of the second is; inf if there is none, negative
+            if it fits better with a smaller H.
+        second: the best of the named gaits whose symmetry is not part of the nearest one's, or
+            None if there is none.
+        period: in the unit of the times.
+        phases: of the cells against cell 1 in cycles, [0, 1), shape (cells,): the shift of best
+            correlation; between different waveforms it is no more than that.
+        h: names of the elements of H, the largest consistent set within the tolerance.
+        k: those among them with shift 0.
+        distances: element name -> (its best shift in cycles, its distance there). An element
+            below the tolerance that h lacks fits no homomorphism with the others.
+
+    """
+
+    name: str | None
+    nearest: str
+    distance: float
+    margin: float
+    second: str | None
+    period: float
+    phases: np.ndarray
+    h: tuple[str, ...]
+    k: tuple[str, ...]
+    distances: dict[str, tuple[float, float]]
+
+
+def _best_shift(ahead: np.ndarray, behind: np.ndarray) -> float:
+    """Return theta in cycles with ahead(t) most like behind(t + theta T), [0, 1).
+
+    Both are Fourier coefficients, shape (harmonics + 1, channels).
+    """
+    cross = np.sum(ahead * behind.conj(), axis=1)
+    cross[0] = 0.0
+    turn = -2j * np.pi * np.arange(cross.size)
+    best = theta = float(np.argmax(np.fft.fft(cross, GRID).real)) / GRID
+    for _ in range(8):
+        terms = cross * np.exp(turn * theta)
+        slope, curvature = np.sum(turn * terms).real, np.sum(turn * turn * terms).real
+        if curvature < 0.0:
+            theta = float(np.clip(theta - slope / curvature, best - 1 / GRID, best + 1 / GRID))
+    # A rounding error below 0 is 0, not 1.
+    return round(theta % 1.0, 12) % 1.0
+
+
+class _Violations:
+    """Distances of a mean cycle from the symmetries of a group."""
+
+    def __init__(self, coefficients: np.ndarray, group: Group) -> None:
+        self.coefficients, self.elements = coefficients, group.elements
+        self._n = np.arange(len(coefficients))
+        # Of a real series: every coefficient but the mean counts twice.
+        self._weights = np.where(self._n > 0, 2.0, 1.0)[:, None]
+        self._power = np.sum(2.0 * np.abs(coefficients[1:]) ** 2)
+        self._known: dict[tuple[str, Fraction], float] = {}
+
+    def at(self, element: Permutation, shift: float) -> float:
+        turned = self.coefficients * np.exp(2j * np.pi * self._n * shift)[:, None]
+        apart = np.abs(self.coefficients[:, list(element)] - turned)
+        return float(np.sqrt(np.sum(self._weights * apart * apart) / self._power))
+
+    def best(self, element: Permutation) -> tuple[float, float]:
+        shift = _best_shift(self.coefficients[:, list(element)], self.coefficients)
+        return shift, self.at(element, shift)
+
+    def of(self, symmetry: Symmetry) -> float:
+        """Return the largest distance over the elements of H."""
+        for name, shift in symmetry.shifts:
+            if (name, shift) not in self._known:
+                self._known[name, shift] = self.at(self.elements[name], float(shift))
+        return max(self._known[one] for one in symmetry.shifts)
+
+
+def _checked(t: np.ndarray, signals: np.ndarray, group: Group, gaits: Mapping[str, Symmetry],
+             period: float | None, tolerance: float) -> None:
+    if t.ndim != 1 or signals.shape != (t.size, group.cells):
+        raise ValueError(f'signals have the shape {signals.shape}, times {t.shape}; '
+                         f'{group.cells} cells need (m, {group.cells}) and (m,)')
+    if t.size < FEWEST:
+        raise ValueError(f'{t.size} samples are not enough, at least {FEWEST} are needed')
+    for name, values in (('t', t), ('signals', signals)):
+        if not np.isfinite(values).all():
+            raise ValueError(f'{name} holds {np.count_nonzero(~np.isfinite(values))} values '
+                             f'that are not finite')
+    if not (np.diff(t) > 0.0).all():
+        late = int(np.argmin(np.diff(t) > 0.0))
+        raise ValueError(f't does not increase: {t[late]:g} is followed by {t[late + 1]:g}')
+    spread = signals.std(axis=0)
+    still = np.flatnonzero(spread <= np.maximum(1e-6 * spread.max(),
+                                                1e-12 * np.abs(signals).max()))
+    if still.size:
+        raise ValueError(f'channel {still[0] + 1} is constant')
+    if not gaits:
+        raise ValueError('gaits is empty')
+    for name, gait in gaits.items():
+        if gait.group != group:
+            raise ValueError(f'the gait {name!r} is one of another group')
+    if not (np.isfinite(tolerance) and tolerance > 0.0):
+        raise ValueError(f'tolerance is {tolerance}, it must be positive')
+    if period is not None and not (np.isfinite(period) and period > 0.0):
+        raise ValueError(f'period is {period}, it must be positive')
+    if period is not None and not holds_two(t, period):
+        raise ValueError(f'the recording lasts {t[-1] - t[0]:g}, less than two periods of '
+                         f'{period:g}')
+
+
+def recognise(t: np.ndarray, signals: np.ndarray, group: Group, gaits: Mapping[str, Symmetry],
+              period: float | None = None, tolerance: float = 0.05) -> Recognised:
+    """Find the symmetry of a rhythm, and the named gait that has it.
+
+    Of several gaits within the tolerance the one with the largest H is meant, and among those
+    the one that fits best: every walk is also a skip, which asks less.
+
+    Args:
+        t: increasing times, evenly or unevenly spaced, shape (m,).
+        signals: the first variable of each cell, shape (m, cells).
+        group: of the network.
+        gaits: name -> symmetry, of that group. A wave and the same one run backwards count as
+            two gaits.
+        period: in the unit of t; found if not given.
+        tolerance: largest distance of a symmetry that holds; see Recognised.
+
+    Raises:
+        ValueError: shapes do not fit, a value is not finite, t does not increase, a channel is
+            constant, there are fewer than two periods or too few samples, or gaits do not
+            belong to the group.
+
+    """
+    t, signals = np.asarray(t, dtype=float), np.asarray(signals, dtype=float)
+    _checked(t, signals, group, gaits, period, tolerance)
+    if period is None:
+        period = find_period(t, signals)
+    cycle = mean_cycle(t, signals, period).coefficients
+    violations = _Violations(cycle, group)
+    # Out of all homomorphisms, so that what is found is a group and its shifts are consistent.
+    found = max((one for one in symmetries(group) if violations.of(one) <= tolerance),
+                key=lambda one: (len(one.h), -violations.of(one)))
+    apart = {name: violations.of(gait) for name, gait in gaits.items()}
+    best = min(gaits, key=apart.__getitem__)
+    known = apart[best] <= tolerance
+    # A gait that includes another fits no better, as it asks more; that is no demerit.
+    fitting = [name for name, gait in gaits.items()
+               if (apart[name] <= tolerance if known else apart[name] <= apart[best] + tolerance
+                   and set(gait.shifts) >= set(gaits[best].shifts))]
+    nearest = min(fitting, key=lambda name: (-len(gaits[name].h), apart[name],
+                                             -len(gaits[name].k)))
+    others = [name for name, gait in gaits.items()
+              if not set(gait.shifts) <= set(gaits[nearest].shifts)]
+    second = min(others, key=apart.__getitem__, default=None)
+    phases = [_best_shift(cycle[:, [cell]], cycle[:, :1]) for cell in range(group.cells)]
+    return Recognised(nearest if known else None, nearest, apart[nearest],
+                      apart[second] - apart[nearest] if second is not None else np.inf, second,
+                      period, np.array(phases), found.h, found.k,
+                      {name: violations.best(element)
+                       for name, element in group.elements.items()})
+
+
+def nearest_gait(phases: np.ndarray, table: Mapping[str, np.ndarray]
+                 ) -> tuple[str, float, str | None, float]:
+    """Find the gait whose leg phases are nearest.
+
+    Args:
+        phases: of the legs in cycles, shape (legs,).
+        table: name -> phases of the same legs. A wave run backwards is a gait of its own.
+
+    Returns:
+        Name and distance of the nearest, the second nearest (None if there is no other), and
+        how much further that is. Distances are RMS over the legs, in cycles around the circle,
+        after the best common shift.
+
+    Raises:
+        ValueError: table is empty, shapes do not fit, or a phase is not finite.
+
+    """
+    phases = np.asarray(phases, dtype=float)
+    if not table:
+        raise ValueError('table is empty')
+    distances = {}
+    for name, reference in table.items():
+        wanted = np.asarray(reference, dtype=float)
+        if phases.ndim != 1 or not phases.size or wanted.shape != phases.shape:
+            raise ValueError(f'phases have the shape {phases.shape}, those of {name!r} '
+                             f'{wanted.shape}; both must be (legs,)')
+        if not np.isfinite(phases + wanted).all():
+            raise ValueError(f'a phase is not finite: {phases}, {name!r} {wanted}')
+        ahead = np.sort((phases - wanted) % 1.0)
+        # The circular mean of least squares cuts the circle between two of the legs.
+        cuts = ahead + np.tri(ahead.size, k=-1)
+        distances[name] = float(cuts.std(axis=1).min())
+    nearest, *others = sorted(distances, key=distances.__getitem__)
+    second = others[0] if others else None
+    return (nearest, distances[nearest], second,
+            distances[second] - distances[nearest] if second is not None else np.inf)

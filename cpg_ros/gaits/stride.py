@@ -1,0 +1,303 @@
+"""The stride of a recording: its steady stretch, frequency, mean cycle, leg phases and gait.
+
+Found where the joints repeat themselves (steady), followed from there with its own phase, as no
+real stride is quite as long as the last (warp), and averaged over that phase (warped).
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Protocol
+
+import numpy as np
+
+from cpg_ros.gaits.leg_names import Legs
+from cpg_ros.gaits.leg_phases import leg_phases, named, named_by_cells
+from cpg_ros.gaits.phase_average import Warped, warped
+from cpg_ros.gaits.phase_estimation import Rough, Warp, followed, grown
+from cpg_ros.gaits.steady_stretch import CYCLES, FASTEST, FEWEST, FINER, best, even, stretches
+from cpg_ros.networks.network import Network
+
+#: Points of a mean cycle.
+POINTS = 64
+#: Joints that all move by less stand (rad).
+STILL = 0.01
+#: Fewest samples of a joint.
+SAMPLES = 8
+#: Below so many cycles errors are rough, and strides must be more alike: the mean square
+#: difference over twice the variance.
+SURE, ALIKE = 3.0, 0.1
+#: Most of the variance that the mean cycle may leave of the joints together.
+LEFT = 0.5
+#: Stretches that are followed, and how much other motion, in cycles, is worth a note.
+SEEDS, OTHERS = 4, 3.0
+#: A sample is no motion if it is off both neighbours by this many standard deviations and times
+#: as much as they differ.
+SPIKE = 3.0
+#: A change of frequency over the stretch that is worth a note.
+DRIFT = 0.04
+
+
+class NoSteadyGait(ValueError):
+    """A recording has no steady gait; the message says what it has instead."""
+
+
+class Recorded(Protocol):
+    """What is needed of a recording; see Recording."""
+
+    @property
+    def joints(self) -> tuple[str, ...]:
+        """Names."""
+
+    @property
+    def times(self) -> np.ndarray:
+        """Rising, s, shape (n,)."""
+
+    @property
+    def positions(self) -> np.ndarray:
+        """Angles in rad, nan where missing, shape (n, joints)."""
+
+    @property
+    def source(self) -> str:
+        """What to call it."""
+
+
+@dataclass(frozen=True)
+class Stride:
+    """The mean stride of a steady stretch.
+
+    Phase 0 is where the joint of the first leg with the largest first harmonic has the maximum
+    of that harmonic.
+
+    Attributes:
+        begin: of the stretch, s.
+        end: of the stretch, s.
+        frequency: mean, strides per second (Hz).
+        frequency_error: its standard error (Hz).
+        cycles: whole strides in the stretch.
+        joints: those of the legs that have angles, in the order of the recording.
+        theta: phases, cycles, even, shape (m,).
+        mean: mean cycle, rad, shape (joints, m).
+        spread: standard deviation of a cycle about it, rad, (joints, m).
+        error: standard error of the mean, rad, (joints, m).
+        counts: samples used, (joints,).
+        phases: leg -> cycles in [0, 1) by which it is ahead of the first leg, in the order of
+            the network's legs: x_leg(t) = x_first(t + phase T).
+        gait: name, None if none is near enough.
+        nearest: the nearest gait.
+        distance: of the leg phases from the nearest, RMS over legs, cycles.
+        margin: how much further the next gait is, cycles.
+        notes: one line each.
+        warp: stride phase of the recording's times within the stretch.
+
+    """
+
+    begin: float
+    end: float
+    frequency: float
+    frequency_error: float
+    cycles: int
+    joints: tuple[str, ...]
+    theta: np.ndarray
+    mean: np.ndarray
+    spread: np.ndarray
+    error: np.ndarray
+    counts: np.ndarray
+    phases: dict[str, float]
+    gait: str | None
+    nearest: str
+    distance: float
+    margin: float
+    notes: tuple[str, ...]
+    warp: Warp
+
+
+def find_stride(recording: Recorded, legs: Legs | Mapping[str, Sequence[str]],
+                network: type[Network] | Network, cells: Mapping[str, int] | None = None,
+                gains: Mapping[str, complex] | None = None) -> Stride:
+    """Find the steady gait of a recording.
+
+    Args:
+        recording: of the joints.
+        legs: leg -> its joints; the legs must be those of the network.
+        network: whose gaits it may be.
+        cells: joint -> the cell that drives it, from 1. A leg's phase is then that of its first
+            cell.
+        gains: joint -> w_x + i w_y, rad, the first two weights of its readout. With these gaits
+            that move the legs alike (walk and run of the biped) are told apart, if every cell
+            has a joint.
+
+    Raises:
+        NoSteadyGait: there is none, or none of a leg's joints has angles.
+        ValueError: the legs are not the network's.
+
+    """
+    kind = network if isinstance(network, type) else type(network)
+    source = recording.source
+    own = next(iter(kind.legs.values()))
+    if set(legs) != set(own):
+        raise ValueError(f'{source}: legs are {", ".join(legs)}; the network {kind.name} has '
+                         f'{", ".join(own)}')
+    chosen, positions, notes = _usable(recording, {leg: legs[leg] for leg in own})
+    times = recording.times
+    names = [name for name in recording.joints if any(name in one for one in chosen.values())]
+    rough, others = _regions(times, positions, source)
+    notes += others
+    warp = followed(times, positions, rough)
+    if warp.cycles < CYCLES:
+        raise NoSteadyGait(f'{source}: no steady gait: only {warp.cycles:.1f} cycles of '
+                           f'{1.0 / warp.frequency:.3g} s are alike, {CYCLES:g} are needed')
+    inside = slice(np.searchsorted(times, warp.knots[0]),
+                   np.searchsorted(times, warp.knots[-1], side='right'))
+    phases, x = warp(times[inside]), positions[inside]
+    theta = np.arange(POINTS) / POINTS
+    full = np.isfinite(x).sum(axis=0) >= SAMPLES
+    if not full.all():
+        lost = [name for name, good in zip(names, full, strict=True) if not good]
+        notes.append(f'left out, without angles in the stretch: {", ".join(lost)}')
+        names = [name for name in names if name not in lost]
+        chosen = _kept(chosen, names, source)
+        x = x[:, full]
+    try:
+        found = warped(phases, x, theta, [names.index(name) for name in chosen[next(iter(own))]])
+    except ValueError as error:
+        raise NoSteadyGait(f'{source}: {error}') from error
+    power = np.array([np.nanvar(column) for column in x.T])
+    left = float(np.sum(found.left * power) / np.sum(power))
+    if left > LEFT:
+        raise NoSteadyGait(f'{source}: no steady gait: the mean cycle, of '
+                           f'{1.0 / warp.frequency:.3g} s, leaves {100.0 * left:.0f} % of the '
+                           'variance')
+    notes += _told(warp, found, names)
+    c = dict(zip(names, found.coefficients.T, strict=True))
+    # A leg's phase is that of its first cell.
+    leading = {leg: tuple(name for name in listed
+                          if cells is None or cells.get(name) == own[leg][0]) or listed
+               for leg, listed in chosen.items()}
+    ahead, by_legs = leg_phases(leading, c)
+    gait = named(ahead, kind)
+    if cells is not None and gains is not None and len(gait.alike) > 1:
+        by_cells = _cell_signals(c, cells, gains, kind)
+        if by_cells is not None:
+            gait = named_by_cells(by_cells, kind)
+    return Stride(float(warp.knots[0]), float(warp.knots[-1]), warp.frequency,
+                  warp.frequency_error, int(warp.cycles + 1e-6), tuple(names), theta,
+                  found.mean(theta), found.spread, found.error, found.counts, ahead, gait.gait,
+                  gait.nearest, gait.distance, gait.margin,
+                  tuple(notes) + by_legs + gait.notes,
+                  replace(warp, phases=warp.phases - found.zero))
+
+
+def _kept(legs: Mapping[str, Sequence[str]], names: Sequence[str], source: str
+          ) -> dict[str, tuple[str, ...]]:
+    """Keep the legs' joints that are among names, at least one of each leg."""
+    kept = {leg: tuple(name for name in listed if name in names) for leg, listed in legs.items()}
+    for leg, listed in kept.items():
+        if not listed:
+            raise NoSteadyGait(f'{source}: none of the joints of {leg} '
+                               f'({", ".join(legs[leg])}) has angles')
+    return kept
+
+
+def _usable(recording: Recorded, legs: Mapping[str, Sequence[str]]
+            ) -> tuple[dict[str, tuple[str, ...]], np.ndarray, list[str]]:
+    """Return the legs' joints that have angles, their positions without spikes, and notes."""
+    listed = [name for name in recording.joints if any(name in one for one in legs.values())]
+    x = recording.positions[:, [recording.joints.index(name) for name in listed]].astype(float)
+    for column in x.T:
+        column[np.isinf(column)] = np.nan
+    enough = np.isfinite(x).sum(axis=0) >= SAMPLES
+    names = [name for name, good in zip(listed, enough, strict=True) if good]
+    lost = [name for name in listed if name not in names]
+    notes = [f'left out, without angles: {", ".join(lost)}'] if lost and names else []
+    if len(recording.times) < SAMPLES:
+        raise NoSteadyGait(f'{recording.source}: {len(recording.times)} samples are not enough '
+                           f'for a gait, at least {SAMPLES} are needed')
+    kept = _kept(legs, names, recording.source)
+    x = x if enough.all() else x[:, enough]
+    spikes = 0
+    for column in x.T:
+        before, here, after = column[:-2], column[1:-1], column[2:]
+        off = np.abs(here - 0.5 * (before + after))
+        with np.errstate(invalid='ignore'):
+            wild = ((off > SPIKE * np.nanstd(column)) & (off > SPIKE * np.abs(after - before)))
+        here[wild] = np.nan
+        spikes += int(np.count_nonzero(wild))
+    if spikes:
+        notes.append(f'left out, far off both neighbours: {spikes} samples')
+    return kept, x, notes
+
+
+def _regions(times: np.ndarray, x: np.ndarray, source: str) -> tuple[Rough, list[str]]:
+    """Find the longest stretch of steady motion, and say which others there are."""
+    reach = np.nanmax(x, axis=0) - np.nanmin(x, axis=0)
+    if reach.max() < STILL:
+        raise NoSteadyGait(f'{source}: no steady gait: the joints stand, none moves by more than '
+                           f'{reach.max():.2g} rad')
+    rate = min(FEWEST * FASTEST, FINER / float(np.median(np.diff(times))))
+    found = stretches(*even(times, x, rate))
+    if not found:
+        raise NoSteadyGait(f'{source}: no steady gait: the joints move, by up to '
+                           f'{reach.max():.2g} rad, but nowhere do they repeat that over '
+                           f'{CYCLES:g} cycles, of at most {times[-1] / CYCLES:.3g} s')
+    regions: list[tuple[Rough, float]] = []
+    largest = max(one.size for one in found)
+    for _ in range(SEEDS):
+        if not found:
+            break
+        seed = best(found)
+        # Two strides may be alike by chance, if not in all joints.
+        if seed.cycles >= SURE or seed.difference <= ALIKE:
+            regions.append((grown(times, x, seed), seed.period))
+            found = [one for one in found if one.outside(regions[-1][0].begin,
+                                                         regions[-1][0].end)]
+        found = [one for one in found if one.outside(seed.begin, seed.end)
+                 and one.cycles >= OTHERS and one.size >= 0.5 * largest]
+    if not regions:
+        raise NoSteadyGait(f'{source}: no steady gait: the joints come back to where they were '
+                           f'only roughly, and for {seed.cycles:.1f} cycles')
+    regions.sort(key=lambda one: one[0].begin - one[0].end)
+    rough = regions[0][0]
+    notes = [f'another steady stretch, of {1.0 / period:.3g} Hz from {one.begin:.2f} to '
+             f'{one.end:.2f} s, is shorter and left out'
+             for one, period in regions[1:]
+             if min(one.end, rough.end) - max(one.begin, rough.begin) < 0.5 * (one.end - one.begin)
+             and one.end - one.begin >= OTHERS * period]
+    return rough, notes
+
+
+def _told(warp: Warp, found: Warped, names: Sequence[str]) -> list[str]:
+    """Say what the errors rest on, whether the frequency drifts, and which samples were wild."""
+    notes = []
+    if warp.cycles < SURE:
+        notes.append(f'only {warp.cycles:.1f} cycles: errors are rough, one figure for the whole '
+                     'cycle of a joint, from what is there twice')
+    elif warp.knots.size > 4:
+        middles = 0.5 * (warp.knots[1:] + warp.knots[:-1])
+        slope = np.polyfit(middles, np.diff(warp.phases) / np.diff(warp.knots), 1)
+        ends = np.polyval(slope, warp.knots[[0, -1]])
+        if abs(ends[1] - ends[0]) > DRIFT * warp.frequency:
+            notes.append(f'the frequency drifts from {ends[0]:.3g} to {ends[1]:.3g} Hz')
+    wild = [f'{name} ({count})' for name, count in zip(names, found.spikes, strict=True) if count]
+    if wild:
+        notes.append(f'samples far off the mean cycle, left out: {", ".join(wild)}')
+    return notes
+
+
+def _cell_signals(c: Mapping[str, np.ndarray], cells: Mapping[str, int],
+                  gains: Mapping[str, complex], network: type[Network]) -> np.ndarray | None:
+    """Return the coefficients of every cell's signal, None unless every cell has a joint.
+
+    Of several joints the one that moves most stands for the cell.
+    """
+    known = {name: cell for name, cell in cells.items()
+             if name in c and abs(gains.get(name, 0.0)) > 0.0}
+    signals = []
+    for cell in range(1, network.cells + 1):
+        names = [name for name, one in known.items() if one == cell]
+        if not names:
+            return None
+        name = max(names, key=lambda one: float(np.abs(c[one][1])))
+        gain, n = complex(gains[name]), np.arange(c[name].size)
+        signals.append(np.where(n > 0, c[name], 0.0)
+                       / np.where(n > 0, gain.real + 1j * n * gain.imag, 1.0))
+    return np.stack(signals, axis=1)

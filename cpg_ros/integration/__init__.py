@@ -1,0 +1,4 @@
+"""The compiled integrator: its kernels, in real time and offline.
+
+Imports ``networks`` and what is below; knows nothing of ROS.
+"""

@@ -1,0 +1,91 @@
+"""How the numerical kernels are compiled, and the elementary functions they share."""
+
+import hashlib
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numba import njit
+
+#: No division checks (they keep loops from being vectorised), fused multiply-add allowed,
+#: and the interpreter lock released: the publishing thread must not wait for parameters.
+OPTIONS: dict[str, Any] = {'error_model': 'numpy', 'fastmath': {'contract'}, 'nogil': True}
+
+jit = njit(**OPTIONS)
+#: For what is built into its caller, where a loop of known length can be unrolled.
+part = njit(inline='always', **OPTIONS)
+
+
+def renamed(function, network: str):
+    """Give a function that is compiled once for each network a name of its own for this one.
+
+    numba names machine code by the function's qualified name and a running number. Code that two
+    processes have put into the disk cache under one name is taken for the same when a third one
+    loads both: a network would run another's equations, on arrays of another length.
+    """
+    function.__qualname__ = f'{function.__qualname__}_{network.rpartition(".")[2]}'
+    return function
+
+
+def sources_digest() -> int:
+    """Return a number that changes whenever a file with compiled code does.
+
+    numba's disk cache watches only the file a cached kernel stands in, not the files of the
+    functions it calls. A kernel that closes over this number is compiled again when any of
+    them changes, because numba keys its cache on closed-over values.
+    """
+    digest = hashlib.sha256()
+    package = Path(__file__).resolve().parent.parent
+    for folder in ('networks', 'integration', 'dynamics', 'motion'):
+        for source in sorted((package / folder).rglob('*.py')):
+            digest.update(source.read_bytes())
+    return int.from_bytes(digest.digest()[:7], 'big')
+
+
+_LOG2E = 1.0 / math.log(2.0)
+# ln 2 split so that n * _LN2_HIGH is exact (fdlibm).
+_LN2_HIGH = 6.93147180369123816490e-01
+_LN2_LOW = 1.90821492927058770002e-10
+# Adding 1.5 * 2**52 rounds to an integer and leaves it in the low bits of the mantissa.
+_ROUND = 6755399441055744.0
+
+
+@jit
+def _reduced(z):
+    """Return 2^n and expm1(r) with z = n ln 2 + r, |r| <= ln(2)/2, for |z| <= 708."""
+    rounded = z * _LOG2E + _ROUND
+    n = rounded - _ROUND
+    r = (z - n * _LN2_HIGH) - n * _LN2_LOW
+    # sum_{k=2}^{13} r^(k-2) / k!, in Estrin's order: short chains of dependent operations.
+    r2 = r * r
+    r4 = r2 * r2
+    low = (0.5 + r * (1 / 6)) + r2 * ((1 / 24) + r * (1 / 120))
+    middle = (1 / 720 + r * (1 / 5040)) + r2 * (1 / 40320 + r * (1 / 362880))
+    high = (1 / 3628800 + r * (1 / 39916800)) + r2 * (1 / 479001600 + r * (1 / 6227020800))
+    q = low + r4 * (middle + r4 * high)
+    power = np.int64((np.float64(rounded).view(np.int64) + 1023) << 52).view(np.float64)
+    return power, r + r2 * q
+
+
+@jit
+def tanh(x):
+    """Hyperbolic tangent, within 4 units in the last place, without a branch.
+
+    libm's tanh cannot be vectorised; this one runs over the cells of a network several at a
+    time. expm1 by reduction and a Taylor polynomial of degree 13, then
+    tanh x = expm1(2x) / (expm1(2x) + 2). NaN stays NaN.
+    """
+    z = abs(x)
+    power, rest = _reduced(2.0 * (20.0 if z > 20.0 else z))
+    expm1 = power * rest + (power - 1.0)
+    return math.copysign(expm1 / (expm1 + 2.0), x)
+
+
+@jit
+def exp(x):
+    """Exponential, within 4 units in the last place for |x| <= 700, limited beyond; see tanh."""
+    z = 700.0 if x > 700.0 else x
+    z = -700.0 if z < -700.0 else z
+    power, rest = _reduced(z)
+    return power + power * rest

@@ -1,0 +1,291 @@
+"""The one integrator: fixed-step RK4 over a history of nodes, for real time and simulation.
+
+A history is three arrays of shape (nodes, components), used as a ring: the state x at each
+node and its slope on either side (``after`` for the interval that starts there, ``before`` for
+the one that ends there). The two differ only where the right-hand side jumps: at the start of
+a simulation and where parameters are changed. Delayed values come from the cubic Hermite
+interpolant of their interval, so the method is of fourth order in the step for any delay of at
+least one step.
+
+Components are those of the network (cells, or cells times their variables) times lanes: several
+copies of the network (lanes) with their own coefficients and delays advance together in vector
+registers. In real time there is one lane. For networks without delay the ring only serves the
+interpolation between nodes.
+"""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from types import FunctionType
+
+import numpy as np
+from numba import njit, prange
+
+from cpg_ros.integration.jit import OPTIONS, jit, part, renamed, sources_digest
+from cpg_ros.networks import biped, delayed, quadruped
+
+DELAYED = delayed.Delayed.kind
+
+
+def _compiled(decorate, network):
+    """Compile the stepping of a network with a numba decorator.
+
+    Args:
+        decorate: numba's decorator.
+        network: module whose ``compiled`` gives drive and rates; drive only with a delay.
+
+    Returns:
+        The functions past_state, restart and steps_of.
+
+    """
+    def own(function):
+        return decorate(renamed(function, network.__name__))
+
+    drive, rates = network.compiled(own)
+    delays = drive is not None
+
+    @own
+    def field(n, x, k, weight, driven, p, gain, basis, lanes, work, out):
+        """Right-hand side at z = x + weight k, with the symmetry lock -gain (I - P) z.
+
+        P projects on the rows of basis, shape (r, components); work is scratch.
+        """
+        z, along = work[0], work[1]
+        for i in range(n):
+            z[i] = x[i] + weight * k[i]
+        rates(n, z, driven, p, lanes, work[1], out)
+        if gain != 0.0:
+            for i in range(n):
+                out[i] -= gain * z[i]
+            for r in range(basis.shape[0]):
+                if lanes == 1:
+                    sum_ = 0.0
+                    for cell in range(basis.shape[1]):
+                        sum_ += basis[r, cell] * z[cell]
+                    for cell in range(basis.shape[1]):
+                        out[cell] += gain * sum_ * basis[r, cell]
+                else:
+                    along[:lanes] = 0.0
+                    for cell in range(basis.shape[1]):
+                        for lane in range(lanes):
+                            along[lane] += basis[r, cell] * z[cell * lanes + lane]
+                    for cell in range(basis.shape[1]):
+                        for lane in range(lanes):
+                            out[cell * lanes + lane] += gain * along[lane] * basis[r, cell]
+
+    @own
+    def past_state(n, x, after, before, head, c, tau, step, first, stride, out):
+        """State at t_head + c step - tau, for tau >= c step, by the cubic Hermite interpolant.
+
+        Only every stride-th component from first on is filled in.
+        """
+        back = tau / step - c
+        nodes = max(1, math.ceil(back))
+        start = head - nodes
+        if start < 0:
+            start += x.shape[0]
+        end = start + 1 if start + 1 < x.shape[0] else 0
+        s = nodes - back
+        h11 = s * s * (s - 1.0) * step
+        h10 = s * (s - 1.0) * (s - 1.0) * step
+        h01 = s * s * (3.0 - 2.0 * s)
+        h00 = 1.0 - h01
+        if stride == 1:
+            for i in range(n):
+                out[i] = (h00 * x[start, i] + h10 * after[start, i]
+                          + h01 * x[end, i] + h11 * before[end, i])
+        else:
+            for i in range(first, n, stride):
+                out[i] = (h00 * x[start, i] + h10 * after[start, i]
+                          + h01 * x[end, i] + h11 * before[end, i])
+
+    @own
+    def past_states(n, x, after, before, head, c, tau, step, out):
+        """The same with a delay for each lane, tau of shape (lanes,); one pass if all agree."""
+        lanes = tau.shape[0]
+        same = True
+        for lane in range(1, lanes):
+            same = same and tau[lane] == tau[0]
+        if same:
+            past_state(n, x, after, before, head, c, tau[0], step, 0, 1, out)
+        else:
+            for lane in range(lanes):
+                past_state(n, x, after, before, head, c, tau[lane], step, lane, lanes, out)
+
+    @own
+    def steps_of(n, lanes, p, tau, gain, basis, step, x, after, before, head, steps, noise,
+                 states, slopes, row, every):
+        """Take RK4 steps from the head node; return the new head.
+
+        ``noise`` is the standard deviation of white noise per square root of model time, added
+        once a step (Euler-Maruyama); the caller seeds.
+        """
+        past, middle, end = np.empty(n), np.zeros(n), np.zeros(n)
+        work = np.zeros((2, n + 2 * lanes))
+        k2, k3, k4 = np.empty(n), np.empty(n), np.empty(n)
+        kick = noise * math.sqrt(step)
+        for _ in range(steps):
+            new = head + 1 if head + 1 < x.shape[0] else 0
+            now, k1 = x[head], after[head]
+            # Stages 2 and 3 share one delayed state, stage 4 and the next step's first another.
+            if delays:
+                past_states(n, x, after, before, head, 0.5, tau, step, past)
+                drive(n, past, p, lanes, middle)
+                past_states(n, x, after, before, head, 1.0, tau, step, past)
+                drive(n, past, p, lanes, end)
+            field(n, now, k1, 0.5 * step, middle, p, gain, basis, lanes, work, k2)
+            field(n, now, k2, 0.5 * step, middle, p, gain, basis, lanes, work, k3)
+            field(n, now, k3, step, end, p, gain, basis, lanes, work, k4)
+            for i in range(n):
+                x[new, i] = now[i] + step / 6.0 * (k1[i] + 2.0 * (k2[i] + k3[i]) + k4[i])
+            if noise > 0.0:
+                for i in range(n):
+                    x[new, i] += kick * np.random.normal()
+            field(n, x[new], k4, 0.0, end, p, gain, basis, lanes, work, after[new])
+            for i in range(n):
+                before[new, i] = after[new, i]
+            if row % every == 0:
+                for lane in range(states.shape[0]):
+                    for i in range(states.shape[2]):
+                        states[lane, row // every, i] = x[new, i * lanes + lane]
+                        slopes[lane, row // every, i] = after[new, i * lanes + lane]
+            row += 1
+            head = new
+        return head
+
+    @own
+    def restart(n, lanes, p, tau, gain, basis, step, x, after, before, head):
+        """Recompute the slope that leaves the head node, after parameters have changed."""
+        past, driven, work = np.empty(n), np.zeros(n), np.zeros((2, n + 2 * lanes))
+        if delays:
+            past_states(n, x, after, before, head, 0.0, tau, step, past)
+            drive(n, past, p, lanes, driven)
+        field(n, x[head], x[head], 0.0, driven, p, gain, basis, lanes, work, after[head])
+
+    return past_state, restart, steps_of
+
+
+# One delayed network by itself has code of its own: built in one piece, its loops unrolled. Lanes
+# run through loops of any length in vector registers, which need functions of their own.
+_, _, _steps_of_one = _compiled(part, delayed)
+_past_state, _restart, _steps = _compiled(jit, delayed)
+
+
+def _with(function, names):
+    """Copy a function that is to use other functions instead of its module's of these names.
+
+    numba keys its disk cache on closed-over values, and a compiled function is another value in
+    every process; what a function finds among its globals does not count.
+    """
+    copy = FunctionType(function.__code__, {**globals(), **names}, function.__name__,
+                        function.__defaults__, function.__closure__)
+    copy.__qualname__, copy.__doc__ = function.__qualname__, function.__doc__
+    return copy
+
+
+def _cached(digest, network, **functions):
+    """Build a network's cached entry points; see sources_digest for why they are closures.
+
+    Args:
+        digest: of the sources, for the cache.
+        network: its name.
+        functions: the network's _restart and _steps.
+
+    """
+
+    def set_slope(p, tau, gain, basis, step, x, after, before, head):
+        """Recompute the slope that leaves the head node, after parameters have changed."""
+        digest  # noqa: B018
+        _restart(x.shape[1], tau.shape[0], p, tau, gain, basis, step, x, after, before, head)
+
+    def advance(p, tau, gain, basis, step, x, after, before, clock, duration, out):
+        """Advance the output instant of one lane by duration and evaluate there.
+
+        clock is (head, ahead): the newest node and its distance beyond the output instant, in
+        [0, step). out receives x, x', x'' at that instant, shape (3, components).
+        """
+        digest  # noqa: B018
+        head = int(clock[0])
+        ahead = clock[1] - duration
+        if ahead < 0.0:
+            steps = math.ceil(-ahead / step)
+            nothing = np.empty((0, 0, 0))
+            # Not the unrolled code: it gains nothing here and takes 15 s more to compile.
+            head = _steps(x.shape[1], tau.shape[0], p, tau, gain, basis, step, x,
+                          after, before, head, steps, 0.0, nothing, nothing,
+                          np.int64(0), np.int64(1))
+            ahead = max(0.0, ahead + steps * step)
+        clock[0] = head
+        clock[1] = ahead
+        start = head - 1 if head > 0 else x.shape[0] - 1
+        s = 1.0 - ahead / step
+        _past_state(x.shape[1], x, after, before, head, 0.0, ahead, step, 0, 1, out[0])
+        for i in range(x.shape[1]):
+            rise = (x[head, i] - x[start, i]) / step
+            out[1, i] = ((1.0 - s) * (1.0 - 3.0 * s) * after[start, i]
+                         + 6.0 * s * (1.0 - s) * rise + s * (3.0 * s - 2.0) * before[head, i])
+            out[2, i] = ((6.0 * s - 4.0) * after[start, i] + 6.0 * (1.0 - 2.0 * s) * rise
+                         + (6.0 * s - 2.0) * before[head, i]) / step
+
+    def integrate_one(p, tau, gain, basis, step, x, after, before, head, steps, noise,
+                      seed, states, slopes, row, every):
+        """The same as integrate for a single trajectory of the delayed network, unrolled."""
+        digest  # noqa: B018
+        np.random.seed(seed)
+        return _steps_of_one(8, 1, p, tau, gain, basis, step, x, after, before, head, steps,
+                             noise, states, slopes, row, every)
+
+    def integrate(p, tau, gain, basis, step, x, after, before, head, steps, noise, seed,
+                  states, slopes, row, every):
+        """Take steps of one block of lanes; return the new head.
+
+        What is reached is recorded in states and slopes, shape (lanes, rows, components): every
+        ``every``-th step, the first one here being number ``row``.
+        """
+        digest  # noqa: B018
+        np.random.seed(seed)
+        return _steps(x.shape[1], tau.shape[0], p, tau, gain, basis, step, x, after,
+                      before, head, steps, noise, states, slopes, row, every)
+
+    def integrate_many(p, tau, gain, basis, step, x, after, before, head, steps, noise,
+                       seeds, states, slopes, row, every):
+        """Take and record steps of many blocks on all cores; return the new head.
+
+        Arrays have a leading axis, the block; states and slopes stay as they are.
+        """
+        digest  # noqa: B018
+        lanes = tau.shape[1]
+        for m in prange(x.shape[0]):
+            np.random.seed(seeds[m])
+            mine = slice(m * lanes, min((m + 1) * lanes, states.shape[0]))
+            _steps(x.shape[2], lanes, p[m], tau[m], gain, basis, step, x[m],
+                   after[m], before[m], head, steps, noise, states[mine], slopes[mine],
+                   row, every)
+        return (head + steps) % x.shape[1]
+
+    def ready(function, parallel=False):
+        mine = renamed(_with(function, functions), network)
+        return njit(cache=True, parallel=parallel, **OPTIONS)(mine)
+
+    return Kernels(ready(set_slope), ready(advance), ready(integrate_one), ready(integrate),
+                   ready(integrate_many, parallel=True))
+
+
+@dataclass(frozen=True)
+class Kernels:
+    """The compiled entry points of one kind of network; see _cached for what they do."""
+
+    set_slope: Callable[..., None]
+    advance: Callable[..., None]
+    integrate_one: Callable[..., int]
+    integrate: Callable[..., int]
+    integrate_many: Callable[..., int]
+
+
+def _kernels(network):
+    _, restart, steps = _compiled(jit, network)
+    return _cached(sources_digest(), network.__name__, _restart=restart, _steps=steps)
+
+
+#: By kind of network.
+KERNELS = tuple(_kernels(network) for network in (delayed, quadruped, biped))

@@ -1,0 +1,202 @@
+"""Offline simulation: the real-time kernel, every node of it recorded."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from cpg_ros.files.progress_bar import progress_bar
+from cpg_ros.integration import kernel
+from cpg_ros.networks.network import Network
+
+#: A constant state, shape (components,), or a function of times t <= 0, shape (m,), that
+#: returns states, shape (m, components); an attribute ``derivative`` of the same form gives the
+#: slopes.
+History = np.ndarray | Sequence[float] | Callable[[np.ndarray], np.ndarray]
+
+#: Trajectories that advance together in vector registers.
+LANES = 8
+#: Work between two updates of the progress bar, in component steps.
+CHUNK = 20_000_000
+
+
+@dataclass(frozen=True)
+class Trajectory:
+    """Dense solution on a fixed grid.
+
+    Attributes:
+        t: nodes from t = 0 on, model time, shape (nodes,).
+        x: states there, shape (nodes, components) or (batch, nodes, components).
+        slopes: time derivatives there, shaped like x; at t = 0 that of the network, not of the
+            history.
+
+    """
+
+    t: np.ndarray
+    x: np.ndarray
+    slopes: np.ndarray
+
+    def __call__(self, times: np.ndarray | float) -> np.ndarray:
+        """Return the states at the times given, cubic Hermite, shape (..., times, components).
+
+        Raises:
+            ValueError: a time lies outside the simulated span.
+
+        """
+        times = np.atleast_1d(np.asarray(times, dtype=float))
+        step = self.t[1]
+        if times.size and not (times.min() >= 0.0 and times.max() <= self.t[-1] + 1e-9 * step):
+            raise ValueError(f'times reach from {times.min()} to {times.max()}, the trajectory '
+                             f'from 0 to {self.t[-1]}')
+        left = np.clip((times / step).astype(int), 0, self.t.size - 2)
+        s = (times / step - left)[:, None]
+        h01 = s * s * (3.0 - 2.0 * s)
+        return ((1.0 - h01) * self.x[..., left, :] + h01 * self.x[..., left + 1, :]
+                + s * (s - 1.0) ** 2 * step * self.slopes[..., left, :]
+                + s * s * (s - 1.0) * step * self.slopes[..., left + 1, :])
+
+
+def sample_history(history: History, nodes: int, step: float, components: int
+                   ) -> tuple[np.ndarray, np.ndarray]:
+    """Sample states and slopes of a history at t = -(nodes - 1) step .. 0.
+
+    Returns:
+        Two arrays of shape (nodes, components). Slopes of a function come from its attribute
+        ``derivative`` if it has one, otherwise from five-point differences a step apart.
+
+    Raises:
+        ValueError: the shape is not that of the network, or a value is not finite.
+
+    """
+    if callable(history):
+        times = (np.arange(nodes) - nodes + 1) * step
+        x = np.array(history(times), dtype=float)
+        derivative = getattr(history, 'derivative', None)
+        if derivative is not None:
+            slopes = np.array(derivative(times), dtype=float)
+        else:
+            # One-sided at both ends, where nothing is known of the other side.
+            offsets = np.arange(5)
+            slopes = np.empty_like(x)
+            for node in range(nodes):
+                first = min(max(node - 2, 0), max(nodes - 5, 0))
+                near = min(5, nodes)
+                powers = np.vander(offsets[:near] + first - node, near, increasing=True).T
+                weights = np.linalg.solve(powers, np.eye(near)[1])
+                slopes[node] = weights @ x[first:first + near] / step
+    else:
+        x = np.repeat(np.asarray(history, dtype=float)[None], nodes, axis=0)
+        slopes = np.zeros_like(x)
+    if x.shape != (nodes, components):
+        raise ValueError(f'a history has the shape ({components},), not {x.shape[1:]}')
+    if not (np.isfinite(x).all() and np.isfinite(slopes).all()):
+        raise ValueError('the history has a value that is not finite')
+    return x, slopes
+
+
+def simulate(network: Network | Sequence[Network], history: History | Sequence[History],
+             t_end: float, step: float, *, lock: tuple[float, Any] | None = None,
+             noise: float = 0.0, seed: int = 0, every: int = 1, progress: bool = True
+             ) -> Trajectory:
+    """Integrate a network from a history, RK4 with cubic Hermite delayed values.
+
+    One network and one history give one trajectory. A sequence of networks, an array of
+    histories of shape (batch, components) or a list of histories give a batch, which runs on all
+    cores; a single one of either goes with every one of the other.
+
+    Args:
+        network: parameters, one set or a sequence of them.
+        history: constant state, function of times t <= 0, or orbit (see History); or many.
+        t_end: model time to reach; rounded up to whole steps.
+        step: model time per step; every delay must be at least one step.
+        lock: symmetry lock (gain in 1/model time, the gait's symmetry), or none.
+        noise: standard deviation of white noise per square root of model time.
+        seed: seeds the noise of the whole batch.
+        every: keep every so many steps only; t_end is rounded up to such a multiple.
+        progress: show a progress bar on work of more than about two seconds.
+
+    Raises:
+        ValueError: step or t_end not positive and finite, a parameter not finite, a delay
+            shorter than a step, or shapes that do not fit.
+
+    """
+    networks = [network] if isinstance(network, Network) else list(network)
+    if not networks or not (callable(history) or len(history)):
+        raise ValueError('there is no network, or no history, to start from')
+    one_history = callable(history) or not (callable(history[0]) or np.ndim(history[0]))
+    histories: list = [history] if one_history else list(history)  # type: ignore[arg-type]
+    batch = max(len(networks), len(histories))
+    if {len(networks), len(histories)} - {1, batch}:
+        raise ValueError(f'{len(networks)} networks do not go with {len(histories)} histories')
+    if not (np.isfinite(t_end) and t_end > 0.0 and np.isfinite(step) and step > 0.0):
+        raise ValueError(f't_end {t_end} and step {step} must be positive and finite')
+    for one in networks:
+        if not all(np.isfinite(value) for value in one.as_dict().values()):
+            raise ValueError(f'a parameter is not finite: {one}')
+        if 0.0 < one.delay < step or (one.delay <= 0.0 and one.kind == kernel.DELAYED):
+            raise ValueError(f'the delay {one.delay} is shorter than the step {step}')
+        if one.kind != networks[0].kind:
+            raise ValueError(f'a batch has one kind of network, not {networks[0].name} and '
+                             f'{one.name}')
+
+    components, kind = networks[0].components, networks[0].kind
+    if every < 1:
+        raise ValueError(f'every {every} must be at least 1')
+    rows = int(np.ceil(t_end / (step * every) - 1e-9))
+    steps = rows * every
+    # Five nodes at least, so that slopes of a given history are of fourth order.
+    nodes = max(5, int(np.ceil(max(one.delay for one in networks) / step)) + 2)
+    lanes = min(LANES, batch)
+    blocks = -(-batch // lanes)
+
+    # Trajectory m is lane m % lanes of block m // lanes; spare lanes repeat the last one.
+    members = np.minimum(np.arange(blocks * lanes), batch - 1).reshape(blocks, lanes)
+    x = np.empty((blocks, nodes, components, lanes))
+    after, before = np.empty_like(x), np.empty_like(x)
+    p = np.empty((blocks, networks[0].coefficients.shape[0], components, lanes))
+    tau = np.empty((blocks, lanes))
+    samples = [sample_history(one, nodes, step, components) for one in histories]
+    for block, row in enumerate(members):
+        for lane, m in enumerate(row):
+            one = networks[m if len(networks) > 1 else 0]
+            p[block, :, :, lane], tau[block, lane] = one.coefficients, one.delay
+            past, past_slopes = samples[m if len(histories) > 1 else 0]
+            x[block, :, :, lane] = past
+            after[block, :, :, lane] = before[block, :, :, lane] = past_slopes
+    flat = [array.reshape(*array.shape[:2], components * lanes) for array in (x, after, before)]
+    flat_p = p.reshape(blocks, -1, components * lanes)
+    gain, basis = (0.0, np.zeros((1, components))) if lock is None else (lock[0], lock[1].basis)
+
+    compiled = kernel.KERNELS[kind]
+    head = nodes - 1
+    for block in range(blocks):
+        compiled.set_slope(flat_p[block], tau[block], gain, basis, step,
+                         *(array[block] for array in flat), head)
+    states = np.empty((batch, rows + 1, components))
+    slopes = np.empty_like(states)
+    for m, (block, lane) in enumerate(np.ndindex(blocks, lanes)):
+        if m < batch:
+            states[m, 0], slopes[m, 0] = x[block, head, :, lane], after[block, head, :, lane]
+    with progress_bar('simulating', steps, enabled=progress) as bar:
+        done = 0
+        while done < steps:
+            chunk = min(steps - done, max(1, CHUNK // x[:, 0].size))
+            seeds = np.random.SeedSequence([seed, done]).generate_state(blocks)
+            if blocks == 1:
+                alone = lanes == 1 and kind == kernel.DELAYED
+                one_block = compiled.integrate_one if alone else compiled.integrate
+                head = one_block(flat_p[0], tau[0], gain, basis, step,
+                                 *(array[0] for array in flat), head, chunk, noise, seeds[0],
+                                 states, slopes, done + 1, every)
+            else:
+                head = compiled.integrate_many(flat_p, tau, gain, basis, step, *flat, head,
+                                             chunk, noise, seeds, states, slopes, done + 1,
+                                             every)
+            done += chunk
+            bar(done)
+
+    times = np.arange(rows + 1) * (step * every)
+    if isinstance(network, Network) and one_history:
+        return Trajectory(times, states[0], slopes[0])
+    return Trajectory(times, states, slopes)

@@ -1,0 +1,137 @@
+"""A gait fitted to a recording: parameters, readouts, how well they do, and what is not known."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from cpg_ros.dynamics.gait_assessment import GaitAssessment
+from cpg_ros.dynamics.hopf import HopfPoint, hopf_point
+from cpg_ros.dynamics.periodic import Orbit
+from cpg_ros.inversion.identifiability import Estimate
+from cpg_ros.inversion.trust_region import Trial
+from cpg_ros.inversion.variable_projection import basis
+from cpg_ros.inversion.waveform_harmonics import signals
+from cpg_ros.networks.delayed import Delayed
+from cpg_ros.networks.network import Network
+
+#: Phases between recording and orbit that are tried.
+SHIFTS = 120
+
+
+@dataclass(frozen=True)
+class Fit:
+    """A gait fitted to a mean cycle.
+
+    Attributes:
+        network: the fitted parameters.
+        gait: one of its gaits.
+        orbit: the gait's.
+        order: of the readouts.
+        harmonics: of a Morris-Lecar cell's waveform that joints follow.
+        parameters: free number -> estimate.
+        correlation: of the free numbers, in their order; not a number where the data do not
+            tell one from others.
+        cells: joint -> the cell behind it, from 1.
+        readouts: joint -> offset and weights, rad, as a robot file takes them.
+        theta: cycles, shape (m,).
+        recorded: mean cycle of each joint, rad, shape (joints, m).
+        errors: fitted minus recorded, rad, shape (joints, m).
+        phase: of the orbit where theta is 0, cycles.
+        cost: half the sum of squares of the errors over their sizes.
+        sizes: joint -> standard error of its mean cycle as far as it counts: the stated one,
+            or what the readout leaves if that is more, rad.
+        misfit: joint -> what the readout leaves, over the stated standard error of the mean.
+        sharing: instants that share one independent error.
+        starts: what came of every start.
+        warnings: one line each.
+
+    """
+
+    network: Network
+    gait: str
+    orbit: Orbit
+    order: int
+    harmonics: int
+    parameters: dict[str, Estimate]
+    correlation: np.ndarray
+    cells: dict[str, int]
+    readouts: dict[str, tuple[float, tuple[float, ...]]]
+    theta: np.ndarray
+    recorded: np.ndarray
+    errors: np.ndarray
+    phase: float
+    cost: float
+    sizes: dict[str, float]
+    misfit: dict[str, float]
+    sharing: float
+    starts: tuple[Trial, ...]
+    warnings: tuple[str, ...]
+
+    @property
+    def joints(self) -> tuple[str, ...]:
+        """Names of the joints."""
+        return tuple(self.readouts)
+
+    @property
+    def fitted(self) -> np.ndarray:
+        """The fitted joints at theta, rad, shape (joints, m)."""
+        return self.recorded + self.errors
+
+    @property
+    def rms(self) -> dict[str, float]:
+        """Root mean square error of each joint, rad."""
+        return dict(zip(self.readouts, np.sqrt(np.mean(self.errors**2, axis=1)).tolist(),
+                        strict=True))
+
+    @property
+    def rms_share(self) -> dict[str, float]:
+        """That over the joint's range; 0 for a joint that stands still."""
+        spans = np.ptp(self.recorded, axis=1)
+        return {name: rms / span if span > 0.0 else 0.0
+                for (name, rms), span in zip(self.rms.items(), spans.tolist(), strict=True)}
+
+    @property
+    def mean_rms_share(self) -> float:
+        """Mean over the joints."""
+        return float(np.mean(list(self.rms_share.values())))
+
+    def share_at(self, order: int) -> float:
+        """Mean RMS error over range with readouts of another order, the parameters kept."""
+        if order == self.order:
+            return self.mean_rms_share
+        seen, shifts = signals(self.orbit, self.harmonics), np.arange(SHIFTS) / SHIFTS
+        spans = np.ptp(self.recorded, axis=1)
+        shares = np.zeros((len(self.recorded), SHIFTS))
+        for j, name in enumerate(self.joints):
+            cell = self.cells[name] - 1
+            psi = basis(order, *seen.values(self.theta, self.orbit.phases[cell] + shifts,
+                                            int(self.orbit.waves[cell])))[0]
+            columns = psi.transpose(1, 0, 2)
+            weights = np.linalg.pinv(columns) @ self.recorded[j][:, None]
+            left = (columns @ weights)[..., 0] - self.recorded[j]
+            shares[j] = np.sqrt(np.mean(left**2, axis=1)) / (spans[j] or np.inf)
+        return float(shares.mean(axis=0).min())
+
+    def synchronisation(self, points: int = 20) -> tuple[np.ndarray, np.ndarray]:
+        """Errors at even instants, as in Liu & Zhang's Figures 5, 6, 8 and 9.
+
+        Returns:
+            Cycles, shape (points,), and errors, rad, shape (joints, points).
+
+        """
+        theta = np.arange(points) / points
+        return theta, np.array([np.interp(theta, self.theta, row, period=1.0)
+                                for row in self.errors])
+
+    @cached_property
+    def hopf(self) -> HopfPoint | None:
+        """Where the gait is born as the delay grows; None for networks without delay."""
+        if isinstance(self.network, Delayed):
+            return hopf_point(self.network, self.network.symmetry(self.gait))
+        return None
+
+    @cached_property
+    def verdict(self) -> GaitAssessment:
+        """How stable the gait is."""
+        return GaitAssessment(self.gait, self.orbit)

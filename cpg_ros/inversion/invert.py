@@ -1,0 +1,209 @@
+"""Parameters of a network, and joints' readouts, from the mean cycle of a recorded gait.
+
+Joints are read off the gait's exact orbit as the generator reads them; their readouts are
+eliminated, and a trust region moves the network's free numbers by exact derivatives. How fast the
+recording walks is no part of that, since the generator's frequency is free: the orbit's period
+counts only where a time scale is given.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
+
+import numpy as np
+
+from cpg_ros.dynamics.periodic import NoOrbit, Orbit
+from cpg_ros.inversion.caveats import findings
+from cpg_ros.inversion.fit_data import MeanCycle, joints_of
+from cpg_ros.inversion.free_parameters import Free, free_numbers
+from cpg_ros.inversion.gait_fit import Fit
+from cpg_ros.inversion.identifiability import Optimum, correlation_length, spread
+from cpg_ros.inversion.least_squares import Period, Problem
+from cpg_ros.inversion.trust_region import Trial
+from cpg_ros.inversion.variable_projection import WEIGHTS
+from cpg_ros.motion.runnable import refusal
+from cpg_ros.networks.network import Network
+from cpg_ros.robots.robot import HARMONICS
+
+#: What is usually fitted.
+USUAL = {'delayed': ('c', 'tau'), 'quadruped': ('alpha', 'beta'), 'biped': ('current', 'phi')}
+#: A frequency is never known better than to this share.
+KNOWN_FREQUENCY = 1e-4
+#: Relative change at which a trust region stops, and at which the last one does.
+TOLERANCE, LAST = 1e-6, 1e-8
+#: Times that joints are weighted anew, and the relative change of a weight that is none.
+WEIGHINGS, SAME = 4, 0.02
+
+
+def invert(cycle: MeanCycle, cells: Mapping[str, int], network: Network, gait: str,
+           free: Sequence[str] = (), order: int = 3,
+           starts: Sequence[Mapping[str, float]] = ({},),
+           bounds: Mapping[str, tuple[float, float]] | None = None, harmonics: int = HARMONICS,
+           time_scale: float = 0.0, profiles: bool = True,
+           done: Callable[[float], None] = lambda share: None) -> Fit:
+    """Fit free numbers of a network, and readouts, to the mean cycle of a recorded gait.
+
+    Args:
+        cycle: the recording's.
+        cells: joint -> the cell that drives it, from 1; other joints are left out.
+        network: parameters; those that are not free keep their values.
+        gait: one of its gaits.
+        free: names of parameters to fit, or of groups of them; the usual ones by default.
+        order: of the readouts, 1 to 3.
+        starts: free number -> value to start from; {} starts from the network's own values.
+        bounds: free number -> lower and upper bound, where narrower than the range.
+        harmonics: of a Morris-Lecar cell's waveform that joints follow.
+        time_scale: seconds in a unit of model time, if the period is to be fitted, too; 0
+            leaves it free, as the generator's frequency does.
+        profiles: whether intervals are those of the profile likelihood where the cost is not
+            quadratic; they take most of the time.
+        done: told which share of the work is done, 0 to 1.
+
+    Raises:
+        ValueError: names, shapes, bounds or starts cannot be used.
+        NoOrbit: no start has such a gait; the message is that of the first.
+
+    """
+    if order not in WEIGHTS:
+        raise ValueError(f'order {order} is not 1, 2 or 3')
+    if not starts:
+        raise ValueError('there is no start')
+    joints = joints_of(cycle, cells, network)
+    numbers = free_numbers(network, gait, free or USUAL[network.name], bounds)
+    taken = len(joints.names) * (1 + WEIGHTS[order]) + len(numbers) + 1
+    if joints.theta.size < 2 * (1 + WEIGHTS[order]) or joints.data.size <= taken:
+        raise ValueError(f'{joints.theta.size} instants of {len(joints.names)} joints do not '
+                         f'determine readouts of order {order} and {len(numbers)} parameters')
+    period = None
+    if time_scale > 0.0:
+        value = 1.0 / (cycle.frequency * time_scale)
+        share = max(cycle.frequency_error / cycle.frequency, KNOWN_FREQUENCY)
+        period = Period(value, value * share)
+    begins = [_begin(network, numbers, start) for start in starts]
+
+    def attempt(refuses: Callable[[Orbit], str]) -> tuple[Problem, list[Trial], np.ndarray]:
+        problem = Problem(joints, joints.stated, network, gait, numbers, order, harmonics, period,
+                          refuses)
+        trials: list[Trial] = []
+        for begin in begins:
+            done(0.5 * len(trials) / len(begins))
+            trials.append(_trial(problem, begin, weigh=all(other.why for other in trials)))
+        done(0.5)
+        best = min(trials, key=lambda trial: trial.cost)
+        if best.why:
+            raise NoOrbit(trials[0].why)
+        return problem, trials, _weighed(problem, best.values)
+
+    problem, trials, values = attempt(lambda orbit: '')
+    flaw, warnings = refusal(problem.placed(values).orbit, harmonics), []
+    if flaw:
+        said = f'the generator would refuse the {gait} that fits best: {flaw}'
+        try:
+            problem, trials, values = attempt(lambda orbit: refusal(orbit, harmonics))
+            said += '; this is the best one that it runs'
+        except NoOrbit:
+            pass
+        warnings = [said]
+    others = _along_the_valley(problem, values) if profiles else []
+    better = min(others, key=lambda trial: trial.cost, default=None)
+    left = problem(values)[0]
+    if (better is not None and better.cost < 0.5 * float(left @ left)
+            and (flaw or not refusal(problem.placed(better.values).orbit, harmonics))):
+        values = _weighed(problem, better.values)
+    return _judged(problem, trials, [trial.values for trial in others], values, profiles,
+                   warnings, done)
+
+
+def _begin(network: Network, numbers: Sequence[Free], start: Mapping[str, float]) -> np.ndarray:
+    """Values of a start, checked."""
+    known = {one.name: one.value(network) for one in numbers}
+    for name, value in start.items():
+        if name not in known:
+            raise ValueError(f"start: '{name}' is not free")
+        known[name] = float(value)
+    for one in numbers:
+        if not one.low <= known[one.name] <= one.high:
+            raise ValueError(f'{one.name} {known[one.name]:g} to start from is not within '
+                             f'{one.low:g} to {one.high:g}')
+    return np.array(list(known.values()))
+
+
+def _left(problem: Problem, values: np.ndarray) -> np.ndarray:
+    """Size of what the readout of each joint leaves, rad, its freedom allowed for."""
+    residual = problem.placed(values).residual
+    return np.sqrt(np.sum(residual**2, axis=0) / (len(residual) - problem.weights))
+
+
+def _trial(problem: Problem, begin: np.ndarray, weigh: bool) -> Trial:
+    """Go down from one start; the first one that has an orbit sets the joints' weights."""
+    values = np.append(begin, 0.0)
+    try:
+        problem.begin(values)
+        values[-1] = problem.first_phase(values)
+    except NoOrbit as error:
+        return Trial(values, values, float('inf'), np.empty((0, 1 + values.size)), 1, 1, False,
+                     str(error))
+    if weigh:
+        problem.sizes = np.maximum(problem.joints.stated, _left(problem, values))
+    return problem.coordinates.descend(problem, values, TOLERANCE)
+
+
+def _weighed(problem: Problem, values: np.ndarray) -> np.ndarray:
+    """Weigh the joints by what is left of each, and fit again."""
+    for last in range(WEIGHINGS):
+        sizes = np.maximum(problem.joints.stated, _left(problem, values))
+        if last and np.abs(sizes / problem.sizes - 1.0).max() < SAME:
+            break
+        problem.sizes = sizes
+        values = problem.coordinates.descend(problem, problem.rephased(values), LAST).values
+    return values
+
+
+def _optimum(problem: Problem, values: np.ndarray, elsewhere: Sequence[np.ndarray] = ()
+             ) -> Optimum:
+    left, slopes = problem(values)
+    sharing = correlation_length(problem.placed(values).residual / problem.sizes)
+    return Optimum(problem, values, problem.free, 0.5 * float(left @ left), sharing,
+                   spread(slopes, sharing), problem.coordinates.descend,
+                   problem.coordinates.moved, problem.rephased, elsewhere)
+
+
+def _along_the_valley(problem: Problem, values: np.ndarray) -> list[Trial]:
+    """Look for other least costs, if that at the values is not the whole story."""
+    optimum = _optimum(problem, values)
+    if all(optimum.regular(k) for k in range(len(problem.free))):
+        return []
+    found = []
+    for begin in problem.coordinates.valley(values):
+        with suppress(NoOrbit):
+            problem.begin(begin)
+            found.append(problem.coordinates.descend(problem, problem.rephased(begin), TOLERANCE))
+    return found
+
+
+def _judged(problem: Problem, trials: Sequence[Trial], elsewhere: Sequence[np.ndarray],
+            values: np.ndarray, profiles: bool, warnings: Sequence[str],
+            done: Callable[[float], None]) -> Fit:
+    """Say what was found, and how sure it is."""
+    joints, best = problem.joints, min(trials, key=lambda trial: trial.cost)
+    placed = problem.placed(values)
+    optimum = _optimum(problem, values, elsewhere)
+    known = optimum.spread
+    estimates = {}
+    for k, one in enumerate(problem.free):
+        done(0.6 + 0.4 * k / len(problem.free))
+        estimates[one.name] = optimum.estimate(k, profiles)
+    done(1.0)
+    rows = [(float(row[0]), tuple(row[1:].tolist())) for row in placed.weights.T]
+    misfit = _left(problem, values) / joints.stated
+    count = len(problem.free)
+    return Fit(
+        network=placed.orbit.network, gait=problem.gait, orbit=placed.orbit,
+        order=problem.order, harmonics=problem.harmonics, parameters=estimates,
+        correlation=known.correlation[:count, :count],
+        cells=dict(zip(joints.names, (joints.cells + 1).tolist(), strict=True)),
+        readouts=dict(zip(joints.names, rows, strict=True)), theta=joints.theta,
+        recorded=joints.data.T, errors=placed.residual.T, phase=float(values[-1]) % 1.0,
+        cost=optimum.cost, sizes=dict(zip(joints.names, problem.sizes.tolist(), strict=True)),
+        misfit=dict(zip(joints.names, misfit.tolist(), strict=True)), sharing=optimum.inflation,
+        starts=tuple(trials),
+        warnings=(*findings(problem.free, estimates, known, best), *warnings))

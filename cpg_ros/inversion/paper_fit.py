@@ -1,0 +1,96 @@
+"""A recorded gait inverted as Liu & Zhang (2024) do it: eight joints taken for the eight cells.
+
+Twenty instants of a cycle; each joint's angle about its mean, in rad, is held against its cell as
+it is, without a readout; the objective is half the sum of squares (section 4, Tables 1 and 2).
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.optimize import minimize_scalar
+
+from cpg_ros.dynamics.delayed_orbit import DelayedOrbit, solve
+from cpg_ros.inversion.cycle_fit import CycleFit, cycle_samples, fit_cycle
+from cpg_ros.inversion.fit_data import MeanCycle
+from cpg_ros.networks.delayed import CELLS, Delayed
+
+#: Instants of a cycle, and phases between recording and orbit that are tried.
+POINTS, SHIFTS = 20, 60
+
+
+@dataclass(frozen=True)
+class PaperFit:
+    """A fit from one start.
+
+    Attributes:
+        start: values of the free parameters to begin with.
+        fit: what came of it.
+        joints: names, in the order of the cells.
+
+    """
+
+    start: dict[str, float]
+    fit: CycleFit
+    joints: tuple[str, ...]
+
+    @property
+    def end(self) -> dict[str, float]:
+        """The numerical solution."""
+        return dict(zip(self.start, self.fit.values.tolist(), strict=True))
+
+    @property
+    def errors(self) -> dict[str, tuple[float, float]]:
+        """Range of the synchronisation error of each joint, rad."""
+        return {name: (float(column.min()), float(column.max()))
+                for name, column in zip(self.joints, self.fit.errors.T, strict=True)}
+
+
+def paper_fits(cycle: MeanCycle, cells: Mapping[str, int], network: Delayed, gait: str,
+               free: Sequence[str], starts: Sequence[Mapping[str, float]] = ({},)
+               ) -> list[PaperFit]:
+    """Fit parameters to eight joints, once from each start.
+
+    Args:
+        cycle: the recording's.
+        cells: joint -> its cell, from 1; each cell has one joint.
+        network: the other parameters.
+        gait: that was recorded.
+        free: names of the parameters to fit.
+        starts: free parameter -> value to start from; {} starts from the network's own values.
+
+    Raises:
+        ValueError: a cell has no joint or several, or what fit_cycle cannot use.
+        NoOrbit: a start has no such gait.
+
+    """
+    by_cell = sorted(cells, key=lambda name: cells[name])
+    if [cells[name] for name in by_cell] != list(range(1, CELLS + 1)):
+        raise ValueError('the paper takes one joint for each of the eight cells: a robot file '
+                         'has to say which, such as the shipped goat')
+    rows = [list(cycle.joints).index(name) for name in by_cell]
+    theta = np.arange(POINTS) / POINTS
+    samples = np.array([np.interp(theta, cycle.theta, cycle.mean[row] - cycle.mean[row].mean(),
+                                  period=1.0) for row in rows]).T
+    for name in (name for start in starts for name in start):
+        if name not in free:
+            raise ValueError(f"start: '{name}' is not free")
+    begins = [replace(network, **start) for start in starts]
+    theta = theta + _shift(solve(begins[0], gait), theta, samples)
+    found = []
+    for begin in begins:
+        values = begin.as_dict()
+        found.append(PaperFit({name: values[name] for name in free},
+                              fit_cycle(samples, theta, begin, gait, free),
+                              tuple(by_cell)))
+    return found
+
+
+def _shift(orbit: DelayedOrbit, theta: np.ndarray, samples: np.ndarray) -> float:
+    """Phase of an orbit, cycles, at which its cells come nearest to samples."""
+    def gap(shift: float) -> float:
+        return float(np.sum((cycle_samples(orbit, theta + shift)[0] - samples)**2))
+
+    near = min(np.arange(SHIFTS) / SHIFTS, key=gap)
+    return float(minimize_scalar(gap, method='bounded', options={'xatol': 1e-9},
+                                 bounds=(near - 1.0 / SHIFTS, near + 1.0 / SHIFTS)).x)

@@ -1,0 +1,119 @@
+"""A fit as files that the generator loads as they are: its parameters, and a robot file."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import yaml
+
+from cpg_ros.files.atomic_write import write_atomically
+from cpg_ros.inversion.recording_fit import Inverted
+from cpg_ros.motion.plan import Refused, plan
+from cpg_ros.networks.registry import NETWORKS, PRESETS
+from cpg_ros.robots.robot import Joint, Robot
+from cpg_ros.robots.robot_file import write_robot
+
+#: Limits of joints that no robot file gives: the share of the recorded range that is left on
+#: either side, and the multiple of the fastest fitted speed.
+ROOM, FASTER = 0.25, 3.0
+
+
+def robot_file_of(path: Path) -> Path:
+    """Where the robot file of a parameter file is written."""
+    return path.with_name(f'{path.stem}_robot.yaml')
+
+
+def fitted_robot(found: Inverted, robot: Robot | None) -> Robot:
+    """Return a robot whose joints move as the recorded ones.
+
+    Args:
+        found: the inverted recording.
+        robot: whose limits, cells and joint order are kept; joints that were not recorded stay
+            as they are. Without one, limits are taken from the recording.
+
+    Raises:
+        ValueError: a leg of the network has no recorded joint, or the robot's limits do not
+            let a joint move so.
+
+    """
+    fit = found.fit
+    if robot is not None:
+        legs = {leg: tuple(_moved(joint, found) for joint in joints)
+                for leg, joints in robot.legs.items()}
+        moved = Robot(robot.name, (fit.network.name,), robot.assignment, fit.harmonics, legs,
+                      robot.order)
+        preset = PRESETS[fit.network.name][fit.gait]
+        try:
+            plan(moved, fit.gait, preset, fit.network, found.stride.frequency)
+        except Refused as error:
+            raise ValueError(f'{found.recording.source}: robot {robot.name} cannot do this: '
+                             f'{error}') from error
+        return moved
+    network = NETWORKS[fit.network.name]
+    assignment = next(iter(network.legs))
+    for leg in network.legs[assignment]:
+        if leg not in found.legs:
+            raise ValueError(f'{found.recording.source}: no joint of {leg} was recorded, and the '
+                             f'network {network.name} drives '
+                             f'{", ".join(network.legs[assignment])}: a robot file is needed')
+    legs = {leg: tuple(_guessed(name, leg, found) for name in names)
+            for leg, names in found.legs.items()}
+    order = tuple(name for name in found.recording.joints if name in fit.readouts)
+    return Robot('fitted', (network.name,), assignment, fit.harmonics, legs, order)
+
+
+def _moved(joint: Joint, found: Inverted) -> Joint:
+    if joint.name not in found.fit.readouts:
+        return joint
+    offset, weights = found.fit.readouts[joint.name]
+    if not joint.lower <= offset <= joint.upper:
+        raise ValueError(f'{found.recording.source}: joint {joint.name!r} swings about '
+                         f"{offset:.4g} rad, outside the robot file's limits {joint.lower:g} to "
+                         f'{joint.upper:g}')
+    return Joint(joint.name, joint.leg, joint.cell, offset, weights, joint.lower, joint.upper,
+                 joint.velocity)
+
+
+def _guessed(name: str, leg: str, found: Inverted) -> Joint:
+    fit = found.fit
+    offset, weights = fit.readouts[name]
+    row = fit.joints.index(name)
+    angles = np.concatenate([fit.recorded[row], fit.fitted[row], [offset]])
+    room = max(ROOM * float(np.ptp(angles)), 0.05)
+    step = 1.0 / (fit.theta.size * found.stride.frequency)
+    fastest = float(np.abs(np.diff(fit.fitted[row], append=fit.fitted[row, 0])).max()) / step
+    return Joint(name, leg, fit.cells[name], offset, weights, float(angles.min()) - room,
+                 float(angles.max()) + room, max(FASTER * fastest, 1.0))
+
+
+def parameter_tree(found: Inverted, robot: Path) -> dict[str, Any]:
+    """Return the generator's parameters as ``--params-file`` takes them, for any node name."""
+    fit = found.fit
+    return {'/**': {'ros__parameters': {
+        'network': fit.network.name, 'robot': str(robot), 'gait': fit.gait,
+        'frequency': float(found.stride.frequency), 'amplitude': 1.0,
+        fit.network.name: {name: float(value)
+                           for name, value in fit.network.as_dict().items()}}}}
+
+
+def write_fitted(path: Path, found: Inverted, robot: Robot | None = None) -> list[Path]:
+    """Write the parameter file, and beside it the robot file that it names.
+
+    Returns:
+        The files written.
+
+    Raises:
+        ValueError: as in fitted_robot.
+        OSError: a file cannot be written.
+
+    """
+    beside = robot_file_of(path)
+    said = (f'{found.fit.gait} at {found.stride.frequency:.4f} Hz, fitted to '
+            f'{found.recording.source}\nmean RMS error {100 * found.fit.mean_rms_share:.1f} % of '
+            f'the joints\' range, readout of order {found.fit.order}')
+    moved, tree = fitted_robot(found, robot), parameter_tree(found, beside.resolve())
+    comment = ''.join(f'# {line}\n' for line in said.splitlines())
+    parameters = comment + yaml.safe_dump(tree, sort_keys=False)
+    write_robot(beside, moved, said)
+    write_atomically(path, parameters)
+    return [path, beside]

@@ -1,0 +1,158 @@
+"""A recording inverted: its steady stride, the gait fitted to it, and how well that does."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from cpg_ros.gaits.leg_names import legs_of
+from cpg_ros.gaits.stride import Stride, find_stride
+from cpg_ros.inversion.fit_data import cells_of
+from cpg_ros.inversion.gait_fit import Fit
+from cpg_ros.inversion.invert import invert
+from cpg_ros.networks.network import Preset
+from cpg_ros.networks.registry import NETWORKS, PRESETS
+from cpg_ros.recordings.recording import Recording
+from cpg_ros.robots.robot import Robot
+
+#: Orders of the readout that are compared.
+ORDERS = (1, 2, 3)
+
+
+@dataclass(frozen=True, eq=False)
+class Inverted:
+    """What came of a recording.
+
+    Attributes:
+        recording: what was recorded.
+        read: how its joints were given to legs.
+        legs: leg -> its joints.
+        stride: its steady gait.
+        fit: the network's gait fitted to that.
+        shares: order of the readout -> mean over the joints of RMS error over range.
+        warnings: one line each.
+
+    """
+
+    recording: Recording
+    read: str
+    legs: Mapping[str, Sequence[str]]
+    stride: Stride
+    fit: Fit
+    shares: dict[int, float]
+    warnings: tuple[str, ...]
+
+    def as_dict(self) -> dict[str, Any]:
+        """Everything in plain types, for JSON."""
+        fit, stride = self.fit, self.stride
+        rms, share = fit.rms, fit.rms_share
+        verdict = fit.verdict
+        return {
+            'gait': fit.gait, 'recognised': stride.gait, 'nearest': stride.nearest,
+            'distance': stride.distance, 'margin': stride.margin,
+            'frequency': stride.frequency, 'frequency_error': stride.frequency_error,
+            'cycles': stride.cycles, 'begin': stride.begin, 'end': stride.end,
+            'phases': {leg: float(phase) for leg, phase in stride.phases.items()},
+            'network': fit.network.name, 'params': fit.network.as_dict(),
+            'parameters': {name: {'value': one.value, 'stderr': one.stderr,
+                                  'low': one.low, 'high': one.high}
+                           for name, one in fit.parameters.items()},
+            'order': fit.order, 'rms_share': fit.mean_rms_share,
+            'rms_share_by_order': {str(order): value for order, value in self.shares.items()},
+            'joints': {name: {'rms': rms[name], 'rms_share': share[name], 'cell': fit.cells[name]}
+                       for name in fit.joints},
+            'starts': [{'start': dict(zip(fit.parameters, trial.start.tolist(), strict=False)),
+                        'end': dict(zip(fit.parameters, trial.values.tolist(), strict=False)),
+                        'iterations': trial.iterations, 'cost': trial.cost, 'why': trial.why}
+                       for trial in fit.starts],
+            'period': fit.orbit.period,
+            'critical_delay': None if fit.hopf is None else fit.hopf.tau,
+            'stable': verdict.stable, 'stable_with_default_gain': verdict.stable_with_default_gain,
+            'source': self.recording.source, 'legs': {leg: list(names) for leg, names
+                                                      in self.legs.items()},
+            'read': self.read, 'notes': [*self.recording.notes, *stride.notes],
+            'warnings': list(self.warnings)}
+
+
+def preset_of(network: str, gait: str) -> Preset:
+    """Return the shipped parameters that a gait is fitted from.
+
+    Raises:
+        ValueError: the network has no such gait or preset.
+
+    """
+    presets = PRESETS[network]
+    if gait not in presets:
+        raise ValueError(f"'{gait}' is not one of the presets of the network {network}: "
+                         f'{", ".join(presets)}')
+    return presets[gait]
+
+
+def _legs(recording: Recording, robot: Robot | None) -> tuple[dict[str, tuple[str, ...]], str]:
+    """Which joints each leg has, and how that was read."""
+    if robot is None:
+        found = legs_of(recording.joints)
+        return dict(found.joints), found.says
+    legs = {leg: tuple(joint.name for joint in joints if joint.name in recording.joints)
+            for leg, joints in robot.legs.items()}
+    missing = [joint.name for joint in robot.joints if joint.name not in recording.joints]
+    if len(missing) == len(robot.joints):
+        raise ValueError(f'{recording.source}: none of the joints of robot {robot.name} is '
+                         f'there: it has {", ".join(recording.joints)}')
+    read = f'legs and cells are those of robot {robot.name}'
+    return ({leg: names for leg, names in legs.items() if names},
+            read + (f'; not recorded: {", ".join(missing)}' if missing else ''))
+
+
+def inverted(recording: Recording, robot: Robot | None = None, network: str = '', gait: str = '',
+             free: Sequence[str] = (), order: int = 3, preset: str = '',
+             starts: Sequence[Mapping[str, float]] = ({},),
+             done: Callable[[float], None] = lambda share: None) -> Inverted:
+    """Find the steady gait of a recording and fit a network's gait and readouts to it.
+
+    Args:
+        recording: joints over time.
+        robot: which joints belong to which legs and cells; told from their names by default.
+        network: name; by default the robot's first, or the delayed network for four legs and
+            the biped for two.
+        gait: of the network; by default the recorded one, as it is recognised.
+        free: parameters to fit; the network's usual ones by default.
+        order: of the readouts, 1 to 3.
+        preset: whose parameters are taken that are not free; the gait's by default.
+        starts: free number -> value to start from.
+        done: told which share of the fit is done, 0 to 1.
+
+    Raises:
+        ValueError: one line that says what is wrong: no legs, no steady gait (NoSteadyGait), no
+            gait of the network's, or no orbit (NoOrbit).
+
+    """
+    legs, read = _legs(recording, robot)
+    if not network:
+        network = robot.networks[0] if robot is not None else (
+            'biped' if set(legs) <= set(next(iter(NETWORKS['biped'].legs.values())))
+            else 'delayed')
+    if network not in NETWORKS:
+        raise ValueError(f"network '{network}' is not one of {', '.join(NETWORKS)}")
+    kind = NETWORKS[network]
+    cells = cells_of(robot if robot is not None else legs, kind)
+    cells = {name: cell for name, cell in cells.items() if name in recording.joints}
+    gains = None if robot is None else {
+        joint.name: complex(*joint.weights[:2]) for joint in robot.joints}
+    stride = find_stride(recording.select(tuple(cells)), legs, kind,
+                         None if robot is None else cells, gains)
+    warnings = []
+    if not gait:
+        gait = stride.gait or ''
+        if not gait:
+            raise ValueError(
+                f'{recording.source}: the recorded phases are none of the gaits of the network '
+                f'{network}: the nearest is {stride.nearest}, {stride.distance:.3f} of a cycle '
+                'off; name the gait to fit it all the same')
+    elif stride.gait != gait:
+        warnings.append(f'the recorded phases are those of {stride.gait or "none of the gaits"}, '
+                        f'not of {gait}')
+    parameters = preset_of(network, preset or gait).network
+    fit = invert(stride, cells, parameters, gait, free, order, starts, done=done)
+    return Inverted(recording, read, legs, stride, fit,
+                    {order: fit.share_at(order) for order in ORDERS},
+                    (*warnings, *fit.warnings))

@@ -1,0 +1,93 @@
+"""The linear readout of joints and its elimination from a fit: variable projection.
+
+A joint is ``offset + sum_k w_k psi_k(x, y)``, psi = x, y, x^2, x y, x^3, x^2 y up to the order
+(DESIGN 3). Whatever the network's parameters, the best offset and weights are a linear
+least-squares problem; put in place they leave a residual of the network's parameters alone. Its
+exact derivative is Golub & Pereyra's (1973).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from cpg_ros.motion.readout import monomials
+
+#: Weights of each readout order.
+WEIGHTS = {1: 2, 2: 4, 3: 6}
+
+
+def basis(order: int, x: np.ndarray, y: np.ndarray, z: np.ndarray
+          ) -> tuple[np.ndarray, np.ndarray]:
+    """Return 1 and the monomials of an order, and their derivatives by phase in cycles.
+
+    Args:
+        order: 1 to 3.
+        x: signal, any shape.
+        y: its derivative by phase in radians.
+        z: the second one.
+
+    Returns:
+        Two arrays of shape (..., 1 + weights).
+
+    """
+    values, by_phase = monomials(x, y, z)
+    count = WEIGHTS[order]
+    return (np.stack([np.ones_like(x), *values[:count]], axis=-1),
+            np.stack([np.zeros_like(x), *by_phase[:count]], axis=-1))
+
+
+def basis_moved(order: int, x: np.ndarray, y: np.ndarray, slopes: np.ndarray) -> np.ndarray:
+    """Return the derivatives of 1 and the monomials, shape (m, 1 + weights, numbers).
+
+    Args:
+        order: 1 to 3.
+        x: signal, shape (m,).
+        y: its derivative by phase in radians.
+        slopes: derivatives of x and y by some numbers, shape (2, m, numbers).
+
+    """
+    one, zero = np.ones_like(x), np.zeros_like(x)
+    by_x = np.stack([zero, one, zero, 2.0 * x, y, 3.0 * x * x, 2.0 * x * y], axis=1)
+    by_y = np.stack([zero, zero, one, zero, x, zero, x * x], axis=1)
+    count = 1 + WEIGHTS[order]
+    return (by_x[:, :count, None] * slopes[0][:, None]
+            + by_y[:, :count, None] * slopes[1][:, None])
+
+
+@dataclass(frozen=True)
+class Projection:
+    """What the best linear readout of some joints leaves.
+
+    Attributes:
+        weights: offset and weights of each joint, shape (1 + weights, joints).
+        residual: fitted minus recorded, shape (m, joints).
+        jacobian: its derivative, the readout staying the best, shape (m, joints, variables).
+
+    """
+
+    weights: np.ndarray
+    residual: np.ndarray
+    jacobian: np.ndarray
+
+
+def project(psi: np.ndarray, moved: np.ndarray, data: np.ndarray) -> Projection:
+    """Fit a basis to joints and differentiate what is left.
+
+    Args:
+        psi: basis, shape (m, n).
+        moved: its derivatives, shape (m, n, variables).
+        data: of the joints, shape (m, joints).
+
+    Raises:
+        numpy.linalg.LinAlgError: the basis is not independent.
+
+    """
+    q, r = np.linalg.qr(psi)
+    weights = np.linalg.solve(r, q.T @ data)
+    left = psi @ weights - data
+    along = np.einsum('mnv,nj->mjv', moved, weights)
+    along -= np.tensordot(q, np.tensordot(q, along, (0, 0)), (1, 0))
+    pulled = np.einsum('mnv,mj->njv', moved, left)
+    pulled = np.linalg.solve(r.T, pulled.reshape(len(r), -1))
+    # The second part vanishes with the residual: it is what Kaufman (1975) leaves out.
+    return Projection(weights, left, along - (q @ pulled).reshape(along.shape))

@@ -1,0 +1,294 @@
+"""The moving pattern: from programs to joint positions and velocities, tick by tick.
+
+A gait switch cross-fades two networks whose legs share one phase; a ramp scales the whole
+pattern between the stand (every joint at its offset) and the gait; a watchdog compares the
+network with its orbit. All three run on the pattern's own clock, which is slowed while they
+move whenever a joint would exceed the speed that the gaits themselves reach.
+"""
+
+import math
+from collections import deque
+
+import numpy as np
+
+from cpg_ros.motion.plan import Program
+from cpg_ros.motion.readout import confine
+from cpg_ros.motion.smoothstep import smoothstep
+from cpg_ros.motion.steering import Drive
+from cpg_ros.motion.track import Track
+
+#: Cross-fades and ramps are worked out at least this often (s), whatever the tick.
+SUBSTEP = 1e-3
+#: Most gaits fading into one another at once; a further one waits for a place.
+MOST_TRACKS = 4
+#: Jumps of the network's output are absorbed over this time (s).
+ABSORB = 0.3
+#: A joint may cover the shift between the stand and a gait at this many times it a second.
+SHIFTING = 2.0
+
+
+class Pattern:
+    """Joint positions and velocities of a robot in its gait.
+
+    ``advance`` belongs to one thread; ``apply`` and ``enable`` may be called from another.
+
+    Attributes:
+        position, velocity: of each joint, rad and rad/s, leg by leg; overwritten by advance.
+        faults: times the watchdog had to put the network back on its orbit.
+        held: ticks in which a limit held a joint back.
+
+    """
+
+    def __init__(self, program: Program, ramp: float = 1.0, enabled: bool = True,
+                 drive: Drive | None = None) -> None:
+        """Stand, then ramp into the program if enabled; a drive steers it."""
+        robot = program.robot
+        self.robot, self.drive = robot, drive
+        self._leg = robot.leg_of_joint
+        self.faults = 0
+        self.held = 0
+        self._offset, self._lower = robot.column('offset'), robot.column('lower')
+        self._upper, self._limit = robot.column('upper'), robot.column('velocity')
+        self._requests: deque = deque()
+        self._tracks = [Track(program, 0.0, drive)]
+        self._ramps: deque[tuple[float, float, float, float]] = deque()
+        self.restart(ramp, enabled)
+
+    def restart(self, ramp: float, enabled: bool = True) -> None:
+        """Begin anew from the stand at phase 0, with the newest program."""
+        newest = self._tracks[-1]
+        newest.phase = 0.0
+        newest.reseed()
+        self._tracks = [newest]
+        self.position, self.velocity = self._offset.copy(), np.zeros_like(self._offset)
+        self._wanted, self._rate = self.position.copy(), self.velocity.copy()
+        self._jump: tuple[np.ndarray, np.ndarray] | None = None
+        self._absorbed = ABSORB
+        self._recovering = False
+        self._slowing = 1.0
+        self._last_rate: np.ndarray | None = None
+        self._level, self._level_rate = 0.0, 0.0
+        self._ramp_to(float(enabled), max(ramp, SUBSTEP))
+        self.enabled = enabled
+
+    # -- asked from other threads ---------------------------------------------------------
+
+    def apply(self, program: Program, transition: float) -> None:
+        """Change to a program over a transition in s; 0 leaves it to the network's dynamics."""
+        # Seeding an orbit takes its time: here, in the caller's thread, not in that of the ticks.
+        prepared = Track(program, max(transition, SUBSTEP), self.drive)
+        self._requests.append((program, prepared if transition > 0.0 else None))
+
+    def enable(self, enabled: bool, ramp: float) -> None:
+        """Ramp into the gait, or down to the stand, over a time in s."""
+        self._requests.append((enabled, max(ramp, SUBSTEP)))
+
+    def steer(self, stride: np.ndarray, pace: float) -> None:
+        """Ask for the legs' strides, shape (legs,), and the pace; see Drive.
+
+        Raises:
+            ValueError: the pattern was made without a drive.
+
+        """
+        if self.drive is None:
+            raise ValueError('this pattern has no drive')
+        self.drive.ask(stride, pace, at_once=self._level == 0.0)
+
+    @property
+    def program(self) -> Program:
+        """The newest program in force."""
+        return self._tracks[-1].program
+
+    @property
+    def phases(self) -> np.ndarray:
+        """Phase of each leg in cycles, shape (legs,); 0 is where its cell peaks."""
+        return self._tracks[-1].legs
+
+    @property
+    def level(self) -> float:
+        """0 at the stand, 1 in the full gait."""
+        return self._level
+
+    @property
+    def standing(self) -> bool:
+        """Tell whether it is disabled and the ramp has ended."""
+        return not self.enabled and self._level == 0.0 and not self._requests
+
+    @property
+    def in_transition(self) -> bool:
+        """Tell whether gaits are still fading into one another, or settling."""
+        return len(self._tracks) > 1 or self._tracks[-1].settling > 0.0
+
+    @property
+    def recovering(self) -> bool:
+        """Tell whether a fault is still being got over."""
+        return self._recovering and self._absorbed < ABSORB
+
+    # -- the tick --------------------------------------------------------------------------
+
+    def advance(self, dt: float) -> None:
+        """Advance by dt in s and fill position, velocity and phases."""
+        if self._requests:
+            self._take_requests()
+        if len(self._tracks) == 1 and not self._ramps and self._absorbed >= ABSORB:
+            self._cruise(dt)
+        else:
+            parts = max(1, math.ceil(dt / SUBSTEP - 1e-9))
+            for _ in range(parts):
+                self._step(dt / parts)
+        self.held += confine(self._wanted, self._rate, self._lower, self._upper, self._limit,
+                             dt, self.position, self.velocity) > 0
+
+    def _take_requests(self) -> None:
+        waiting = []
+        while self._requests:
+            what, how = self._requests.popleft()
+            if isinstance(what, bool):
+                self.enabled = what
+                self._ramp_to(float(what), how)
+            elif how is None:
+                del self._tracks[:-1]
+                self._tracks[0].drift_to(what)
+                self._absorb()
+            elif len(self._tracks) < MOST_TRACKS:
+                how.align(self._tracks[-1].phase)
+                self._tracks.append(how)
+            else:
+                # Of those that wait, only the last one matters.
+                waiting = [(what, how)]
+        self._requests.extend(waiting)
+
+    def _absorb(self) -> None:
+        """Take note that the network's output jumps here; ``_step`` smooths it."""
+        self._jump, self._absorbed = None, 0.0
+
+    def _cruise(self, dt: float) -> None:
+        """One gait, at the stand or in full swing: nothing to mix, nothing to allocate."""
+        self._slowing, self._last_rate = 1.0, None
+        track, drive = self._tracks[0], self.drive
+        frequency = track.program.frequency
+        if drive is not None:
+            drive.advance(dt)
+            frequency *= drive.pace
+        if not track.advance(frequency * dt):
+            self._recover(track)
+            self._step(0.0)
+            return
+        np.multiply(track.angle, self._level, out=self._wanted)
+        self._wanted += self._offset
+        np.multiply(track.rise, self._level * frequency, out=self._rate)
+        if drive is not None:
+            self._rate += self._level * drive.rate[self._leg] * track.reach
+
+    def _recover(self, track: Track) -> None:
+        self.faults += 1
+        self._recovering = True
+        track.reseed()
+        self._absorb()
+
+    def _step(self, dt: float) -> None:
+        clock = dt * self._slowing
+        tracks = self._tracks
+        first = tracks[0]
+        frequency, moving = first.program.frequency, len(tracks) > 1
+        fades = []
+        if moving:
+            for track in tracks[1:]:
+                track.progress = min(1.0, track.progress + clock / track.transition)
+                share, share_rate = smoothstep(track.progress)
+                fades.append((share, share_rate / track.transition))
+                frequency += share * (track.program.frequency - frequency)
+        if self.drive is not None:
+            self.drive.advance(dt)
+            frequency *= self.drive.pace
+        for track in tracks:
+            if not track.advance(frequency * clock):
+                self._recover(track)
+
+        wanted, rate = first.angle, self._rate_of(first, frequency)
+        for track, (share, share_rate) in zip(tracks[1:], fades, strict=True):
+            rate = (rate + share * (self._rate_of(track, frequency) - rate)
+                    + share_rate * (track.angle - wanted))
+            wanted = wanted + share * (track.angle - wanted)
+        while len(tracks) > 1 and tracks[1].progress >= 1.0:
+            del tracks[0]
+
+        if self._ramps:
+            moving = True
+            self._advance_ramp(clock)
+        if self._level != 1.0 or self._level_rate:
+            rate = self._level * rate + self._level_rate * wanted
+            wanted = self._level * wanted
+        if moving:
+            # The pattern slows where it would outrun the gaits, now or at the next substep.
+            bound = np.minimum(np.max([t.program.speed + SHIFTING * np.abs(t.program.shift)
+                                       for t in tracks], axis=0), self._limit)
+            ahead = rate if self._last_rate is None else 2.0 * rate - self._last_rate
+            fastest = np.maximum(np.abs(rate), np.abs(ahead))
+            self._last_rate = rate
+            self._slowing = 1.0 / max(1.0, float(np.max(fastest / np.maximum(bound, 1e-9))))
+            rate = self._slowing * rate
+        else:
+            self._slowing, self._last_rate = 1.0, None
+
+        if self._absorbed < ABSORB:
+            wanted, rate = self._smooth(wanted + self._offset, rate, dt)
+            self._wanted[:], self._rate[:] = wanted, rate
+        else:
+            self._wanted[:] = wanted
+            self._wanted += self._offset
+            self._rate[:] = rate
+
+    def _rate_of(self, track: Track, frequency: float) -> np.ndarray:
+        rate = track.rise * frequency
+        if self.drive is not None:
+            rate += self.drive.rate[self._leg] * track.reach
+        return rate
+
+    def _ramp_to(self, end: float, time: float) -> None:
+        """Plan the level's way to its end, from its present value and rate, without overshoot.
+
+        Cubics that end at rest, each (start, rate, end, time). One that starts towards its end
+        stays in between if it takes no longer than 3 |end - start| / |rate|.
+        """
+        level, rate = self._level, self._level_rate
+        self._ramps.clear()
+        self._ramped = 0.0
+        if rate * (end - level) < 0.0:
+            # Turned round half way: brake first, within half of the room that is left.
+            turn = level + 0.5 * ((1.0 if rate > 0.0 else 0.0) - level)
+            self._ramps.append((level, rate, turn, 2.0 * (turn - level) / rate))
+            level, rate = turn, 0.0
+        if rate:
+            time = min(time, 3.0 * (end - level) / rate)
+        self._ramps.append((level, rate, end, time))
+
+    def _advance_ramp(self, clock: float) -> None:
+        start, start_rate, end, time = self._ramps[0]
+        self._ramped += clock
+        s = self._ramped / time if time > 0.0 else 1.0
+        if s >= 1.0:
+            self._ramps.popleft()
+            self._ramped = 0.0
+            self._level, self._level_rate = end, 0.0
+            return
+        share, share_rate = smoothstep(s)
+        self._level = start + share * (end - start) + s * (1.0 - s)**2 * time * start_rate
+        self._level_rate = (share_rate * (end - start) / time
+                            + (1.0 - s) * (1.0 - 3.0 * s) * start_rate)
+
+    def _smooth(self, wanted: np.ndarray, rate: np.ndarray, dt: float
+                ) -> tuple[np.ndarray, np.ndarray]:
+        """Add a difference that starts where the output was and dies out."""
+        if self._jump is None:
+            self._jump = (self._wanted + dt * self._rate - wanted, self._rate - rate)
+        else:
+            self._absorbed += dt
+        s = min(1.0, self._absorbed / ABSORB)
+        share, share_rate = smoothstep(s)
+        gap, gap_rate = self._jump
+        wanted = wanted + (1.0 - share) * gap + s * (1.0 - s) ** 2 * ABSORB * gap_rate
+        rate = rate - share_rate / ABSORB * gap + (1.0 - s) * (1.0 - 3.0 * s) * gap_rate
+        if s >= 1.0:
+            self._jump, self._recovering = None, False
+        return wanted, rate

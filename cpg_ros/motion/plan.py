@@ -1,0 +1,193 @@
+"""What the generator is asked to do, worked out and checked before anything moves."""
+
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+
+import numpy as np
+
+from cpg_ros.dynamics.orbit import Orbit, solve_orbit, solve_preset
+from cpg_ros.dynamics.stability import Stability, stability
+from cpg_ros.integration.stepper import Stepper
+from cpg_ros.motion.phase_readout import PhaseReadout
+from cpg_ros.motion.readout import WaveReadout, extremes
+from cpg_ros.networks.network import Network, Preset
+from cpg_ros.robots.robot import Motion, Robot, Steering
+
+#: Strides per second below which a robot would seem to stand (Hz).
+SLOWEST = 0.01
+#: A period needs this many steps for the integrator to stay on the orbit.
+STEPS_A_PERIOD = 40
+
+
+class Refused(ValueError):
+    """The request cannot be run; the message says why, with the figures."""
+
+
+@dataclass(frozen=True)
+class Program:
+    """One gait on one robot, ready to run.
+
+    Attributes:
+        name: the preset's or gait's name.
+        gait: one of the network's gaits.
+        orbit: the gait's orbit.
+        stability: whether it attracts, and with what symmetry gain.
+        gain: symmetry lock in 1/model time.
+        frequency: strides per second (Hz).
+        motion: what the gait makes of the robot.
+        shift: of each joint from the stand to where the gait swings about, rad, (joints,).
+        readout: reads joints and legs off the network's state.
+        in_place: the same for legs that take strides of length 0.
+        span: smallest and largest deviation of each joint from its offset, rad, (2, joints).
+        speed: largest speed of each joint, rad/s, shape (joints,).
+
+    """
+
+    name: str
+    robot: Robot
+    gait: str
+    orbit: Orbit
+    stability: Stability
+    gain: float
+    frequency: float
+    motion: Motion
+    shift: np.ndarray
+    readout: WaveReadout | PhaseReadout
+    in_place: WaveReadout | PhaseReadout
+    span: np.ndarray
+    speed: np.ndarray
+
+    @cached_property
+    def seed(self) -> Stepper:
+        """A stepper on the orbit at phase 0; copy it, do not advance it."""
+        network = self.orbit.network
+        return Stepper(network, self.orbit, gain=self.gain, symmetry=self.orbit.symmetry)
+
+    @property
+    def speeds(self) -> tuple[float, float]:
+        """Slowest and fastest forward speed that steering can ask for, m/s."""
+        speed = self._steering.speed
+        return speed[0], speed[-1]
+
+    def steer(self, speed: float, turn: float) -> tuple[np.ndarray, float]:
+        """Return each leg's stride, shape (legs,), and the pace for a wanted motion.
+
+        Args:
+            speed: forward, m/s.
+            turn: yaw rate, rad/s, positive to the left.
+
+        Raises:
+            ValueError: the robot file does not say how to steer this gait.
+
+        """
+        left, right, frequency = self._steering.ask(speed, turn)
+        strides = np.array([left if leg[0] == 'l' else right for leg in self.robot.legs])
+        # The table is for the gait's own frequency; a wanted one scales it.
+        return strides, frequency / (self.motion.frequency or frequency)
+
+    @property
+    def _steering(self) -> Steering:
+        if self.motion.steering is None:
+            raise ValueError(f"robot file '{self.robot.name}' does not say how to steer the gait "
+                             f"'{self.name}' (gaits.{self.gait}.steering)")
+        return self.motion.steering
+
+    @property
+    def character(self) -> str:
+        """Walk-like, run-like or neither: how the two cells of each leg go together."""
+        return self.orbit.network.character(self.gait, self.robot.assignment)
+
+    @cached_property
+    def wave(self) -> tuple[np.ndarray, np.ndarray]:
+        """Mean state of the orbit, and rows that span its first harmonic in state space."""
+        states = self.orbit(np.arange(64) / 64 * self.orbit.period)
+        harmonic = np.fft.fft(states, axis=0)[1] / 64
+        _, sizes, rows = np.linalg.svd(np.array([harmonic.real, harmonic.imag]),
+                                       full_matrices=False)
+        return states.mean(axis=0), rows[sizes > 1e-6 * sizes[0]]
+
+
+@lru_cache(maxsize=32)
+def gait_of(preset: Preset, network: Network) -> tuple[Orbit, Stability]:
+    """Solve for a preset's gait with parameters of its own, and judge its stability.
+
+    Raises:
+        ValueError: bad parameters, or no such orbit (NoOrbit).
+
+    """
+    known = None if preset.start is None else solve_preset(preset)
+    if known is None or network != preset.network:
+        known = solve_orbit(network, preset.gait, known)
+    return known, stability(known)
+
+
+def plan(robot: Robot, name: str, preset: Preset, network: Network, frequency: float = 0.0,
+         amplitude: float = 1.0, gain: float = -1.0) -> Program:
+    """Work out a gait on a robot and check it against the robot's limits.
+
+    Args:
+        robot: legs, joints and limits.
+        name: what to call it, the preset's name or the gait's.
+        preset: the gait and parameters near which it is known.
+        network: parameters.
+        frequency: strides per second (Hz); 0 takes one model time unit as a second.
+        amplitude: factor on every joint's readout weights.
+        gain: symmetry lock in 1/model time; negative chooses one that makes the gait attract.
+
+    Raises:
+        Refused: there is no such orbit, it does not attract, or a joint would leave its limits.
+
+    """
+    gait = preset.gait
+    if 0.0 < frequency < SLOWEST:
+        raise Refused(f'frequency {frequency:g} is neither 0 nor at least {SLOWEST:g} Hz')
+    if network.longest_delay and not network.step <= network.delay <= network.longest_delay:
+        raise Refused(f'tau {network.delay:g} must be from {network.step} to '
+                      f'{network.longest_delay:g}')
+    try:
+        orbit, judged = gait_of(preset, network)
+    except ValueError as error:
+        raise Refused(str(error)) from error
+    if orbit.period < STEPS_A_PERIOD * network.step:
+        raise Refused(f'the {gait} has a period of {orbit.period:.3g} model time units, too short '
+                      f'for steps of {network.step}: at least {STEPS_A_PERIOD * network.step:g} '
+                      'is needed')
+    if judged.flaw:
+        raise Refused(f'the {gait} exists at these parameters but does not attract: {judged.flaw}')
+
+    motion = robot.motion(name, gait)
+    shift = robot.shift(motion)
+    try:
+        readout, in_place = (_readout(orbit, robot, amplitude * robot.weights(motion, at_rest))
+                             for at_rest in (False, True))
+    except ValueError as error:
+        raise Refused(f'the {gait} at these parameters cannot drive joints: {error}') from error
+    strides = frequency if frequency > 0.0 else 1.0 / orbit.period
+    swings = [(readout.angles, readout.rises)]
+    if motion.steering is not None:
+        # Strides from 1 to -1: at one of the ends a joint goes furthest.
+        swings.append((2.0 * in_place.angles - readout.angles,
+                       2.0 * in_place.rises - readout.rises))
+    lows, highs = zip(*(extremes(angles) for angles, _ in swings), strict=True)
+    span = shift + np.stack([np.min(lows, axis=0), np.max(highs, axis=0)])
+    speed = strides * np.max([np.abs(extremes(rises)) for _, rises in swings], axis=(0, 1))
+    for joint, low, high, fastest in zip(robot.joints, *span, speed, strict=True):
+        if joint.offset + low < joint.lower - 1e-9:
+            raise Refused(f'amplitude {amplitude:g} takes {joint.name} to '
+                          f'{joint.offset + low:.3f} rad, below its limit {joint.lower:g}')
+        if joint.offset + high > joint.upper + 1e-9:
+            raise Refused(f'amplitude {amplitude:g} takes {joint.name} to '
+                          f'{joint.offset + high:.3f} rad, above its limit {joint.upper:g}')
+        if fastest > joint.velocity:
+            raise Refused(f'frequency {strides:.3g} Hz at amplitude {amplitude:g} moves '
+                          f'{joint.name} at {fastest:.2f} rad/s, above its limit '
+                          f'{joint.velocity:g}')
+    gain = judged.chosen if gain < 0.0 else gain
+    return Program(name, robot, gait, orbit, judged, gain, strides, motion, shift, readout,
+                   in_place, span, speed)
+
+
+def _readout(orbit: Orbit, robot: Robot, weights: np.ndarray) -> WaveReadout | PhaseReadout:
+    if orbit.network.variables == 1:
+        return WaveReadout(orbit, robot.cells, weights, robot.leg_cells)
+    return PhaseReadout(orbit, robot.cells, weights, robot.leg_cells, robot.harmonics)

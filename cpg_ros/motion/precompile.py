@@ -1,0 +1,29 @@
+"""Make every kernel of the real-time path ready, compiling those not yet on disk."""
+
+import numpy as np
+
+from cpg_ros.integration.simulate import simulate
+from cpg_ros.integration.stepper import Stepper
+from cpg_ros.motion.phase_readout import observe_phases
+from cpg_ros.motion.readout import confine, observe
+from cpg_ros.networks.registry import NETWORKS, PRESETS
+
+
+def precompile(name: str) -> None:
+    """Run each kernel that a network needs once, on the types the generator uses."""
+    preset = next(iter(PRESETS[name].values()))
+    network = preset.network
+    stepper = Stepper(network, np.zeros(network.components), gain=1.0,
+                      symmetry=network.symmetry(preset.gait))
+    stepper.advance(2.0 * network.step)
+    joints, table, cells = np.zeros(1), np.zeros(4), np.zeros(1, dtype=int)
+    weights = np.zeros((1, 6))
+    if NETWORKS[name].variables == 1:
+        observe(stepper.now, 1.0, 1.0, cells, weights, np.zeros(8), cells, table, table, joints,
+                joints, joints)
+    else:
+        simulate(network, np.zeros(network.components), network.step, network.step)
+        observe_phases(stepper.now, 1.0, 1, cells, np.zeros(1), np.ones((1, 4)),
+                       np.ones((1, 4, 3)), np.zeros((1, 2, 2)), joints, cells, weights, cells,
+                       np.zeros((4, 1)), joints, joints, joints)
+    confine(joints, joints, joints, joints, joints, 1.0, joints, joints)

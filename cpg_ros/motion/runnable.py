@@ -1,0 +1,37 @@
+"""Whether the generator can run a gait at all, whatever the robot."""
+
+import numpy as np
+
+from cpg_ros.dynamics.periodic import Orbit
+from cpg_ros.dynamics.stability import stability
+from cpg_ros.motion.phase_readout import phase_map
+from cpg_ros.motion.plan import STEPS_A_PERIOD
+from cpg_ros.motion.readout import TURN, lead_table
+
+#: Points of a cycle by which a waveform's humps are counted.
+POINTS = 512
+
+
+def refusal(orbit: Orbit, harmonics: int) -> str:
+    """Say why the generator would refuse a gait, or ''.
+
+    Args:
+        orbit: the gait's.
+        harmonics: of a Morris-Lecar cell's waveform that joints follow.
+
+    """
+    shortest = STEPS_A_PERIOD * orbit.network.step
+    if orbit.period < shortest:
+        return f'its period of {orbit.period:.3g} model time units is below {shortest:g}'
+    flaw = stability(orbit).flaw
+    if flaw:
+        return f'it does not attract: {flaw}'
+    try:
+        if orbit.network.variables == 1:
+            theta = np.arange(POINTS) / POINTS
+            lead_table(orbit.waveform(theta), orbit.waveform(theta, 1) / TURN)
+        else:
+            phase_map(orbit, harmonics)
+    except ValueError as error:
+        return f'it cannot drive joints: {error}'
+    return ''

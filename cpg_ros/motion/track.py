@@ -1,0 +1,123 @@
+"""One network running one gait, watched: is it still where the gait has it?"""
+
+import math
+
+import numpy as np
+
+from cpg_ros.motion.plan import Program
+from cpg_ros.motion.steering import Drive
+
+#: Off the orbit: a cell further away than this share of the peak, or the phase behind or ahead
+#: of the clock by this share of a cycle, for longer than this many strides.
+FAR, ASTRAY, PATIENCE = 0.3, 0.15, 0.5
+#: Strides the network gets to find its new gait by itself after a transition of 0 s.
+SETTLING = 40.0
+#: At rest: no state changes by more than this share of a cell's range in a stride.
+AT_REST = 0.05
+#: Such a transition starts with at least this share of the new gait in the state.
+KICK = 0.05
+
+
+class Track:
+    """A network running one program.
+
+    Attributes:
+        angle: of each joint from the stand, rad.
+        rise: its derivative by phase, rad per cycle.
+        reach: its derivative by the stride of the joint's leg, rad; only with a drive.
+        legs: phase of each leg, cycles.
+
+    """
+
+    def __init__(self, program: Program, transition: float, drive: Drive | None = None) -> None:
+        """Run a program, its strides as long as a drive has them, if there is one."""
+        self.transition = transition
+        self.progress = 0.0
+        self.drive = drive
+        self._leg = program.robot.leg_of_joint
+        self.angle, self.rise, self.reach, self._lift = np.zeros((4, self._leg.size))
+        self.legs = np.zeros(len(program.robot.legs))
+        self.stepper = program.seed.copy()
+        self.settling = self._calm = self._still = 0.0
+        self.follow(program)
+
+    def follow(self, program: Program) -> None:
+        """Read joints and judge health by this program from now on."""
+        self.program = program
+        self._least = AT_REST * float(program.orbit.levels[0, 0, 1])
+        self._astray = 0.0
+        self._look()
+        self.phase = float(self.legs[0])
+
+    def align(self, phase: float) -> None:
+        """Bring the first leg to this phase, from the orbit's start."""
+        ahead = (phase - self.program.readout.start) % 1.0
+        self.stepper.advance(ahead * self.program.orbit.period)
+        self._look()
+        self.phase = float(self.legs[0])
+        self._astray = 0.0
+
+    def _look(self) -> float:
+        program, now, angle, rise = self.program, self.stepper.now, self.angle, self.rise
+        distance = program.readout.look(now, angle, rise, self.legs)
+        if self.drive is not None:
+            # angle = in_place + stride (angle - in_place), and so its derivatives.
+            stride = self.drive.stride[self._leg]
+            still, lift = self.reach, self._lift
+            program.in_place.look(now, still, lift, self.legs)
+            rise += (stride - 1.0) * (rise - lift)
+            np.subtract(angle, still, out=self.reach)
+            angle += (stride - 1.0) * self.reach
+        angle += program.shift
+        return distance
+
+    def advance(self, strides: float) -> bool:
+        """Advance by some strides; tell whether the network is still on its orbit."""
+        self.stepper.advance(strides * self.program.orbit.period)
+        distance = self._look()
+        expected = self.phase + strides
+        if not math.isfinite(distance):
+            self.phase = expected % 1.0
+            return False
+        error = (self.legs[0] - expected + 0.5) % 1.0 - 0.5
+        # The clock follows the network's own phase within two strides.
+        self.phase = (expected + min(1.0, 0.5 * strides) * error) % 1.0
+        if self.settling > 0.0:
+            # A stride on the orbit is the end of it; for an instant a small state may look so.
+            self._calm = self._calm + strides if distance < FAR / 3 else 0.0
+            self.settling = 0.0 if self._calm > 1.0 else self.settling - strides
+            # Come to rest, where the network has a stable equilibrium beside the gait?
+            moving = np.abs(self.stepper.now[1]).max() * self.program.orbit.period
+            self._still = self._still + strides if moving < self._least else 0.0
+            if self._still > 1.0:
+                self.settling, self._astray = 0.0, 2.0 * PATIENCE
+            self.phase = float(self.legs[0])
+        elif distance > FAR or abs(error) > ASTRAY:
+            self._astray += strides
+        else:
+            self._astray = 0.0
+        return self._astray <= PATIENCE
+
+    def reseed(self) -> None:
+        """Put the network back on its orbit, at the phase the clock has."""
+        self.stepper = self.program.seed.copy()
+        self.settling = 0.0
+        self.align(self.phase)
+
+    def drift_to(self, program: Program) -> None:
+        """Take a program's parameters and leave the change to the network's own dynamics.
+
+        A gait in whose class the state has nothing, as between any two gaits on their exact
+        orbits, gets a small start; the lock would otherwise hold the network at rest.
+        """
+        orbit = program.orbit
+        self.stepper.set(orbit.network, program.gain, orbit.symmetry)
+        mean, basis = program.wave
+        ahead = (self.phase - program.readout.start) % 1.0
+        state, target = self.stepper.newest() - mean, orbit(np.array(ahead * orbit.period)) - mean
+        if np.linalg.norm(basis @ state) < KICK * np.linalg.norm(basis @ target):
+            self.stepper.disturb(KICK * target)
+        # On to the node where the change is, so that all of it shows at once.
+        self.stepper.advance(self.stepper.ahead)
+        self.follow(program)
+        self.settling, self._calm, self._still = SETTLING, 0.0, 0.0

@@ -1,0 +1,61 @@
+"""A line in a network's parameter space: parameters that move together, each with a sign."""
+
+from dataclasses import dataclass, replace
+from typing import TypeVar
+
+from cpg_ros.networks.network import Network
+
+AnyNetwork = TypeVar('AnyNetwork', bound=Network)
+
+
+@dataclass(frozen=True)
+class ParameterLine:
+    """Parameters that are set to plus or minus one value; written ``alpha=-beta``.
+
+    Attributes:
+        names: of the parameters.
+        signs: 1.0 or -1.0 for each; the first is 1.
+
+    """
+
+    names: tuple[str, ...]
+    signs: tuple[float, ...]
+
+    @classmethod
+    def parse(cls, text: str, network: type[Network]) -> 'ParameterLine':
+        """Read ``tau``, ``alpha=beta``, ``alpha=-beta`` or a group of the network, ``w_a``.
+
+        Raises:
+            ValueError: a name that is not a parameter of the network, or given twice.
+
+        """
+        names: list[str] = []
+        signs: list[float] = []
+        for part in text.split('='):
+            name = part.strip().removeprefix('-')
+            members = network.groups.get(name, (name,))
+            for member in members:
+                if member not in network.parameters():
+                    known = ', '.join((*network.groups, *network.parameters()))
+                    raise ValueError(f"'{name}' is not one of {known}")
+                if member in names:
+                    raise ValueError(f"'{text}' names {member} twice")
+            sign = -1.0 if part.strip().startswith('-') else 1.0
+            if not names and sign < 0.0:
+                raise ValueError(f"'{text}' must not begin with a minus")
+            names.extend(members)
+            signs.extend([sign] * len(members))
+        return cls(tuple(names), tuple(signs))
+
+    def __str__(self) -> str:
+        return '='.join(('' if sign > 0.0 else '-') + name
+                        for name, sign in zip(self.names, self.signs, strict=True))
+
+    def value(self, network: Network) -> float:
+        """Where a network is on the line: the value of its first parameter."""
+        return network.as_dict()[self.names[0]]
+
+    def at(self, network: AnyNetwork, value: float) -> AnyNetwork:
+        """Return the network with the parameters set."""
+        return replace(network, **{  # type: ignore[type-var]
+            name: sign * value for name, sign in zip(self.names, self.signs, strict=True)})

@@ -1,0 +1,87 @@
+"""Preset files: named parameter sets with the gait each of them runs and a state on its orbit."""
+
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from cpg_ros.files.atomic_write import write_atomically
+from cpg_ros.files.shared_resources import share
+from cpg_ros.files.yaml_reader import Reader
+from cpg_ros.networks.network import Network, Preset
+
+#: No number in a preset is larger.
+LARGEST = 1e3
+
+
+class PresetError(ValueError):
+    """A preset file cannot be used; the message names the file, the key and the reason."""
+
+
+def read_presets(path: str | Path, network: type[Network]) -> dict[str, Preset]:
+    """Read a preset file of a network: name -> preset.
+
+    Raises:
+        PresetError: the file cannot be read, is for another network, or has a bad value.
+
+    """
+    reader = Reader(Path(path), 'preset file', PresetError, LARGEST)
+    tree = reader.keys(reader.tree(), 'file', {'network', 'presets'})
+    if tree['network'] != network.name:
+        raise reader.fail('network', f"is '{tree['network']}', not '{network.name}'")
+    if not isinstance(tree['presets'], dict) or not tree['presets']:
+        raise reader.fail('presets', 'must be a mapping with at least one name')
+    found = {}
+    for name, entry in tree['presets'].items():
+        where = f'presets.{name}'
+        entry = reader.keys(entry, where, {'gait', 'parameters'}, {'start', 'period'})
+        gait = reader.text(entry['gait'], f'{where}.gait')
+        if gait not in network.gaits():
+            raise reader.fail(f'{where}.gait', f"'{gait}' is not one of "
+                              f'{", ".join(network.gaits())}')
+        names = network.parameters()
+        values = reader.keys(entry['parameters'], f'{where}.parameters', set(names))
+        numbers = [reader.number(values[key], f'{where}.parameters.{key}') for key in names]
+        for key, value in zip(names, numbers, strict=True):
+            allowed = network.ranges[key]
+            if not allowed.low <= value <= allowed.high:
+                raise reader.fail(f'{where}.parameters.{key}', f'{value:g} is not from '
+                                  f'{allowed.low:g} to {allowed.high:g}')
+        parameters = network(*numbers)
+        if ('start' in entry) != ('period' in entry):
+            raise reader.fail(where, "'start' and 'period' go together")
+        if 'start' not in entry:
+            found[name] = Preset(gait, parameters)
+            continue
+        if parameters.delay:
+            raise reader.fail(f'{where}.start', f'is not for the network {network.name}, which '
+                              'has a delay')
+        start = [reader.number(value, f'{where}.start[{k}]')
+                 for k, value in enumerate(reader.items(entry['start'], f'{where}.start'))]
+        if len(start) != parameters.components:
+            raise reader.fail(f'{where}.start', f'has {len(start)} numbers, not '
+                              f'{parameters.components}: the first variable of each cell, then '
+                              'the second')
+        period = reader.number(entry['period'], f'{where}.period')
+        if period <= 0.0:
+            raise reader.fail(f'{where}.period', f'{period:g} must be positive')
+        found[name] = Preset(gait, parameters, tuple(start), period)
+    return found
+
+
+def shipped(network: type[Network]) -> dict[str, Preset]:
+    """Read the presets that come with the package."""
+    return read_presets(share() / 'config' / 'presets' / f'{network.name}.yaml', network)
+
+
+def write_presets(path: str | Path, network: type[Network], presets: dict[str, Preset],
+                  comment: str = '') -> None:
+    """Write a preset file."""
+    tree: dict[str, Any] = {'network': network.name, 'presets': {}}
+    for name, preset in presets.items():
+        tree['presets'][name] = {
+            'gait': preset.gait, 'parameters': preset.network.as_dict(),
+            **({'start': list(preset.start), 'period': preset.period} if preset.start else {})}
+    lines = ''.join(f'# {line}\n' for line in comment.splitlines())
+    write_atomically(path, lines + yaml.safe_dump(tree, sort_keys=False, default_flow_style=None,
+                                             width=96))

@@ -1,0 +1,171 @@
+"""Joint commands taken from topics, as a robot's controllers would take them."""
+
+from collections.abc import Sequence
+from functools import partial
+from typing import Any
+
+import numpy as np
+from rclpy.callback_groups import CallbackGroup
+from rclpy.node import Node
+from rclpy.qos import QoSProfile
+from rclpy.qos_overriding_options import QoSOverridingOptions
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Float64MultiArray
+from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
+
+from cpg_ros.nodes.joint_publishers import COMMAND_TOPICS
+from cpg_ros.robots.robot import Robot
+from cpg_ros.robots.robot_file import LARGEST
+
+KINDS = ('joint_states', *COMMAND_TOPICS)
+#: Least time between two warnings about commands, s.
+QUIET = 10.0
+
+
+class _Unserved(CallbackGroup):
+    """Keeps subscriptions from the executor: their messages wait until they are taken."""
+
+    def can_execute(self, entity) -> bool:
+        return False
+
+    def beginning_execution(self, entity) -> bool:
+        return False
+
+    def ending_execution(self, entity) -> None:
+        pass
+
+
+class _Bad(ValueError):
+    """A message that cannot be used."""
+
+
+class Commands:
+    """The angles that the last good messages asked for.
+
+    ``take`` reads what has arrived, in the thread that uses it: of each topic the last message,
+    whole or, where anything in it is wrong, not at all.
+
+    Attributes:
+        angles: rad, in ``robot.order``; until commands come, what it was made with.
+        topics: the names of the topics, resolved.
+
+    """
+
+    def __init__(self, node: Node, robot: Robot, kind: str, period: float, angles: np.ndarray
+                 ) -> None:
+        """Subscribe to the topics of one kind of command.
+
+        Args:
+            node: that subscribes.
+            robot: whose joints are commanded.
+            kind: one of KINDS.
+            period: between two calls of ``take``, s.
+            angles: before the first command, rad.
+
+        """
+        self._node, self._robot, self._period = node, robot, period
+        self.angles = np.array(angles, dtype=float)
+        self._index = {name: k for k, name in enumerate(robot.order)}
+        self._group = _Unserved()
+        # One for each topic: the subscription, what reads a message, and names -> places.
+        self._sources: list[tuple[Any, Any]] = []
+        self._known: dict[str, tuple[list[str], np.ndarray]] = {}
+        self._fresh: list[bool] = []
+        self._since = 0
+        if kind == 'joint_states':
+            for leg, joints in robot.legs.items():
+                topic = f'{leg}/joint_states'
+                self._listen(JointState, topic, partial(
+                    self._states, topic, tuple(joint.name for joint in joints)))
+        elif kind == 'joint_trajectory':
+            self._listen(JointTrajectory, COMMAND_TOPICS[kind],
+                         partial(self._trajectory, COMMAND_TOPICS[kind]))
+        else:
+            self._listen(Float64MultiArray, COMMAND_TOPICS[kind],
+                         partial(self._array, COMMAND_TOPICS[kind]))
+        self.topics = [subscription.topic_name for subscription, _ in self._sources]
+
+    def _listen(self, kind: type, topic: str, read: Any) -> None:
+        subscription = self._node.create_subscription(
+            kind, topic, lambda _: None, QoSProfile(depth=10), callback_group=self._group,
+            qos_overriding_options=QoSOverridingOptions.with_default_policies())
+        self._sources.append((subscription, read))
+        self._fresh.append(False)
+
+    @property
+    def connected(self) -> bool:
+        """Whether somebody publishes on every topic."""
+        return all(self._node.count_publishers(topic) for topic in self.topics)
+
+    def expect(self, since: int) -> None:
+        """Wait for commands from now on that are not stamped before an instant, ns."""
+        self._since = since
+        self._fresh = [False] * len(self._fresh)
+
+    def take(self) -> bool:
+        """Take what has arrived; return whether all topics have brought what is expected."""
+        for k, (subscription, read) in enumerate(self._sources):
+            last = None
+            with subscription.handle:
+                while (taken := subscription.handle.take_message(
+                        subscription.msg_type, False)) is not None:
+                    last = taken[0]
+            if last is not None:
+                try:
+                    self._fresh[k] |= read(last)
+                except _Bad as error:
+                    self._node.get_logger().warning(f'ignored: {error}',
+                                                    throttle_duration_sec=QUIET)
+        return all(self._fresh)
+
+    def _states(self, topic: str, wanted: tuple[str, ...], message: JointState) -> bool:
+        self._apply(topic, wanted, message.name, message.position)
+        stamp = message.header.stamp
+        nanoseconds = 1_000_000_000 * stamp.sec + stamp.nanosec
+        return not nanoseconds or nanoseconds >= self._since
+
+    def _trajectory(self, topic: str, message: JointTrajectory) -> bool:
+        if not message.points:
+            raise _Bad(f'{topic}: no points')
+
+        def apart(point: JointTrajectoryPoint) -> float:
+            time = point.time_from_start
+            return abs(time.sec + 1e-9 * time.nanosec - self._period)
+
+        # A controller would interpolate; here it is the point next to the coming instant.
+        point = min(message.points, key=apart)
+        self._apply(topic, self._robot.order, message.joint_names, point.positions)
+        return True
+
+    def _array(self, topic: str, message: Float64MultiArray) -> bool:
+        if len(message.data) != len(self.angles):
+            raise _Bad(f'{topic}: {len(message.data)} numbers for {len(self.angles)} joints')
+        self._write(topic, self._robot.order, slice(None), message.data)
+        return True
+
+    def _apply(self, topic: str, wanted: tuple[str, ...], names: list[str],
+               positions: Sequence[float]) -> None:
+        known = self._known.get(topic)
+        if known is None or known[0] != names:
+            known = list(names), self._places(topic, wanted, names)
+            self._known[topic] = known
+        if len(positions) != len(names):
+            raise _Bad(f'{topic}: {len(positions)} positions for {len(names)} joints')
+        self._write(topic, names, known[1], positions)
+
+    def _places(self, topic: str, wanted: tuple[str, ...], names: list[str]) -> np.ndarray:
+        for name in names:
+            if name not in wanted:
+                raise _Bad(f"{topic}: joint '{name}' is not one of {', '.join(wanted)}")
+        for name in wanted:
+            if names.count(name) != 1:
+                raise _Bad(f"{topic}: joint '{name}' is "
+                           f"{'there twice' if name in names else 'missing'}")
+        return np.array([self._index[name] for name in names])
+
+    def _write(self, topic: str, names: Sequence[str], places: Any, values: Sequence[float]
+               ) -> None:
+        for name, value in zip(names, values, strict=True):
+            if not abs(value) <= LARGEST:
+                raise _Bad(f"{topic}: joint '{name}' at {value}")
+        self.angles[places] = values

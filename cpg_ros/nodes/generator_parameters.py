@@ -1,0 +1,187 @@
+"""The generator's parameters: descriptors, presets, and what a batch of changes asks for."""
+
+import contextlib
+import functools
+import math
+from dataclasses import dataclass
+from typing import Any
+
+from rclpy.parameter import Parameter
+
+from cpg_ros.motion.plan import Program, Refused, gait_of, plan
+from cpg_ros.networks.network import Network, Preset
+from cpg_ros.networks.registry import NETWORKS, PRESETS
+from cpg_ros.nodes.parameter_spec import Spec
+from cpg_ros.robots.robot import Robot
+
+COMMANDS = ('none', 'joint_trajectory', 'forward_position')
+#: Network -> the robot file and the gait it starts with.
+USUAL = {'delayed': ('quadruped', 'trot'), 'quadruped': ('quadruped', 'trot'),
+         'biped': ('biped', 'walk')}
+
+
+NETWORK = Spec('delayed', 'network of cells that makes the rhythm', read_only=True,
+               constraints='one of: ' + ', '.join(NETWORKS))
+
+
+def specs(network: str) -> dict[str, Spec]:
+    """Return the parameters that depend on nothing but the network, in order of declaration."""
+    robot, gait = USUAL[network]
+    return {
+        'presets': Spec('', 'file with further presets; empty for none', read_only=True),
+        'robot': Spec(robot, 'robot file, or the name of a shipped one', read_only=True,
+                      constraints='a shipped name, or the path of a YAML file'),
+        'gait': Spec(gait, 'gait; setting it loads its preset of network parameters',
+                     constraints='one of: ' + ', '.join(PRESETS[network])
+                     + ', and those of the file given by presets'),
+        'rate': Spec(100.0, 'messages per second on every output topic [Hz]', 1.0, 2000.0),
+        'amplitude': Spec(1.0, "factor on the robot file's joint amplitudes", 0.0, 3.0),
+        'transition': Spec(1.0, 'duration of a change of gait or parameters [s]; 0 leaves it to '
+                           "the network's own dynamics", 0.0, 30.0),
+        'ramp': Spec(1.0, 'duration of the ramp between the stand and the gait [s]', 0.0, 30.0),
+        'symmetry_gain': Spec(-1.0, 'gain of the symmetry lock [1/model time]; -1 chooses one '
+                              "that makes the gait attract, 0 is the paper's model", -1.0, 200.0),
+        'combined_topic': Spec('joint_states', 'topic with all joints in one message; empty for '
+                               'none', read_only=True),
+        'command': Spec('none', 'command topic for ros2_control', read_only=True,
+                        constraints='one of: ' + ', '.join(COMMANDS)),
+        'autostart': Spec(True, 'ramp into the gait at start; false waits for ~/enable',
+                          read_only=True),
+        'cmd_vel': Spec(False, 'walk as the topic cmd_vel asks; the robot file must say how',
+                        read_only=True),
+        'cmd_vel_timeout': Spec(0.5, 'a cmd_vel older than this stops the robot [s]', 0.05, 60.0)}
+
+
+@dataclass(frozen=True)
+class Settings:
+    """What a program is planned from; hashable, so that a plan is made once."""
+
+    gait: str
+    network: Network
+    frequency: float
+    amplitude: float
+    symmetry_gain: float
+
+
+class Planner:
+    """Turns parameters into programs for one network and one robot.
+
+    Attributes:
+        network: whose parameters.
+        presets: name -> preset, all that ``gait`` can be set to.
+        robot: which the programs are for.
+        steered: whether only gaits that the robot file says how to steer can run.
+        names: of the parameters that make up the settings.
+
+    """
+
+    def __init__(self, network: type[Network], presets: dict[str, Preset], robot: Robot,
+                 steered: bool = False) -> None:
+        self.network, self.presets, self.robot = network, presets, robot
+        self.steered = steered
+        self.names = ('gait', 'frequency', 'amplitude', 'symmetry_gain',
+                      *(f'{network.name}.{key}' for key in network.parameters()))
+        self.program = functools.lru_cache(maxsize=32)(self._program)
+
+    def prepare(self) -> None:
+        """Solve every preset's gait ahead, so that a switch to it is answered at once."""
+        for preset in self.presets.values():
+            # What cannot run is refused when it is asked for, with the reason.
+            with contextlib.suppress(ValueError):
+                gait_of(preset, preset.network)
+
+    def specs(self, preset: str) -> dict[str, Spec]:
+        """Return ``frequency`` and the network's own, with a preset's values as defaults."""
+        network, values = self.network, self._values(self.presets[preset].network)
+        frequency = self._frequency(preset)
+        found = {'frequency': Spec(1.0 if frequency is None else frequency,
+                                   "strides per second [Hz]; 0 runs in the model's own time, one "
+                                   'unit a second', 0.0, 10.0)}
+        found |= {f'{network.name}.{key}': Spec(values[key], allowed.text, allowed.low,
+                                               allowed.high)
+                 for key, allowed in network.ranges.items()}
+        for group, members in network.groups.items():
+            allowed = network.ranges[members[0]]
+            found[f'{network.name}.{group}'] = Spec(
+                values[group], f'{" ".join(members)}: the mean; setting it sets all of them',
+                allowed.low, allowed.high)
+        return found
+
+    def _frequency(self, preset: str) -> float | None:
+        """Frequency for which the robot file has this gait, Hz."""
+        return self.robot.motion(preset, self.presets[preset].gait).frequency
+
+    def _values(self, network: Network) -> dict[str, float]:
+        """Parameters and groups by their bare names."""
+        values = network.as_dict()
+        return {**values, **{group: math.fsum(values[key] for key in members) / len(members)
+                             for group, members in network.groups.items()}}
+
+    def settings(self, values: dict[str, Any]) -> Settings:
+        """Build settings from all parameters by name.
+
+        Raises:
+            Refused: a value of the wrong kind, not finite, or an unknown gait.
+
+        """
+        for name in self.names:
+            value = values[name]
+            if name != 'gait' and not (isinstance(value, float) and math.isfinite(value)):
+                raise Refused(f'{name} must be a finite number, not {value!r}')
+        if values['gait'] not in self.presets:
+            raise Refused(f"gait '{values['gait']}' is not one of {', '.join(self.presets)}")
+        gain = values['symmetry_gain']
+        if -1.0 < gain < 0.0:
+            raise Refused(f'symmetry_gain {gain:g} is neither -1 (chosen) nor at least 0')
+        network = self.network(*(values[f'{self.network.name}.{key}']
+                                 for key in self.network.parameters()))
+        return Settings(values['gait'], network, values['frequency'], values['amplitude'], gain)
+
+    def plan(self, values: dict[str, Any]) -> Program:
+        """Work out the program that all parameters, by name, ask for.
+
+        Raises:
+            Refused: it cannot be run.
+
+        """
+        program = self.program(self.settings(values))
+        if self.steered:
+            try:
+                program.steer(0.0, 0.0)
+            except ValueError as error:
+                raise Refused(f'{error}, which cmd_vel needs') from error
+        return program
+
+    def _program(self, settings: Settings) -> Program:
+        return plan(self.robot, settings.gait, self.presets[settings.gait], settings.network,
+                    settings.frequency, settings.amplitude, settings.symmetry_gain)
+
+    def complete(self, parameters: list[Parameter], current: dict[str, Any]) -> list[Parameter]:
+        """Add to a batch what follows from it.
+
+        The gait's preset, the frequency that the robot file has for it, then what a group sets,
+        then the means of the groups; single parameters in the batch win over all of them. An
+        unknown gait adds nothing; it is refused later.
+        """
+        prefix = f'{self.network.name}.'
+        given = {p.name: p.value for p in parameters}
+        gait = given.get('gait')
+        preset = self.presets.get(gait) if isinstance(gait, str) else None
+        wanted: dict[str, float] = {} if preset is None else {
+            prefix + key: value for key, value in preset.network.as_dict().items()}
+        frequency = None if preset is None else self._frequency(str(gait))
+        if frequency is not None:
+            wanted['frequency'] = frequency
+        for group, members in self.network.groups.items():
+            if isinstance(given.get(prefix + group), float):
+                wanted.update({prefix + key: given[prefix + group] for key in members})
+        wanted = {name: value for name, value in wanted.items() if name not in given}
+        values = {**current, **wanted, **given}
+        for group, members in self.network.groups.items():
+            parts = [values[prefix + key] for key in members]
+            if (any(prefix + key in wanted or prefix + key in given for key in members)
+                    and all(isinstance(part, float) for part in parts)):
+                parameters = [p for p in parameters if p.name != prefix + group]
+                wanted[prefix + group] = math.fsum(parts) / len(parts)
+        return [Parameter(name, Parameter.Type.DOUBLE, value)
+                for name, value in wanted.items()] + parameters

@@ -1,0 +1,142 @@
+"""How nodes declare parameters, start, serve and end."""
+
+import gc
+import signal
+import sys
+import threading
+import traceback
+from collections.abc import Callable
+
+import rclpy
+from rclpy.exceptions import InvalidParameterTypeException, InvalidParameterValueException
+from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.logging import get_logger
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+from rclpy.signals import SignalHandlerOptions
+
+from cpg_ros.nodes.parameter_services import StrictParameterService
+from cpg_ros.nodes.parameter_spec import Spec, as_doubles
+from cpg_ros.nodes.shutdown import ended
+
+#: What a parameter of a type is called.
+KINDS = {bool: 'a bool', int: 'an integer', float: 'a double', str: 'a string',
+         list: 'a list of strings'}
+
+
+class StartError(RuntimeError):
+    """The node cannot start; the message is one line for the user."""
+
+
+class StartedNode(Node):
+    """A node whose parameters come from specs, and that has a thread of its own at work.
+
+    Attributes:
+        stop: set when the node is to end.
+        failure: what ended the thread, if anything did.
+        thread: one that may be at work when the node ends, and need not come to its end.
+
+    """
+
+    def __init__(self, name: str, **options) -> None:
+        super().__init__(name, start_parameter_services=False, **options)
+        self._parameter_service = StrictParameterService(self)
+        self._doubles: set[str] = set()
+        self.add_pre_set_parameters_callback(self._complete)
+        self.failure: BaseException | None = None
+        self.thread: threading.Thread | None = None
+        self.stop = threading.Event()
+
+    def _declare(self, name: str, spec: Spec) -> None:
+        override = self._parameter_overrides.get(name)
+        if isinstance(spec.default, float):
+            self._doubles.add(name)
+            if override is not None and override.type_ == Parameter.Type.INTEGER:
+                self._parameter_overrides[name] = as_doubles([override], {name})[0]
+        try:
+            self.declare_parameter(name, spec.default, spec.descriptor())
+        except InvalidParameterTypeException as error:
+            raise StartError(f'parameter {name} must be {KINDS[type(spec.default)]}, not '
+                             f'{self._parameter_overrides[name].value!r}') from error
+        except InvalidParameterValueException as error:
+            raise StartError(f'parameter {name}: {self._parameter_overrides[name].value} is not '
+                             f'from {spec.low:g} to {spec.high:g}') from error
+
+    def _complete(self, parameters: list[Parameter]) -> list[Parameter]:
+        """Return what a batch of changes stands for."""
+        return as_doubles(parameters, self._doubles)
+
+    def _value(self, name: str):
+        return self.get_parameter(name).value
+
+    def _one_of(self, name: str, allowed: tuple[str, ...]) -> None:
+        if self._value(name) not in allowed:
+            raise StartError(f"{name} '{self._value(name)}' is not one of {', '.join(allowed)}")
+
+    def _warn_of_unknown(self) -> None:
+        for name in self._parameter_overrides:
+            if not self.has_parameter(name):
+                self.get_logger().warning(f"there is no parameter '{name}': ignored")
+
+    def _fail(self, error: BaseException) -> None:
+        """End the node because of an exception in its thread."""
+        self.failure = error
+        self.get_logger().fatal('the publishing thread failed:\n'
+                                + ''.join(traceback.format_exception(error)))
+        self.stop.set()
+
+    def begin(self) -> None:
+        """Start the thread."""
+
+    def finish(self) -> None:
+        """End the thread."""
+
+
+def _spin(executor: SingleThreadedExecutor, node: StartedNode) -> None:
+    """Serve parameters, services and timers until the executor is shut down."""
+    while not node.stop.is_set():
+        try:
+            executor.spin_once()
+        except ExternalShutdownException:
+            return
+        except Exception:
+            # One bad request must not end a node that moves a robot.
+            node.get_logger().error('a request failed:\n' + traceback.format_exc())
+
+
+def run(make: Callable[[], StartedNode], name: str, args: list[str] | None) -> int:
+    """Run a node until SIGINT or SIGTERM, or until it stops itself; return the exit code."""
+    def leave(*_: object) -> None:
+        raise SystemExit(0)
+
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, leave)
+    # The publishing thread must not wait long for one that computes in Python.
+    sys.setswitchinterval(2e-4)
+    rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
+    try:
+        node = make()
+    except StartError as error:
+        get_logger(name).fatal(str(error))
+        rclpy.shutdown()
+        return 1
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda *_: node.stop.set())
+    executor = SingleThreadedExecutor()
+    executor.add_node(node)
+    serving = threading.Thread(target=_spin, args=(executor, node), name='executor', daemon=True)
+    gc.collect()
+    gc.freeze()
+    node.begin()
+    serving.start()
+    # A bare wait() can miss a signal that another thread received.
+    while not node.stop.wait(0.2):
+        pass
+    node.finish()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        # It ends already: a second one, while the interpreter winds up, would kill it.
+        signal.signal(number, signal.SIG_IGN)
+    executor.shutdown(timeout_sec=0.1)
+    rclpy.shutdown()
+    code = 0 if node.failure is None else 1
+    return ended(ended(code, node.thread), serving)

@@ -1,0 +1,60 @@
+"""Joint states out of rosbag2 bags: sqlite3 and mcap, compressed or not, without ROS.
+
+The library `rosbags` reads the storage; positions come from the messages' bytes in bulk (see
+`cdr`), so that of a long bag only the angles are ever in memory.
+"""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from cpg_ros.files.progress_bar import progress_bar
+from cpg_ros.recordings.bag_storage import opened
+from cpg_ros.recordings.joint_streams import BATCH, Stream, recorded
+from cpg_ros.recordings.recording import Recording
+from cpg_ros.recordings.servo import Servo
+
+
+def read_bag(path: str | Path, topics: Sequence[str] = (), joints: Sequence[str] = (),
+             progress: bool = True, some: bool = False, servo: Servo | None = None
+             ) -> Recording:
+    """Read the joint states of a bag.
+
+    See `recorded` for joints that are on several topics, and for stamps.
+
+    A recorder that died leaves mcap files without an end and no metadata.yaml. What is whole of
+    such files is read; a note says so. A cut sqlite3 file is refused.
+
+    Args:
+        path: the bag's folder, or one of its storage files (.mcap, .db3).
+        topics: which to read; all topics of type sensor_msgs/msg/JointState, if empty.
+        joints: which joints to take, in this order; all of them, if empty.
+        progress: show a progress bar.
+        some: joints that are not there are passed over, unless none is.
+        servo: of the joints, if the angles that they were driven to are wanted.
+
+    Raises:
+        RecordingError: see `recorded`; a bag that cannot be read, a topic that is not there or of
+            another type.
+
+    """
+    path = Path(path)
+    with opened(path) as bag:
+        streams = {topic: Stream(topic, joints, servo) for topic in bag.choose(topics)}
+        expected = bag.expected()
+        total = max(1, sum(expected[topic] for topic in streams))
+        with progress_bar(f'reading {path.name}', total, enabled=progress) as bar:
+            done = 0
+            for topic, received, message in bag.messages(list(streams)):
+                stream = streams[topic]
+                stream.add(received, message)
+                if len(stream.messages) == BATCH:
+                    stream.decode(f'{path}, ')
+                    done += BATCH
+                    bar(done)
+        for stream in streams.values():
+            stream.decode(f'{path}, ')
+        notes = [*bag.notes, *(
+            f"{topic}: {stream.count} messages, where the bag's metadata counts {expected[topic]}"
+            for topic, stream in streams.items() if stream.count != expected[topic]), *(
+            f'{topic}: no messages' for topic, stream in streams.items() if not stream.count)]
+    return recorded(list(streams.values()), joints, f'{path}, ', notes, some)

@@ -1,0 +1,142 @@
+"""The storage of rosbag2 bags: which topics are there, and their messages as bytes.
+
+Whatever the library raises on a damaged bag ends here, as one line that names the file.
+"""
+
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+
+from rosbags.rosbag2 import Reader, ReaderError
+
+from cpg_ros.recordings.cdr import JOINT_STATE
+from cpg_ros.recordings.recording import RecordingError, few
+from cpg_ros.recordings.unfinished_mcap import UnfinishedPath, whole_part
+
+STORAGES = ('.mcap', '.db3')
+
+
+class Bag:
+    """The readers of a bag: one, or one for each storage file where metadata.yaml is missing."""
+
+    def __init__(self, path: Path, readers: list[Reader], cut: bool, notes: list[str]) -> None:
+        self.path, self.readers, self.notes = path, readers, notes
+        self.connections = [one for reader in readers for one in reader.connections]
+        # The library refuses unordered messages in files without an index; those of a single
+        # topic mostly are in order.
+        self.apart = cut
+
+    def choose(self, topics: Sequence[str]) -> list[str]:
+        """Return the topics to read."""
+        types: dict[str, set[str]] = {}
+        for one in self.connections:
+            types.setdefault(one.topic, set()).add(one.msgtype)
+        if not types:
+            raise RecordingError(f'{self.path}: an empty bag, without topics')
+        fitting = [topic for topic in types if types[topic] == {JOINT_STATE}]
+        if not topics and not fitting:
+            there = ', '.join(f'{topic} ({", ".join(sorted(types[topic]))})'
+                              for topic in list(types)[:6])
+            raise RecordingError(f'{self.path}: no topic of type {JOINT_STATE}; it has {there}')
+        chosen = [topic if topic in types else '/' + topic.lstrip('/') for topic in topics]
+        for topic in chosen:
+            if topic not in types:
+                raise RecordingError(f'{self.path}: no topic {topic!r}; '
+                                     f'there are {few(list(types), 20)}')
+            if topic not in fitting:
+                raise RecordingError(f'{self.path}, {topic}: {" and ".join(sorted(types[topic]))}'
+                                     f', where {JOINT_STATE} is needed')
+        return list(dict.fromkeys(chosen)) or fitting
+
+    def expected(self) -> Counter[str]:
+        """Count the messages of each topic, as the bag says."""
+        counts: Counter[str] = Counter()
+        for one in self.connections:
+            counts[one.topic] += one.msgcount
+        return counts
+
+    def messages(self, topics: Sequence[str]) -> Iterator[tuple[str, int, bytes]]:
+        """Yield topic, receive time (ns) and bytes of each message."""
+        read: Counter[str] = Counter()
+        for reader in self.readers:
+            chosen = [one for one in reader.connections if one.topic in topics]
+            for some in [[one] for one in chosen] if self.apart else [chosen] * bool(chosen):
+                try:
+                    for connection, received, message in reader.messages(some):
+                        read[connection.topic] += 1
+                        yield connection.topic, received, message
+                # As to what the library raises, see opened.
+                except Exception as error:
+                    where = ', '.join(f'{read[topic]} messages of {topic}' for topic in topics)
+                    raise RecordingError(f'{reader.path}: {line(error)}, after {where}'
+                                         ) from error
+
+
+@contextmanager
+def opened(path: Path) -> Iterator[Bag]:
+    """Open a bag.
+
+    Raises:
+        RecordingError: it is not there or damaged.
+
+    """
+    try:
+        files = _files(path)
+        notes = [f'{file}: its recorder did not finish it; what is whole before byte {end} is used'
+                 for file in files if (end := whole_part(file)) is not None]
+        whole = path.is_file() or (path / 'metadata.yaml').exists()
+    except OSError as error:
+        raise RecordingError(f'{error.filename or path}: {error.strerror}') from error
+    cut = bool(notes)
+    if not whole:
+        notes.append(f'{path}: metadata.yaml is missing; its storage files are read as they are')
+    with ExitStack() as stack:
+        readers = []
+        for one in [path] if whole else files:
+            try:
+                reader = Reader(UnfinishedPath(one) if cut else one)
+                reader.open()
+            # The library names no complete list of what a damaged bag makes it raise.
+            except Exception as error:
+                raise RecordingError(f'{_culprit(one, files, error)}: {line(error)}') from error
+            stack.callback(reader.close)
+            readers.append(reader)
+        yield Bag(path, readers, cut, notes)
+
+
+def _files(path: Path) -> list[Path]:
+    """Return the storage files of a bag that the library can read by themselves, in order."""
+    if not path.exists():
+        raise RecordingError(f'{path}: no such bag')
+    if not path.is_dir():
+        if path.suffix not in STORAGES:
+            raise RecordingError(f'{path}: neither a folder nor a file with the ending '
+                                 f'{" or ".join(STORAGES)}')
+        return [path]
+    files = [file for file in path.iterdir() if file.suffix in STORAGES and file.is_file()]
+    if not files and not (path / 'metadata.yaml').exists():
+        raise RecordingError(f'{path}: no bag: it has neither metadata.yaml nor a storage file '
+                             f'({", ".join(STORAGES)})')
+    return sorted(files, key=lambda file: (len(file.name), file.name))
+
+
+def _culprit(path: Path, files: list[Path], error: Exception) -> str:
+    """Say what of a bag that could not be opened is damaged."""
+    if path.is_file():
+        return str(path)
+    for file in files:
+        try:
+            with Reader(UnfinishedPath(file)):
+                pass
+        except Exception:
+            return str(file)
+    if files or isinstance(error, ReaderError):
+        return (f'{path / "metadata.yaml"} cannot be used'
+                + (f' to read {few([file.name for file in files])}' if files else ''))
+    return ' or '.join(str(file) for file in path.iterdir() if file.name != 'metadata.yaml')
+
+
+def line(error: Exception) -> str:
+    """Return an error in one line, without a full stop."""
+    return ' '.join((str(error) or type(error).__name__).split()).rstrip('.')

@@ -1,0 +1,274 @@
+"""Joint angles out of CSV files: a time column and one column per joint."""
+
+import csv
+import io
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from fnmatch import fnmatchcase
+from itertools import islice
+from pathlib import Path
+
+import numpy as np
+
+from cpg_ros.files.progress_bar import progress_bar
+from cpg_ros.recordings.recording import (
+    LATEST,
+    Chunk,
+    Recording,
+    RecordingError,
+    few,
+    merged,
+    require,
+)
+
+#: What a header may call its unit -> that in rad, or in s.
+ANGLES = {'rad': 1.0, 'radian': 1.0, 'radians': 1.0,
+          'deg': np.pi / 180.0, 'degree': np.pi / 180.0, 'degrees': np.pi / 180.0,
+          '°': np.pi / 180.0}
+TIMES = {'s': 1.0, 'sec': 1.0, 'secs': 1.0, 'second': 1.0, 'seconds': 1.0,
+         'ms': 1e-3, 'msec': 1e-3, 'us': 1e-6, 'ns': 1e-9, 'nsec': 1e-9}
+#: 'knee [deg]', 'Time(s)', and for times also 'time_ms'.
+BRACKETED = re.compile(r'^(.*?)\s*[\[(]\s*([^\[\]()]*?)\s*[\])]$')
+TIME = re.compile(r'^[_%#/\s]*(t|time|times|stamp|timestamp|time_?stamp)(?:[_ ]([a-z]+))?$', re.I)
+#: Among other columns, those so called are the joints': 'JointPosFR_hip', as PlotJuggler has it
+#: '/joint_states/lf_knee/position'.
+POSITION = re.compile(r'^joint_?pos(?:ition)?s?[_./ ]*(.+)$|^/.*/position/([^/]+)$'
+                      r'|^/.*/([^/]+)/position$', re.I)
+DELIMITERS = ',;\t'
+#: Lines that are parsed together.
+LINES = 8192
+
+
+@dataclass(frozen=True)
+class _Column:
+    """Where a number is, what its header says, which joint it is of, and its unit's size."""
+
+    index: int
+    header: str
+    joint: str
+    scale: float
+
+
+def read_csv(path: str | Path, unit: str | None = None, time: str | None = None,
+             joints: Sequence[str] = (), progress: bool = True) -> Recording:
+    """Read joint angles from a CSV file (commas, semicolons or tabs; the first line the header).
+
+    A unit in a header, as in `knee [deg]` or `time [ms]`, counts for its column; other columns
+    are in `unit` and `time`, or in rad and s. Columns in another unit are not joints. Where some
+    columns are called positions (`JointPosFR_hip`), only those are joints, named `FR_hip`.
+    Otherwise every column but the time is a joint.
+
+    Args:
+        path: the file.
+        unit: 'rad' or 'deg', of columns whose header names no unit.
+        time: 's', 'ms', 'us' or 'ns', of the time column if its header names no unit.
+        joints: the joints or columns to take, in this order, or patterns such as 'JointPos*';
+            all joints, if empty.
+        progress: show a progress bar.
+
+    Raises:
+        RecordingError: see `merged`; a file that is no such table, time that goes back, or a
+            value that is no number; the message names line and column.
+
+    """
+    path = Path(path)
+    for value, units in ((unit, ANGLES), (time, TIMES)):
+        if value is not None and value not in units:
+            raise RecordingError(f'{path}: unit {value!r} is none of {few(list(units), 20)}')
+    try:
+        size = path.stat().st_size
+        with path.open(encoding='utf-8-sig', newline='') as file:
+            table = _Table(path, file, unit, time, joints)
+            with progress_bar(f'reading {path.name}', max(1, size), enabled=progress) as bar:
+                chunks = []
+                for chunk in table.chunks():
+                    chunks.append(chunk)
+                    bar(min(size, table.read))
+    except OSError as error:
+        raise RecordingError(f'{path}: {error.strerror}') from error
+    except UnicodeDecodeError as error:
+        raise RecordingError(f'{path}: not a text file ({error.reason})') from error
+    recording = merged(chunks, str(path), [column.joint for column in table.columns])
+    return replace(recording, notes=(*table.notes, *recording.notes))
+
+
+class _Table:
+    """A CSV file, its header read."""
+
+    def __init__(self, path: Path, file: io.TextIOBase, unit: str | None, time: str | None,
+                 joints: Sequence[str]) -> None:
+        self.path, self.file = path, file
+        self.line, self.read = 1, 0
+        self.notes: list[str] = []
+        line = file.readline()
+        while line and not line.strip():
+            line, self.line = file.readline(), self.line + 1
+        if not line:
+            raise RecordingError(f'{path}: the file is empty')
+        self._printable(line, self.line)
+        self.delimiter = max(DELIMITERS, key=line.count)
+        headers = [header.strip() for header in self._cells(line.lstrip('#'), self.line)]
+        if len(headers) < 2:
+            raise RecordingError(f'{path}, line {self.line}: one column only, {headers[0]!r}; '
+                                 'a table has a time column and one per joint')
+        if all(_number(header) is not None for header in headers if header):
+            raise RecordingError(f'{path}, line {self.line}: no header; the first line has to '
+                                 'name the columns')
+        self.width = len(headers)
+        self.time = self._time(headers, time)
+        self.columns = self._joints(headers, unit, joints)
+        self.last = -np.inf
+
+    def _cells(self, line: str, number: int) -> list[str]:
+        try:
+            return next(csv.reader([line], delimiter=self.delimiter, strict=True))
+        except csv.Error as error:
+            raise RecordingError(f'{self.path}, line {number}: {error}') from error
+
+    def _printable(self, line: str, number: int) -> None:
+        if '\0' in line:
+            raise RecordingError(f'{self.path}, line {number}: not a text file (a byte 0)')
+
+    def _time(self, headers: list[str], option: str | None) -> _Column:
+        """Find the time column."""
+        found = []
+        for k, header in enumerate(headers):
+            name, unit = _split(header)
+            match = TIME.match(name)
+            if match and match[2]:
+                unit = unit or match[2]
+            if match and (unit is None or unit in TIMES):
+                found.append((k, header, unit))
+        if len(found) != 1:
+            raise RecordingError(
+                f'{self.path}, line {self.line}: '
+                + (f'{len(found)} time columns, {few([one[1] for one in found])}' if found else
+                   "no time column, such as 'time' or 'time [ms]'; the columns are "
+                   + few(headers, 20)))
+        k, header, unit = found[0]
+        if unit and option and TIMES[unit] != TIMES[option]:
+            raise RecordingError(f'{self.path}: column {header!r} is in {unit}, not {option}')
+        return _Column(k, header, '', TIMES[unit or option or 's'])
+
+    def _joints(self, headers: list[str], option: str | None, wanted: Sequence[str]
+                ) -> list[_Column]:
+        """Find the joints' columns."""
+        columns, others = [], []
+        for k, header in enumerate(headers):
+            name, unit = _split(header)
+            if k == self.time.index or not name:
+                continue
+            if unit is None or unit.lower() in ANGLES:
+                angle = (unit or option or 'rad').lower()
+                if unit and option and ANGLES[angle] != ANGLES[option]:
+                    raise RecordingError(
+                        f'{self.path}: column {header!r} is in {unit}, not {option}')
+                columns.append(_Column(k, header, name, ANGLES[angle]))
+            else:
+                others.append(header)
+        positions = [replace(column, joint=match[match.lastindex or 0])
+                     for column in columns if (match := POSITION.match(column.joint))]
+        named = {column.index: column for column in (*columns, *positions)}
+        if wanted:
+            chosen = []
+            for pattern in wanted:
+                fitting = [column for column in named.values() if any(
+                    pattern == name or fnmatchcase(name, pattern)
+                    for name in (column.joint, column.header))]
+                if not fitting:
+                    raise RecordingError(f'{self.path}: no column {pattern!r}; there are '
+                                         f'{few([one.header for one in columns], 40)}')
+                chosen += fitting
+            columns = list(dict.fromkeys(chosen))
+        else:
+            others += [one.header for one in columns] if positions else []
+            columns = positions or columns
+            left = [header for header in others
+                    if header not in {column.header for column in columns}]
+            if left:
+                self.notes.append(f'{len(left)} columns left out: {few(left)}')
+        names = [column.joint for column in columns]
+        if not names:
+            raise RecordingError(f'{self.path}, line {self.line}: no column of angles')
+        require(names, names, f'{self.path}, line {self.line}')
+        return columns
+
+    def chunks(self) -> Iterator[Chunk]:
+        """Yield the samples."""
+        names = [column.joint for column in self.columns]
+        places = [column.index for column in self.columns]
+        scales = np.array([column.scale for column in self.columns])
+        while lines := list(islice(self.file, LINES)):
+            self.read += sum(map(len, lines))
+            numbers = self._numbers(lines)
+            seconds = numbers[:, self.time.index] * self.time.scale
+            self._check(seconds, lines)
+            yield (np.rint(seconds * 1e9).astype(np.int64), names,
+                   numbers[:, places] * scales)
+            self.line += len(lines)
+
+    def _numbers(self, lines: list[str]) -> np.ndarray:
+        """Return the numbers of some lines, shape (lines that are not blank, columns)."""
+        if any(map(str.strip, lines)):
+            try:
+                numbers = np.loadtxt(lines, delimiter=self.delimiter, comments=None, ndmin=2)
+                if numbers.shape[1] == self.width:
+                    return numbers
+            except ValueError:
+                pass  # Cells without a number, or with a text: which, the slow way tells.
+        needed = {column.index: column.header for column in (self.time, *self.columns)}
+        rows = []
+        for number, line in enumerate(lines, self.line + 1):
+            if not line.strip():
+                continue
+            self._printable(line, number)
+            cells = self._cells(line, number)
+            if len(cells) != self.width:
+                raise RecordingError(f'{self.path}, line {number}: {len(cells)} columns, where '
+                                     f'the header has {self.width}')
+            row = np.full(self.width, np.nan)
+            for k, header in needed.items():
+                value = _number(cells[k])
+                if value is None:
+                    raise RecordingError(f'{self.path}, line {number}, column {header!r}: '
+                                         f'{cells[k].strip()[:40]!r} is not a number')
+                row[k] = value
+            rows.append(row)
+        return np.array(rows).reshape(-1, self.width)
+
+    def _check(self, seconds: np.ndarray, lines: list[str]) -> None:
+        """Refuse times that are none, or go back."""
+        before = np.append(self.last, seconds[:-1])[:len(seconds)]
+        wrong = ~(np.abs(seconds) < LATEST) | (seconds < before)
+        if wrong.any():
+            row = int(np.argmax(wrong))
+            number = [k for k, line in enumerate(lines, self.line + 1) if line.strip()][row]
+            where = f'{self.path}, line {number}, column {self.time.header!r}: '
+            value = float(seconds[row])
+            if not np.isfinite(value):
+                raise RecordingError(where + 'no time')
+            if abs(value) >= LATEST:
+                raise RecordingError(where + f'{value:.6g} s is no time; if it is in ms, us or '
+                                     'ns, declare it')
+            raise RecordingError(where + f'time goes back from {before[row]:.9g} to '
+                                 f'{value:.9g} s')
+        if len(seconds):
+            self.last = float(seconds[-1])
+
+
+def _split(header: str) -> tuple[str, str | None]:
+    """Return name and unit of a header."""
+    match = BRACKETED.match(header)
+    return (match[1], match[2]) if match else (header, None)
+
+
+def _number(cell: str) -> float | None:
+    """Return the number in a cell, nan where it is empty, None where it is something else."""
+    cell = cell.strip()
+    if not cell:
+        return float('nan')
+    try:
+        return float(cell)
+    except ValueError:
+        return None

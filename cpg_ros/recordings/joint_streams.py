@@ -1,0 +1,200 @@
+"""Joint states topic by topic, from serialised messages to one recording."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from itertools import compress
+
+import numpy as np
+
+from cpg_ros.recordings.bag_storage import line
+from cpg_ros.recordings.cdr import JOINT_STATE, MessageBlock, UndecodableError, decode, in_order
+from cpg_ros.recordings.recording import (
+    Chunk,
+    Recording,
+    RecordingError,
+    few,
+    merged,
+    named,
+    require,
+)
+from cpg_ros.recordings.servo import Servo
+
+#: Messages of a topic that are decoded together; a few MB.
+BATCH = 4096
+#: Stamps later than this (ns) are of a clock that shows the date, where 0 means not stamped.
+DATED = 10**17
+
+
+class Stream:
+    """What a topic delivered.
+
+    Args:
+        topic: its name.
+        joints: that are wanted; all of them, if empty.
+        servo: of the joints, if what they were told is wanted instead of what they did.
+
+    """
+
+    def __init__(self, topic: str, joints: Sequence[str], servo: Servo | None = None) -> None:
+        self.topic, self.servo = topic, servo
+        self.wanted = set(joints)
+        self.taken: set[str] = set()
+        #: What is not decoded yet, and the times of receipt in ns.
+        self.messages: list[bytes] = []
+        self.received: list[int] = []
+        #: Header stamps and receive times in ns, names, positions.
+        self.parts: list[tuple[np.ndarray, np.ndarray, tuple[str, ...], np.ndarray]] = []
+        self.joints: dict[str, None] = {}
+        self.count = self.mute = self.odd = self.slack = self.unstamped = 0
+        #: Joints with a position, but not what the servo needs besides; and those whose effort
+        #: was ever a number but 0.
+        self.lacking: dict[str, None] = {}
+        self.pulled: set[str] = set()
+        self.dated = False
+
+    @property
+    def stamped(self) -> bool:
+        """Whether any message has a header stamp."""
+        return self.unstamped < self.count - self.mute - self.odd - self.slack
+
+    def add(self, received: int, message: bytes) -> None:
+        """Take a serialised message, received at a time in ns."""
+        self.received.append(received)
+        self.messages.append(message)
+
+    def decode(self, source: str) -> None:
+        """Decode the messages at hand.
+
+        Raises:
+            RecordingError: a message that is no JointState.
+
+        """
+        received = np.array(self.received, np.int64)
+        try:
+            for block in in_order(decode(self.messages, self.servo is not None)):
+                self._keep(block, received[block.rows])
+        except UndecodableError as error:
+            raise RecordingError(
+                f'{source}{self.topic}: message {self.count + error.index + 1} is no '
+                f'{JOINT_STATE}: {line(error)}') from error
+        self.count += len(self.messages)
+        self.messages, self.received = [], []
+
+    def _keep(self, block: MessageBlock, received: np.ndarray) -> None:
+        stamps, names, positions = block.stamps, block.names, block.positions
+        if not positions.shape[1]:
+            self.mute += len(stamps)
+        elif positions.shape[1] != len(names):
+            self.odd += len(stamps)
+        elif self.servo and not (positions.shape == block.efforts.shape and (
+                not self.servo.kd or positions.shape == block.velocities.shape)):
+            self.slack += len(stamps)
+            self.lacking.update(dict.fromkeys(names))
+        else:
+            if self.servo:
+                pulling = (np.isfinite(block.efforts) & (block.efforts != 0.0)).any(axis=0)
+                self.pulled.update(compress(names, pulling))
+                positions = self.servo.command(positions, block.velocities, block.efforts)
+            self.joints.update(dict.fromkeys(names))
+            self.unstamped += int((stamps == 0).sum())
+            self.dated = self.dated or bool((stamps > DATED).any())
+            if self.wanted and not self.wanted.issuperset(names):
+                columns = [k for k, name in enumerate(names) if name in self.wanted]
+                names, positions = tuple(names[k] for k in columns), positions[:, columns]
+            self.parts.append((stamps, received, names, positions))
+
+    def notes(self, headers: bool) -> list[str]:
+        """Say what is left out."""
+        counts = ((self.mute, 'without positions'),
+                  (self.odd, 'with more or fewer positions than names'),
+                  (self.slack, f'without {self.servo.needs} of each joint' if self.servo else ''),
+                  (self.unstamped if headers and self.dated else 0, 'without a stamp'))
+        return [f'{self.topic}: {count} of {self.count} messages {what}, left out'
+                for count, what in counts if count]
+
+    def chunks(self, headers: bool) -> Iterator[Chunk]:
+        """Yield the samples, and forget them."""
+        self.parts.reverse()
+        while self.parts:
+            stamps, received, names, positions = self.parts.pop()
+            if headers and self.dated and not stamps.all():
+                there = stamps != 0
+                stamps, positions = stamps[there], positions[there]
+            if not self.taken.issuperset(names):
+                columns = [k for k, name in enumerate(names) if name in self.taken]
+                names, positions = tuple(names[k] for k in columns), positions[:, columns]
+            yield stamps if headers else received, names, positions
+
+
+def _once_each(streams: list[Stream], wanted: Sequence[str]) -> list[str]:
+    """Choose one topic for every joint that is on several, and say which."""
+    order = sorted(streams, key=lambda one: (
+        -len(one.joints), one.topic.rsplit('/')[-1] != 'joint_states', -one.count))
+    owner = {name: stream for stream in reversed(order) for name in stream.joints}
+    notes = []
+    for stream in streams:
+        stream.taken = {name for name in wanted if owner[name] is stream}
+        for other in streams:
+            common = [name for name in wanted
+                      if name in stream.joints and owner[name] is other is not stream]
+            if common:
+                notes.append(f'{stream.topic}: {named(common)} taken from {other.topic}')
+    return notes
+
+
+def _refuse_lacking(where: str, what: str, joints: list[str]) -> None:
+    """Refuse joints whose servo cannot be undone."""
+    if joints:
+        raise RecordingError(f'{where}: no {what} of {named(joints)}, and kp needs it; name the '
+                             'joints to take to do without')
+
+
+def recorded(streams: Sequence[Stream], joints: Sequence[str], source: str,
+             notes: Sequence[str] = (), some: bool = False) -> Recording:
+    """Make one recording of what topics delivered.
+
+    A joint on several topics is taken from one: from the topic with the most joints, and among
+    these the one called joint_states, the one with the most messages, the first. Samples are at
+    their header stamps; where all of a topic's are 0, all samples are at their receive times.
+
+    Args:
+        streams: decoded topics; their samples are forgotten.
+        joints: which to take, in this order; all of them, if empty.
+        source: what to put before the topics' names in messages.
+        notes: to begin with.
+        some: joints that are not there are passed over, unless none is.
+
+    Raises:
+        RecordingError: see `merged`; no message with positions, or, where the joints' servo is
+            known, a joint without efforts, or with none but 0.
+
+    """
+    there = list(dict.fromkeys(name for stream in streams for name in stream.joints))
+    whole = f'{source}{", ".join(stream.topic for stream in streams)}'
+    for stream in streams:
+        idle = [name for name in stream.lacking if name not in there
+                and (not joints or name in joints)]
+        if stream.servo:
+            _refuse_lacking(f'{source}{stream.topic}', stream.servo.needs, idle)
+    if not there:
+        raise RecordingError('; '.join((f'{whole}: no message with positions', *notes)))
+    found = [name for name in joints if name in there]
+    joints = found if some and found else joints
+    require(joints, there, whole)
+    notes = [*notes, *_once_each(list(streams), joints or there)]
+    read = [stream for stream in streams if stream.taken]
+    whole = f'{source}{", ".join(stream.topic for stream in read)}'
+    headers = all(stream.stamped for stream in read)
+    if not headers:
+        unset = [stream.topic for stream in read if not stream.stamped]
+        notes.append(f'no header stamps on {few(unset)}: the times are those of receipt')
+    for stream in read:
+        if stream.servo:
+            _refuse_lacking(f'{source}{stream.topic}', 'effort but 0',
+                            sorted(stream.taken - stream.pulled))
+            notes.append(f'{stream.topic}: what the joints were told, by kp {stream.servo.kp:g} '
+                         f'and kd {stream.servo.kd:g}')
+        notes += stream.notes(headers)
+    chunks = (chunk for stream in read for chunk in stream.chunks(headers))
+    recording = merged(chunks, whole, joints)
+    return replace(recording, notes=(*notes, *recording.notes))

@@ -1,0 +1,4 @@
+"""Robots: legs, joints and limits, their files, and URDF.
+
+Imports ``networks`` and ``files``; knows nothing of ROS.
+"""

@@ -1,0 +1,248 @@
+"""Robot files: YAML that people write, read with every mistake named, and written.
+
+The first part says which cell drives each joint and how, and the joints' limits; the optional
+part ``gaits`` says what a gait does otherwise, and how to steer it.
+"""
+
+from collections.abc import Mapping
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from cpg_ros.files.atomic_write import write_atomically
+from cpg_ros.files.shared_resources import share
+from cpg_ros.files.yaml_reader import Reader, shown
+from cpg_ros.networks.registry import NETWORKS, PRESETS
+from cpg_ros.robots.robot import (
+    HARMONICS,
+    WEIGHTS,
+    Joint,
+    JointMotion,
+    Motion,
+    Robot,
+    Steering,
+)
+
+#: No angle (rad) or speed (rad/s) of a joint is larger.
+LARGEST = 1e6
+
+
+class RobotError(ValueError):
+    """A robot file cannot be used; the message names the file, the key and the reason."""
+
+
+class _Reader(Reader):
+    """Reads networks and joints, too."""
+
+    def networks(self, value: Any) -> tuple[str, ...]:
+        names = value if isinstance(value, list) else [value]
+        for k, name in enumerate(self.items(names, 'network')):
+            where = f'network[{k}]' if isinstance(value, list) else 'network'
+            if self.text(name, where) not in NETWORKS:
+                raise self.fail(where, f"'{name}' is not one of {', '.join(NETWORKS)}")
+        return tuple(names)
+
+    def joint(self, tree: Any, where: str, leg: str, cells: tuple[int, ...]) -> Joint:
+        numbers = {'offset', 'lower', 'upper', 'velocity'}
+        tree = self.keys(tree, where, numbers | {'name', 'cell'}, {'amplitude', 'weights'})
+        name = self.text(tree['name'], f'{where}.name')
+        where = f'{where} ({name})'
+        values = {key: self.number(tree[key], f'{where}.{key}') for key in sorted(numbers)}
+        if type(tree['cell']) is not int or tree['cell'] not in cells:
+            raise self.fail(f'{where}.cell', f"leg '{leg}' has the cells "
+                            f'{" and ".join(map(str, cells))}, not {shown(tree["cell"])}')
+        weights = self.readout(tree, where)
+        if not values['lower'] < values['upper']:
+            raise self.fail(f'{where}.lower', f'{values["lower"]:g} is not below upper '
+                            f'{values["upper"]:g}')
+        if not values['lower'] <= values['offset'] <= values['upper']:
+            raise self.fail(f'{where}.offset', f'{values["offset"]:g} is outside the limits '
+                            f'{values["lower"]:g} to {values["upper"]:g}')
+        if values['velocity'] <= 0.0:
+            raise self.fail(f'{where}.velocity', f'{values["velocity"]:g} must be positive')
+        return Joint(name=name, leg=leg, cell=tree['cell'], weights=weights, **values)
+
+    def readout(self, tree: Mapping[str, Any], where: str) -> tuple[float, ...]:
+        """Return the weights that 'amplitude' or 'weights' gives."""
+        if ('amplitude' in tree) == ('weights' in tree):
+            raise self.fail(where, "needs exactly one of 'amplitude' and 'weights'")
+        if 'amplitude' in tree:
+            return (self.number(tree['amplitude'], f'{where}.amplitude'),)
+        return self.weights(tree['weights'], f'{where}.weights')
+
+    def weights(self, value: Any, where: str) -> tuple[float, ...]:
+        listed = self.items(value, where)
+        if len(listed) not in WEIGHTS:
+            raise self.fail(where, f'takes 1, 2, 4 or 6 numbers (x, y, x^2, x y, x^3, x^2 y), '
+                            f'not {len(listed)}')
+        return self.numbers(listed, where)
+
+    def numbers(self, value: Any, where: str) -> tuple[float, ...]:
+        return tuple(self.number(entry, f'{where}[{k}]')
+                     for k, entry in enumerate(self.items(value, where)))
+
+    def motion(self, tree: Any, where: str, joints: Mapping[str, Joint]) -> Motion:
+        """Return what a gait makes of the robot with these joints."""
+        tree = self.keys(tree, where, set(), {'frequency', 'joints', 'steering'})
+        frequency = None
+        if 'frequency' in tree:
+            frequency = self.number(tree['frequency'], f'{where}.frequency')
+            if not 0.01 <= frequency <= 10.0:
+                raise self.fail(f'{where}.frequency', f'{frequency:g} is not from 0.01 to 10 Hz')
+        moved = {}
+        listed = self.keys(tree.get('joints', {}), f'{where}.joints', set(), set(joints))
+        for name in listed:
+            place, joint = f'{where}.joints.{name}', joints[name]
+            entry = self.keys(listed[name], place, set(),
+                              {'offset', 'amplitude', 'weights', 'in_place'})
+            offset = self.number(entry.get('offset', joint.offset), f'{place}.offset')
+            if not joint.lower <= offset <= joint.upper:
+                raise self.fail(f'{place}.offset', f'{offset:g} is outside the limits '
+                                f'{joint.lower:g} to {joint.upper:g}')
+            weights = joint.weights
+            if 'amplitude' in entry or 'weights' in entry:
+                weights = self.readout(entry, place)
+            in_place: tuple[float, ...] = ()
+            if 'in_place' in entry:
+                in_place = self.weights(entry['in_place'], f'{place}.in_place')
+            moved[name] = JointMotion(offset, weights, in_place)
+        steering = None
+        if 'steering' in tree:
+            steering = self.steering(tree['steering'], f'{where}.steering', frequency)
+        return Motion(frequency, moved, steering)
+
+    def steering(self, tree: Any, where: str, fastest: float | None) -> Steering:
+        if fastest is None:
+            raise self.fail(where, "needs the gait's 'frequency', too")
+        columns = ('speed', 'stride', 'frequency', 'turn')
+        tree = self.keys(tree, where, set(columns))
+        rows = {key: self.numbers(tree[key], f'{where}.{key}') for key in columns}
+        for key in columns:
+            if len(rows[key]) != len(rows['speed']):
+                raise self.fail(f'{where}.{key}', f'has {len(rows[key])} numbers, and speed has '
+                                f'{len(rows["speed"])}')
+        allowed = {'stride': (-1.0, 1.0, '-1 to 1'), 'turn': (1e-3, 1e3, '0.001 to 1000 rad/s'),
+                   'frequency': (0.01, fastest, f"0.01 to the gait's {fastest:g} Hz")}
+        for key, (low, high, text) in allowed.items():
+            for k, value in enumerate(rows[key]):
+                if not low <= value <= high:
+                    raise self.fail(f'{where}.{key}[{k}]', f'{value:g} is not from {text}')
+        for k, (before, after) in enumerate(pairwise(rows['speed'])):
+            if not before < after:
+                raise self.fail(f'{where}.speed[{k + 1}]', f'{after:g} is not above {before:g}')
+        return Steering(**rows)
+
+
+def load_robot(path: str | Path) -> Robot:
+    """Read and check a robot file.
+
+    Raises:
+        RobotError: the file cannot be read or a value in it cannot be used; one line with the
+            file, the key and the reason.
+
+    """
+    path = Path(path)
+    reader = _Reader(path, 'robot file', RobotError, LARGEST)
+    tree = reader.keys(reader.tree(), 'file', {'network', 'legs'},
+                       {'joint_order', 'assignment', 'harmonics', 'gaits'})
+    networks = reader.networks(tree['network'])
+    first = NETWORKS[networks[0]]
+    assignment = reader.text(tree.get('assignment', next(iter(first.legs))), 'assignment')
+    for name in networks:
+        if assignment not in NETWORKS[name].legs:
+            raise reader.fail('assignment', f"'{assignment}' is not one of the network {name}: "
+                              f'{", ".join(NETWORKS[name].legs)}')
+        if NETWORKS[name].legs[assignment] != first.legs[assignment]:
+            raise reader.fail('network', f"'{name}' has other legs or cells than '{networks[0]}'")
+    harmonics = tree.get('harmonics', HARMONICS)
+    if type(harmonics) is not int or not 1 <= harmonics <= 32:
+        raise reader.fail('harmonics', f'must be a whole number from 1 to 32, not '
+                          f'{shown(harmonics)}')
+    cells = first.legs[assignment]
+    reader.keys(tree['legs'], 'legs', set(cells))
+
+    legs: dict[str, tuple[Joint, ...]] = {}
+    seen: dict[str, str] = {}
+    for leg in tree['legs']:
+        where = f'legs.{leg}'
+        listed = reader.items(reader.keys(tree['legs'][leg], where, {'joints'})['joints'],
+                              f'{where}.joints')
+        joints = []
+        for k, entry in enumerate(listed):
+            place = f'{where}.joints[{k}]'
+            joint = reader.joint(entry, place, leg, cells[leg])
+            if joint.name in seen:
+                raise reader.fail(f'{place}.name', f"'{joint.name}' is also the name of "
+                                  f'{seen[joint.name]}')
+            seen[joint.name] = place
+            joints.append(joint)
+        legs[leg] = tuple(joints)
+
+    order = list(seen)
+    if 'joint_order' in tree:
+        order = [reader.text(name, f'joint_order[{k}]')
+                 for k, name in enumerate(reader.items(tree['joint_order'], 'joint_order'))]
+        for k, name in enumerate(order):
+            if name not in seen:
+                raise reader.fail(f'joint_order[{k}]', f"joint '{name}' is missing from the legs")
+            if name in order[:k]:
+                raise reader.fail(f'joint_order[{k}]', f"'{name}' is there twice")
+        for name, place in seen.items():
+            if name not in order:
+                raise reader.fail('joint_order', f"joint '{name}' of {place} is missing")
+    motions = {}
+    if 'gaits' in tree:
+        known = {name for network in networks for name in PRESETS[network]}
+        joints_by_name = {joint.name: joint for leg in legs.values() for joint in leg}
+        motions = {name: reader.motion(entry, f'gaits.{name}', joints_by_name) for name, entry
+                   in reader.keys(tree['gaits'], 'gaits', set(), known).items()}
+    return Robot(path.stem, networks, assignment, harmonics, legs, tuple(order), motions)
+
+
+def find_robot(name: str) -> Robot:
+    """Load a robot file, or a shipped one by its bare name.
+
+    Raises:
+        RobotError: there is no such file, or it cannot be used.
+
+    """
+    if name.endswith(('.yaml', '.yml')) or '/' in name:
+        return load_robot(Path(name).expanduser())
+    path = share() / 'config' / f'{name}.yaml'
+    if not path.is_file():
+        shipped = ', '.join(sorted(file.stem for file in path.parent.glob('*.yaml')))
+        raise RobotError(f"robot '{name}' is neither a .yaml file nor one of: {shipped}")
+    return load_robot(path)
+
+
+def write_robot(path: str | Path, robot: Robot, comment: str = '') -> None:
+    """Write a robot file that load_robot reads back; the name is that of the file."""
+    tree: dict[str, Any] = {'network': list(robot.networks), 'assignment': robot.assignment,
+                            'harmonics': robot.harmonics, 'joint_order': list(robot.order),
+                            'legs': {}}
+    for leg, joints in robot.legs.items():
+        tree['legs'][leg] = {'joints': [
+            {'name': joint.name, 'cell': joint.cell, 'offset': joint.offset,
+             'weights': list(joint.weights), 'lower': joint.lower, 'upper': joint.upper,
+             'velocity': joint.velocity} for joint in joints]}
+    if robot.motions:
+        tree['gaits'] = {name: _motion_tree(motion) for name, motion in robot.motions.items()}
+    lines = ''.join(f'# {line}\n' for line in comment.splitlines())
+    write_atomically(path, lines + yaml.safe_dump(tree, sort_keys=False, default_flow_style=None,
+                                             width=96))
+
+
+def _motion_tree(motion: Motion) -> dict[str, Any]:
+    tree: dict[str, Any] = {}
+    if motion.frequency is not None:
+        tree['frequency'] = motion.frequency
+    if motion.joints:
+        tree['joints'] = {
+            name: {'offset': joint.offset, 'weights': list(joint.weights)}
+            | ({'in_place': list(joint.in_place)} if joint.in_place else {})
+            for name, joint in motion.joints.items()}
+    if motion.steering is not None:
+        tree['steering'] = {key: list(values) for key, values in vars(motion.steering).items()}
+    return tree

@@ -1,0 +1,4 @@
+"""Weights that give a network a gait, found by NSGA-II.
+
+Imports ``gaits``, ``dynamics`` and what is below; knows nothing of ROS.
+"""

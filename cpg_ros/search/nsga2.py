@@ -1,0 +1,166 @@
+"""Weights that give a network a gait, found by NSGA-II (Deb et al. 2000).
+
+As in Rashidi et al. (2016), section 4, with what the paper leaves to luck asked for: that the
+gait is stable, and that two waveforms are two. A generation is simulated in one batch, sets that
+end near the gait are judged by their exact orbit, and the chosen one is proven.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from cpg_ros.files.progress_bar import progress_bar
+from cpg_ros.networks.network import Network
+from cpg_ros.search.objectives import Score, evaluate, pairs
+from cpg_ros.search.search_space import Space, search_space
+from cpg_ros.search.verification import Chosen, NotGood, polish
+
+#: Sets of the front that are tried before the search is given up.
+TRIALS = 20
+#: Phase errors (degrees) that are all the same when one set is chosen, and the largest allowed.
+SAME, LARGEST = 0.1, 1.0
+
+
+class NotInstalled(RuntimeError):
+    """The optional dependency is missing; the message says how to get it."""
+
+
+class NothingFound(RuntimeError):
+    """No set passed; the message says how close the search came."""
+
+
+@dataclass(frozen=True)
+class Front:
+    """What a search has found.
+
+    Attributes:
+        space: what was varied.
+        scores: the Pareto front of all sets that were tried, best first.
+        tried: all of them, in the order in which they were tried.
+        chosen: the best one, with its exact orbit.
+
+    """
+
+    space: Space
+    scores: tuple[Score, ...]
+    tried: tuple[Score, ...]
+    chosen: Chosen
+
+
+def objective_names(space: Space) -> tuple[str, ...]:
+    """Names of the objectives with their units, in the order of Score.objectives."""
+    symmetry = space.build(np.array([v.low for v in space.free])).symmetry(space.gait)
+    names = []
+    for group in pairs(symmetry):
+        cells = sorted(cell + 1 for cell, _ in group)
+        which = str(cells[0]) if len(cells) == 1 else f'{cells[0]} to {cells[-1]}'
+        names.append(f'phase error of cell {which} [deg]')
+    return (*names, 'leading multiplier [1]',
+            *(['minus difference of waveforms [1]'] if symmetry.waves.max() else []))
+
+
+def optimise(network_name: str, gait: str, population: int = 60, generations: int = 12,
+             seed: int = 0, bounds: Mapping[str, tuple[float, float]] | None = None,
+             fixed: Mapping[str, float] | None = None, progress: bool = True) -> Front:
+    """Look for weights that give a network a gait.
+
+    Args:
+        network_name: biped or quadruped.
+        gait: one of the network's.
+        population: parameter sets in a generation.
+        generations: how many.
+        seed: of everything random; the same seed finds the same.
+        bounds: variable -> lower and upper bound, instead of the usual ones.
+        fixed: variable -> its value.
+        progress: show a progress bar.
+
+    Raises:
+        ValueError: an unknown network, gait or variable, or a bound that cannot be used.
+        NotInstalled: pymoo is missing.
+        NothingFound: no set passed.
+
+    """
+    space = search_space(network_name, gait, bounds or {}, fixed or {})
+    if population < 4 or generations < 1:
+        raise ValueError(f'population {population} must be at least 4 and generations '
+                         f'{generations} at least 1')
+    if seed < 0:
+        raise ValueError(f'seed {seed} must not be negative')
+    try:
+        from pymoo.algorithms.moo.nsga2 import NSGA2
+        from pymoo.core.evaluator import Evaluator
+        from pymoo.core.problem import Problem
+        from pymoo.problems.static import StaticProblem
+    except ImportError as error:
+        raise NotInstalled('optimize needs pymoo: pip install cpg-ros[optimize]') from error
+
+    count = len(objective_names(space))
+    problem = Problem(n_var=len(space.free), n_obj=count, n_ieq_constr=1,
+                      xl=np.array([variable.low for variable in space.free]),
+                      xu=np.array([variable.high for variable in space.free]))
+    algorithm = NSGA2(pop_size=population)
+    algorithm.setup(problem, termination=('n_gen', generations), seed=seed)
+    tried: dict[Network, Score] = {}
+    with progress_bar(f'optimising the {gait}', generations, enabled=progress) as bar:
+        for generation in range(generations):
+            asked = algorithm.ask()
+            networks = [space.build(values) for values in asked.get('X')]
+            new = list(dict.fromkeys(one for one in networks if one not in tried))
+            if new:
+                tried.update(zip(new, evaluate(new, gait, seed), strict=True))
+            scores = [tried[one] for one in networks]
+            # Bounds as the algorithm has them; waveforms that miss what is asked of them come
+            # after all others, whatever their phases.
+            static = StaticProblem(problem, F=np.array([one.objectives for one in scores]),
+                                   G=np.array([[one.shortfall] for one in scores]))
+            Evaluator().eval(static, asked)
+            algorithm.tell(infills=asked)
+            bar(generation + 1)
+    return _front(space, tuple(tried.values()), seed)
+
+
+def _front(space: Space, tried: tuple[Score, ...], seed: int) -> Front:
+    """Choose from the front; a set that does not stand up to scrutiny is struck off it."""
+    left = [one for one in tried if one.exact and one.errors.max() <= LARGEST]
+    if not left:
+        best = min(tried, key=lambda one: (one.errors.max(), one.shortfall, one.stability))
+        raise _nothing(space, tried, _closeness(best))
+    for _ in range(TRIALS):
+        front = sorted(_non_dominated(left), key=_order)
+        try:
+            chosen = polish(front[0], space.gait, seed)
+        except NotGood as error:
+            why = f'the best has the phases, but {error}'
+            left.remove(front[0])
+            if not left:
+                break
+            continue
+        return Front(space, tuple(front), tried, chosen)
+    raise _nothing(space, tried, why)
+
+
+def _closeness(best: Score) -> str:
+    """Say how close a set comes to its gait without being on it."""
+    if best.errors.max() > LARGEST:
+        return f'the best has phase errors of up to {best.errors.max():.1f} degrees'
+    if best.shortfall > 0.0:
+        return ('the best has the phases, but a waveform is too small, turns too unsteadily or is '
+                'too like the other')
+    return 'the best has the phases, but is not on an orbit of this gait'
+
+
+def _nothing(space: Space, tried: tuple[Score, ...], why: str) -> NothingFound:
+    return NothingFound(f'no {space.gait} among {len(tried)} sets of weights: {why}; more '
+                        'generations, a larger population or another seed may find one')
+
+
+def _order(score: Score) -> tuple[float, float]:
+    """Smallest phase errors first, then the most stable."""
+    return np.ceil(score.errors.max() / SAME), score.stability
+
+
+def _non_dominated(scores: list[Score]) -> list[Score]:
+    values = np.array([one.objectives for one in scores])
+    return [one for one, own in zip(scores, values, strict=True)
+            if not ((values <= own).all(axis=1) & (values < own).any(axis=1)).any()]

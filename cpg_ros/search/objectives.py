@@ -1,0 +1,197 @@
+"""What makes a parameter set good for a gait: phases, stability, and waveforms that differ.
+
+Phase errors are those of Rashidi et al. (2016), eqs. 6-9, with the cell numbers of their Table 5:
+the phase of every cell against the first one, compared with the gait's. Where a gait has two
+waveforms they are taken between the cells that share one. Stability is the leading Floquet
+multiplier. All sets of a generation are simulated in one batch.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from cpg_ros.dynamics.cell_orbit import richer
+from cpg_ros.dynamics.floquet import multipliers
+from cpg_ros.dynamics.mesh_newton import collocate
+from cpg_ros.gaits.waveform_comparison import lag, shape_difference, shifted, steadiness
+from cpg_ros.integration.simulate import Trajectory
+from cpg_ros.networks.network import Network
+from cpg_ros.networks.symmetry import Symmetry
+from cpg_ros.search.settled_cycle import (
+    ALIVE,
+    SPAN,
+    SettledCycle,
+    last_cycle,
+    population_run,
+    start_states,
+)
+
+#: Sets that are simulated at once, which limits memory: a usual generation is one batch.
+LARGEST_BATCH = 256
+#: How far a start is from the gait, as a share of the signals (see ``_mismatch``).
+START_MISMATCH = 0.2
+#: Smaller phase errors (degrees) are all the same: they tell of rounding, not of weights.
+RESOLUTION = 0.001
+#: Nearer to the gait than this its exact orbit is solved for: phases (degrees) and mismatch.
+NEAR, NEAR_MISMATCH = 5.0, 0.15
+#: That takes 20 to 300 ms, so no more of a generation have it done, those that seem most stable;
+#: and the period that is found may differ from the simulated one by this share.
+MOST_EXACT, SAME_PERIOD = 16, 0.02
+#: What is asked of every cell's range, of its turning (fitting.waveforms.steadiness), and of the
+#: difference in shape of two waveforms; the search keeps away from the limits by a factor.
+LEAST_RANGE, LEAST_STEADINESS, LEAST_DIFFERENCE, MARGIN = 0.15, 0.1, 0.15, 1.2
+#: Objectives of a set that comes to rest or runs away, and of one that repeats nothing.
+WORST, DEAD, APERIODIC = 180.0, 2.0, 1.5
+
+
+@dataclass(frozen=True)
+class Score:
+    """A parameter set, what it is worth, and where its gait can be found.
+
+    Attributes:
+        network: the parameters.
+        errors: phase errors in degrees, shape (3,) or (2,); see ``pairs``.
+        stability: leading Floquet multiplier; an estimate where ``exact`` is not set.
+        difference: in shape of the gait's two waveforms; None for a gait with one.
+        shortfall: by how much waveforms miss what is asked of them, 0 if they do not.
+        exact: whether the orbit was solved for.
+        state: one on the exact orbit, shape (components,).
+        period: of that, model time.
+
+    """
+
+    network: Network
+    errors: np.ndarray
+    stability: float
+    difference: float | None
+    shortfall: float
+    exact: bool = False
+    state: tuple[float, ...] = ()
+    period: float = 0.0
+
+    @property
+    def objectives(self) -> np.ndarray:
+        """What is minimised: phase errors, stability, and minus a difference of waveforms."""
+        rest = [self.stability] + ([] if self.difference is None else [-self.difference])
+        return np.array([*np.maximum(self.errors, RESOLUTION), *rest])
+
+
+def pairs(symmetry: Symmetry) -> list[list[tuple[int, int]]]:
+    """Pairs of cells (from 0) behind each phase error: a cell, and the first one of its waveform.
+
+    At most three errors: with more than three pairs the last one is the largest of the rest.
+    """
+    first = symmetry.first[symmetry.waves].tolist()
+    found = [(cell, one) for cell, one in enumerate(first) if cell != one]
+    return [[pair] for pair in found[:2]] + ([found[2:]] if found[2:] else [])
+
+
+def _mismatch(signals: np.ndarray, symmetry: Symmetry) -> float:
+    """How far signals are from the gait's symmetry: largest RMS over pairs, over the signal's."""
+    largest = 0.0
+    for cell, one in (pair for group in pairs(symmetry) for pair in group):
+        theta = symmetry.phases[cell] - symmetry.phases[one]
+        gap = np.sqrt(np.mean((signals[:, cell] - shifted(signals[:, one], theta))**2))
+        size = min(signals[:, cell].std(), signals[:, one].std())
+        largest = max(largest, float(gap / size) if size > 0.0 else 10.0)
+    return largest
+
+
+def phase_errors(signals: np.ndarray, symmetry: Symmetry) -> np.ndarray:
+    """Phase errors of the groups of ``pairs`` in degrees, 0 to 180, shape (..., groups).
+
+    Args:
+        signals: of the cells on even points of a cycle, shape (..., m, cells or more).
+        symmetry: of the gait.
+
+    """
+    waves = np.swapaxes(signals, -1, -2)
+    errors = []
+    for group in pairs(symmetry):
+        cells, first = np.array(group).T
+        off = (lag(waves[..., cells, :], waves[..., first, :]) - symmetry.phases[cells]
+               + symmetry.phases[first])
+        errors.append(np.abs((off + 0.5) % 1.0 - 0.5).max(axis=-1) * 360.0)
+    return np.stack(errors, axis=-1)
+
+
+def waveform_shortfall(signals: np.ndarray, symmetry: Symmetry, margin: float = 1.0) -> float:
+    """By how much waveforms miss what is asked of them, in shares of it; 0 if they do not.
+
+    Every cell has a range and turns steadily, so that its phase can be read in spite of noise;
+    two waveforms differ in shape.
+    """
+    cells, first = symmetry.group.cells, symmetry.first
+    have = [(np.ptp(signals[:, one]), LEAST_RANGE) for one in first]
+    have += [(steadiness(signals[:, one], signals[:, one + cells]), LEAST_STEADINESS)
+             for one in first]
+    if len(first) == 2:
+        have.append((shape_difference(*signals[:, first].T), LEAST_DIFFERENCE))
+    return float(sum(max(0.0, margin - max(0.0, value / asked)) for value, asked in have))
+
+
+def _simulated(network: Network, gait: str, run: Trajectory) -> tuple[Score, SettledCycle | None]:
+    """Score a set by its simulation; also return its cycle if that is worth solving for."""
+    symmetry, cells = network.symmetry(gait), network.cells
+    first = symmetry.first
+    two = len(first) == 2
+    finite = bool(np.isfinite(run.x[-1]).all())
+    cycle = last_cycle(run, cells) if finite else None
+    if cycle is None:
+        alive = finite and np.ptp(run.x[run.t.size // 2:, :cells], axis=0).max() >= ALIVE
+        return Score(network, np.full(len(pairs(symmetry)), WORST),
+                     APERIODIC if alive else DEAD, 0.0 if two else None, 10.0), None
+    signals = cycle.signals
+    errors = phase_errors(signals, symmetry)
+    mismatch = _mismatch(signals, symmetry)
+    near = errors.max() <= NEAR and mismatch <= NEAR_MISMATCH
+    if near:
+        shortfall = waveform_shortfall(signals, symmetry, MARGIN)
+    else:
+        # The shapes are not those of the gait: only the range counts, and two waveforms that
+        # are not there at all fall shorter than any that are.
+        shortfall = max(0.0, MARGIN - np.ptp(signals[:, :cells], axis=0).min() / LEAST_RANGE)
+        shortfall += (MARGIN + errors.max() / WORST) if two else 0.0
+    difference = (shape_difference(*signals[:, first].T) if near else 0.0) if two else None
+    # An estimate at no cost: by how much a cycle has brought the disturbance of the start nearer
+    # to the gait. It is above 1 where the network has left, and smaller the slower it left.
+    stability = min(APERIODIC, (max(mismatch, 1e-10) / START_MISMATCH)**(cycle.period / SPAN))
+    score = Score(network, errors, float(stability), difference, float(shortfall))
+    return score, cycle if near and shortfall == 0.0 else None
+
+
+def _proven(score: Score, cycle: SettledCycle, gait: str) -> Score:
+    """Solve for the exact orbit of a set that ends near its gait, from its cycle."""
+    symmetry = score.network.symmetry(gait)
+    orbit = collocate(score.network, symmetry, cycle, cycle.period)
+    if orbit is None or richer(orbit) or abs(orbit.period / cycle.period - 1.0) > SAME_PERIOD:
+        # What is near the gait but not on it has no right to the estimate.
+        return replace(score, stability=max(1.0, score.stability))
+    return replace(score, stability=multipliers(orbit).leading, exact=True,
+                   state=tuple(orbit(np.array(0.0)).tolist()), period=orbit.period)
+
+
+def evaluate(networks: Sequence[Network], gait: str, seed: int) -> list[Score]:
+    """Simulate the parameter sets of a generation in a batch, and score each.
+
+    Args:
+        networks: of one kind.
+        gait: one of theirs.
+        seed: of the start.
+
+    """
+    found = []
+    for first in range(0, len(networks), LARGEST_BATCH):
+        batch = networks[first:first + LARGEST_BATCH]
+        runs = population_run(batch, start_states(batch, gait, seed))
+        found += [_simulated(network, gait, Trajectory(runs.t, x, slopes))
+                  for network, x, slopes in zip(batch, runs.x, runs.slopes, strict=True)]
+    scores = [score for score, _ in found]
+    worth = sorted((k for k, (_, cycle) in enumerate(found) if cycle is not None),
+                   key=lambda k: scores[k].stability)
+    for k in worth[:MOST_EXACT]:
+        cycle = found[k][1]
+        assert cycle is not None
+        scores[k] = _proven(scores[k], cycle, gait)
+    return scores

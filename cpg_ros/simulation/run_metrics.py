@@ -1,0 +1,146 @@
+"""What a run of a body is judged by."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from cpg_ros.simulation.body import FALLEN, Body
+from cpg_ros.simulation.model_indices import Anatomy
+from cpg_ros.simulation.robot_model import engine
+
+GRAVITY = 9.81
+#: Seconds from the stand that say nothing about the gait itself.
+BEGINNING = 2.0
+#: A foot's position is looked at this often, s.
+LOOK = 0.01
+#: All feet off the floor for so long is a hop, s.
+AIRBORNE = 0.02
+
+
+@dataclass(frozen=True)
+class RunMetrics:
+    """One run's figures; those marked * leave out its first BEGINNING seconds.
+
+    Attributes:
+        distance: forward, along the heading at the start, m.
+        drift: to the left of it, m.
+        heading: at the end, positive to the left, degrees.
+        speed: * mean over ground, along the body's own heading, m/s.
+        turn: * mean yaw rate, rad/s.
+        height: * mean of the base, m.
+        bob: * standard deviation of it, m.
+        roll, pitch: * largest absolute angle, degrees.
+        sway: * root mean square of roll and pitch together, degrees.
+        fell: when it fell, s; infinite if it did not.
+        hops: times that all feet left the floor.
+        duty: * share of the time that a foot is on the floor, mean of all.
+        cost: * of transport: mechanical work of the motors, none regained, per weight and metre.
+        saturation: share of time and motors at the limit of torque.
+        slip: * way that feet slide on the floor per metre that the body goes.
+        lift: * height that a foot exceeds for a tenth of the time, least of all legs, m.
+
+    """
+
+    distance: float
+    drift: float
+    heading: float
+    speed: float
+    turn: float
+    height: float
+    bob: float
+    roll: float
+    pitch: float
+    sway: float
+    fell: float
+    hops: int
+    duty: float
+    cost: float
+    saturation: float
+    slip: float
+    lift: float
+
+    @property
+    def upright(self) -> bool:
+        """Whether it did not fall."""
+        return math.isinf(self.fell)
+
+
+def judge(body: Body, parts: Anatomy, wanted: np.ndarray, mass: float, states: np.ndarray,
+          sensors: np.ndarray) -> RunMetrics:
+    """Judge a run.
+
+    Args:
+        body: whose model it was.
+        parts: of that model.
+        wanted: angles that the joints were driven to, rad, shape (steps, joints).
+        mass: factor on the model's.
+        states: after each step, as of mjSTATE_FULLPHYSICS, shape (steps, states).
+        sensors: after each step, as of ``model.load``, shape (steps, sensors).
+
+    """
+    model, dt = body.model, body.model.opt.timestep
+    place, angles, rates = states[:, 1:1 + model.nq], parts.angles, parts.speeds
+    moving = states[:, 1 + model.nq:1 + model.nq + model.nv]
+    pose = place[:, parts.pose]
+    w, x, y, z = pose[:, 3:].T
+    yaw = np.unwrap(np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z)))
+    roll = np.arctan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y))
+    pitch = np.arcsin(np.clip(2.0 * (w * y - z * x), -1.0, 1.0))
+    legs = len(body.robot.legs)
+    force = -sensors[:, :3 * legs].reshape(len(sensors), legs, 3)[:, :, 2]
+    touching: np.ndarray = force > 1.0
+    down = (1.0 - 2.0 * (x * x + y * y) < math.cos(FALLEN)) | (sensors[:, 3 * legs] > 0.0)
+    fell = float(states[down.argmax(), 0]) if down.any() else math.inf
+
+    later = slice(min(round(BEGINNING / dt), len(states) // 2), None)
+    every = max(1, round(LOOK / dt))
+    feet = _feet(body, parts.feet, place[later][::every])
+    path = np.diff(pose[later, :2], axis=0)
+    middle = 0.5 * (yaw[later][1:] + yaw[later][:-1])
+    way = float((path[:, 0] * np.cos(middle) + path[:, 1] * np.sin(middle)).sum())
+    time = dt * len(path)
+    stiffness, damping = model.actuator_gainprm[:, 0], -model.actuator_biasprm[:, 2]
+    speeds = moving[:, rates]
+    torque = stiffness * (wanted - place[:, angles]) - damping * speeds
+    limits = np.where(model.actuator_forcelimited.astype(bool)[:, None],
+                      model.actuator_forcerange, [-np.inf, np.inf])
+    applied = np.clip(torque, *limits.T)
+    work = float(np.maximum(applied * speeds, 0.0)[later].sum()) * dt
+    weight = GRAVITY * mass * float(model.body_mass.sum())
+    return RunMetrics(
+        distance=float(pose[-1, 0]), drift=float(pose[-1, 1]),
+        heading=math.degrees(yaw[-1]), speed=way / time,
+        turn=float(yaw[later][-1] - yaw[later][0]) / time,
+        height=float(pose[later, 2].mean()), bob=float(pose[later, 2].std()),
+        roll=math.degrees(np.abs(roll[later]).max()),
+        pitch=math.degrees(np.abs(pitch[later]).max()),
+        sway=math.degrees(math.sqrt(float((roll[later]**2 + pitch[later]**2).mean()))),
+        fell=fell, hops=_hops(np.any(touching, axis=1), dt), duty=float(touching[later].mean()),
+        cost=work / (weight * max(abs(way), 1e-3)),
+        saturation=float((torque != applied).mean()),
+        slip=_slide(feet, touching[later][::every]) / max(abs(way), 1e-3),
+        lift=float(np.subtract(*np.percentile(feet[:, :, 2], [90.0, 10.0], axis=0)).min()))
+
+
+def _hops(touching: np.ndarray, dt: float) -> int:
+    """Count the stretches without any foot on the floor that last AIRBORNE."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[True], touching, [True]])))
+    return int((np.diff(edges)[::2] * dt >= AIRBORNE).sum())
+
+
+def _feet(body: Body, geoms: list[int], places: np.ndarray) -> np.ndarray:
+    """Work out where the feet are, m, shape (places, legs, 3)."""
+    mujoco, data = engine(), engine().MjData(body.model)
+    feet = np.empty((len(places), len(geoms), 3))
+    for row, place in zip(feet, places, strict=True):
+        data.qpos[:] = place
+        mujoco.mj_kinematics(body.model, data)
+        row[:] = data.geom_xpos[geoms]
+    return feet
+
+
+def _slide(feet: np.ndarray, touching: np.ndarray) -> float:
+    """Sum the ways of the feet while they touch the floor, mean of all legs, m."""
+    ways = np.linalg.norm(np.diff(feet[:, :, :2], axis=0), axis=2)
+    return float((ways * (touching[1:] & touching[:-1])).sum()) / feet.shape[1]

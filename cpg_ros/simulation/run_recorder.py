@@ -1,0 +1,111 @@
+"""What is kept of a run for its film, its footfall diagram and its summary."""
+
+import math
+from collections import deque
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+from cpg_ros.simulation.body import Body
+from cpg_ros.simulation.robot_model import SimulationError, legs, load
+
+#: How much of the end of a run is kept, s: a longer film or diagram nobody looks at.
+KEPT = 60.0
+#: Pictures of a film and samples of the footfalls a second.
+FRAMES, SAMPLES = 12.5, 200.0
+
+
+class Diary:
+    """Looks at a body after each of its periods."""
+
+    def __init__(self, body: Body, rate: float, film: Path | None = None,
+                 footfalls: Path | None = None) -> None:
+        """Keep what the files need; one that is None is not made.
+
+        Args:
+            body: looked at.
+            rate: of the periods, Hz.
+            film: .gif or .mp4.
+            footfalls: .png, .svg or .pdf.
+
+        Raises:
+            SimulationError: a file can be told now not to come about.
+
+        """
+        self._body, self._film, self._footfalls = body, film, footfalls
+        self._fps = min(FRAMES, rate)
+        self._frames = _Every(rate, FRAMES)
+        self._samples = _Every(rate, SAMPLES)
+        self._poses: deque[np.ndarray] = deque(maxlen=round(KEPT * FRAMES))
+        self._steps: deque[tuple] = deque(maxlen=round(KEPT * SAMPLES))
+        self._gaits: list[tuple[float, str]] = []
+        self._now = 0.0
+        if footfalls is not None:
+            from cpg_ros.simulation.footfall_diagram import FORMATS
+            if footfalls.suffix not in FORMATS:
+                raise SimulationError(f'footfalls {footfalls}: must end in {", ".join(FORMATS)}')
+            if not footfalls.parent.is_dir():
+                raise SimulationError(f'footfalls {footfalls}: there is no folder '
+                                      f'{footfalls.parent}')
+        if film is not None:
+            from cpg_ros.simulation.camera import check_film
+            check_film(film)
+
+    def gait(self, name: str) -> None:
+        """Note that a gait begins."""
+        if not self._gaits or self._gaits[-1][1] != name:
+            self._gaits.append((self._now, name))
+
+    def look(self, now: float) -> None:
+        """Keep what the body does at a time, s, that grows from call to call."""
+        self._now, body = now, self._body
+        if self._film is not None and self._frames.due():
+            self._poses.append(body.data.qpos.copy())
+        if self._footfalls is not None and self._samples.due():
+            self._steps.append((now, body.feet.copy(), body.base[:2].copy()))
+
+    def write(self, name: str, enough: Callable[[], bool] = lambda: False) -> list[Path]:
+        """Make the files and return them; ``name`` is that of the model.
+
+        Raises:
+            SimulationError, OSError: one cannot be made.
+
+        """
+        written = []
+        if self._footfalls is not None and len(self._steps) > 2:
+            from cpg_ros.simulation.footfall_diagram import plot_footfalls
+            times, forces, places = (np.array(each) for each in zip(*self._steps, strict=True))
+            begun = [gait for gait in self._gaits if gait[0] <= times[0]][-1:]
+            gaits = [(max(float(times[0]), when), gait) for when, gait in
+                     begun + [gait for gait in self._gaits if gait[0] > times[0]]]
+            plot_footfalls(self._footfalls, legs(self._body.robot), times, forces, places, gaits)
+            written.append(self._footfalls)
+        if self._film is not None and self._poses:
+            from cpg_ros.simulation.camera import shoot
+            model = load(name, self._body.robot, visual=True)
+            shoot(self._film, model, self._poses, self._fps, enough=enough)
+            written.append(self._film)
+        return written
+
+
+class _Every:
+    """Tells which of the periods of one rate are due at a lower one."""
+
+    def __init__(self, rate: float, wanted: float) -> None:
+        self._share, self._sum = min(1.0, wanted / rate), 1.0
+
+    def due(self) -> bool:
+        due = self._sum >= 1.0 - 1e-9
+        self._sum += self._share - (1.0 if due else 0.0)
+        return due
+
+
+def summary(body: Body, since: float) -> str:
+    """Say in one line where the body has come to in a time, s."""
+    x, y = body.base[:2]
+    way = math.hypot(x, y)
+    speed = way / since if since > 0.0 else 0.0
+    return (f'{way:.2f} m from the start (x {x:.2f}, y {y:.2f}) in {since:.1f} s, '
+            f'{speed:.2f} m/s, heading {math.degrees(body.yaw):.0f} degrees, '
+            f'{"fallen" if body.fallen else "upright"}')

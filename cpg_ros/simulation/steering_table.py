@@ -1,0 +1,71 @@
+"""How fast a tuned gait goes and turns with strides of other lengths: measured, not assumed."""
+
+from collections.abc import Callable
+
+import numpy as np
+
+from cpg_ros.motion.plan import Program
+from cpg_ros.robots.robot import Steering
+from cpg_ros.simulation.batch import Batch, Scenario, targets
+
+#: Strides that are tried, and how much slower the legs move at a stride of 0.
+STRIDES = (-0.4, -0.2, 0.0, 0.2, 0.4, 0.6, 0.8, 1.0)
+SLOWER = 0.2
+#: Difference of stride between the legs of both sides, when turning is measured.
+DIFFERENCE = 0.5
+#: Length of a run, s.
+DURATION = 8.0
+#: Floors that speeds and turns are means of.
+FLOORS = (Scenario(), Scenario(0.7))
+#: A gait counts as steered if its speeds rise by at least this much a row, m/s, and if it turns at
+#: least so fast for a difference of 1, rad/s.
+RISE, TURN = 0.01, 0.2
+
+
+def measure(batch: Batch, program: Program,
+            update: Callable[[int], None] = lambda done: None) -> Steering | None:
+    """Measure a gait at several strides; None if its speed does not rise with them.
+
+    Rows are left out at the ends, where the robot falls or its speed does not rise any more.
+
+    Args:
+        batch: bodies.
+        program: the gait, of a robot with a motion that has a frequency.
+        update: takes the number of strides measured so far.
+
+    """
+    left = np.array([leg[0] == 'l' for leg in program.robot.legs])
+    rows = []
+    for done, stride in enumerate(STRIDES):
+        pace = 1.0 - SLOWER * (1.0 - abs(stride))
+        # Within strides of -1 to 1 on both sides.
+        middle = min(stride, 1.0 - 0.5 * DIFFERENCE)
+        asked = [np.full(left.size, stride),
+                 *(middle + sign * 0.5 * DIFFERENCE * np.where(left, -1.0, 1.0)
+                   for sign in (1.0, -1.0))]
+        trials = batch.run([(targets(program, DURATION, batch.timestep, one.tolist(), pace),
+                             floor) for one in asked for floor in FLOORS])
+        speeds = [trial.speed for trial in trials]
+        turns = [trial.turn for trial in trials]
+        n = len(FLOORS)
+        turn = (np.mean(turns[n:2 * n]) - np.mean(turns[2 * n:])) / (2.0 * DIFFERENCE)
+        rows.append((float(np.mean(speeds[:n])), stride, pace * program.frequency, float(turn),
+                     bool(turn >= TURN) and all(trial.upright for trial in trials)))
+        update(done + 1)
+    return _rising(rows)
+
+
+def _rising(rows: list[tuple[float, float, float, float, bool]]) -> Steering | None:
+    """Keep the rows about the stride of 0 as far as speeds rise."""
+    zero = STRIDES.index(0.0)
+    first = last = zero
+    while last + 1 < len(rows) and rows[last + 1][4] and (
+            rows[last + 1][0] >= rows[last][0] + RISE):
+        last += 1
+    while first > 0 and rows[first - 1][4] and rows[first - 1][0] <= rows[first][0] - RISE:
+        first -= 1
+    if not rows[zero][4] or last == zero:
+        return None
+    speed, stride, frequency, turn = zip(*(row[:4] for row in rows[first:last + 1]), strict=True)
+    return Steering(*(tuple(round(value, 4) for value in column)
+                      for column in (speed, stride, frequency, turn)))

@@ -1,0 +1,128 @@
+"""Footfall (Hildebrand) diagrams: when legs stand, or muscles are active, over two strides.
+
+``python -m cpg_ros.tools.gait_diagram gaits.png --network biped`` draws a network's gaits from
+their orbits. A quadruped's leg stands while the signal that drives it falls, from peak to trough;
+a biped's flexors and extensors are active while their cell is above the middle of its range.
+"""
+
+import argparse
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+import matplotlib
+import numpy as np
+from matplotlib.axes import Axes
+
+from cpg_ros.dynamics.orbit import Orbit, solve_preset
+from cpg_ros.motion.phase_readout import evaluate, phase_map
+from cpg_ros.networks.registry import NETWORKS, PRESETS
+from cpg_ros.robots.robot import HARMONICS
+
+STRIDES = 2.0
+#: Rows from the top: what, cell from 1, and a colour for each girdle or leg.
+BLUE, ORANGE = '#2b6cb0', '#c05621'
+LEG_ROWS = (('LF', 3, BLUE), ('RF', 4, BLUE), ('LH', 1, ORANGE), ('RH', 2, ORANGE))
+MUSCLE_ROWS = (('left flexor', 1, BLUE), ('left extensor', 3, BLUE), ('right flexor', 2, ORANGE),
+               ('right extensor', 4, ORANGE))
+
+
+def signal(orbit: Orbit, cell: int, theta: np.ndarray, order: int = 0) -> np.ndarray:
+    """What drives a leg: its cell over its range, smoothed as joints see it, from -1 to 1.
+
+    Args:
+        orbit: the gait.
+        cell: from 1.
+        theta: in cycles, any shape.
+        order: 1 for the derivative.
+
+    """
+    phase, wave = orbit.phases[cell - 1], int(orbit.waves[cell - 1])
+    if orbit.network.variables == 1:
+        return orbit.waveform(theta + phase, order) / orbit.peak
+    return evaluate(phase_map(orbit, HARMONICS).terms[wave], theta + phase, order)
+
+
+def active(orbit: Orbit, cell: int, strides: float = STRIDES) -> list[tuple[float, float]]:
+    """Intervals (begin, length), in strides, of a row's bars.
+
+    Args:
+        orbit: the gait.
+        cell: from 1.
+        strides: how long.
+
+    """
+    theta = np.linspace(0.0, strides, int(1000 * strides) + 1)
+    if orbit.network.name == 'biped':
+        wave = int(orbit.waves[cell - 1])
+        on = orbit.waveform(theta + orbit.phases[cell - 1], 0, wave) > orbit.levels[wave, 0, 0]
+    else:
+        # Not merely below 0: at a peak on the grid the sign of the slope is that of rounding.
+        on = signal(orbit, cell, theta, 1) < -1e-9
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], on, [False]]).astype(int)))
+    last = theta.size - 1
+    return [(float(theta[a]), float(theta[min(b, last)] - theta[a]))
+            for a, b in edges.reshape(-1, 2)]
+
+
+def draw(axes: Axes, orbit: Orbit, title: str) -> None:
+    """Draw one gait, with each row's cell as a line over it."""
+    biped = orbit.network.name == 'biped'
+    rows = MUSCLE_ROWS if biped else LEG_ROWS
+    theta = np.linspace(0.0, STRIDES, 801)
+    for row, (_, cell, colour) in enumerate(rows):
+        height = len(rows) - 1 - row
+        axes.broken_barh(active(orbit, cell), (height - 0.36, 0.72), color=colour, alpha=0.85)
+        wave = int(orbit.waves[cell - 1])
+        middle, half = orbit.levels[wave, 0]
+        line = (orbit.waveform(theta + orbit.phases[cell - 1], 0, wave) - middle) / half
+        axes.plot(theta, height + 0.33 * line, color='#1a202c', linewidth=0.9)
+    axes.set_yticks(range(len(rows)), [name for name, _, _ in reversed(rows)])
+    axes.set_xlim(0.0, STRIDES)
+    axes.set_ylim(-0.55, len(rows) - 0.45)
+    axes.set_title(title, fontsize=10, loc='left')
+    for side in ('top', 'right', 'left'):
+        axes.spines[side].set_visible(False)
+    axes.tick_params(left=False)
+
+
+def picture(network: str, path: Path) -> None:
+    """Write the picture of a network's gaits, each from the preset of its name."""
+    matplotlib.use('Agg')
+    from matplotlib import pyplot
+    presets = {name: preset for name, preset in PRESETS[network].items() if name == preset.gait}
+    columns = 3
+    lines = -(-len(presets) // columns)
+    figure, grid = pyplot.subplots(lines, columns, figsize=(10.5, 0.4 + 2.4 * lines), sharex=True,
+                                   sharey=True, layout='constrained')
+    for axes in grid.flat[len(presets):]:
+        axes.axis('off')
+    for axes, (name, preset) in zip(grid.flat, presets.items(), strict=False):
+        orbit = solve_preset(preset)
+        draw(axes, orbit, f'{name.replace("_", " ")}   (period {orbit.period:.4f})')
+    for axes in grid[-1]:
+        axes.set_xlabel('time [strides]')
+    bars = ('Bars: the cell is above the middle of its range.' if network == 'biped' else
+            'Bars: the leg stands, while the signal that drives it falls.')
+    figure.suptitle(f'{bars} Lines: the cell. Periods in model time.', fontsize=10)
+    figure.savefig(path, dpi=130)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Write the picture; return the exit code."""
+    parser = argparse.ArgumentParser(prog='python -m cpg_ros.tools.gait_diagram',
+                                     description=__doc__,
+                                     formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument('picture', type=Path, help='file to write, .png or .pdf or .svg')
+    parser.add_argument('--network', choices=tuple(NETWORKS), default='delayed')
+    chosen = parser.parse_args(arguments)
+    try:
+        picture(chosen.network, chosen.picture)
+    except (OSError, ValueError) as error:
+        print(f'{chosen.picture}: {error}', file=sys.stderr)
+        return 1
+    return 0
+
+
+if __name__ == '__main__':
+    sys.exit(main())
