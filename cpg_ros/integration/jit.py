@@ -2,6 +2,7 @@
 
 import hashlib
 import math
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -28,14 +29,15 @@ def renamed(function, network: str):
     return function
 
 
-def sources_digest() -> int:
-    """Return a number that changes whenever a file with compiled code does.
+@cache
+def sources_digest(key: str = '') -> int:
+    """Return a number that changes whenever a file with compiled code does, or the key.
 
     numba's disk cache watches only the file a cached kernel stands in, not the files of the
     functions it calls. A kernel that closes over this number is compiled again when any of
     them changes, because numba keys its cache on closed-over values.
     """
-    digest = hashlib.sha256()
+    digest = hashlib.sha256(key.encode())
     package = Path(__file__).resolve().parent.parent
     for folder in ('networks', 'integration', 'dynamics', 'motion'):
         for source in sorted((package / folder).rglob('*.py')):
@@ -89,3 +91,17 @@ def exp(x):
     z = -700.0 if z < -700.0 else z
     power, rest = _reduced(z)
     return power + power * rest
+
+
+@jit
+def fetch(lanes, source, given, out):
+    """Copy what each cell hears: of cell ``source[cell]`` all lanes."""
+    if lanes == 1:
+        for cell in range(len(source)):
+            out[cell] = given[source[cell]]
+    else:
+        for cell in range(len(source)):
+            begin = source[cell] * lanes
+            there, here = given[begin:begin + lanes], out[cell * lanes:(cell + 1) * lanes]
+            for lane in range(lanes):
+                here[lane] = there[lane]

@@ -16,44 +16,56 @@ interpolation between nodes.
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache
 from types import FunctionType
 
 import numpy as np
 from numba import njit, prange
 
 from cpg_ros.integration.jit import OPTIONS, jit, part, renamed, sources_digest
-from cpg_ros.networks import biped, delayed, quadruped
+from cpg_ros.networks import generated
+from cpg_ros.networks.equations import equations_of
+from cpg_ros.networks.network import Network
 
-DELAYED = delayed.Delayed.kind
+
+def _field_code():
+    # sympy takes a third of a second to load, and is needed once for each set of equations.
+    from cpg_ros.integration import field_code
+    return field_code
 
 
-def _compiled(decorate, network):
+def _compiled(decorate, equations):
     """Compile the stepping of a network with a numba decorator.
 
     Args:
         decorate: numba's decorator.
-        network: module whose ``compiled`` gives drive and rates; drive only with a delay.
+        equations: of the network.
 
     Returns:
         The functions past_state, restart and steps_of.
 
     """
     def own(function):
-        return decorate(renamed(function, network.__name__))
+        return decorate(renamed(function, equations.key))
 
-    drive, rates = network.compiled(own)
+    code = generated.load(f'{equations.key}_kernel',
+                          lambda: _field_code().kernel_source(equations))
+    drive, rates = code.compiled(own)
     delays = drive is not None
+    driven_rows, work_rows, extra = max(code.DRIVEN, 1), max(code.WORK, 1), code.EXTRA + 1
+    variables = len(equations.texts)
 
     @own
     def field(n, x, k, weight, driven, p, gain, basis, lanes, work, out):
         """Right-hand side at z = x + weight k, with the symmetry lock -gain (I - P) z.
 
-        P projects on the rows of basis, shape (r, components); work is scratch.
+        P projects on the rows of basis, shape (r, components); work is scratch, room for z and
+        for what the rates need.
         """
-        z, along = work[0], work[1]
+        z, along = work[:n], work[n:]
         for i in range(n):
             z[i] = x[i] + weight * k[i]
-        rates(n, z, driven, p, lanes, work[1], out)
+        rates(n, z, driven, p, lanes, along, out)
         if gain != 0.0:
             for i in range(n):
                 out[i] -= gain * z[i]
@@ -120,8 +132,10 @@ def _compiled(decorate, network):
         ``noise`` is the standard deviation of white noise per square root of model time, added
         once a step (Euler-Maruyama); the caller seeds.
         """
-        past, middle, end = np.empty(n), np.zeros(n), np.zeros(n)
-        work = np.zeros((2, n + 2 * lanes))
+        past = np.empty(n)
+        middle = np.zeros(driven_rows * n // variables)
+        end = np.zeros(driven_rows * n // variables)
+        work = np.zeros(n + work_rows * n // variables + extra * lanes)
         k2, k3, k4 = np.empty(n), np.empty(n), np.empty(n)
         kick = noise * math.sqrt(step)
         for _ in range(steps):
@@ -130,9 +144,9 @@ def _compiled(decorate, network):
             # Stages 2 and 3 share one delayed state, stage 4 and the next step's first another.
             if delays:
                 past_states(n, x, after, before, head, 0.5, tau, step, past)
-                drive(n, past, p, lanes, middle)
+                drive(n, past, p, lanes, work, middle)
                 past_states(n, x, after, before, head, 1.0, tau, step, past)
-                drive(n, past, p, lanes, end)
+                drive(n, past, p, lanes, work, end)
             field(n, now, k1, 0.5 * step, middle, p, gain, basis, lanes, work, k2)
             field(n, now, k2, 0.5 * step, middle, p, gain, basis, lanes, work, k3)
             field(n, now, k3, step, end, p, gain, basis, lanes, work, k4)
@@ -156,19 +170,14 @@ def _compiled(decorate, network):
     @own
     def restart(n, lanes, p, tau, gain, basis, step, x, after, before, head):
         """Recompute the slope that leaves the head node, after parameters have changed."""
-        past, driven, work = np.empty(n), np.zeros(n), np.zeros((2, n + 2 * lanes))
+        past, driven = np.empty(n), np.zeros(driven_rows * n // variables)
+        work = np.zeros(n + work_rows * n // variables + extra * lanes)
         if delays:
             past_states(n, x, after, before, head, 0.0, tau, step, past)
-            drive(n, past, p, lanes, driven)
+            drive(n, past, p, lanes, work, driven)
         field(n, x[head], x[head], 0.0, driven, p, gain, basis, lanes, work, after[head])
 
     return past_state, restart, steps_of
-
-
-# One delayed network by itself has code of its own: built in one piece, its loops unrolled. Lanes
-# run through loops of any length in vector registers, which need functions of their own.
-_, _, _steps_of_one = _compiled(part, delayed)
-_past_state, _restart, _steps = _compiled(jit, delayed)
 
 
 def _with(function, names):
@@ -183,13 +192,14 @@ def _with(function, names):
     return copy
 
 
-def _cached(digest, network, **functions):
+def _cached(digest, network, components, **functions):
     """Build a network's cached entry points; see sources_digest for why they are closures.
 
     Args:
         digest: of the sources, for the cache.
         network: its name.
-        functions: the network's _restart and _steps.
+        components: length of its state.
+        functions: its _past_state, _restart, _steps and _steps_of_one.
 
     """
 
@@ -229,10 +239,10 @@ def _cached(digest, network, **functions):
 
     def integrate_one(p, tau, gain, basis, step, x, after, before, head, steps, noise,
                       seed, states, slopes, row, every):
-        """The same as integrate for a single trajectory of the delayed network, unrolled."""
+        """The same as integrate for a single trajectory, built in one piece, loops unrolled."""
         digest  # noqa: B018
         np.random.seed(seed)
-        return _steps_of_one(8, 1, p, tau, gain, basis, step, x, after, before, head, steps,
+        return _steps_of_one(components, 1, p, tau, gain, basis, step, x, after, before, head, steps,
                              noise, states, slopes, row, every)
 
     def integrate(p, tau, gain, basis, step, x, after, before, head, steps, noise, seed,
@@ -282,10 +292,16 @@ class Kernels:
     integrate_many: Callable[..., int]
 
 
-def _kernels(network):
-    _, restart, steps = _compiled(jit, network)
-    return _cached(sources_digest(), network.__name__, _restart=restart, _steps=steps)
+@cache
+def kernels(network: type[Network]) -> Kernels:
+    """Return the compiled entry points of a kind of network, compiled when they are first used.
 
-
-#: By kind of network.
-KERNELS = tuple(_kernels(network) for network in (delayed, quadruped, biped))
+    A trajectory by itself has code of its own, built in one piece, its loops unrolled; lanes run
+    through loops of any length in vector registers, which need functions of their own.
+    """
+    equations = equations_of(network)
+    _, _, steps_of_one = _compiled(part, equations)
+    past_state, restart, steps = _compiled(jit, equations)
+    return _cached(sources_digest(equations.key), equations.key, network.cells * network.variables,
+                   _past_state=past_state, _restart=restart, _steps=steps,
+                   _steps_of_one=steps_of_one)

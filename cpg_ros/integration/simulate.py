@@ -2,13 +2,13 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from cpg_ros.files.progress_bar import progress_bar
 from cpg_ros.integration import kernel
 from cpg_ros.networks.network import Network
+from cpg_ros.networks.symmetry import Symmetry
 
 #: A constant state, shape (components,), or a function of times t <= 0, shape (m,), that
 #: returns states, shape (m, components); an attribute ``derivative`` of the same form gives the
@@ -96,7 +96,7 @@ def sample_history(history: History, nodes: int, step: float, components: int
 
 
 def simulate(network: Network | Sequence[Network], history: History | Sequence[History],
-             t_end: float, step: float, *, lock: tuple[float, Any] | None = None,
+             t_end: float, step: float, *, lock: tuple[float, Symmetry] | None = None,
              noise: float = 0.0, seed: int = 0, every: int = 1, progress: bool = True
              ) -> Trajectory:
     """Integrate a network from a history, RK4 with cubic Hermite delayed values.
@@ -134,13 +134,13 @@ def simulate(network: Network | Sequence[Network], history: History | Sequence[H
     for one in networks:
         if not all(np.isfinite(value) for value in one.as_dict().values()):
             raise ValueError(f'a parameter is not finite: {one}')
-        if 0.0 < one.delay < step or (one.delay <= 0.0 and one.kind == kernel.DELAYED):
+        if 0.0 < one.delay < step or (one.delay <= 0.0 and one.delay_parameter):
             raise ValueError(f'the delay {one.delay} is shorter than the step {step}')
-        if one.kind != networks[0].kind:
+        if type(one) is not type(networks[0]):
             raise ValueError(f'a batch has one kind of network, not {networks[0].name} and '
                              f'{one.name}')
 
-    components, kind = networks[0].components, networks[0].kind
+    components, cells = networks[0].components, networks[0].cells
     if every < 1:
         raise ValueError(f'every {every} must be at least 1')
     rows = int(np.ceil(t_end / (step * every) - 1e-9))
@@ -154,7 +154,7 @@ def simulate(network: Network | Sequence[Network], history: History | Sequence[H
     members = np.minimum(np.arange(blocks * lanes), batch - 1).reshape(blocks, lanes)
     x = np.empty((blocks, nodes, components, lanes))
     after, before = np.empty_like(x), np.empty_like(x)
-    p = np.empty((blocks, networks[0].coefficients.shape[0], components, lanes))
+    p = np.empty((blocks, networks[0].coefficients.shape[0], cells, lanes))
     tau = np.empty((blocks, lanes))
     samples = [sample_history(one, nodes, step, components) for one in histories]
     for block, row in enumerate(members):
@@ -165,10 +165,10 @@ def simulate(network: Network | Sequence[Network], history: History | Sequence[H
             x[block, :, :, lane] = past
             after[block, :, :, lane] = before[block, :, :, lane] = past_slopes
     flat = [array.reshape(*array.shape[:2], components * lanes) for array in (x, after, before)]
-    flat_p = p.reshape(blocks, -1, components * lanes)
+    flat_p = p.reshape(blocks, -1, cells * lanes)
     gain, basis = (0.0, np.zeros((1, components))) if lock is None else (lock[0], lock[1].basis)
 
-    compiled = kernel.KERNELS[kind]
+    compiled = kernel.kernels(type(networks[0]))
     head = nodes - 1
     for block in range(blocks):
         compiled.set_slope(flat_p[block], tau[block], gain, basis, step,
@@ -184,7 +184,7 @@ def simulate(network: Network | Sequence[Network], history: History | Sequence[H
             chunk = min(steps - done, max(1, CHUNK // x[:, 0].size))
             seeds = np.random.SeedSequence([seed, done]).generate_state(blocks)
             if blocks == 1:
-                alone = lanes == 1 and kind == kernel.DELAYED
+                alone = lanes == 1 and networks[0].variables == 1
                 one_block = compiled.integrate_one if alone else compiled.integrate
                 head = one_block(flat_p[0], tau[0], gain, basis, step,
                                  *(array[0] for array in flat), head, chunk, noise, seeds[0],

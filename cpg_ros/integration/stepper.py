@@ -2,13 +2,13 @@
 
 import copy
 import math
-from typing import Any
 
 import numpy as np
 
 from cpg_ros.integration import kernel
 from cpg_ros.integration.simulate import History, sample_history
 from cpg_ros.networks.network import Network
+from cpg_ros.networks.symmetry import Symmetry
 
 
 class Stepper:
@@ -23,7 +23,7 @@ class Stepper:
     """
 
     def __init__(self, network: Network, history: History, step: float | None = None,
-                 max_delay: float | None = None, gain: float = 0.0, symmetry: Any = None
+                 max_delay: float | None = None, gain: float = 0.0, symmetry: Symmetry | None = None
                  ) -> None:
         """Start at model time 0 from a history.
 
@@ -55,7 +55,7 @@ class Stepper:
         self.set(network, gain, symmetry)
         self.advance(0.0)
 
-    def set(self, network: Network, gain: float = 0.0, symmetry: Any = None) -> None:
+    def set(self, network: Network, gain: float = 0.0, symmetry: Symmetry | None = None) -> None:
         """Go on with other parameters from the next step, keeping the history.
 
         Raises:
@@ -65,12 +65,12 @@ class Stepper:
         """
         if not all(math.isfinite(v) for v in (*network.as_dict().values(), gain)):
             raise ValueError(f'not finite: {network}, gain {gain}')
-        if network.kind == kernel.DELAYED and not self.step <= network.delay <= self.max_delay:
-            raise ValueError(f'tau {network.delay} must be from {self.step} to {self.max_delay}')
+        if network.delay_parameter and not self.step <= network.delay <= self.max_delay:
+            raise ValueError(f'{network.delay_parameter} {network.delay} must be from {self.step} to {self.max_delay}')
         if gain and symmetry is None:
             raise ValueError('a symmetry gain needs the symmetry class')
         self.network, self.gain, self.symmetry = network, gain, symmetry
-        self._kernels = kernel.KERNELS[network.kind]
+        self._kernels = kernel.kernels(type(network))
         self._tau[0] = network.delay
         self._fixed = (network.coefficients, self._tau, float(gain),
                        np.zeros((1, network.components)) if symmetry is None else symmetry.basis,

@@ -11,6 +11,11 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from cpg_ros.networks.equations import Cell, values_of
+from cpg_ros.networks.field import Field
+from cpg_ros.networks.symmetry import Symmetry
+from cpg_ros.networks.terms import Number
+
 
 @dataclass(frozen=True)
 class Range:
@@ -26,9 +31,9 @@ class Network(ABC):
 
     Attributes:
         name: by which it is chosen.
-        kind: number of its compiled rates in the kernel.
         cells: how many.
         variables: state variables of each cell.
+        delay_parameter: name of the parameter that is the delay, or ''.
         longest_delay: that may be set at run time, model time.
         step: model time per step in real time; an orbit is followed to about 1e-9 a cycle.
         ranges: parameter -> range in which it may be set at run time.
@@ -39,9 +44,9 @@ class Network(ABC):
     """
 
     name: ClassVar[str]
-    kind: ClassVar[int]
     cells: ClassVar[int]
     variables: ClassVar[int] = 1
+    delay_parameter: ClassVar[str] = ''
     longest_delay: ClassVar[float] = 0.0
     step: ClassVar[float]
     ranges: ClassVar[dict[str, Range]]
@@ -65,12 +70,40 @@ class Network(ABC):
     @property
     def delay(self) -> float:
         """How far back the rates look, model time; 0 for an ordinary differential equation."""
-        return 0.0
+        return float(getattr(self, self.delay_parameter)) if self.delay_parameter else 0.0
+
+    @staticmethod
+    @abstractmethod
+    def equations(cell: Cell, p: Any) -> tuple[Number, ...]:
+        """Return the rate of each variable of a cell, written once for all cells.
+
+        Args:
+            cell: gives the variables: ``cell.now()`` its own, ``cell.now(source)`` those of the
+                cells that each cell hears, ``cell.past(source)`` the same a delay ago.
+            p: the parameters, and groups of them that have one for each cell, by name.
+
+        """
+
+    def rates(self, x: np.ndarray, past: np.ndarray | None = None) -> np.ndarray:
+        """Right-hand side at states now and a delay ago (by default the same), (..., components)."""
+        return Field(self).rates(x, past)
+
+    def jacobian(self, x: np.ndarray, past: np.ndarray | None = None) -> np.ndarray:
+        """Derivative of the rates by the state now, shape (..., components, components)."""
+        return Field(self).linearised(x, past)[1]
+
+    def delayed_jacobian(self, x: np.ndarray, past: np.ndarray | None = None) -> np.ndarray:
+        """Derivative of the rates by the state a delay ago, shape as of ``jacobian``."""
+        return Field(self).linearised(x, past)[2]
+
+    def by_parameter(self, x: np.ndarray, past: np.ndarray | None = None) -> np.ndarray:
+        """Derivative of the rates by the parameters, shape (..., components, parameters)."""
+        return Field(self).by_parameter(x, past)
 
     @property
-    @abstractmethod
     def coefficients(self) -> np.ndarray:
-        """The kernel's coefficients, shape (rows, components)."""
+        """The parameters as the kernel takes them, a value for each cell, shape (rows, cells)."""
+        return np.array([np.broadcast_to(value, self.cells) for value in values_of(self)])
 
     @classmethod
     @abstractmethod
@@ -78,7 +111,7 @@ class Network(ABC):
         """Names of the gaits it knows."""
 
     @abstractmethod
-    def symmetry(self, gait: str) -> Any:
+    def symmetry(self, gait: str) -> Symmetry:
         """Return the gait's symmetry in this network: phases and waves of cells, lock's basis.
 
         Raises:
@@ -87,9 +120,20 @@ class Network(ABC):
         """
 
     @classmethod
-    def families(cls, symmetry: Any) -> tuple[tuple[str, ...], ...]:
+    def families(cls, symmetry: Symmetry) -> tuple[tuple[str, ...], ...]:
         """Parameters that a gait's symmetry carries into one another, and so has to find equal."""
         return tuple((name,) for name in cls.parameters())
+
+    def sufficient_gain(self, rate: float) -> float | None:
+        """Return a symmetry gain with which every gait attracts in any state, 1/model time.
+
+        None where no such bound is known; the gain then comes from the gait's multipliers.
+
+        Args:
+            rate: at which disturbances outside the gait's class are to decay, 1/model time.
+
+        """
+        return None
 
     def broken(self, gait: str) -> str:
         """Name parameters that would have to be equal for the gait, or '' if all are."""

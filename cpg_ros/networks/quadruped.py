@@ -7,23 +7,25 @@ swapping 1-2, 3-4, 5-6, 7-8. The network is equivariant under Z4 (i -> i + 2) x 
 
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import ClassVar
+from typing import Any, ClassVar
 
-import numpy as np
-
-from cpg_ros.networks import morris_lecar
+from cpg_ros.networks.equations import Cell
+from cpg_ros.networks.morris_lecar import MorrisLecar
 from cpg_ros.networks.network import Network, Range, known
 from cpg_ros.networks.preset_files import shipped
 from cpg_ros.networks.symmetry import GAITS, Z4_Z2, Symmetry
+from cpg_ros.networks.terms import Number
 
 CELLS = 8
 CURRENT, PHI = 1.0, 0.2
 #: Constants of section 6.
-CELL = morris_lecar.Cell(g_ca=3.0, v_ca=1.0, g_k=1.8, v_k=-0.8, g_l=0.6, v_l=-1.8,
+CELL = MorrisLecar(g_ca=3.0, v_ca=1.0, g_k=1.8, v_k=-0.8, g_l=0.6, v_l=-1.8,
                          v1=0.2, v2=0.4, v3=0.3, v4=0.2, base=0.0)
 
-#: Where v and w of cell i hear: i - 2, s(i) and i + 4.
-_HEARD = (np.roll(np.arange(CELLS), 2), np.arange(CELLS) ^ 1, np.roll(np.arange(CELLS), 4))
+#: Which cell cell i hears: i - 2 behind it, s(i) on the other side, i + 4 across its ring.
+BEHIND = tuple((i - 2) % CELLS for i in range(CELLS))
+ACROSS = tuple(i ^ 1 for i in range(CELLS))
+OPPOSITE = tuple((i + 4) % CELLS for i in range(CELLS))
 
 
 @dataclass(frozen=True)
@@ -38,7 +40,6 @@ class Quadruped(Network):
     eta: float = 0.0
 
     name: ClassVar[str] = 'quadruped'
-    kind: ClassVar[int] = 1
     cells: ClassVar[int] = CELLS
     variables: ClassVar[int] = 2
     step: ClassVar[float] = 0.01
@@ -55,12 +56,16 @@ class Quadruped(Network):
         'zigzag': {'lh': (1, 5), 'rh': (2, 6), 'lf': (3, 7), 'rf': (4, 8)},
         'crisscross': {'lh': (1, 6), 'rh': (2, 5), 'lf': (3, 8), 'rf': (4, 7)}}
 
-    @property
-    def coefficients(self) -> np.ndarray:
-        """Rows: from i - 2, s(i), i + 4, and i for v, phi for w; shape (4, components)."""
-        pairs = ((self.alpha, self.beta), (self.gamma, self.delta), (self.xi, self.eta),
-                 (CURRENT, PHI))
-        return np.array([np.repeat(pair, CELLS) for pair in pairs], dtype=float)
+    @staticmethod
+    def equations(cell: Cell, p: Any) -> tuple[Number, ...]:
+        """Section 6 and eq. 4.4; see the module."""
+        v, w = cell.now()
+        dv, dw = CELL.rates(v, w, CURRENT, PHI)
+        for source, a, b in ((BEHIND, p.alpha, p.beta), (ACROSS, p.gamma, p.delta),
+                             (OPPOSITE, p.xi, p.eta)):
+            v_j, w_j = cell.now(source)
+            dv, dw = dv + a * v_j, dw + b * w_j
+        return dv, dw
 
     @classmethod
     def gaits(cls) -> tuple[str, ...]:
@@ -80,72 +85,6 @@ class Quadruped(Network):
         j, k = GAITS[known(gait, self.gaits())]
         j = 3 if j == 1 and self.alpha >= 0.0 else j
         return Symmetry.of(Z4_Z2, {'omega': Fraction(j, 4), 'kappa': Fraction(k, 2)})
-
-    def rates(self, x: np.ndarray) -> np.ndarray:
-        """Right-hand side at states x, shape (..., components)."""
-        v, w = x[..., :CELLS], x[..., CELLS:]
-        dv, dw = CELL.rates(v, w, CURRENT, PHI)
-        by_v, by_w = (self.alpha, self.gamma, self.xi), (self.beta, self.delta, self.eta)
-        for heard, a, b in zip(_HEARD, by_v, by_w, strict=True):
-            dv = dv + a * v[..., heard]
-            dw = dw + b * w[..., heard]
-        return np.concatenate([dv, dw], axis=-1)
-
-    def jacobian(self, x: np.ndarray) -> np.ndarray:
-        """Derivative of the rates by the state, shape (..., components, components)."""
-        matrix, i = CELL.jacobian(x[..., :CELLS], x[..., CELLS:], PHI), np.arange(CELLS)
-        by_v, by_w = (self.alpha, self.gamma, self.xi), (self.beta, self.delta, self.eta)
-        for heard, a, b in zip(_HEARD, by_v, by_w, strict=True):
-            matrix[..., i, heard] += a
-            matrix[..., i + CELLS, heard + CELLS] += b
-        return matrix
-
-    def by_parameter(self, x: np.ndarray) -> np.ndarray:
-        """Derivative of the rates by the parameters, shape (..., components, 6)."""
-        v, w = x[..., :CELLS], x[..., CELLS:]
-        columns = np.zeros((*x.shape, 6))
-        for k, heard in enumerate(_HEARD):
-            columns[..., :CELLS, 2 * k] = v[..., heard]
-            columns[..., CELLS:, 2 * k + 1] = w[..., heard]
-        return columns
-
-
-def compiled(decorate):
-    """Compile (no drive, right-hand side); coefficients have shape (4, n), driven is unused."""
-    cell_rates = morris_lecar.compiled(decorate, CELL)
-
-    @decorate
-    def field(n, z, driven, p, lanes, work, out):
-        """Right-hand side at z; work is scratch."""
-        half = n // 2
-        v, w, dv, dw = z[:half], z[half:n], out[:half], out[half:n]
-        cell_rates(half, v, w, p[3, :half], p[3, half:n], work, dv, dw)
-        # Slices, not index sums: those would be checked for negative values in every pass.
-        pair, ring = 2 * lanes, 8 * lanes
-        for block in range(2):
-            y, dy = z[block * half:(block + 1) * half], out[block * half:(block + 1) * half]
-            a, c, e = (p[0, block * half:(block + 1) * half],
-                       p[1, block * half:(block + 1) * half],
-                       p[2, block * half:(block + 1) * half])
-            last = y[ring - pair:]
-            for i in range(pair):
-                dy[i] += a[i] * last[i]
-            later, weight_later = dy[pair:], a[pair:]
-            for i in range(ring - pair):
-                later[i] += weight_later[i] * y[i]
-            upper, upper_rate, upper_weight = y[2 * pair:], dy[2 * pair:], e[2 * pair:]
-            for i in range(2 * pair):
-                dy[i] += e[i] * upper[i]
-                upper_rate[i] += upper_weight[i] * y[i]
-            for start in range(0, ring, pair):
-                here, there = y[start:start + lanes], y[start + lanes:start + pair]
-                rate, other = dy[start:start + lanes], dy[start + lanes:start + pair]
-                mine, its = c[start:start + lanes], c[start + lanes:start + pair]
-                for lane in range(lanes):
-                    rate[lane] += mine[lane] * there[lane]
-                    other[lane] += its[lane] * here[lane]
-
-    return None, field
 
 
 PRESETS = shipped(Quadruped)

@@ -109,16 +109,19 @@ class Symmetry:
         group: of the network.
         shifts: element name -> shift in cycles, a homomorphism on H.
         variables: state variables of each cell.
+        odd: whether the network has the symmetry x -> -x, and the gait it with a shift of 1/2:
+            every waveform is its own negative half a cycle later.
 
     """
 
     group: Group
     shifts: tuple[tuple[str, Fraction], ...]
     variables: int = 2
+    odd: bool = False
 
     @classmethod
-    def of(cls, group: Group, shifts: Mapping[str, Fraction | float], variables: int = 2
-           ) -> 'Symmetry':
+    def of(cls, group: Group, shifts: Mapping[str, Fraction | float], variables: int = 2,
+           odd: bool = False) -> 'Symmetry':
         """Build from the shifts of elements that generate H.
 
         Raises:
@@ -130,7 +133,7 @@ class Symmetry:
                 raise ValueError(f"'{name}' is not one of {', '.join(group.elements)}")
         exact = {name: Fraction(shift).limit_denominator(64) % 1
                  for name, shift in shifts.items()}
-        return cls(group, tuple(group.generated(exact).items()), variables)
+        return cls(group, tuple(group.generated(exact).items()), variables, odd)
 
     @property
     def h(self) -> tuple[str, ...]:
@@ -191,7 +194,20 @@ class Symmetry:
 
     @cached_property
     def basis(self) -> np.ndarray:
-        """Orthonormal rows that span Fix(K), shape (variables * classes, variables * cells)."""
-        rows = (np.arange(self.classes.max() + 1)[:, None] == self.classes).astype(float)
-        rows /= np.linalg.norm(rows, axis=1, keepdims=True)
-        return np.kron(np.eye(self.variables), rows)
+        """Orthonormal rows that span the gait's class, shape (variables * d, variables * cells).
+
+        It is Fix(K), the states that K leaves alone, which the flow never leaves. With x -> -x
+        an element with the shift 1/2 leaves them alone together with that.
+        """
+        still = [(self.group.elements[name], 1.0 if shift == 0 else -1.0)
+                 for name, shift in self.shifts
+                 if shift == 0 or (self.odd and shift == Fraction(1, 2))]
+        rows, seen = [], np.zeros(self.group.cells, dtype=bool)
+        for cell in range(self.group.cells):
+            if not seen[cell]:
+                row = np.zeros(self.group.cells)
+                for element, sign in still:
+                    row[element[cell]] += sign
+                seen |= row != 0.0
+                rows.append(row / np.linalg.norm(row))
+        return np.kron(np.eye(self.variables), np.array(rows))

@@ -1,0 +1,94 @@
+"""Numpy code for a network's rates and their derivatives, derived by sympy."""
+
+from collections.abc import Iterable, Sequence
+from itertools import combinations_with_replacement, product
+from typing import TYPE_CHECKING, Any
+
+import sympy
+from sympy.printing.numpy import NumPyPrinter
+
+if TYPE_CHECKING:
+    from cpg_ros.networks.equations import Equations
+
+
+
+def print_float(printer: Any, value: Any) -> str:
+    """Print a number to the last digit: sympy leaves out two of them."""
+    return repr(float(value))
+
+
+class _Printer(NumPyPrinter):
+    """Numpy, numbers to the last digit."""
+
+    _print_Float = print_float
+
+
+_PRINTER = _Printer({'fully_qualified_modules': False, 'allow_unknown_functions': False})
+
+
+def expressions(equations: 'Equations') -> tuple[list[Any], list[Any]]:
+    """Return the equations as sympy has them, and their symbols in the order of ``names``."""
+    symbols = {name: sympy.Symbol(name, real=True) for name in equations.names}
+    return ([sympy.sympify(text, locals=symbols) for text in equations.texts],
+            list(symbols.values()))
+
+
+def _function(name: str, symbols: Sequence[Any], parts: Sequence[Sequence[Any]]) -> str:
+    """Write a function that returns expressions, what they share worked out once."""
+    shared, reduced = sympy.cse([one for part in parts for one in part],
+                                sympy.numbered_symbols('s'))
+    lines = [f'def {name}({", ".join(map(str, symbols))}):']
+    lines += [f'    {symbol} = {_PRINTER.doprint(value)}' for symbol, value in shared]
+    written, place = [], 0
+    for part in parts:
+        mine = reduced[place:place + len(part)]
+        written.append(f'({"".join(f"{_PRINTER.doprint(one)}, " for one in mine)})')
+        place += len(part)
+    lines.append(f'    return {written[0] if len(parts) == 1 else ", ".join(written)}')
+    return '\n'.join(lines)
+
+
+def _nonzero(table: Iterable[tuple[tuple[int, ...], Any]]) -> tuple[list[Any], list[Any]]:
+    kept = [(place, one) for place, one in table if one != 0]
+    return [place for place, _ in kept], [one for _, one in kept]
+
+
+def _source(*parts: str) -> str:
+    text = '\n\n\n'.join(parts)
+    known = sorted({word for word in ('abs', 'cos', 'cosh', 'exp', 'sign', 'sin', 'sinh', 'sqrt',
+                                      'tan', 'tanh') if f'{word}(' in text})
+    head = f'from numpy import {", ".join(known)}\n\n\n' if known else ''
+    return f'{head}{text}\n'
+
+
+def first(equations: 'Equations') -> str:
+    """Write rates, and their derivatives by the arguments and by the parameters."""
+    rates, symbols = expressions(equations)
+    count = len(equations.arguments)
+    slopes, entries = _nonzero(((v, k), sympy.diff(rate, symbols[k])) for (v, rate), k
+                               in product(enumerate(rates), range(count)))
+    rows, columns = _nonzero(((v, r), sympy.diff(rate, symbols[count + r])) for (v, rate), r
+                             in product(enumerate(rates), range(len(equations.rows))))
+    return _source(f'SLOPES = {slopes!r}\nBY_PARAMETER = {rows!r}',
+                   _function('rates', symbols, [rates]),
+                   _function('slopes', symbols, [rates, entries]),
+                   _function('by_parameter', symbols, [columns]))
+
+
+def higher(equations: 'Equations') -> str:
+    """Write second and third derivatives by the arguments, and those by a parameter as well."""
+    rates, symbols = expressions(equations)
+    count = len(equations.arguments)
+    texts, tables = [], []
+    for name, order in (('second', 2), ('third', 3)):
+        places, entries = _nonzero(
+            ((v, *ks), sympy.diff(rate, *(symbols[k] for k in ks))) for (v, rate), ks
+            in product(enumerate(rates), combinations_with_replacement(range(count), order)))
+        tables.append(f'{name.upper()} = {places!r}')
+        texts.append(_function(name, symbols, [entries]))
+    places, entries = _nonzero(
+        ((v, r, k), sympy.diff(rate, symbols[count + r], symbols[k])) for (v, rate), r, k
+        in product(enumerate(rates), range(len(equations.rows)), range(count)))
+    tables.append(f'MIXED = {places!r}')
+    texts.append(_function('mixed', symbols, [entries]))
+    return _source('\n'.join(tables), *texts)

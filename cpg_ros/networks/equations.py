@@ -1,0 +1,185 @@
+"""A network's equations, read once: what they are made of, and functions on arrays from them.
+
+Every cell obeys the same equations, in which it hears other cells, now or a delay ago. They are
+written once for a cell (``Network.equations``); here they are read as texts, and sympy derives the
+rates and their derivatives, exactly, as numpy code that is kept on disk.
+"""
+
+import hashlib
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cache, cached_property
+from types import ModuleType
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from cpg_ros.networks import generated
+from cpg_ros.networks.terms import Term
+
+if TYPE_CHECKING:
+    from cpg_ros.networks.network import Network
+
+#: Which cell each cell hears, from 0.
+Source = tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class Argument:
+    """A state variable as it stands in the equations of a cell.
+
+    Attributes:
+        variable: of the cell that is heard, from 0.
+        source: the cell that each cell hears; None for itself.
+        delayed: whether it is heard a delay ago.
+
+    """
+
+    variable: int
+    source: Source | None
+    delayed: bool
+
+
+class Cell:
+    """Any cell of a network, as its equations see it."""
+
+    def __init__(self, variables: int) -> None:
+        """Begin to note what is heard."""
+        self._variables = variables
+        self.arguments: list[Argument] = []
+
+    def now(self, source: Source | None = None) -> tuple[Term, ...]:
+        """Return the variables of the cell itself, or of those that each cell hears."""
+        return self._heard(source, False)
+
+    def past(self, source: Source | None = None) -> tuple[Term, ...]:
+        """Return the same as they were a delay ago."""
+        return self._heard(source, True)
+
+    def _heard(self, source: Source | None, delayed: bool) -> tuple[Term, ...]:
+        found = []
+        for variable in range(self._variables):
+            one = Argument(variable, None if source is None else tuple(source), delayed)
+            if one not in self.arguments:
+                self.arguments.append(one)
+            found.append(Term(f'x{self.arguments.index(one)}'))
+        return tuple(found)
+
+
+class Parameters:
+    """A network's parameters, as its equations see them: one number, or one for each cell."""
+
+    def __init__(self, network: 'type[Network]') -> None:
+        """Offer the parameters by name, and groups that have one for each cell."""
+        self._known = {*network.parameters(), *(
+            name for name, members in network.groups.items() if len(members) == network.cells)}
+
+    def __getattr__(self, name: str) -> Term:
+        if name not in self._known:
+            raise AttributeError(f"'{name}' is not one of {', '.join(sorted(self._known))}")
+        return Term(f'p_{name}')
+
+
+class Equations:
+    """The equations of a network, with functions on arrays.
+
+    Arrays of a variable, an argument or a parameter have one shape, or shapes that broadcast.
+
+    Attributes:
+        arguments: that stand in them, in order.
+        rows: names of the parameters, or groups of them, that stand in them.
+        groups: names that have a parameter for each cell.
+        texts: the rate of each variable, in x0, x1 ... for the arguments and p_NAME.
+        key: digest of all that follows from them.
+
+    """
+
+    def __init__(self, network: 'type[Network]') -> None:
+        """Read a network's equations.
+
+        Raises:
+            TypeError: they are not as many as the cell has variables.
+
+        """
+        cell = Cell(network.variables)
+        found = network.equations(cell, Parameters(network))
+        self.texts = tuple(term.text if isinstance(term, Term) else repr(float(term))
+                           for term in found)
+        if len(self.texts) != network.variables:
+            raise TypeError(f'{network.__name__}.equations returns {len(self.texts)} rates for '
+                            f'{network.variables} variables')
+        said = ' '.join(self.texts)
+        self._numbers = tuple(k for k in range(len(cell.arguments))
+                              if re.search(rf'\bx{k}\b', said))
+        self.arguments = tuple(cell.arguments[k] for k in self._numbers)
+        self.groups = frozenset(network.groups)
+        self.rows = tuple(dict.fromkeys(re.findall(r'\bp_(\w+)', said)))
+        words = repr((self.texts, cell.arguments, network.cells))
+        self.key = f'{network.name}_{hashlib.sha256(words.encode()).hexdigest()[:16]}'
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The symbols in the texts: arguments, then parameters."""
+        return (*(f'x{k}' for k in self._numbers), *(f'p_{row}' for row in self.rows))
+
+    @cached_property
+    def _first(self) -> ModuleType:
+        return generated.load(f'{self.key}_rates', lambda: _derivation().first(self))
+
+    @cached_property
+    def _higher(self) -> ModuleType:
+        return generated.load(f'{self.key}_higher', lambda: _derivation().higher(self))
+
+    def rates(self, x: Sequence[Any], p: Sequence[Any]) -> list[Any]:
+        """Return the rate of each variable.
+
+        Args:
+            x: the arguments, arrays.
+            p: the parameters of ``rows``, numbers or arrays.
+
+        """
+        return list(self._first.rates(*x, *p))
+
+    def slopes(self, x: Sequence[Any], p: Sequence[Any]
+               ) -> tuple[list[Any], dict[tuple[int, int], Any]]:
+        """Return the rates, and (variable, argument) -> derivative, those not identically 0."""
+        rates, found = self._first.slopes(*x, *p)
+        return list(rates), dict(zip(self._first.SLOPES, found, strict=True))
+
+    def by_parameter(self, x: Sequence[Any], p: Sequence[Any]) -> dict[tuple[int, int], Any]:
+        """Return (variable, row) -> derivative of the rate, those not identically 0."""
+        return dict(zip(self._first.BY_PARAMETER, self._first.by_parameter(*x, *p), strict=True))
+
+    def by_parameter_and_argument(self, x: Sequence[Any], p: Sequence[Any]
+                                  ) -> dict[tuple[int, int, int], Any]:
+        """Return (variable, row, argument) -> mixed second derivative, those not 0."""
+        return dict(zip(self._higher.MIXED, self._higher.mixed(*x, *p), strict=True))
+
+    def second(self, x: Sequence[Any], p: Sequence[Any]) -> dict[tuple[int, int, int], Any]:
+        """Return (variable, argument, argument) -> second derivative, arguments rising."""
+        return dict(zip(self._higher.SECOND, self._higher.second(*x, *p), strict=True))
+
+    def third(self, x: Sequence[Any], p: Sequence[Any]
+              ) -> dict[tuple[int, int, int, int], Any]:
+        """Return (variable, three arguments) -> third derivative, arguments rising."""
+        return dict(zip(self._higher.THIRD, self._higher.third(*x, *p), strict=True))
+
+
+def _derivation() -> ModuleType:
+    # sympy takes a third of a second to load, and is needed once for each set of equations.
+    from cpg_ros.networks import derivation
+    return derivation
+
+
+@cache
+def equations_of(network: 'type[Network]') -> Equations:
+    """Return a network's equations, read once."""
+    return Equations(network)
+
+
+def values_of(network: 'Network') -> list[np.ndarray]:
+    """Return the parameters of the equations' rows, each one number or one for each cell."""
+    values = network.as_dict()
+    return [np.array([values[name] for name in network.groups[row]]) if row in network.groups
+            else np.array(values[row]) for row in equations_of(type(network)).rows]
