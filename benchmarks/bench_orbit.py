@@ -3,7 +3,8 @@
 One is simulation: the symmetry-locked network runs until two successive periods agree. The other
 is scipy's general root finder on the same discretised problem, without our Jacobian and starting
 from the same first harmonic. Accuracy: the residual of all eight equations between the nodes, and
-the periods against the ones established beforehand (DESIGN 2.1).
+the periods against the ones established beforehand (docs/numbers_and_errata.md, section Orbits
+of the delayed network).
 """
 
 from functools import partial

@@ -25,7 +25,7 @@ def as_json(capsys, *arguments):
 
 
 def test_example_1_as_json(capsys):
-    # DESIGN 2.1.
+    # docs/numbers_and_errata.md, section Hopf points of the delayed network.
     said = as_json(capsys, *EXAMPLE_1)
     assert said['network'] == 'delayed'
     assert said['params'] == {'a': -4.5, 'b': 1.0, 'c': 6.5, 'd': -2.0, 'tau': 0.4}

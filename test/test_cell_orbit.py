@@ -1,4 +1,4 @@
-"""Orbits of the Morris-Lecar networks against DESIGN 2.2, 2.3, simulation, and the equations."""
+"""Orbits of the Morris-Lecar networks against simulation, published gaits and the equations."""
 
 from dataclasses import replace
 from functools import cache
@@ -18,6 +18,7 @@ from cpg_ros.networks.registry import PRESETS
 
 ALL = [(network, name) for network in ('quadruped', 'biped') for name in PRESETS[network]]
 EVERY = pytest.mark.parametrize(('network', 'name'), ALL)
+# docs/numbers_and_errata.md, section Periods of the quadruped network, and the next one.
 PERIODS = {'quadruped': {'pronk': 10.524, 'pace': 10.388, 'bound': 10.388, 'trot': 24.072,
                          'jump': 9.575, 'walk': 25.374},
            'biped': {'walk': 14.265, 'run': 9.745, 'two_legged_jump': 13.401,

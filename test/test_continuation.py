@@ -26,14 +26,15 @@ from cpg_ros.networks.registry import NETWORKS, PRESETS
 EXAMPLE = Delayed(-4.5, 1.0, 6.5, -2.0, 0.4)
 TAU = ParameterLine.parse('tau', Delayed)
 SWAP = [1, 0, 3, 2, 5, 4, 7, 6]
-# Subcritical Hopf points: parameters, mode, sign of the root and n of DESIGN 2.1.
+# Subcritical Hopf points: parameters, mode, sign of the root and n (docs/theory.md, section Roots
+# and Hopf points).
 SUBCRITICAL = {'pace': (Delayed(-3.4, 3.9, -6.2, 5.4, 1.0), Mode(0, 1), 1, 0),
                'trot': (Delayed(-2.6, 0.4, 7.5, -9.4, 1.0), Mode(2, 1), 1, 1),
                'walk': (Delayed(-3.2, 4.8, 7.6, -7.0, 1.0), Mode(3, 1), 1, 0)}
 
 
 def hopf(network, mode, sign, n):
-    """A Hopf point of DESIGN 2.1, omega and tau, and k1 and k2 of its normal form."""
+    """A Hopf point by docs/theory.md: omega and tau, and k1 and k2 of its normal form."""
     turn = 1j ** -mode.j
     a = network.a + network.b + network.d * turn
     b = network.c * (-1) ** mode.k

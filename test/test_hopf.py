@@ -15,7 +15,8 @@ from cpg_ros.networks.delayed import MODES, PRESETS, Delayed, Mode
 
 EXAMPLE_1, EXAMPLE_2 = Delayed(-4.5, 1.0, 6.5, -2.0, 0.4), Delayed(-3.0, 0.1, 4.0, 1.0, 0.7)
 GOAT_TROT, GOAT_WALK = Delayed(-2.0, 1.0, 6.43, -2.0, 0.25), Delayed(-2.0, 1.0, 6.5, -2.0, 0.245)
-#: DESIGN 2.1: network, gait, omega, tau, k1 and k2, k1 and k2 as published.
+#: docs/numbers_and_errata.md, section Hopf points of the delayed network: network, gait, omega,
+#: tau, k1 and k2, k1 and k2 as published.
 VERIFIED = [
     (EXAMPLE_1, 'walk', 7.4772, 0.2861, 1.8135, -0.9177, 0.4179, -0.2349),
     (EXAMPLE_1, 'trot', 6.3246, 0.2852, 2.1557, -0.9610, 0.6486, -0.2544),
@@ -62,7 +63,7 @@ def test_verified_figures(network, gait, omega, tau, k1, k2, p1, p2):
              point.published.k1.real, point.published.k2.real)
     assert found == pytest.approx((omega, tau, k1, k2, p1, p2), abs=6e-5)
     assert point.direction == 1 and point.supercritical and point.normal_form.side == 1
-    # None of them is stable in the full network (DESIGN 2.4, no. 3).
+    # None of them is stable in the full network (erratum 3).
     assert point.unstable_transverse_roots > 0
 
 

@@ -1,4 +1,4 @@
-"""The symmetry lock, noise, and what the network ends in without the lock (DESIGN 2.1)."""
+"""The symmetry lock, noise, and what the network ends in without the lock."""
 
 import numpy as np
 import pytest
@@ -17,7 +17,7 @@ networks = st.builds(Delayed, st.floats(-6.0, 1.0), rates, rates, rates, st.floa
 
 
 def field(network, x, past):
-    """The equation of DESIGN 2.1."""
+    """Liu & Zhang (2024), eq. 1.1."""
     return (network.a * x + network.b * np.tanh(x) + network.d * np.tanh(np.roll(x, 2))
             + network.c * np.tanh(past[SWAP]))
 
@@ -82,7 +82,7 @@ def test_the_lock_changes_neither_waveform_nor_period(gait):
 
 @pytest.mark.parametrize('gait', GAITS)
 def test_noise_with_and_without_the_lock(gait):
-    # DESIGN 2.1: with the lock every gait survives, without it the network latches.
+    # docs/theory.md, section Why the published gaits freeze.
     network = PRESETS[gait].network
     orbit = solve_orbit(network, gait)
     locked, free = (simulate(network, orbit, 200.0, orbit.period / 400, noise=0.02, seed=7,

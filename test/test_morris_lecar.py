@@ -32,7 +32,7 @@ def share(v, middle, width):
 
 
 def equations(kind, values, x):
-    """DESIGN 2.2 or 2.3, cell by cell; complex numbers are for derivatives."""
+    """The paper's equations, cell by cell; complex numbers are for derivatives."""
     p, (v, w) = dict(zip(kind.parameters(), values, strict=True)), x.reshape(2, -1)
     out = np.zeros((2, kind.cells), np.result_type(x, np.asarray(values)))
     for i in range(kind.cells):
@@ -165,7 +165,7 @@ def test_batches_single_runs_and_some_of_their_rows_agree(kind, batch, monkeypat
 
 
 def test_the_stand_of_the_quadruped():
-    # DESIGN 2.2: where an uncoupled cell rests, found on w = n(v) of this file's equations.
+    # Section 6: where an uncoupled cell rests, found on w = n(v) of this file's equations.
     def on_nullcline(v):
         return np.repeat([v, share(v, 0.3, 0.2)], 8)
     v = brentq(lambda v: equations(Quadruped, [0.0] * 6, on_nullcline(v))[0], 0.2, 0.4, xtol=1e-15)

@@ -13,7 +13,8 @@ from cpg_ros.networks.registry import NETWORKS, PRESETS
 from cpg_ros.robots.robot_file import load_robot
 
 CONFIG = Path(get_package_share_directory('cpg_ros')) / 'config'
-# DESIGN 2.1 and 2.3: phases of the legs, where the gait's symmetry prescribes them.
+# Phases of the legs, where the gait's symmetry prescribes them: docs/theory.md, section The
+# delayed network and section The biped network.
 PHASES = {'quadruped': {'pronk': (0, 0, 0, 0), 'pace': (0, .5, 0, .5), 'bound': (0, 0, .5, .5),
                         'trot': (0, .5, .5, 0), 'jump': (0, 0, .75, .75),
                         'walk': (0, .5, .75, .25)},

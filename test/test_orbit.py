@@ -1,4 +1,4 @@
-"""Orbits and Hopf points against DESIGN 2.1, and the whole delay equation."""
+"""Orbits and Hopf points against verified numbers and the whole delay equation."""
 
 from dataclasses import replace
 
@@ -16,7 +16,8 @@ EXAMPLE = Delayed(-4.5, 1.0, 6.5, -2.0, 0.4)
 SWAP = [1, 0, 3, 2, 5, 4, 7, 6]
 OFF_NODES = np.random.default_rng(3).uniform(-3.0, 3.0, 200)
 
-# DESIGN 2.1: parameters, gait, omega, tau_c, k1, k2.
+# docs/numbers_and_errata.md, section Hopf points of the delayed network: parameters, gait,
+# omega, tau_c, k1, k2.
 ONSETS = [(EXAMPLE, 'walk', 7.4772, 0.2861, 1.8135, -0.9177),
           (EXAMPLE, 'trot', 6.3246, 0.2852, 2.1557, -0.9610),
           (Delayed(-3.0, 0.1, 4.0, 1.0, 0.7), 'pace', 3.5199, 0.5869, 0.8319, -0.9142),
@@ -29,6 +30,7 @@ networks = st.builds(lambda a, b, d, more: Delayed(a, b, abs(a + b) + abs(d) + m
                      st.floats(0.5, 4.0))
 
 
+# docs/numbers_and_errata.md, section Orbits of the delayed network.
 @pytest.mark.parametrize(('network', 'gait', 'period', 'peak'), [
     (EXAMPLE, 'trot', 1.27827056, 0.981144), (EXAMPLE, 'walk', 1.09048163, 0.890828),
     (Delayed(-3.0, 0.1, 4.0, 1.0, 0.7), 'pace', 2.04780069, 0.621207),
@@ -58,7 +60,7 @@ def test_solves_all_eight_equations_between_the_nodes(preset):
     ('liu2024_walk', (0, 0.5, 0.25, 0.75)), ('goat_slope_walk', (0, 0.5, 0.25, 0.75))])
 def test_phases_of_the_legs(preset, legs):
     # Cells 1 to 4 are LH, RH, LF, RF. LF at 3/4 peaks T / 4 after LH: the lateral sequence LH,
-    # LF, RH, RF of most quadrupeds; the paper's sets walk diagonally (DESIGN, erratum 7).
+    # LF, RH, RF of most quadrupeds; the paper's sets walk diagonally (erratum 7).
     orbit = solve_orbit(PRESETS[preset].network, PRESETS[preset].gait)
     times = np.linspace(0.0, orbit.period, 57)
     for cell, phase in enumerate(legs):

@@ -103,7 +103,8 @@ def test_without_a_transition_the_network_settles_by_itself(old, new):
 
 @pytest.mark.parametrize(('gait', 'frequency', 'hertz'), [
     ('pronk', 0.31, 0.31), ('pace', 1.03, 1.03), ('bound', 2.51, 2.51), ('jump', 0.71, 0.71),
-    # Model time, one unit a second, with the periods of DESIGN 2.1.
+    # Model time, one unit a second: docs/numbers_and_errata.md, section Orbits of the delayed
+    # network.
     ('trot', 0.0, 1.0 / 1.27827056), ('walk', 0.0, 1.0 / 1.09048163)])
 def test_strides_a_second_and_amplitudes_of_goat_yaml_are_exact(gait, frequency, hertz):
     position, velocity, phases = drive(in_swing(program(gait, frequency)), 20.0, 0.02)

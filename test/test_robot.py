@@ -40,7 +40,7 @@ def error_of(path):
 
 def test_the_goat():
     robot = load_robot(CONFIG / 'goat.yaml')
-    # DESIGN 2.1: cells 1, 7 LH; 2, 8 RH; 3, 5 LF; 4, 6 RF.
+    # docs/theory.md, section The delayed network: cells 1, 7 LH; 2, 8 RH; 3, 5 LF; 4, 6 RF.
     assert [(joint.leg, joint.cell) for joint in robot.joints] == [
         ('lh', 1), ('lh', 7), ('rh', 2), ('rh', 8), ('lf', 3), ('lf', 5), ('rf', 4), ('rf', 6)]
     assert robot.order == tuple(GOAT['joint_order'])

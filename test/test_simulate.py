@@ -1,4 +1,4 @@
-"""Simulation against the equation (DESIGN 2.1) solved by other means, and its symmetries."""
+"""Simulation against the equation solved by other means, and its symmetries."""
 
 from dataclasses import replace
 from itertools import pairwise
@@ -54,7 +54,8 @@ def published():
 
 
 def test_error_after_twenty_units(published):
-    # DESIGN 3: about 8e-7 at h = tau / 40, between the nodes as well.
+    # docs/numbers_and_errata.md, section Step and readout: 7.5e-7 at h = tau / 40, between the
+    # nodes as well.
     times, states = published
     assert 1e-8 < np.abs(simulate(WALK, START, 20.0, 0.01)(times) - states).max() < 1e-6
     assert np.abs(simulate(WALK, START, 20.0, 0.4 / 500)(times) - states).max() < 1e-9

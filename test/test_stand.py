@@ -29,7 +29,7 @@ def apart(found, wanted):
 
 
 def scalar_roots(network):
-    """Stands' v for the quadruped from the equations in DESIGN 2.2, w eliminated by hand."""
+    """Stands' v for the quadruped from the equations of section 6, w eliminated by hand."""
     v = np.linspace(-2.0, 2.0, 400_001)
     m, n = (1 + np.tanh((v - 0.2) / 0.4)) / 2, (1 + np.tanh((v - 0.3) / 0.2)) / 2
     speed = 0.2 * np.cosh((v - 0.3) / 0.4)
@@ -43,7 +43,7 @@ def scalar_roots(network):
 @pytest.mark.parametrize('network', [Quadruped(0, 0, 0, 0), Quadruped(0.2, 0.2, -0.2, -0.2),
                                      Quadruped(-0.15, -0.15, -0.16, -0.16, 0.31, 0.31)])
 def test_the_stand_of_the_paper(network):
-    # Section 6 and DESIGN 2.2; where the couplings add up to nothing it does not move.
+    # Section 6, to more digits; where the couplings add up to nothing it does not move.
     state = stand(network)
     assert state == pytest.approx([0.3096, 0.5240], abs=5e-5)
     _, _, _, slopes = CELL.slopes(*state, PHI)

@@ -15,7 +15,8 @@ from cpg_ros.robots.robot_file import load_robot
 
 ROBOT = load_robot(Path(get_package_share_directory('cpg_ros')) / 'config' / 'quadruped.yaml')
 OFFSET, LOWER, UPPER = (ROBOT.column(key) for key in ('offset', 'lower', 'upper'))
-# DESIGN 2.1: phases of LH, RH, LF, RF; walk and jump run backward round the ring, as d > 0.
+# Phases of LH, RH, LF, RF (docs/theory.md, section The delayed network); walk and jump run
+# backward round the ring, as d > 0.
 PHASES = {'pronk': (0, 0, 0, 0), 'pace': (0, .5, 0, .5), 'bound': (0, 0, .5, .5),
           'trot': (0, .5, .5, 0), 'jump': (0, 0, .75, .75), 'walk': (0, .5, .75, .25)}
 

@@ -138,8 +138,8 @@ def test_every_pair_has_phi_of_m_symmetries(group):
         assert all(one.classes.max() + 1 == pair.signals for one in own)
 
 
-# DESIGN 2.1 and Buono & Golubitsky, Tables 1 and 2: mode (j, k), phases of LH, RH, LF, RF, which
-# are cells 1 to 4. Of +- the paper has + and our gaits -.
+# Buono & Golubitsky (2001), Tables 1 and 2: mode (j, k), phases of LH, RH, LF, RF, which are
+# cells 1 to 4. Of +- the paper has + and our gaits -.
 @pytest.mark.parametrize(('gait', 'j', 'k', 'phases'), [
     ('pronk', 0, 0, (0, 0, 0, 0)), ('pace', 0, 1, (0, 0.5, 0, 0.5)),
     ('bound', 2, 0, (0, 0, 0.5, 0.5)), ('trot', 2, 1, (0, 0.5, 0.5, 0)),
@@ -153,7 +153,7 @@ def test_primary_gaits_of_the_quadruped(gait, j, k, phases):
         assert not one.waves.any()
         assert one.h == tuple(Z4_Z2.elements)
         assert one.k == paper.k
-        # The eigenvector (1, (-1)^k, i^j, (-1)^k i^j, ...) of DESIGN 2.1, or its conjugate.
+        # The eigenvector (1, (-1)^k, i^j, (-1)^k i^j, ...), or its conjugate.
         vector = np.exp(2j * np.pi * (one.phases if one is paper else -one.phases))
         cells = np.arange(8)
         assert np.allclose(vector, 1j ** (j * (cells // 2)) * (-1.0) ** (k * (cells % 2)))
@@ -172,7 +172,7 @@ def test_h_and_k_of_the_biped(gait, h, k):
 
 
 @pytest.mark.parametrize(('gait', 'waves', 'phases'), [
-    # DESIGN 2.3.
+    # Rashidi et al. (2016), Tables 4 and 5.
     ('walk', (1, 1, 1, 1), (0, 0.5, 0.5, 0)), ('run', (1, 1, 1, 1), (0, 0.5, 0, 0.5)),
     ('jump', (1, 1, 1, 1), (0, 0, 0.5, 0.5)), ('hop', (1, 1, 1, 1), (0, 0, 0, 0)),
     ('skip', (1, 1, 2, 2), (0, 0.5, 0, 0.5)), ('gallop', (1, 2, 1, 2), (0, 0, 0.5, 0.5)),

@@ -1,8 +1,9 @@
 """Characteristic roots of the delayed network's rest state, all of them, by Lambert's W.
 
 In the symmetry class (j, k) the characteristic equation is ``lambda = A + B exp(-lambda tau)``
-(DESIGN 2.1), so ``(lambda - A) tau`` is a branch of W at ``B tau exp(-A tau)``:
-``lambda_n = A + W_n(B tau exp(-A tau)) / tau``. Real parts fall as n goes from 0 to either side.
+(docs/theory.md, section Roots and Hopf points), so ``(lambda - A) tau`` is a branch of W at
+``B tau exp(-A tau)``: ``lambda_n = A + W_n(B tau exp(-A tau)) / tau``. Real parts
+fall as n goes from 0 to either side.
 """
 
 import numpy as np

@@ -1,7 +1,7 @@
 """Gaits of the delayed network as exact periodic orbits.
 
 On a primary gait every cell is x_1 shifted by a known phase, so the eight delay equations
-collapse to one periodic problem (DESIGN 3): with theta = t / T in cycles,
+collapse to one periodic problem (docs/theory.md, section Exact orbits): with theta = t / T,
 ``u'(theta)/T = a u + b tanh u + d tanh u(theta + phi_d) + c tanh u(theta + phi_c - tau/T)``,
 solved by Fourier collocation with the period as unknown. Phase zero is where x_1 peaks.
 """

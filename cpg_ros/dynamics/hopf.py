@@ -1,9 +1,9 @@
 """Hopf points of the delayed network's rest state, mode by mode, and their normal forms.
 
 In the symmetry class (j, k) the characteristic equation is ``lambda = A + B exp(-lambda tau)``
-with ``A = a + b + d i^(-j)`` and ``B = c (-1)^k``; its crossings are known in closed form (DESIGN
-2.1). The normal forms are in the paper's time, t/tau, and in mu = tau - tau_c; docs/theory.md
-derives the correct one.
+with ``A = a + b + d i^(-j)`` and ``B = c (-1)^k``; its crossings are known in closed form
+(docs/theory.md, section Roots and Hopf points). The normal forms are in the paper's time, t/tau,
+and in mu = tau - tau_c; the section after that derives the correct one.
 """
 
 import cmath
@@ -68,7 +68,7 @@ class HopfPoint:
 
     @cached_property
     def published(self) -> NormalForm:
-        """The normal form as Liu & Zhang (2024) print it, section 2; wrong (DESIGN 2.4, no. 1).
+        """The normal form as Liu & Zhang (2024) print it, section 2; erratum 1.
 
         ``D = 1/(8 (-1 + c e))``, ``k1 = 8 D (-a - b - d + c e)``, ``k2 = -8 tau D (-b + c e - d)``
         with e = exp(i omega tau), whatever the mode.

@@ -1,9 +1,9 @@
 """The linear readout of joints and its elimination from a fit: variable projection.
 
 A joint is ``offset + sum_k w_k psi_k(x, y)``, psi = x, y, x^2, x y, x^3, x^2 y up to the order
-(DESIGN 3). Whatever the network's parameters, the best offset and weights are a linear
-least-squares problem; put in place they leave a residual of the network's parameters alone. Its
-exact derivative is Golub & Pereyra's (1973).
+(docs/theory.md, section Readout). Whatever the network's parameters, the best offset and weights
+are a linear least-squares problem; put in place they leave a residual of the network's parameters
+alone. Its exact derivative is Golub & Pereyra's (1973).
 """
 
 from dataclasses import dataclass

@@ -28,7 +28,7 @@ PARTNERS = {'a': (1, 0, 3, 2), 'b': (2, 3, 0, 1), 'c': (3, 2, 1, 0)}
 WEIGHTS = {letter: tuple(f'w_{j + 1}{i + 1}' for i, j in enumerate(partners))
            for letter, partners in PARTNERS.items()}
 
-#: Gait -> shifts of the elements that generate its H (Table 5, DESIGN 2.3).
+#: Gait -> shifts of the elements that generate its H (Tables 4 and 5).
 GAITS: dict[str, dict[str, Fraction]] = {
     'walk': {'rho': Fraction(1, 2), 'tau': Fraction(1, 2)},
     'run': {'rho': Fraction(1, 2), 'tau': Fraction(0)},

@@ -1,6 +1,7 @@
 """Errata of the three papers, by number. Rows of the report that differ name one of these.
 
-1 to 8 are those of the design, in its order; the others were found while the report was made.
+docs/numbers_and_errata.md, section Errata, says how 1 to 8 were verified; the others were found
+while the report was made.
 """
 
 LIU, BUONO, RASHIDI = 'Liu & Zhang 2024', 'Buono & Golubitsky 2001', 'Rashidi et al. 2016'

@@ -2,9 +2,10 @@
 
 A joint's angle is ``offset + amplitude * sum_k w_k psi_k(x, y)``: x is its cell's waveform (of a
 Morris-Lecar cell: the first harmonics of it), y the derivative of that by phase (in radians),
-psi = x, y, x^2, x y, x^3, x^2 y (DESIGN 3). On every gait x runs from -1 to 1, so weights are in
-radians. A gait can have offsets and weights of its own, its motion. Where legs take strides of
-different lengths the weights are ``in_place + stride (w - in_place)``, stride from -1 to 1.
+psi = x, y, x^2, x y, x^3, x^2 y (docs/theory.md, section Readout). On every gait x runs from -1 to
+1, so weights are in radians. A gait can have offsets and weights of its own, its motion. Where
+legs take strides of different lengths the weights are ``in_place + stride (w - in_place)``, stride
+from -1 to 1.
 """
 
 from dataclasses import dataclass, field

@@ -1,0 +1,52 @@
+"""What the documentation names is there: cited sections, links, files, modules; its code runs."""
+
+import importlib
+import re
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+PAGES = [ROOT / 'README.md', *sorted((ROOT / 'docs').glob('*.md'))]
+SOURCES = [path for folder in ('cpg_ros', 'test', 'benchmarks')
+           for path in sorted((ROOT / folder).rglob('*.py')) if path != Path(__file__)]
+CITATION = re.compile(r'docs/(\w+\.md), section (.{60})')
+
+
+def headings(page):
+    return re.findall(r'^##+ (.+)$', page.read_text(), re.MULTILINE)
+
+
+def anchors(page):
+    """As GitHub makes them."""
+    return {re.sub(r'[^\w -]', '', heading.lower()).replace(' ', '-')
+            for heading in headings(page)}
+
+
+def test_sections_that_code_cites():
+    cited = [(path.name, *found) for path in SOURCES for found in CITATION.findall(
+        re.sub(r'\s+(#:? )?\s*', ' ', path.read_text()))]
+    assert len(cited) > 10
+    assert not [one for one in cited
+                if not one[2].startswith(tuple(headings(ROOT / 'docs' / one[1])))]
+
+
+@pytest.mark.parametrize('page', PAGES, ids=lambda page: page.name)
+def test_what_a_page_names(page):
+    text = page.read_text()
+    for link, anchor in re.findall(r'\]\((?!https?:)([^)#]*)#?([^)]*)\)', text):
+        there = (page.parent / link) if link else page
+        assert there.exists(), link
+        assert not anchor or anchor in anchors(there), f'{link}#{anchor}'
+    for name in re.findall(r'`((?:test|bench)_\w+\.py)`', text):
+        assert any((ROOT / folder / name).exists() for folder in ('test', 'benchmarks')), name
+    rooms = '|'.join(path.name for path in (ROOT / 'cpg_ros').iterdir() if path.is_dir())
+    for name in re.findall(rf'`(?:cpg_ros/)?((?:{rooms})/\w+\.py)`', text):
+        assert (ROOT / 'cpg_ros' / name).exists(), name
+    for module, name in re.findall(r'\b(cpg_ros\.[a-z_]+\.[a-z_]+)\.?(\w*)', text):
+        assert hasattr(importlib.import_module(module), name or '__name__'), f'{module}.{name}'
+
+
+def test_the_example_of_the_readme_runs():
+    (example,) = re.findall(r'```python\n(.*?)```', PAGES[0].read_text(), re.DOTALL)
+    exec(example, {})
