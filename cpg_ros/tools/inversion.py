@@ -10,6 +10,7 @@ from argparse import RawDescriptionHelpFormatter
 from collections.abc import Sequence
 from pathlib import Path
 
+from cpg_ros.errors import CpgError, InputError
 from cpg_ros.files.atomic_write import write_atomically
 from cpg_ros.files.progress_bar import progress_bar
 from cpg_ros.files.yaml_reader import shown
@@ -134,7 +135,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if chosen.paper and (robot is None or 'delayed' not in robot.networks
                              or chosen.network not in (None, 'delayed')
                              or sorted(robot.cells) != list(range(CELLS))):
-            raise ValueError('--paper: the paper has one joint for each of the eight cells of the '
+            raise InputError('--paper: the paper has one joint for each of the eight cells of the '
                              'delayed network: a --robot file has to say which, such as goat')
         recording = _recording(chosen, robot)
         with progress_bar('fitting', 100) as bar:
@@ -146,7 +147,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except NoSteadyGait as error:
         print(f'inversion: {error}', file=sys.stderr)
         return 1
-    except (ValueError, OSError) as error:
+    except (CpgError, OSError) as error:
         print(f'inversion: {error}', file=sys.stderr)
         return 2
     except KeyboardInterrupt:
@@ -170,7 +171,7 @@ def _paper(chosen, found: Inverted, starts: list[dict[str, float]]) -> list[Pape
         return []
     network = preset_of(found.fit.network.name, chosen.preset or found.fit.gait).network
     if not isinstance(network, Delayed):
-        raise ValueError(f'--paper: the paper has the delayed network, not the {network.name}')
+        raise InputError(f'--paper: the paper has the delayed network, not the {network.name}')
     return paper_fits(found.stride, found.fit.cells, network, found.fit.gait,
                       list(found.fit.parameters), starts)
 

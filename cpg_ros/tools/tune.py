@@ -12,10 +12,11 @@ from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
+from cpg_ros.errors import CpgError
 from cpg_ros.files.progress_bar import progress_bar
 from cpg_ros.networks.registry import PRESETS
 from cpg_ros.robots.robot import Robot
-from cpg_ros.robots.robot_file import RobotError, find_robot, write_robot
+from cpg_ros.robots.robot_file import find_robot, write_robot
 from cpg_ros.simulation.gait_design import AIMS
 from cpg_ros.simulation.robot_model import SimulationError
 from cpg_ros.simulation.steering_table import STRIDES, measure
@@ -120,12 +121,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
         write_robot(chosen.out, robot, '\n'.join([
             f'Gaits made by: {command}',
             f'{LONG:g} s in simulation from the stand:', *lines]))
-    except (RobotError, OSError) as error:
-        print(f'tune: {error}', file=sys.stderr)
-        return 2
     except SimulationError as error:
         print(f'tune: {error}', file=sys.stderr)
         return 1
+    except (CpgError, OSError) as error:
+        print(f'tune: {error}', file=sys.stderr)
+        return 2
     except KeyboardInterrupt:
         print('tune: stopped, nothing is written', file=sys.stderr)
         return 130

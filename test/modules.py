@@ -1,0 +1,14 @@
+"""The modules of the package."""
+
+import importlib
+import pkgutil
+from types import ModuleType
+
+import cpg_ros
+
+
+def modules() -> list[ModuleType]:
+    """Import every module of the package; that for launch files only where launch is."""
+    names = [one.name for one in pkgutil.walk_packages(cpg_ros.__path__, 'cpg_ros.')
+             if not one.name.endswith('launch_arguments') or importlib.util.find_spec('launch')]
+    return [importlib.import_module(name) for name in names]
