@@ -31,7 +31,7 @@ setup(
     entry_points={'console_scripts': [
         'generator = cpg_ros.nodes.generator:main',
         'robot_sim = cpg_ros.nodes.robot_sim:main',
-        'inversion = cpg_ros.nodes.inversion:main',
+        'inversion = cpg_ros.tools.inversion:main',
         'demo = cpg_ros.tools.demo:main',
         'analyze = cpg_ros.tools.analyze:main',
         'check_robot = cpg_ros.tools.check_robot:main',

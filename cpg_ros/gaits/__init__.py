@@ -1,4 +1,4 @@
 """What a recording does: its steady stretch, stride, mean cycle, leg phases and gait.
 
-Imports ``recordings``, ``networks`` and ``files``; knows nothing of ROS.
+Imports ``networks`` and ``files``; knows nothing of ROS.
 """

@@ -25,6 +25,7 @@ from std_srvs.srv import Trigger
 
 from cpg_ros.errors import CpgError
 from cpg_ros.files.atomic_write import write_atomically
+from cpg_ros.files.plain_text import finite
 from cpg_ros.inversion.parameter_files import write_fitted
 from cpg_ros.inversion.recording_fit import Inverted, inverted
 from cpg_ros.nodes import node_base as starting
@@ -34,7 +35,6 @@ from cpg_ros.recordings.live_buffer import Live
 from cpg_ros.recordings.servo import Servo
 from cpg_ros.robots.robot import Robot
 from cpg_ros.robots.robot_file import find_robot
-from cpg_ros.tools.arguments import finite
 
 NAME = 'cpg_inversion'
 #: Seconds that a generator gets to answer.
@@ -181,7 +181,7 @@ class Inversion(StartedNode):
             written += write_fitted(Path(self._value('out')).expanduser(), found, self._robot)
         if self._value('report'):
             # matplotlib takes half a second, and only pages need it.
-            from cpg_ros.tools.inversion_report import as_html
+            from cpg_ros.inversion.fit_report import as_html
             path = Path(self._value('report')).expanduser()
             write_atomically(path, as_html(found))
             written.append(path)

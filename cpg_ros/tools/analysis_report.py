@@ -14,12 +14,12 @@ from cpg_ros.dynamics.gait_assessment import GaitAssessment, nearest_threshold
 from cpg_ros.dynamics.hopf import HopfPoint, hopf_points
 from cpg_ros.dynamics.isotypic import Block, blocks
 from cpg_ros.errors import CpgError
+from cpg_ros.files.plain_text import table
 from cpg_ros.networks.delayed import MODES, Delayed
 from cpg_ros.networks.network import Network
 from cpg_ros.networks.parameter_line import ParameterLine
 from cpg_ros.networks.quadruped import Quadruped
 from cpg_ros.papers.theorem_4_2 import TheoremVerdict, theorem_4_2
-from cpg_ros.tools.arguments import table
 
 
 def _root(value: complex) -> str:

@@ -16,20 +16,13 @@ import numpy as np
 from cpg_ros.dynamics.gait_assessment import verdicts
 from cpg_ros.errors import CpgError, InputError
 from cpg_ros.files.atomic_write import write_atomically
+from cpg_ros.files.plain_text import as_json
 from cpg_ros.files.progress_bar import progress_bar
 from cpg_ros.networks.network import Network
 from cpg_ros.networks.parameter_line import ParameterLine
 from cpg_ros.networks.registry import NETWORKS, PRESETS, USUAL
 from cpg_ros.tools.analysis_report import CellAnalysis, DelayAnalysis, analysed
-from cpg_ros.tools.arguments import (
-    Parser,
-    as_json,
-    assignment,
-    interval,
-    number,
-    say,
-    twice,
-)
+from cpg_ros.tools.arguments import Parser, assignment, interval, number, say, twice
 
 DESCRIPTION = '''\
 Tell what a parameter set does before it runs on a robot: the rest state and its Hopf points, the

@@ -13,11 +13,12 @@ from pathlib import Path
 from cpg_ros.checks.robot_template import robot_from
 from cpg_ros.checks.urdf_match import RobotCheck, checked
 from cpg_ros.errors import CpgError, InputError
+from cpg_ros.files.plain_text import as_json
 from cpg_ros.networks.registry import PRESETS
 from cpg_ros.robots.robot import Robot
 from cpg_ros.robots.robot_file import find_robot, write_robot
 from cpg_ros.robots.urdf import load_urdf
-from cpg_ros.tools.arguments import Parser, as_json, number, say
+from cpg_ros.tools.arguments import Parser, number, say
 
 DESCRIPTION = '''\
 Compare a robot file with the robot's URDF: joints that the URDF does not have or that cannot
