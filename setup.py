@@ -6,6 +6,7 @@ setup(
     name='cpg_ros',
     version='0.1.0',
     packages=find_packages(include=['cpg_ros', 'cpg_ros.*']),
+    package_data={'cpg_ros': ['py.typed']},
     data_files=[
         ('share/ament_index/resource_index/packages', ['resource/cpg_ros']),
         ('share/cpg_ros', ['package.xml']),

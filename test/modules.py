@@ -8,7 +8,7 @@ import cpg_ros
 
 
 def modules() -> list[ModuleType]:
-    """Import every module of the package; that for launch files only where launch is."""
+    """Import every module of the package; that for launch files only where ROS's launch is."""
     names = [one.name for one in pkgutil.walk_packages(cpg_ros.__path__, 'cpg_ros.')
-             if not one.name.endswith('launch_arguments') or importlib.util.find_spec('launch')]
+             if not one.name.endswith('launch_arguments') or importlib.util.find_spec('launch_ros')]
     return [importlib.import_module(name) for name in names]

@@ -2,3 +2,6 @@
 
 Imports ``networks`` and ``files``; knows nothing of ROS.
 """
+
+__all__ = ['leg_names', 'leg_phases', 'mean_cycle', 'period', 'phase_average', 'phase_estimation',
+           'recognition', 'steady_stretch', 'stride', 'waveform_comparison']
