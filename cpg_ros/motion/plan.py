@@ -29,6 +29,7 @@ class Program:
 
     Attributes:
         name: the preset's or gait's name.
+        robot: that it is for.
         gait: one of the network's gaits.
         orbit: the gait's orbit.
         stability: whether it attracts, and with what symmetry gain.
