@@ -24,6 +24,7 @@ demo: install/.built
 test: install/.built
 	@$(VENV)/bin/ruff check .
 	@$(VENV)/bin/mypy
+	@$(VENV)/bin/lint-imports --no-logo
 	@$(ENTER); for part in '-n auto -m "not live"' '-m live'; do \
 		eval $(VENV)/bin/pytest test $$part $(ARGS) || [ $$? = 5 ]; done  # 5: none selected
 

@@ -6,6 +6,7 @@ setup(
     name='cpg_ros',
     version='0.1.0',
     packages=find_packages(include=['cpg_ros', 'cpg_ros.*']),
+    package_data={'cpg_ros': ['py.typed']},
     data_files=[
         ('share/ament_index/resource_index/packages', ['resource/cpg_ros']),
         ('share/cpg_ros', ['package.xml']),
@@ -31,7 +32,7 @@ setup(
     entry_points={'console_scripts': [
         'generator = cpg_ros.nodes.generator:main',
         'robot_sim = cpg_ros.nodes.robot_sim:main',
-        'inversion = cpg_ros.nodes.inversion:main',
+        'inversion = cpg_ros.tools.inversion:main',
         'demo = cpg_ros.tools.demo:main',
         'analyze = cpg_ros.tools.analyze:main',
         'check_robot = cpg_ros.tools.check_robot:main',

@@ -1,9 +1,53 @@
-"""Central pattern generators of legged locomotion, true to the theory and running on ROS 2."""
+"""Central pattern generators of legged locomotion, true to the theory and running on ROS 2.
+
+What is used most is here by name, and loaded when it is first asked for; the rest is in the rooms.
+"""
 
 import os
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
 
 # Matrices here are small: threads of BLAS cost more than they give, and its idle ones spin on the
 # cores that the publishing thread needs. It is read when numpy loads, so before anything else.
 os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
 
+if TYPE_CHECKING:
+    from cpg_ros.dynamics.continuation import follow
+    from cpg_ros.dynamics.floquet import multipliers
+    from cpg_ros.dynamics.hopf import hopf_points
+    from cpg_ros.dynamics.orbit import NoOrbit, solve_orbit
+    from cpg_ros.errors import CpgError
+    from cpg_ros.integration.simulate import simulate
+    from cpg_ros.integration.stepper import Stepper
+    from cpg_ros.inversion.recording_fit import inverted
+    from cpg_ros.motion.pattern import Pattern
+    from cpg_ros.motion.plan import plan
+    from cpg_ros.networks.registry import NETWORKS, PRESETS
+    from cpg_ros.recordings.bag_reader import read_bag
+    from cpg_ros.recordings.csv_reader import read_csv
+    from cpg_ros.robots.robot_file import find_robot
+
 __version__ = '0.1.0'
+__all__ = ['NETWORKS', 'PRESETS', 'CpgError', 'NoOrbit', 'Pattern', 'Stepper', 'find_robot',
+           'follow', 'hopf_points', 'inverted', 'multipliers', 'plan', 'read_bag', 'read_csv',
+           'simulate', 'solve_orbit']
+
+_PLACES = {
+    'NETWORKS': 'networks.registry', 'PRESETS': 'networks.registry', 'CpgError': 'errors',
+    'NoOrbit': 'dynamics.orbit', 'Pattern': 'motion.pattern', 'Stepper': 'integration.stepper',
+    'find_robot': 'robots.robot_file', 'follow': 'dynamics.continuation',
+    'hopf_points': 'dynamics.hopf', 'inverted': 'inversion.recording_fit',
+    'multipliers': 'dynamics.floquet', 'plan': 'motion.plan', 'read_bag': 'recordings.bag_reader',
+    'read_csv': 'recordings.csv_reader', 'simulate': 'integration.simulate',
+    'solve_orbit': 'dynamics.orbit'}
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _PLACES:
+        raise AttributeError(f'module {__name__!r} has no attribute {name!r}')
+    value = globals()[name] = getattr(import_module(f'{__name__}.{_PLACES[name]}'), name)
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

@@ -146,6 +146,7 @@ def test_a_biped_set_with_weights_of_its_own(capsys):
 @pytest.mark.parametrize(('arguments', 'words'), [
     (('--set', 'tau=nan'), 'tau is nan, it must be finite'),
     (('--set', 'c=inf'), 'c is inf, it must be finite'),
+    (('--set', 'b=-1e300', 'c=1e300'), 'b is -1e+300, it must be at most 1e+06'),
     (('--set', 'tau=-0.1'), 'tau is -0.1, a delay must be positive'),
     (('--set', 'tau=0'), 'tau is 0, a delay must be positive'),
     (('--set', 'c=0'), 'c is 0'),

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from cpg_ros.dynamics.hopf import hopf_point
+from cpg_ros.dynamics.periodic import NoOrbit
 from cpg_ros.networks.quadruped import Quadruped
 from cpg_ros.papers import buono_blocks, buono_groups, liu_zhang, rashidi
 from cpg_ros.papers.catalogue import PAPERS
@@ -208,7 +209,7 @@ def test_a_changed_linearisation_fails(monkeypatch, capsys):
 def test_a_part_without_a_result_fails(monkeypatch, capsys):
     def broken():
         yield AT.holds('so it is', True)
-        raise ValueError('no orbit was found')
+        raise NoOrbit('no orbit was found')
 
     only(monkeypatch, 'rashidi', broken)
     code, rows = outcome(capsys, 'rashidi')

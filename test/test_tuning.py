@@ -220,7 +220,7 @@ def test_the_search_improves_a_bad_start_and_can_be_repeated(quick):
 
 
 def test_the_tool_writes_a_robot_file_that_can_be_read(quick, tmp_path, capsys, monkeypatch):
-    monkeypatch.setattr(tool, 'measure', lambda batch, program, update: None)
+    monkeypatch.setattr(tuning, 'measure', lambda batch, program, update: None)
     out = tmp_path / 'my_go2.yaml'
     assert tool.main(['--robot', str(FILE), '--model', 'go2', '--gaits', 'trot', '--evaluations',
                       '7', '--seed', '2', '--out', str(out)]) == 0

@@ -2,3 +2,5 @@
 
 Imports ``motion``, ``gaits``, ``robots`` and what is below; knows nothing of ROS.
 """
+
+__all__ = ['robot_template', 'urdf_match']

@@ -6,12 +6,12 @@ from difflib import get_close_matches
 from math import inf, nan
 from typing import Any
 
+from cpg_ros.files.plain_text import table
 from cpg_ros.gaits.leg_names import LegsError, legs_of, role_of
 from cpg_ros.motion.plan import Refused, plan
 from cpg_ros.networks.registry import NETWORKS, PRESETS
 from cpg_ros.robots.robot import Joint, Motion, Robot
 from cpg_ros.robots.urdf import UrdfJoint
-from cpg_ros.tools.arguments import table
 
 #: Files have limits rounded: differences up to this many rad (rad/s) are none.
 ROUNDING = 1e-4

@@ -27,6 +27,7 @@ from cpg_ros.dynamics.equilibrium import (
 from cpg_ros.dynamics.isotypic import Block, blocks, characters, rightmost_first
 from cpg_ros.dynamics.normal_form import NormalForm
 from cpg_ros.dynamics.sign_changes import crossings
+from cpg_ros.errors import InputError
 from cpg_ros.networks.biped import Biped
 from cpg_ros.networks.parameter_line import ParameterLine
 from cpg_ros.networks.quadruped import Quadruped
@@ -167,7 +168,7 @@ def cell_hopf_points(network: Quadruped | Biped, along: ParameterLine, low: floa
 
     """
     if not (np.isfinite(low) and np.isfinite(high) and low < high):
-        raise ValueError(f'low {low} must be less than high {high}')
+        raise InputError(f'low {low} must be less than high {high}')
 
     kinds = characters(type(network))
 

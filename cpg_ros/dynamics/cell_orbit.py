@@ -14,6 +14,7 @@ import numpy as np
 from cpg_ros.dynamics.mesh_newton import collocate, predicted
 from cpg_ros.dynamics.mesh_orbit import MeshOrbit
 from cpg_ros.dynamics.periodic import NoOrbit
+from cpg_ros.errors import InputError
 from cpg_ros.integration.simulate import simulate
 from cpg_ros.networks.network import Network, Preset
 from cpg_ros.networks.registry import PRESETS
@@ -85,7 +86,7 @@ def from_preset(preset: Preset) -> MeshOrbit:
 
     """
     if preset.start is None:
-        raise ValueError(f'the preset of {preset.gait} has no start')
+        raise InputError(f'the preset of {preset.gait} has no start')
     network, start = preset.network, np.array(preset.start)
     _check(network, preset.gait)
     symmetry = network.symmetry(preset.gait)
@@ -163,7 +164,7 @@ def solve(network: Network, gait: str, near: MeshOrbit | None = None) -> MeshOrb
     symmetry = network.symmetry(gait)
     for name, value in network.as_dict().items():
         if not np.isfinite(value):
-            raise ValueError(f'{name} is {value}, not a finite number')
+            raise InputError(f'{name} is {value}, not a finite number')
     _check(network, gait)
     if near is None:
         if gait not in PRESETS[network.name]:

@@ -17,6 +17,7 @@ from cpg_ros.dynamics.delayed_orbit import NODES, DelayedOrbit
 from cpg_ros.dynamics.mesh_newton import Reduced, Solution, sampled
 from cpg_ros.dynamics.mesh_orbit import MeshOrbit
 from cpg_ros.dynamics.periodic import NoOrbit
+from cpg_ros.errors import InputError
 from cpg_ros.networks.delayed import Delayed, Mode
 from cpg_ros.networks.network import Network
 from cpg_ros.networks.parameter_line import ParameterLine
@@ -307,12 +308,12 @@ def _check(network: Network, symmetry: Mode | Symmetry, along: ParameterLine, lo
            high: float) -> None:
     value = along.value(network)
     if along.at(network, value) != network:
-        raise ValueError(f'the network is not on the line {along}')
+        raise InputError(f'the network is not on the line {along}')
     if not low <= value <= high:
-        raise ValueError(f'{along} {value:g} is not from {low:g} to {high:g}')
+        raise InputError(f'{along} {value:g} is not from {low:g} to {high:g}')
     if isinstance(symmetry, Symmetry):
         other = along.at(network, high if value != high else low).as_dict()
         for family in network.families(symmetry):
             if len({other[name] for name in family}) > 1:
-                raise ValueError(f'{along} breaks the symmetry: it needs {", ".join(family)} '
+                raise InputError(f'{along} breaks the symmetry: it needs {", ".join(family)} '
                                  f'to be equal')

@@ -14,6 +14,7 @@ from scipy.optimize import brentq
 from cpg_ros.dynamics import fourier as collocation
 from cpg_ros.dynamics.hopf import hopf_point, weakened
 from cpg_ros.dynamics.periodic import NoOrbit, Orbit
+from cpg_ros.errors import InputError
 from cpg_ros.networks.delayed import Delayed, Mode
 
 NODES = 63
@@ -198,9 +199,9 @@ def solve(network: Delayed, gait: str, near: DelayedOrbit | None = None) -> Dela
     mode = network.symmetry(gait)
     for name, value in network.as_dict().items():
         if not np.isfinite(value):
-            raise ValueError(f'{name} is {value}, not a finite number')
+            raise InputError(f'{name} is {value}, not a finite number')
     if network.tau <= 0.0:
-        raise ValueError(f'tau is {network.tau}, it must be positive')
+        raise InputError(f'tau is {network.tau}, it must be positive')
     a, b = mode.eigenvalue_terms(network)
     if mode.j % 2 == 0 and b >= 0.0:
         wanted = 'positive' if mode.k else 'negative'

@@ -12,6 +12,7 @@ from typing import TypeVar
 import numpy as np
 
 from cpg_ros.dynamics.sign_changes import crossings
+from cpg_ros.errors import CpgError, InputError
 from cpg_ros.networks.biped import Biped
 from cpg_ros.networks.quadruped import Quadruped
 
@@ -30,7 +31,7 @@ FURTHEST = 1e3
 SHORTEST = 1e-5
 
 
-class NoStand(ValueError):
+class NoStand(CpgError):
     """The stand cannot be followed from the uncoupled cells to these couplings."""
 
 
@@ -162,4 +163,4 @@ def _newton(network: Quadruped | Biped, cell: np.ndarray) -> np.ndarray | None:
 def _check(network: Quadruped | Biped) -> None:
     for name, value in network.as_dict().items():
         if not np.isfinite(value):
-            raise ValueError(f'{name} is {value}')
+            raise InputError(f'{name} is {value}')

@@ -42,7 +42,7 @@ class GaitAssessment:
     @property
     def _orbit(self) -> Orbit:
         if self.orbit is None:
-            raise ValueError(f'there is no {self.gait}: {self.why}')
+            raise NoOrbit(f'there is no {self.gait}: {self.why}')
         return self.orbit
 
     @property

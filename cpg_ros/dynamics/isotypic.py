@@ -13,6 +13,7 @@ from functools import cache, cached_property
 import numpy as np
 
 from cpg_ros.dynamics.equilibrium import everywhere
+from cpg_ros.errors import InputError
 from cpg_ros.networks import biped, quadruped
 from cpg_ros.networks.biped import Biped
 from cpg_ros.networks.quadruped import Quadruped
@@ -87,7 +88,7 @@ def blocks(network: Quadruped | Biped, state: np.ndarray) -> tuple[Block, ...]:
     """
     known = characters(type(network))
     if unequal := network.broken(known[0][0]):
-        raise ValueError(f'{unequal} differ: the network has not the symmetry of its gaits')
+        raise InputError(f'{unequal} differ: the network has not the symmetry of its gaits')
     whole = network.jacobian(everywhere(network, np.asarray(state, dtype=float)))
     row = whole.reshape(2, network.cells, 2, network.cells)[:, 0]
     return tuple(Block(gait, mode, symmetry, row @ _values(symmetry))

@@ -7,6 +7,8 @@ With ``z = r exp(i theta)``: ``r' = Re k1 mu r + Re k2 r^3`` and
 import math
 from dataclasses import dataclass
 
+from cpg_ros.dynamics.periodic import NoOrbit
+
 
 @dataclass(frozen=True)
 class NormalForm:
@@ -44,7 +46,7 @@ class NormalForm:
         """
         square = -self.k1.real * mu / self.k2.real
         if square < 0.0:
-            raise ValueError(f'at mu {mu:g} the normal form has no orbit')
+            raise NoOrbit(f'at mu {mu:g} the normal form has no orbit')
         return math.sqrt(square)
 
     def shift(self, mu: float) -> float:

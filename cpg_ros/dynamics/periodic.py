@@ -7,13 +7,14 @@ from typing import Any
 
 import numpy as np
 
+from cpg_ros.errors import CpgError
 from cpg_ros.networks.network import Network
 
 #: Points of a cycle among which extremes are looked for before they are refined.
 POINTS = 1024
 
 
-class NoOrbit(ValueError):
+class NoOrbit(CpgError):
     """The parameter set has no such gait; the message says what stands against it."""
 
 

@@ -7,6 +7,8 @@ from typing import Any
 
 import yaml
 
+from cpg_ros.errors import CpgError
+
 
 class _UniqueKeys(yaml.SafeLoader):
     """YAML without silently overwritten keys."""
@@ -33,14 +35,14 @@ def shown(value: Any) -> str:
 class Reader:
     """Takes checked values out of one file's tree, and says where a bad one stands."""
 
-    def __init__(self, path: Path, what: str, error: type[ValueError], largest: float) -> None:
+    def __init__(self, path: Path, what: str, error: type[CpgError], largest: float) -> None:
         """Read for a file that is called ``what``; failures are of the type ``error``.
 
         No number may be larger than ``largest``.
         """
         self.path, self.what, self.error, self.largest = path, what, error, largest
 
-    def fail(self, where: str, why: str) -> ValueError:
+    def fail(self, where: str, why: str) -> CpgError:
         """Return the error that says where and why."""
         return self.error(' '.join(f'{self.what} {self.path}: {where}: {why}'.split()))
 

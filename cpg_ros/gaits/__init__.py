@@ -1,4 +1,7 @@
 """What a recording does: its steady stretch, stride, mean cycle, leg phases and gait.
 
-Imports ``recordings``, ``networks`` and ``files``; knows nothing of ROS.
+Imports ``networks`` and ``files``; knows nothing of ROS.
 """
+
+__all__ = ['leg_names', 'leg_phases', 'mean_cycle', 'period', 'phase_average', 'phase_estimation',
+           'recognition', 'steady_stretch', 'stride', 'waveform_comparison']

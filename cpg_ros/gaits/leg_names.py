@@ -10,6 +10,8 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+from cpg_ros.errors import CpgError
+
 #: Letters and words of left and right, fore and hind.
 SIDES = {'left': 'l', 'l': 'l', 'right': 'r', 'r': 'r'}
 ENDS = {'front': 'f', 'fore': 'f', 'hind': 'h', 'rear': 'h', 'back': 'h'}
@@ -34,7 +36,7 @@ _STUCK = re.compile(rf'(?<![a-z])({"|".join((*CODES, *SIDES, *ENDS))})(?=({"|".j
                     re.IGNORECASE)
 
 
-class LegsError(ValueError):
+class LegsError(CpgError):
     """No legs can be told from the names; the message says which are there or missing."""
 
 

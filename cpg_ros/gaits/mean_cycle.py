@@ -8,6 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import solve_toeplitz, toeplitz
 
+from cpg_ros.errors import InputError
+
 #: Most harmonics of a mean cycle.
 HARMONICS = 32
 #: Least eigenvalue of the normal matrix of harmonics, of at most 1.
@@ -104,12 +106,12 @@ def mean_cycle(t: np.ndarray, signals: np.ndarray, period: float) -> Cycle:
         period: in the unit of t.
 
     Raises:
-        ValueError: the samples do not even determine the first harmonic.
+        InputError: the samples do not even determine the first harmonic.
 
     """
     harmonics = determined(t, period)
     if harmonics < 1:
-        raise ValueError(f'the samples, folded onto one period of {period:g}, leave too much of '
+        raise InputError(f'the samples, folded onto one period of {period:g}, leave too much of '
                          f'it empty')
     rows = rows_of((t - t[0]) / period, harmonics)
     weights = weights_for(signals.T, rows)

@@ -10,6 +10,7 @@ import numpy as np
 from scipy.interpolate import PchipInterpolator
 from scipy.signal import argrelmin
 
+from cpg_ros.errors import InputError
 from cpg_ros.gaits.mean_cycle import determined, rows_of, series, weights_for
 
 #: What deviates by less, as a share of the signals' RMS, does not tell a period from its half.
@@ -124,7 +125,7 @@ def find_period(t: np.ndarray, signals: np.ndarray) -> float:
         signals: one channel per column, shape (m, channels).
 
     Raises:
-        ValueError: the recording does not repeat, or holds less than two periods.
+        InputError: the recording does not repeat, or holds less than two periods.
 
     """
     if t.size > LONGEST:
@@ -154,7 +155,7 @@ def find_period(t: np.ndarray, signals: np.ndarray) -> float:
         if best[0] <= NEGLIGIBLE ** 2:
             break
     if best[0] > REPEATS:
-        raise ValueError(f'no period found: the signals do not repeat steadily within half of '
+        raise InputError(f'no period found: the signals do not repeat steadily within half of '
                          f'the {_span(t):g} recorded; at least two periods are needed')
     # Where samples are few, lags tell a cycle from its like halves less well than this does.
     for share in (2, 3):

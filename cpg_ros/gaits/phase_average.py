@@ -11,6 +11,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from cpg_ros.errors import InputError
 from cpg_ros.gaits.mean_cycle import determined, rows_of, series, weights_for
 
 #: Most harmonics of a mean cycle.
@@ -84,7 +85,7 @@ def warped(phases: np.ndarray, positions: np.ndarray, theta: np.ndarray, first: 
         first: joints of which the one with the largest first harmonic gives phase 0.
 
     Raises:
-        ValueError: a joint has too few samples.
+        InputError: a joint has too few samples.
 
     """
     there = np.isfinite(positions)
@@ -127,7 +128,7 @@ def _fitted(phases: np.ndarray, x: np.ndarray) -> tuple[np.ndarray, np.ndarray, 
     """Fit the series of joints with the same samples; return weights, rest and its bins."""
     n = min(determined(phases - phases[0], 1.0), HARMONICS) if phases.size > 4 else 0
     if n < 1:
-        raise ValueError(f'{phases.size} samples leave too much of the cycle empty')
+        raise InputError(f'{phases.size} samples leave too much of the cycle empty')
     some = mean_weights(x, phases, n)
     rest = np.empty_like(x)
     for part in blocks(phases):

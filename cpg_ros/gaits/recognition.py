@@ -11,6 +11,7 @@ from fractions import Fraction
 
 import numpy as np
 
+from cpg_ros.errors import InputError
 from cpg_ros.gaits.mean_cycle import mean_cycle
 from cpg_ros.gaits.period import find_period, holds_two
 from cpg_ros.networks.hk_theorem import symmetries
@@ -112,14 +113,14 @@ def _checked(t: np.ndarray, signals: np.ndarray, group: Group, gaits: Mapping[st
         raise ValueError(f'signals have the shape {signals.shape}, times {t.shape}; '
                          f'{group.cells} cells need (m, {group.cells}) and (m,)')
     if t.size < FEWEST:
-        raise ValueError(f'{t.size} samples are not enough, at least {FEWEST} are needed')
+        raise InputError(f'{t.size} samples are not enough, at least {FEWEST} are needed')
     for name, values in (('t', t), ('signals', signals)):
         if not np.isfinite(values).all():
-            raise ValueError(f'{name} holds {np.count_nonzero(~np.isfinite(values))} values '
+            raise InputError(f'{name} holds {np.count_nonzero(~np.isfinite(values))} values '
                              f'that are not finite')
     if not (np.diff(t) > 0.0).all():
         late = int(np.argmin(np.diff(t) > 0.0))
-        raise ValueError(f't does not increase: {t[late]:g} is followed by {t[late + 1]:g}')
+        raise InputError(f't does not increase: {t[late]:g} is followed by {t[late + 1]:g}')
     spread = signals.std(axis=0)
     still = np.flatnonzero(spread <= np.maximum(1e-6 * spread.max(),
                                                 1e-12 * np.abs(signals).max()))
@@ -131,11 +132,11 @@ def _checked(t: np.ndarray, signals: np.ndarray, group: Group, gaits: Mapping[st
         if gait.group != group:
             raise ValueError(f'the gait {name!r} is one of another group')
     if not (np.isfinite(tolerance) and tolerance > 0.0):
-        raise ValueError(f'tolerance is {tolerance}, it must be positive')
+        raise InputError(f'tolerance is {tolerance}, it must be positive')
     if period is not None and not (np.isfinite(period) and period > 0.0):
-        raise ValueError(f'period is {period}, it must be positive')
+        raise InputError(f'period is {period}, it must be positive')
     if period is not None and not holds_two(t, period):
-        raise ValueError(f'the recording lasts {t[-1] - t[0]:g}, less than two periods of '
+        raise InputError(f'the recording lasts {t[-1] - t[0]:g}, less than two periods of '
                          f'{period:g}')
 
 
@@ -156,9 +157,9 @@ def recognise(t: np.ndarray, signals: np.ndarray, group: Group, gaits: Mapping[s
         tolerance: largest distance of a symmetry that holds; see Recognised.
 
     Raises:
-        ValueError: shapes do not fit, a value is not finite, t does not increase, a channel is
-            constant, there are fewer than two periods or too few samples, or gaits do not
-            belong to the group.
+        InputError: a value is not finite, t does not increase, a channel is constant, or there
+            are fewer than two periods or too few samples.
+        ValueError: shapes do not fit, or gaits do not belong to the group.
 
     """
     t, signals = np.asarray(t, dtype=float), np.asarray(signals, dtype=float)
@@ -204,7 +205,8 @@ def nearest_gait(phases: np.ndarray, table: Mapping[str, np.ndarray]
         after the best common shift.
 
     Raises:
-        ValueError: table is empty, shapes do not fit, or a phase is not finite.
+        InputError: a phase is not finite.
+        ValueError: table is empty, or shapes do not fit.
 
     """
     phases = np.asarray(phases, dtype=float)
@@ -217,7 +219,7 @@ def nearest_gait(phases: np.ndarray, table: Mapping[str, np.ndarray]
             raise ValueError(f'phases have the shape {phases.shape}, those of {name!r} '
                              f'{wanted.shape}; both must be (legs,)')
         if not np.isfinite(phases + wanted).all():
-            raise ValueError(f'a phase is not finite: {phases}, {name!r} {wanted}')
+            raise InputError(f'a phase is not finite: {phases}, {name!r} {wanted}')
         ahead = np.sort((phases - wanted) % 1.0)
         # The circular mean of least squares cuts the circle between two of the legs.
         cuts = ahead + np.tri(ahead.size, k=-1)

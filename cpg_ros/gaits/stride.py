@@ -10,6 +10,7 @@ from typing import Protocol
 
 import numpy as np
 
+from cpg_ros.errors import CpgError, InputError
 from cpg_ros.gaits.leg_names import Legs
 from cpg_ros.gaits.leg_phases import leg_phases, named, named_by_cells
 from cpg_ros.gaits.phase_average import Warped, warped
@@ -37,7 +38,7 @@ SPIKE = 3.0
 DRIFT = 0.04
 
 
-class NoSteadyGait(ValueError):
+class NoSteadyGait(CpgError):
     """A recording has no steady gait; the message says what it has instead."""
 
 
@@ -128,14 +129,14 @@ def find_stride(recording: Recorded, legs: Legs | Mapping[str, Sequence[str]],
 
     Raises:
         NoSteadyGait: there is none, or none of a leg's joints has angles.
-        ValueError: the legs are not the network's.
+        InputError: the legs are not the network's.
 
     """
     kind = network if isinstance(network, type) else type(network)
     source = recording.source
     own = next(iter(kind.legs.values()))
     if set(legs) != set(own):
-        raise ValueError(f'{source}: legs are {", ".join(legs)}; the network {kind.name} has '
+        raise InputError(f'{source}: legs are {", ".join(legs)}; the network {kind.name} has '
                          f'{", ".join(own)}')
     chosen, positions, notes = _usable(recording, {leg: legs[leg] for leg in own})
     times = recording.times
@@ -159,7 +160,7 @@ def find_stride(recording: Recorded, legs: Legs | Mapping[str, Sequence[str]],
         x = x[:, full]
     try:
         found = warped(phases, x, theta, [names.index(name) for name in chosen[next(iter(own))]])
-    except ValueError as error:
+    except InputError as error:
         raise NoSteadyGait(f'{source}: {error}') from error
     power = np.array([np.nanvar(column) for column in x.T])
     left = float(np.sum(found.left * power) / np.sum(power))

@@ -2,3 +2,5 @@
 
 Imports ``networks`` and what is below; knows nothing of ROS.
 """
+
+__all__ = ['jit', 'kernel', 'simulate', 'stepper']

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from cpg_ros.errors import InputError
 from cpg_ros.files.progress_bar import progress_bar
 from cpg_ros.integration import kernel
 from cpg_ros.networks.network import Network
@@ -47,7 +48,7 @@ class Trajectory:
         times = np.atleast_1d(np.asarray(times, dtype=float))
         step = self.t[1]
         if times.size and not (times.min() >= 0.0 and times.max() <= self.t[-1] + 1e-9 * step):
-            raise ValueError(f'times reach from {times.min()} to {times.max()}, the trajectory '
+            raise InputError(f'times reach from {times.min()} to {times.max()}, the trajectory '
                              f'from 0 to {self.t[-1]}')
         left = np.clip((times / step).astype(int), 0, self.t.size - 2)
         s = (times / step - left)[:, None]
@@ -91,7 +92,7 @@ def sample_history(history: History, nodes: int, step: float, components: int
     if x.shape != (nodes, components):
         raise ValueError(f'a history has the shape ({components},), not {x.shape[1:]}')
     if not (np.isfinite(x).all() and np.isfinite(slopes).all()):
-        raise ValueError('the history has a value that is not finite')
+        raise InputError('the history has a value that is not finite')
     return x, slopes
 
 
@@ -130,19 +131,19 @@ def simulate(network: Network | Sequence[Network], history: History | Sequence[H
     if {len(networks), len(histories)} - {1, batch}:
         raise ValueError(f'{len(networks)} networks do not go with {len(histories)} histories')
     if not (np.isfinite(t_end) and t_end > 0.0 and np.isfinite(step) and step > 0.0):
-        raise ValueError(f't_end {t_end} and step {step} must be positive and finite')
+        raise InputError(f't_end {t_end} and step {step} must be positive and finite')
     for one in networks:
         if not all(np.isfinite(value) for value in one.as_dict().values()):
-            raise ValueError(f'a parameter is not finite: {one}')
+            raise InputError(f'a parameter is not finite: {one}')
         if 0.0 < one.delay < step or (one.delay <= 0.0 and one.delay_parameter):
-            raise ValueError(f'the delay {one.delay} is shorter than the step {step}')
+            raise InputError(f'the delay {one.delay} is shorter than the step {step}')
         if type(one) is not type(networks[0]):
             raise ValueError(f'a batch has one kind of network, not {networks[0].name} and '
                              f'{one.name}')
 
     components, cells = networks[0].components, networks[0].cells
     if every < 1:
-        raise ValueError(f'every {every} must be at least 1')
+        raise InputError(f'every {every} must be at least 1')
     rows = int(np.ceil(t_end / (step * every) - 1e-9))
     steps = rows * every
     # Five nodes at least, so that slopes of a given history are of fourth order.

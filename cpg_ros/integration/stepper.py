@@ -5,6 +5,7 @@ import math
 
 import numpy as np
 
+from cpg_ros.errors import InputError
 from cpg_ros.integration import kernel
 from cpg_ros.integration.simulate import History, sample_history
 from cpg_ros.networks.network import Network
@@ -43,7 +44,7 @@ class Stepper:
         step = network.step if step is None else step
         max_delay = max(network.longest_delay, step) if max_delay is None else max_delay
         if not (math.isfinite(step) and step > 0.0 and max_delay >= step):
-            raise ValueError(f'step {step} must be positive and at most max_delay {max_delay}')
+            raise InputError(f'step {step} must be positive and at most max_delay {max_delay}')
         self.step = step
         self.max_delay = max_delay
         nodes = math.ceil(max_delay / step) + 3
@@ -64,9 +65,10 @@ class Stepper:
 
         """
         if not all(math.isfinite(v) for v in (*network.as_dict().values(), gain)):
-            raise ValueError(f'not finite: {network}, gain {gain}')
+            raise InputError(f'not finite: {network}, gain {gain}')
         if network.delay_parameter and not self.step <= network.delay <= self.max_delay:
-            raise ValueError(f'{network.delay_parameter} {network.delay} must be from {self.step} to {self.max_delay}')
+            raise InputError(f'{network.delay_parameter} {network.delay} must be from '
+                             f'{self.step} to {self.max_delay}')
         if gain and symmetry is None:
             raise ValueError('a symmetry gain needs the symmetry class')
         self.network, self.gain, self.symmetry = network, gain, symmetry

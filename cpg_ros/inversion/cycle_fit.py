@@ -12,6 +12,7 @@ import numpy as np
 
 from cpg_ros.dynamics.delayed_orbit import DelayedOrbit, solve
 from cpg_ros.dynamics.periodic import NoOrbit
+from cpg_ros.errors import InputError
 from cpg_ros.inversion.free_parameters import free_numbers, with_values
 from cpg_ros.inversion.trust_region import Trial, descend
 from cpg_ros.networks.delayed import Delayed
@@ -79,8 +80,9 @@ def fit_cycle(samples: np.ndarray, theta: np.ndarray, start: Delayed, gait: str,
         names: of the parameters to fit, each within its range; the others keep their values.
 
     Raises:
-        ValueError: shapes do not fit, a value is not finite, a name is unknown or given twice,
-            there are fewer values than parameters, or the start is out of a parameter's range.
+        ValueError: shapes do not fit.
+        InputError: a value is not finite, a name is unknown or given twice, there are fewer
+            values than parameters, or the start is out of a parameter's range.
         NoOrbit: the start has no such gait.
 
     """
@@ -89,15 +91,15 @@ def fit_cycle(samples: np.ndarray, theta: np.ndarray, start: Delayed, gait: str,
         raise ValueError(f'samples have the shape {samples.shape}, theta {theta.shape}; '
                          f'{start.cells} cells need (m, {start.cells}) and (m,)')
     if not (np.isfinite(samples).all() and np.isfinite(theta).all()):
-        raise ValueError('samples or theta hold a value that is not finite')
+        raise InputError('samples or theta hold a value that is not finite')
     free = free_numbers(start, gait, names)
     if samples.size < len(free):
-        raise ValueError(f'{samples.size} values do not determine {len(free)} parameters')
+        raise InputError(f'{samples.size} values do not determine {len(free)} parameters')
     columns = [start.parameters().index(one.name) for one in free]
     begin = np.array([one.value(start) for one in free])
     for one, value in zip(free, begin, strict=True):
         if not one.low < value < one.high:
-            raise ValueError(f'{one.name} {value:g} to start from is not between {one.low:g} '
+            raise InputError(f'{one.name} {value:g} to start from is not between {one.low:g} '
                              f'and {one.high:g}')
     solved: dict[bytes, DelayedOrbit] = {}
 

@@ -6,6 +6,7 @@ from typing import Protocol
 
 import numpy as np
 
+from cpg_ros.errors import InputError
 from cpg_ros.networks.network import Network
 from cpg_ros.robots.robot import Robot
 
@@ -71,20 +72,20 @@ def cells_of(source: Robot | Mapping[str, Sequence[str]], network: type[Network]
         assignment: of cells to legs, the usual one by default.
 
     Raises:
-        ValueError: the network has no such leg or assignment, or does not drive this robot.
+        InputError: the network has no such leg or assignment, or does not drive this robot.
 
     """
     if isinstance(source, Robot):
         if network.name not in source.networks:
-            raise ValueError(f'robot {source.name} is not for the network {network.name}')
+            raise InputError(f'robot {source.name} is not for the network {network.name}')
         return {joint.name: joint.cell for joint in source.joints}
     assignment = assignment or next(iter(network.legs))
     if assignment not in network.legs:
-        raise ValueError(f"assignment '{assignment}' is not one of {', '.join(network.legs)}")
+        raise InputError(f"assignment '{assignment}' is not one of {', '.join(network.legs)}")
     legs = network.legs[assignment]
     for leg in source:
         if leg not in legs:
-            raise ValueError(f"the network {network.name} has no leg '{leg}': it has "
+            raise InputError(f"the network {network.name} has no leg '{leg}': it has "
                              f'{", ".join(legs)}')
     return {joint: legs[leg][0] for leg, joints in source.items() for joint in joints}
 
@@ -99,7 +100,8 @@ def joints_of(cycle: MeanCycle, cells: Mapping[str, int], network: Network
         network: whose cells.
 
     Raises:
-        ValueError: shapes do not fit, a value is not finite, or a joint or cell is unknown.
+        InputError: a value is not finite, or a joint or cell is unknown.
+        ValueError: shapes do not fit.
 
     """
     names = list(cells)
@@ -111,20 +113,20 @@ def joints_of(cycle: MeanCycle, cells: Mapping[str, int], network: Network
                          f'{len(recorded)} joints on {theta.size} instants need '
                          f'({len(recorded)}, {theta.size})')
     if not names:
-        raise ValueError('no joint is assigned to a cell')
+        raise InputError('no joint is assigned to a cell')
     if theta.size < 1 or np.abs((theta - theta[0]) - np.arange(theta.size) / theta.size
                                 ).max() > 1e-9:
         raise ValueError('theta must be an even grid over one cycle')
     for name in names:
         if name not in recorded:
-            raise ValueError(f"joint '{name}' is not in the recording")
+            raise InputError(f"joint '{name}' is not in the recording")
         if not 1 <= cells[name] <= network.cells:
-            raise ValueError(f"joint '{name}' has the cell {cells[name]}; there are "
+            raise InputError(f"joint '{name}' has the cell {cells[name]}; there are "
                              f'{network.cells}')
         row = recorded.index(name)
         if not (np.isfinite(mean[row]).all() and np.isfinite(error[row]).all()
                 and (error[row] >= 0.0).all()):
-            raise ValueError(f"joint '{name}' has a mean or error that is not finite")
+            raise InputError(f"joint '{name}' has a mean or error that is not finite")
     rows = [recorded.index(name) for name in names]
     stated = np.sqrt(np.mean(error[rows]**2, axis=1))
     spans = np.ptp(mean[rows], axis=1)

@@ -7,6 +7,7 @@ from typing import TypeVar
 import numpy as np
 
 from cpg_ros.dynamics.hopf import hopf_point
+from cpg_ros.errors import InputError
 from cpg_ros.networks.delayed import Delayed
 from cpg_ros.networks.network import Network
 
@@ -48,7 +49,7 @@ def free_numbers(network: Network, gait: str, names: Sequence[str],
         bounds: name -> lower and upper bound, where they are to be narrower than the range.
 
     Raises:
-        ValueError: a name is unknown or given twice, or bounds cannot be used.
+        InputError: a name is unknown or given twice, or bounds cannot be used.
 
     """
     bounds = dict(bounds or {})
@@ -56,30 +57,30 @@ def free_numbers(network: Network, gait: str, names: Sequence[str],
     known = (*network.parameters(), *network.groups)
     found: list[Free] = []
     if not names or isinstance(names, str):
-        raise ValueError(f'no names of parameters to fit; there are {", ".join(known)}')
+        raise InputError(f'no names of parameters to fit; there are {", ".join(known)}')
     if len(set(names)) < len(names):
-        raise ValueError(f"names are '{', '.join(names)}'; they must be different ones")
+        raise InputError(f"names are '{', '.join(names)}'; they must be different ones")
     for name in names:
         if name not in known:
-            raise ValueError(f"'{name}' is not one of the parameters of {network.name}: "
+            raise InputError(f"'{name}' is not one of the parameters of {network.name}: "
                              f'{", ".join(known)}')
         asked = network.groups.get(name, (name,))
         members = tuple(dict.fromkeys(
             member for family in families if set(family) & set(asked) for member in family))
         taken = [other.name for other in found if set(other.members) & set(members)]
         if taken:
-            raise ValueError(f'{name} is the same as {taken[0]}, which is free already')
+            raise InputError(f'{name} is the same as {taken[0]}, which is free already')
         low = max(network.ranges[member].low for member in members)
         high = min(network.ranges[member].high for member in members)
         if name in bounds:
             least, most = bounds.pop(name)
             if not low <= least < most <= high:
-                raise ValueError(f'{name}: bounds {least:g} to {most:g} are not in order within '
+                raise InputError(f'{name}: bounds {least:g} to {most:g} are not in order within '
                                  f'{low:g} to {high:g}')
             low, high = least, most
         found.append(Free(name, members, low, high))
     if bounds:
-        raise ValueError(f"'{next(iter(bounds))}' has bounds but is not free")
+        raise InputError(f"'{next(iter(bounds))}' has bounds but is not free")
     return tuple(found)
 
 

@@ -12,6 +12,7 @@ from contextlib import suppress
 import numpy as np
 
 from cpg_ros.dynamics.periodic import NoOrbit, Orbit
+from cpg_ros.errors import InputError
 from cpg_ros.inversion.caveats import findings
 from cpg_ros.inversion.fit_data import MeanCycle, joints_of
 from cpg_ros.inversion.free_parameters import Free, free_numbers
@@ -59,7 +60,8 @@ def invert(cycle: MeanCycle, cells: Mapping[str, int], network: Network, gait: s
         done: told which share of the work is done, 0 to 1.
 
     Raises:
-        ValueError: names, shapes, bounds or starts cannot be used.
+        InputError: names, bounds or starts cannot be used.
+        ValueError: shapes do not fit, or there is no start.
         NoOrbit: no start has such a gait; the message is that of the first.
 
     """
@@ -71,7 +73,7 @@ def invert(cycle: MeanCycle, cells: Mapping[str, int], network: Network, gait: s
     numbers = free_numbers(network, gait, free or USUAL[network.name], bounds)
     taken = len(joints.names) * (1 + WEIGHTS[order]) + len(numbers) + 1
     if joints.theta.size < 2 * (1 + WEIGHTS[order]) or joints.data.size <= taken:
-        raise ValueError(f'{joints.theta.size} instants of {len(joints.names)} joints do not '
+        raise InputError(f'{joints.theta.size} instants of {len(joints.names)} joints do not '
                          f'determine readouts of order {order} and {len(numbers)} parameters')
     period = None
     if time_scale > 0.0:
@@ -118,11 +120,11 @@ def _begin(network: Network, numbers: Sequence[Free], start: Mapping[str, float]
     known = {one.name: one.value(network) for one in numbers}
     for name, value in start.items():
         if name not in known:
-            raise ValueError(f"start: '{name}' is not free")
+            raise InputError(f"start: '{name}' is not free")
         known[name] = float(value)
     for one in numbers:
         if not one.low <= known[one.name] <= one.high:
-            raise ValueError(f'{one.name} {known[one.name]:g} to start from is not within '
+            raise InputError(f'{one.name} {known[one.name]:g} to start from is not within '
                              f'{one.low:g} to {one.high:g}')
     return np.array(list(known.values()))
 

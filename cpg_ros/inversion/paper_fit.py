@@ -11,6 +11,7 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 
 from cpg_ros.dynamics.delayed_orbit import DelayedOrbit, solve
+from cpg_ros.errors import InputError
 from cpg_ros.inversion.cycle_fit import CycleFit, cycle_samples, fit_cycle
 from cpg_ros.inversion.fit_data import MeanCycle
 from cpg_ros.networks.delayed import CELLS, Delayed
@@ -60,13 +61,13 @@ def paper_fits(cycle: MeanCycle, cells: Mapping[str, int], network: Delayed, gai
         starts: free parameter -> value to start from; {} starts from the network's own values.
 
     Raises:
-        ValueError: a cell has no joint or several, or what fit_cycle cannot use.
+        InputError: a cell has no joint or several, or what fit_cycle cannot use.
         NoOrbit: a start has no such gait.
 
     """
     by_cell = sorted(cells, key=lambda name: cells[name])
     if [cells[name] for name in by_cell] != list(range(1, CELLS + 1)):
-        raise ValueError('the paper takes one joint for each of the eight cells: a robot file '
+        raise InputError('the paper takes one joint for each of the eight cells: a robot file '
                          'has to say which, such as the shipped goat')
     rows = [list(cycle.joints).index(name) for name in by_cell]
     theta = np.arange(POINTS) / POINTS
@@ -74,7 +75,7 @@ def paper_fits(cycle: MeanCycle, cells: Mapping[str, int], network: Delayed, gai
                                   period=1.0) for row in rows]).T
     for name in (name for start in starts for name in start):
         if name not in free:
-            raise ValueError(f"start: '{name}' is not free")
+            raise InputError(f"start: '{name}' is not free")
     begins = [replace(network, **start) for start in starts]
     theta = theta + _shift(solve(begins[0], gait), theta, samples)
     found = []

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import yaml
 
+from cpg_ros.errors import InputError
 from cpg_ros.files.atomic_write import write_atomically
 from cpg_ros.inversion.recording_fit import Inverted
 from cpg_ros.motion.plan import Refused, plan
@@ -32,8 +33,9 @@ def fitted_robot(found: Inverted, robot: Robot | None) -> Robot:
             as they are. Without one, limits are taken from the recording.
 
     Raises:
-        ValueError: a leg of the network has no recorded joint, or the robot's limits do not
-            let a joint move so.
+        InputError: a leg of the network has no recorded joint, or a joint would swing about an
+            angle outside its limits.
+        Refused: the robot's limits do not let a joint move so.
 
     """
     fit = found.fit
@@ -46,14 +48,14 @@ def fitted_robot(found: Inverted, robot: Robot | None) -> Robot:
         try:
             plan(moved, fit.gait, preset, fit.network, found.stride.frequency)
         except Refused as error:
-            raise ValueError(f'{found.recording.source}: robot {robot.name} cannot do this: '
-                             f'{error}') from error
+            raise Refused(f'{found.recording.source}: robot {robot.name} cannot do this: '
+                          f'{error}') from error
         return moved
     network = NETWORKS[fit.network.name]
     assignment = next(iter(network.legs))
     for leg in network.legs[assignment]:
         if leg not in found.legs:
-            raise ValueError(f'{found.recording.source}: no joint of {leg} was recorded, and the '
+            raise InputError(f'{found.recording.source}: no joint of {leg} was recorded, and the '
                              f'network {network.name} drives '
                              f'{", ".join(network.legs[assignment])}: a robot file is needed')
     legs = {leg: tuple(_guessed(name, leg, found) for name in names)
@@ -67,7 +69,7 @@ def _moved(joint: Joint, found: Inverted) -> Joint:
         return joint
     offset, weights = found.fit.readouts[joint.name]
     if not joint.lower <= offset <= joint.upper:
-        raise ValueError(f'{found.recording.source}: joint {joint.name!r} swings about '
+        raise InputError(f'{found.recording.source}: joint {joint.name!r} swings about '
                          f"{offset:.4g} rad, outside the robot file's limits {joint.lower:g} to "
                          f'{joint.upper:g}')
     return Joint(joint.name, joint.leg, joint.cell, offset, weights, joint.lower, joint.upper,
@@ -103,7 +105,7 @@ def write_fitted(path: Path, found: Inverted, robot: Robot | None = None) -> lis
         The files written.
 
     Raises:
-        ValueError: as in fitted_robot.
+        CpgError: as in fitted_robot.
         OSError: a file cannot be written.
 
     """

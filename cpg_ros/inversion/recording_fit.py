@@ -4,6 +4,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from cpg_ros.errors import InputError
 from cpg_ros.gaits.leg_names import legs_of
 from cpg_ros.gaits.stride import Stride, find_stride
 from cpg_ros.inversion.fit_data import cells_of
@@ -77,12 +78,12 @@ def preset_of(network: str, gait: str) -> Preset:
     """Return the shipped parameters that a gait is fitted from.
 
     Raises:
-        ValueError: the network has no such gait or preset.
+        InputError: the network has no such gait or preset.
 
     """
     presets = PRESETS[network]
     if gait not in presets:
-        raise ValueError(f"'{gait}' is not one of the presets of the network {network}: "
+        raise InputError(f"'{gait}' is not one of the presets of the network {network}: "
                          f'{", ".join(presets)}')
     return presets[gait]
 
@@ -96,7 +97,7 @@ def _legs(recording: Recording, robot: Robot | None) -> tuple[dict[str, tuple[st
             for leg, joints in robot.legs.items()}
     missing = [joint.name for joint in robot.joints if joint.name not in recording.joints]
     if len(missing) == len(robot.joints):
-        raise ValueError(f'{recording.source}: none of the joints of robot {robot.name} is '
+        raise InputError(f'{recording.source}: none of the joints of robot {robot.name} is '
                          f'there: it has {", ".join(recording.joints)}')
     read = f'legs and cells are those of robot {robot.name}'
     return ({leg: names for leg, names in legs.items() if names},
@@ -122,7 +123,7 @@ def inverted(recording: Recording, robot: Robot | None = None, network: str = ''
         done: told which share of the fit is done, 0 to 1.
 
     Raises:
-        ValueError: one line that says what is wrong: no legs, no steady gait (NoSteadyGait), no
+        CpgError: one line that says what is wrong: no legs, no steady gait (NoSteadyGait), no
             gait of the network's, or no orbit (NoOrbit).
 
     """
@@ -132,7 +133,7 @@ def inverted(recording: Recording, robot: Robot | None = None, network: str = ''
             'biped' if set(legs) <= set(next(iter(NETWORKS['biped'].legs.values())))
             else 'delayed')
     if network not in NETWORKS:
-        raise ValueError(f"network '{network}' is not one of {', '.join(NETWORKS)}")
+        raise InputError(f"network '{network}' is not one of {', '.join(NETWORKS)}")
     kind = NETWORKS[network]
     cells = cells_of(robot if robot is not None else legs, kind)
     cells = {name: cell for name, cell in cells.items() if name in recording.joints}
@@ -144,7 +145,7 @@ def inverted(recording: Recording, robot: Robot | None = None, network: str = ''
     if not gait:
         gait = stride.gait or ''
         if not gait:
-            raise ValueError(
+            raise InputError(
                 f'{recording.source}: the recorded phases are none of the gaits of the network '
                 f'{network}: the nearest is {stride.nearest}, {stride.distance:.3f} of a cycle '
                 'off; name the gait to fit it all the same')

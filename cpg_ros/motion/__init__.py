@@ -2,3 +2,6 @@
 
 Imports ``dynamics``, ``robots`` and what is below; knows nothing of ROS.
 """
+
+__all__ = ['pattern', 'phase_readout', 'plan', 'precompile', 'readout', 'runnable', 'smoothstep',
+           'steering', 'track']

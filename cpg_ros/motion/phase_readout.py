@@ -19,7 +19,7 @@ from scipy.optimize import minimize
 
 from cpg_ros.dynamics.periodic import Orbit
 from cpg_ros.integration.jit import OPTIONS, sources_digest
-from cpg_ros.motion.readout import TURN, monomials
+from cpg_ros.motion.readout import TURN, NoPhase, monomials
 
 #: Entries of the tables over the angle, and points of a cycle they are made from. On the plateaus
 #: of the quadruped's trot and walk a cell hardly turns: there the phase hangs on the last digits.
@@ -170,7 +170,7 @@ def _centre(v: np.ndarray, w: np.ndarray, dv: np.ndarray, dw: np.ndarray) -> np.
         dw: derivative of the second.
 
     Raises:
-        ValueError: it turns back somewhere, whatever the centre.
+        NoPhase: it turns back somewhere, whatever the centre.
 
     """
     def slowest(centre: np.ndarray) -> float:
@@ -183,8 +183,8 @@ def _centre(v: np.ndarray, w: np.ndarray, dv: np.ndarray, dw: np.ndarray) -> np.
                      options={'maxfev': 120, 'xatol': 1e-3})
     turns = np.unwrap(np.arctan2(w - found.x[1], v - found.x[0]))
     if found.fun >= 0.0 or not 0.9 * TURN < turns[-1] - turns[0] < TURN:
-        raise ValueError("its waveform does not turn steadily about any centre in the plane of "
-                         "the cell's two variables, so that they do not tell its phase")
+        raise NoPhase("its waveform does not turn steadily about any centre in the plane of "
+                      "the cell's two variables, so that they do not tell its phase")
     return found.x
 
 
@@ -227,7 +227,7 @@ def phase_map(orbit: Orbit, harmonics: int) -> PhaseMap:
     """Return an orbit's phase map, made once.
 
     Raises:
-        ValueError: a waveform does not tell the phase.
+        NoPhase: a waveform does not tell the phase.
 
     """
     return PhaseMap(orbit, harmonics)
@@ -247,7 +247,7 @@ class PhaseReadout:
         """Prepare for an orbit; arguments as in WaveReadout, and how many harmonics x has.
 
         Raises:
-            ValueError: a waveform does not tell the phase.
+            NoPhase: a waveform does not tell the phase.
 
         """
         known = phase_map(orbit, harmonics)

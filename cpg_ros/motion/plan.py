@@ -7,19 +7,19 @@ import numpy as np
 
 from cpg_ros.dynamics.orbit import Orbit, solve_orbit, solve_preset
 from cpg_ros.dynamics.stability import Stability, stability
+from cpg_ros.errors import CpgError
 from cpg_ros.integration.stepper import Stepper
 from cpg_ros.motion.phase_readout import PhaseReadout
 from cpg_ros.motion.readout import WaveReadout, extremes
+from cpg_ros.motion.runnable import obstacle, readout_of
 from cpg_ros.networks.network import Network, Preset
 from cpg_ros.robots.robot import Motion, Robot, Steering
 
 #: Strides per second below which a robot would seem to stand (Hz).
 SLOWEST = 0.01
-#: A period needs this many steps for the integrator to stay on the orbit.
-STEPS_A_PERIOD = 40
 
 
-class Refused(ValueError):
+class Refused(CpgError):
     """The request cannot be run; the message says why, with the figures."""
 
 
@@ -29,6 +29,7 @@ class Program:
 
     Attributes:
         name: the preset's or gait's name.
+        robot: that it is for.
         gait: one of the network's gaits.
         orbit: the gait's orbit.
         stability: whether it attracts, and with what symmetry gain.
@@ -77,7 +78,7 @@ class Program:
             turn: yaw rate, rad/s, positive to the left.
 
         Raises:
-            ValueError: the robot file does not say how to steer this gait.
+            Refused: the robot file does not say how to steer this gait.
 
         """
         left, right, frequency = self._steering.ask(speed, turn)
@@ -88,8 +89,8 @@ class Program:
     @property
     def _steering(self) -> Steering:
         if self.motion.steering is None:
-            raise ValueError(f"robot file '{self.robot.name}' does not say how to steer the gait "
-                             f"'{self.name}' (gaits.{self.gait}.steering)")
+            raise Refused(f"robot file '{self.robot.name}' does not say how to steer the gait "
+                          f"'{self.name}' (gaits.{self.gait}.steering)")
         return self.motion.steering
 
     @property
@@ -112,7 +113,7 @@ def gait_of(preset: Preset, network: Network) -> tuple[Orbit, Stability]:
     """Solve for a preset's gait with parameters of its own, and judge its stability.
 
     Raises:
-        ValueError: bad parameters, or no such orbit (NoOrbit).
+        CpgError: bad parameters, or no such orbit (NoOrbit).
 
     """
     known = None if preset.start is None else solve_preset(preset)
@@ -146,22 +147,16 @@ def plan(robot: Robot, name: str, preset: Preset, network: Network, frequency: f
                       f'{network.longest_delay:g}')
     try:
         orbit, judged = gait_of(preset, network)
-    except ValueError as error:
+    except CpgError as error:
         raise Refused(str(error)) from error
-    if orbit.period < STEPS_A_PERIOD * network.step:
-        raise Refused(f'the {gait} has a period of {orbit.period:.3g} model time units, too short '
-                      f'for steps of {network.step}: at least {STEPS_A_PERIOD * network.step:g} '
-                      'is needed')
-    if judged.flaw:
-        raise Refused(f'the {gait} exists at these parameters but does not attract: {judged.flaw}')
+    if (found := obstacle(orbit, judged, robot.harmonics)) is not None:
+        raise Refused(f'the {gait} {found.said}')
 
     motion = robot.motion(name, gait)
     shift = robot.shift(motion)
-    try:
-        readout, in_place = (_readout(orbit, robot, amplitude * robot.weights(motion, at_rest))
-                             for at_rest in (False, True))
-    except ValueError as error:
-        raise Refused(f'the {gait} at these parameters cannot drive joints: {error}') from error
+    readout, in_place = (
+        readout_of(orbit, robot.cells, amplitude * robot.weights(motion, at_rest),
+                   robot.leg_cells, robot.harmonics) for at_rest in (False, True))
     strides = frequency if frequency > 0.0 else 1.0 / orbit.period
     swings = [(readout.angles, readout.rises)]
     if motion.steering is not None:
@@ -185,9 +180,3 @@ def plan(robot: Robot, name: str, preset: Preset, network: Network, frequency: f
     gain = judged.chosen if gain < 0.0 else gain
     return Program(name, robot, gait, orbit, judged, gain, strides, motion, shift, readout,
                    in_place, span, speed)
-
-
-def _readout(orbit: Orbit, robot: Robot, weights: np.ndarray) -> WaveReadout | PhaseReadout:
-    if orbit.network.variables == 1:
-        return WaveReadout(orbit, robot.cells, weights, robot.leg_cells)
-    return PhaseReadout(orbit, robot.cells, weights, robot.leg_cells, robot.harmonics)

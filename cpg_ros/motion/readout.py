@@ -10,12 +10,17 @@ import numpy as np
 from numba import njit
 
 from cpg_ros.dynamics.periodic import Orbit
+from cpg_ros.errors import CpgError
 from cpg_ros.integration.jit import OPTIONS, jit, sources_digest
 
 #: Entries of the tables over one cycle.
 TABLE = 512
 
 TURN = 2.0 * math.pi
+
+
+class NoPhase(CpgError):
+    """A waveform does not tell its phase and so cannot drive joints; the message says why."""
 
 
 @jit
@@ -119,7 +124,7 @@ def lead_table(x: np.ndarray, y: np.ndarray) -> np.ndarray:
         y: its derivative by phase in radians, shape (m,). The angle is atan2(-y, x).
 
     Raises:
-        ValueError: the curve does not turn steadily about the origin, so that its angle does
+        NoPhase: the curve does not turn steadily about the origin, so that its angle does
             not tell the phase.
 
     """
@@ -127,7 +132,7 @@ def lead_table(x: np.ndarray, y: np.ndarray) -> np.ndarray:
     angle = np.unwrap(np.arctan2(-np.append(y, y[0]), np.append(x, x[0]))) / TURN
     angle -= angle[0]
     if not (np.diff(angle) > 0.0).all() or abs(angle[-1] - 1.0) > 1e-9:
-        raise ValueError('the waveform has more than one hump a cycle')
+        raise NoPhase('the waveform has more than one hump a cycle')
     grid = np.arange(TABLE) / TABLE
     return np.interp(grid, angle, phase) - grid
 
@@ -169,7 +174,7 @@ class WaveReadout:
             leg_cells: the cell that gives each leg's phase, shape (legs,).
 
         Raises:
-            ValueError: the waveform does not tell the phase.
+            NoPhase: the waveform does not tell the phase.
 
         """
         theta = np.arange(TABLE) / TABLE

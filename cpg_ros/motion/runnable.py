@@ -1,37 +1,71 @@
 """Whether the generator can run a gait at all, whatever the robot."""
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from cpg_ros.dynamics.periodic import Orbit
-from cpg_ros.dynamics.stability import stability
-from cpg_ros.motion.phase_readout import phase_map
-from cpg_ros.motion.plan import STEPS_A_PERIOD
-from cpg_ros.motion.readout import TURN, lead_table
+from cpg_ros.dynamics.stability import Stability, stability
+from cpg_ros.motion.phase_readout import PhaseReadout
+from cpg_ros.motion.readout import NoPhase, WaveReadout
 
-#: Points of a cycle by which a waveform's humps are counted.
-POINTS = 512
+#: A period needs this many steps for the integrator to stay on the orbit.
+STEPS_A_PERIOD = 40
 
 
-def refusal(orbit: Orbit, harmonics: int) -> str:
-    """Say why the generator would refuse a gait, or ''.
+@dataclass(frozen=True)
+class Obstacle:
+    """Why the generator cannot run a gait.
+
+    Attributes:
+        said: of a gait that is named, such as 'has a period of ...'.
+        aside: the same of one that has been named, in fewer words, such as 'its period of ...'.
+
+    """
+
+    said: str
+    aside: str
+
+
+def readout_of(orbit: Orbit, cells: np.ndarray, weights: np.ndarray, leg_cells: np.ndarray,
+               harmonics: int) -> WaveReadout | PhaseReadout:
+    """Return what reads joints off a network in its gait; arguments as in PhaseReadout.
+
+    Raises:
+        NoPhase: a waveform does not tell the phase.
+
+    """
+    if orbit.network.variables == 1:
+        return WaveReadout(orbit, cells, weights, leg_cells)
+    return PhaseReadout(orbit, cells, weights, leg_cells, harmonics)
+
+
+def obstacle(orbit: Orbit, judged: Stability, harmonics: int) -> Obstacle | None:
+    """Find why the generator cannot run a gait: its period, its stability, or its waveform.
 
     Args:
         orbit: the gait's.
+        judged: its stability.
         harmonics: of a Morris-Lecar cell's waveform that joints follow.
 
     """
     shortest = STEPS_A_PERIOD * orbit.network.step
     if orbit.period < shortest:
-        return f'its period of {orbit.period:.3g} model time units is below {shortest:g}'
-    flaw = stability(orbit).flaw
-    if flaw:
-        return f'it does not attract: {flaw}'
+        period = f'period of {orbit.period:.3g} model time units'
+        return Obstacle(f'has a {period}, too short for steps of {orbit.network.step}: at least '
+                        f'{shortest:g} is needed', f'its {period} is below {shortest:g}')
+    if judged.flaw:
+        return Obstacle(f'exists at these parameters but does not attract: {judged.flaw}',
+                        f'it does not attract: {judged.flaw}')
     try:
-        if orbit.network.variables == 1:
-            theta = np.arange(POINTS) / POINTS
-            lead_table(orbit.waveform(theta), orbit.waveform(theta, 1) / TURN)
-        else:
-            phase_map(orbit, harmonics)
-    except ValueError as error:
-        return f'it cannot drive joints: {error}'
-    return ''
+        readout_of(orbit, np.empty(0, int), np.empty((0, 6)), np.zeros(1, int), harmonics)
+    except NoPhase as error:
+        return Obstacle(f'at these parameters cannot drive joints: {error}',
+                        f'it cannot drive joints: {error}')
+    return None
+
+
+def refusal(orbit: Orbit, harmonics: int) -> str:
+    """Say why the generator would refuse a gait, or ''; arguments as in obstacle."""
+    found = obstacle(orbit, stability(orbit), harmonics)
+    return '' if found is None else found.aside

@@ -11,6 +11,7 @@ from fractions import Fraction
 from functools import cache
 from itertools import combinations, product
 
+from cpg_ros.errors import InputError
 from cpg_ros.networks.symmetry import Group, Symmetry
 
 #: Names of the elements of a subgroup, in the order in which the group lists them.
@@ -116,7 +117,7 @@ def symmetries(group: Group) -> tuple[Symmetry, ...]:
                 found.append(Symmetry.of(group, {
                     name: Fraction(turn, order)
                     for name, turn, order in zip(names, turns, orders, strict=True)}))
-            except ValueError:
+            except InputError:
                 # Generators that are not independent: these shifts contradict one another.
                 continue
     return tuple(found)

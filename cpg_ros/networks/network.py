@@ -11,6 +11,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from cpg_ros.errors import InputError
 from cpg_ros.networks.equations import Cell, values_of
 from cpg_ros.networks.field import Field
 from cpg_ros.networks.symmetry import Symmetry
@@ -152,7 +153,7 @@ class Network(ABC):
 
         """
         if assignment not in self.legs:
-            raise ValueError(f"assignment '{assignment}' is not one of {', '.join(self.legs)}")
+            raise InputError(f"assignment '{assignment}' is not one of {', '.join(self.legs)}")
         symmetry = self.symmetry(gait)
         pairs = [(a - 1, b - 1) for a, b in self.legs[assignment].values()]
         alike = all(symmetry.waves[a] == symmetry.waves[b] for a, b in pairs)
@@ -188,5 +189,5 @@ def known(gait: str, gaits: tuple[str, ...]) -> str:
 
     """
     if gait not in gaits:
-        raise ValueError(f"gait '{gait}' is not one of {', '.join(gaits)}")
+        raise InputError(f"gait '{gait}' is not one of {', '.join(gaits)}")
     return gait

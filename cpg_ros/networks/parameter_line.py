@@ -3,6 +3,7 @@
 from dataclasses import dataclass, replace
 from typing import TypeVar
 
+from cpg_ros.errors import InputError
 from cpg_ros.networks.network import Network
 
 AnyNetwork = TypeVar('AnyNetwork', bound=Network)
@@ -37,12 +38,12 @@ class ParameterLine:
             for member in members:
                 if member not in network.parameters():
                     known = ', '.join((*network.groups, *network.parameters()))
-                    raise ValueError(f"'{name}' is not one of {known}")
+                    raise InputError(f"'{name}' is not one of {known}")
                 if member in names:
-                    raise ValueError(f"'{text}' names {member} twice")
+                    raise InputError(f"'{text}' names {member} twice")
             sign = -1.0 if part.strip().startswith('-') else 1.0
             if not names and sign < 0.0:
-                raise ValueError(f"'{text}' must not begin with a minus")
+                raise InputError(f"'{text}' must not begin with a minus")
             names.extend(members)
             signs.extend([sign] * len(members))
         return cls(tuple(names), tuple(signs))

@@ -5,6 +5,7 @@ from typing import Any
 
 import yaml
 
+from cpg_ros.errors import CpgError
 from cpg_ros.files.atomic_write import write_atomically
 from cpg_ros.files.shared_resources import share
 from cpg_ros.files.yaml_reader import Reader
@@ -14,7 +15,7 @@ from cpg_ros.networks.network import Network, Preset
 LARGEST = 1e3
 
 
-class PresetError(ValueError):
+class PresetError(CpgError):
     """A preset file cannot be used; the message names the file, the key and the reason."""
 
 

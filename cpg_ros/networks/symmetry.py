@@ -14,6 +14,8 @@ from itertools import product
 
 import numpy as np
 
+from cpg_ros.errors import InputError
+
 #: g as a permutation: cell i (from 0) goes to cell g[i].
 Permutation = tuple[int, ...]
 
@@ -85,7 +87,7 @@ class Group:
                     found[image] = theta
                     waiting.append(image)
                 elif found[image] != theta:
-                    raise ValueError(f'{names[image]} would have the shifts {theta} and '
+                    raise InputError(f'{names[image]} would have the shifts {theta} and '
                                      f'{found[image]}')
         return {name: found[element] for name, element in self.elements.items()
                 if element in found}
@@ -130,7 +132,7 @@ class Symmetry:
         """
         for name in shifts:
             if name not in group.elements:
-                raise ValueError(f"'{name}' is not one of {', '.join(group.elements)}")
+                raise InputError(f"'{name}' is not one of {', '.join(group.elements)}")
         exact = {name: Fraction(shift).limit_denominator(64) % 1
                  for name, shift in shifts.items()}
         return cls(group, tuple(group.generated(exact).items()), variables, odd)

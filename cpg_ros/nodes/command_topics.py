@@ -13,6 +13,7 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
+from cpg_ros.errors import CpgError
 from cpg_ros.nodes.joint_publishers import COMMAND_TOPICS
 from cpg_ros.robots.robot import Robot
 from cpg_ros.robots.robot_file import LARGEST
@@ -35,7 +36,7 @@ class _Unserved(CallbackGroup):
         pass
 
 
-class _Bad(ValueError):
+class _Bad(CpgError):
     """A message that cannot be used."""
 
 

@@ -8,6 +8,7 @@ from typing import Any
 
 from rclpy.parameter import Parameter
 
+from cpg_ros.errors import CpgError
 from cpg_ros.motion.plan import Program, Refused, gait_of, plan
 from cpg_ros.networks.network import Network, Preset
 from cpg_ros.networks.registry import NETWORKS, PRESETS
@@ -87,7 +88,7 @@ class Planner:
         """Solve every preset's gait ahead, so that a switch to it is answered at once."""
         for preset in self.presets.values():
             # What cannot run is refused when it is asked for, with the reason.
-            with contextlib.suppress(ValueError):
+            with contextlib.suppress(CpgError):
                 gait_of(preset, preset.network)
 
     def specs(self, preset: str) -> dict[str, Spec]:
@@ -148,7 +149,7 @@ class Planner:
         if self.steered:
             try:
                 program.steer(0.0, 0.0)
-            except ValueError as error:
+            except Refused as error:
                 raise Refused(f'{error}, which cmd_vel needs') from error
         return program
 

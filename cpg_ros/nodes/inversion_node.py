@@ -23,7 +23,9 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
+from cpg_ros.errors import CpgError
 from cpg_ros.files.atomic_write import write_atomically
+from cpg_ros.files.plain_text import finite
 from cpg_ros.inversion.parameter_files import write_fitted
 from cpg_ros.inversion.recording_fit import Inverted, inverted
 from cpg_ros.nodes import node_base as starting
@@ -33,7 +35,6 @@ from cpg_ros.recordings.live_buffer import Live
 from cpg_ros.recordings.servo import Servo
 from cpg_ros.robots.robot import Robot
 from cpg_ros.robots.robot_file import find_robot
-from cpg_ros.tools.arguments import finite
 
 NAME = 'cpg_inversion'
 #: Seconds that a generator gets to answer.
@@ -73,7 +74,7 @@ class Inversion(StartedNode):
         name = self._value('robot')
         self._robot: Robot | None = find_robot(name) if name else None
         if not self.get_parameter_or('topics').value:
-            raise ValueError('parameter topics must not be empty')
+            raise StartError('parameter topics must not be empty')
         for topic in self._value('topics'):
             validate_topic_name(topic)
         topics = tuple(self.resolve_topic_name(topic) for topic in self._value('topics'))
@@ -167,7 +168,7 @@ class Inversion(StartedNode):
             found = inverted(recording, robot, self._value('network'), self._value('gait'),
                              tuple(free), self._value('order'), self._value('preset'))
             work.set_result(('; '.join([_summary(found), *self._written(found)]), found))
-        except (ValueError, OSError) as error:
+        except (CpgError, OSError) as error:
             work.set_result((str(error), None))
         except Exception as error:
             # One fit must not end a node that listens.
@@ -180,7 +181,7 @@ class Inversion(StartedNode):
             written += write_fitted(Path(self._value('out')).expanduser(), found, self._robot)
         if self._value('report'):
             # matplotlib takes half a second, and only pages need it.
-            from cpg_ros.tools.inversion_report import as_html
+            from cpg_ros.inversion.fit_report import as_html
             path = Path(self._value('report')).expanduser()
             write_atomically(path, as_html(found))
             written.append(path)
@@ -224,7 +225,7 @@ def _summary(found: Inverted) -> str:
 def _started() -> Inversion:
     try:
         return Inversion()
-    except (ValueError, ParameterException, NameValidationException) as error:
+    except (CpgError, ParameterException, NameValidationException) as error:
         raise StartError(' '.join(str(error).split())) from error
 
 

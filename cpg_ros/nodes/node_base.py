@@ -15,6 +15,7 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.signals import SignalHandlerOptions
 
+from cpg_ros.errors import CpgError
 from cpg_ros.nodes.parameter_services import StrictParameterService
 from cpg_ros.nodes.parameter_spec import Spec, as_doubles
 from cpg_ros.nodes.shutdown import ended
@@ -24,7 +25,7 @@ KINDS = {bool: 'a bool', int: 'an integer', float: 'a double', str: 'a string',
          list: 'a list of strings'}
 
 
-class StartError(RuntimeError):
+class StartError(CpgError):
     """The node cannot start; the message is one line for the user."""
 
 

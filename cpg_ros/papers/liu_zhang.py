@@ -8,6 +8,7 @@ import numpy as np
 from cpg_ros.dynamics import delayed_orbit
 from cpg_ros.dynamics.floquet import multipliers
 from cpg_ros.dynamics.hopf import HopfPoint, hopf_point
+from cpg_ros.dynamics.periodic import NoOrbit
 from cpg_ros.inversion.cycle_fit import CycleFit, cycle_samples, fit_cycle
 from cpg_ros.networks.delayed import Delayed
 from cpg_ros.networks.symmetry import Z4_Z2
@@ -111,7 +112,7 @@ def _example(example: Example) -> Iterator[Row | Picture]:
     at = Citation(AUTHORS, example.place)
     point = hopf_point(network, network.symmetry(gait))
     if point is None:
-        raise ValueError(f'{example.place}: no Hopf point of the {gait}')
+        raise NoOrbit(f'{example.place}: no Hopf point of the {gait}')
     for name, symbol, value in (('omega', example.names[0], point.omega),
                                 ('tau', example.names[1], point.tau)):
         if name in example.numbers:

@@ -7,6 +7,7 @@ from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass
 from io import BytesIO
 
+from cpg_ros.errors import CpgError
 from cpg_ros.papers.catalogue import PAPERS
 from cpg_ros.papers.errata import ERRATA
 from cpg_ros.papers.row import Paper, Picture, Row
@@ -75,7 +76,7 @@ def _section(paper: Paper, number: int, draw: bool) -> tuple[list[Row], list[Dra
                 rows.append(one)
             elif draw:
                 figures.append(_drawn(one))
-    except (ValueError, ArithmeticError) as error:
+    except (CpgError, ArithmeticError) as error:
         rows.append(Row(paper.authors, section.__name__.replace('_', ' '), 'what is printed here',
                         'a result', f'no result: {error}', False, 'computed at all'))
     return rows, figures

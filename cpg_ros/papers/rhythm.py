@@ -66,7 +66,7 @@ def rhythm(network: Network, start: Sequence[float] | np.ndarray, t_end: float, 
         gaits: that are told apart.
 
     Raises:
-        ValueError: it comes to rest, or repeats nothing.
+        InputError: it comes to rest, or repeats nothing.
 
     """
     run = simulate(network, np.asarray(start, dtype=float), t_end, network.step, progress=False)

@@ -71,7 +71,7 @@ def theorem_4_2(network: Quadruped, gait: str) -> TheoremVerdict:
     bifurcation is simple.
 
     Raises:
-        ValueError: the gait is not one of the six, or a parameter is not finite.
+        InputError: the gait is not one of the six, or a parameter is not finite.
         NoStand: the network has no stand.
 
     """

@@ -2,3 +2,6 @@
 
 Imports ``files``; knows nothing of ROS.
 """
+
+__all__ = ['bag_reader', 'bag_storage', 'cdr', 'csv_reader', 'joint_streams', 'live_buffer',
+           'recording', 'servo', 'unfinished_mcap']

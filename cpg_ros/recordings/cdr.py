@@ -15,6 +15,8 @@ import numpy as np
 from rosbags.serde import SerdeError
 from rosbags.typesys import Stores, get_typestore
 
+from cpg_ros.errors import CpgError
+
 JOINT_STATE = 'sensor_msgs/msg/JointState'
 #: The layout of a JointState is the same in all ROS 2 distributions.
 STORE = get_typestore(Stores.ROS2_JAZZY)
@@ -26,7 +28,7 @@ FIELDS = ('position', 'velocity', 'effort')
 HEADER = 4
 
 
-class UndecodableError(ValueError):
+class UndecodableError(CpgError):
     """Message `index` of a batch is no JointState."""
 
     def __init__(self, index: int, reason: str) -> None:

@@ -8,6 +8,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from cpg_ros.errors import CpgError
+
 #: Stamps, shape (n,), int64, ns; the joints' names; positions, shape (n, names), rad.
 Chunk = tuple[np.ndarray, Sequence[str], np.ndarray]
 
@@ -18,7 +20,7 @@ DROPOUT, JITTER = 1.5, 0.1
 LATEST = 2**32
 
 
-class RecordingError(ValueError):
+class RecordingError(CpgError):
     """A recording cannot be used; the message is one line with the file, topic and place."""
 
 

@@ -4,6 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from cpg_ros.errors import InputError
+
 #: Gains beyond these are mistakes, and would make numbers overflow.
 SMALLEST, LARGEST = 1e-3, 1e5
 
@@ -17,7 +19,7 @@ class Servo:
         kd: N m s / rad, from 0 to LARGEST.
 
     Raises:
-        ValueError: a gain is out of its range.
+        InputError: a gain is out of its range.
 
     """
 
@@ -26,9 +28,9 @@ class Servo:
 
     def __post_init__(self) -> None:
         if not SMALLEST <= self.kp <= LARGEST:
-            raise ValueError(f'kp {self.kp:g} is not from {SMALLEST:g} to {LARGEST:g} N m/rad')
+            raise InputError(f'kp {self.kp:g} is not from {SMALLEST:g} to {LARGEST:g} N m/rad')
         if not 0.0 <= self.kd <= LARGEST:
-            raise ValueError(f'kd {self.kd:g} is not from 0 to {LARGEST:g} N m s/rad')
+            raise InputError(f'kd {self.kd:g} is not from 0 to {LARGEST:g} N m s/rad')
 
     @property
     def needs(self) -> str:

@@ -2,3 +2,5 @@
 
 Imports ``networks`` and ``files``; knows nothing of ROS.
 """
+
+__all__ = ['robot', 'robot_file', 'urdf']

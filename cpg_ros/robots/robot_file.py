@@ -11,6 +11,7 @@ from typing import Any
 
 import yaml
 
+from cpg_ros.errors import CpgError
 from cpg_ros.files.atomic_write import write_atomically
 from cpg_ros.files.shared_resources import share
 from cpg_ros.files.yaml_reader import Reader, shown
@@ -29,7 +30,7 @@ from cpg_ros.robots.robot import (
 LARGEST = 1e6
 
 
-class RobotError(ValueError):
+class RobotError(CpgError):
     """A robot file cannot be used; the message names the file, the key and the reason."""
 
 

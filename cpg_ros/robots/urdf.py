@@ -11,13 +11,15 @@ from xml.parsers import expat
 
 import numpy as np
 
+from cpg_ros.errors import CpgError
+
 #: Kinds of joints that turn, which a cell can drive.
 TURNING = ('revolute', 'continuous')
 #: Children of a joint that are read, and their attributes.
 _PARTS = ('origin', 'axis', 'parent', 'child', 'limit', 'mimic')
 
 
-class UrdfError(ValueError):
+class UrdfError(CpgError):
     """A URDF file cannot be used; the message names the file and the reason in one line."""
 
 
@@ -149,9 +151,9 @@ def load_urdf(path: str | Path) -> dict[str, UrdfJoint]:
         raise UrdfError(f'URDF {path}: {error.strerror}') from error
     except expat.ExpatError as error:
         raise document.fail(f'line {error.lineno}: {expat.ErrorString(error.code)}') from error
+    except UrdfError:
+        raise
     except (ValueError, LookupError) as error:
-        if isinstance(error, UrdfError):
-            raise
         raise document.fail(str(error)) from error
     if not document.joints:
         raise document.fail('there is no joint in it')

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from cpg_ros.errors import CpgError, InputError
 from cpg_ros.files.progress_bar import progress_bar
 from cpg_ros.networks.network import Network
 from cpg_ros.search.objectives import Score, evaluate, pairs
@@ -22,11 +23,11 @@ TRIALS = 20
 SAME, LARGEST = 0.1, 1.0
 
 
-class NotInstalled(RuntimeError):
+class NotInstalled(CpgError):
     """The optional dependency is missing; the message says how to get it."""
 
 
-class NothingFound(RuntimeError):
+class NothingFound(CpgError):
     """No set passed; the message says how close the search came."""
 
 
@@ -76,17 +77,17 @@ def optimise(network_name: str, gait: str, population: int = 60, generations: in
         progress: show a progress bar.
 
     Raises:
-        ValueError: an unknown network, gait or variable, or a bound that cannot be used.
+        InputError: an unknown network, gait or variable, or a bound that cannot be used.
         NotInstalled: pymoo is missing.
         NothingFound: no set passed.
 
     """
     space = search_space(network_name, gait, bounds or {}, fixed or {})
     if population < 4 or generations < 1:
-        raise ValueError(f'population {population} must be at least 4 and generations '
+        raise InputError(f'population {population} must be at least 4 and generations '
                          f'{generations} at least 1')
     if seed < 0:
-        raise ValueError(f'seed {seed} must not be negative')
+        raise InputError(f'seed {seed} must not be negative')
     try:
         from pymoo.algorithms.moo.nsga2 import NSGA2
         from pymoo.core.evaluator import Evaluator

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from cpg_ros.errors import InputError
 from cpg_ros.networks import biped, quadruped
 from cpg_ros.networks.network import Network, known
 from cpg_ros.networks.symmetry import Symmetry
@@ -100,11 +101,11 @@ def search_space(network_name: str, gait: str, bounds: Mapping[str, tuple[float,
         fixed: the same -> its value.
 
     Raises:
-        ValueError: the network or gait is unknown, or a bound or value cannot be used.
+        InputError: the network or gait is unknown, or a bound or value cannot be used.
 
     """
     if network_name not in NETWORKS:
-        raise ValueError(f"network '{network_name}' is not one of {', '.join(NETWORKS)}")
+        raise InputError(f"network '{network_name}' is not one of {', '.join(NETWORKS)}")
     network = NETWORKS[network_name]
     known(gait, network.gaits())
     variables = (_biped_variables(gait) if network is biped.Biped else
@@ -115,22 +116,22 @@ def search_space(network_name: str, gait: str, bounds: Mapping[str, tuple[float,
     for name, (low, high) in [*bounds.items(), *((name, (value, value))
                                                  for name, value in fixed.items())]:
         if name not in places:
-            raise ValueError(f"'{name}' is not one of the variables of {gait}: "
+            raise InputError(f"'{name}' is not one of the variables of {gait}: "
                              f'{", ".join(variable.name for variable in variables)}')
         place = places[name]
         old = variables[place]
         if place in given:
-            raise ValueError(f'{name} is the same as {given[place]}, which is given already')
+            raise InputError(f'{name} is the same as {given[place]}, which is given already')
         if name in bounds and not low < high:
-            raise ValueError(f'{name}: the lower bound {low:g} is not below the upper bound '
+            raise InputError(f'{name}: the lower bound {low:g} is not below the upper bound '
                              f'{high:g}')
         allowed = network.ranges[old.members[0]]
         if not allowed.low <= low <= high <= allowed.high:
-            raise ValueError(f'{name}: {low:g}{"" if low == high else f" to {high:g}"} is not '
+            raise InputError(f'{name}: {low:g}{"" if low == high else f" to {high:g}"} is not '
                              f'within {allowed.low:g} to {allowed.high:g}')
         given[place] = name
         variables[place] = Variable(old.name, low, high, old.members)
     space = Space(network, gait, tuple(variables))
     if not space.free:
-        raise ValueError('every variable is fixed: there is nothing to look for')
+        raise InputError('every variable is fixed: there is nothing to look for')
     return space

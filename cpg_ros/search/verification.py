@@ -8,6 +8,7 @@ from cpg_ros.dynamics.cell_orbit import from_preset
 from cpg_ros.dynamics.floquet import multipliers
 from cpg_ros.dynamics.mesh_orbit import MeshOrbit
 from cpg_ros.dynamics.periodic import NoOrbit
+from cpg_ros.errors import CpgError
 from cpg_ros.gaits.waveform_comparison import shape_difference
 from cpg_ros.integration.simulate import Trajectory, simulate
 from cpg_ros.networks.network import Preset
@@ -27,7 +28,7 @@ LOST, CYCLES = 60.0, 4
 POINTS, DIGITS = 1024, 10
 
 
-class NotGood(ValueError):
+class NotGood(CpgError):
     """A parameter set does not stand up to scrutiny; the message says why."""
 
 

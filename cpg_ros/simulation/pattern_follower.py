@@ -2,11 +2,12 @@
 
 import numpy as np
 
+from cpg_ros.errors import CpgError
 from cpg_ros.motion.pattern import Pattern
 from cpg_ros.simulation.body import Body
 
 
-class Fallen(RuntimeError):
+class Fallen(CpgError):
     """The robot fell; the message says when."""
 
 

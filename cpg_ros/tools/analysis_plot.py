@@ -19,6 +19,7 @@ from cpg_ros.dynamics.floquet import ATTRACTS, multipliers
 from cpg_ros.dynamics.hopf import HopfPoint
 from cpg_ros.dynamics.mesh_orbit import MeshOrbit
 from cpg_ros.dynamics.orbit import NoOrbit, Orbit
+from cpg_ros.errors import InputError
 from cpg_ros.files.progress_bar import progress_bar
 from cpg_ros.networks.delayed import MODES, Delayed
 from cpg_ros.tools import gait_diagram as footfall
@@ -191,12 +192,12 @@ def picture(analysis: Analysis, suffix: str) -> bytes:
         suffix: of the file, such as '.png'.
 
     Raises:
-        ValueError: matplotlib does not write such files.
+        InputError: matplotlib does not write such files.
 
     """
     matplotlib.use('Agg')
     if suffix.lstrip('.') not in Figure().canvas.get_supported_filetypes():
-        raise ValueError(f"--plot: '{suffix}' is not a kind of picture that can be written, such "
+        raise InputError(f"--plot: '{suffix}' is not a kind of picture that can be written, such "
                          "as .png, .pdf or .svg")
     from matplotlib import pyplot
     count = max(1, len(analysis.existing))

@@ -9,16 +9,17 @@ from typing import Any
 
 from cpg_ros.dynamics.cell_hopf import CellHopf, cell_hopf_points
 from cpg_ros.dynamics.characteristic import leading_roots, unstable_roots
-from cpg_ros.dynamics.equilibrium import NoStand, stand
+from cpg_ros.dynamics.equilibrium import stand
 from cpg_ros.dynamics.gait_assessment import GaitAssessment, nearest_threshold
 from cpg_ros.dynamics.hopf import HopfPoint, hopf_points
 from cpg_ros.dynamics.isotypic import Block, blocks
+from cpg_ros.errors import CpgError
+from cpg_ros.files.plain_text import table
 from cpg_ros.networks.delayed import MODES, Delayed
 from cpg_ros.networks.network import Network
 from cpg_ros.networks.parameter_line import ParameterLine
 from cpg_ros.networks.quadruped import Quadruped
 from cpg_ros.papers.theorem_4_2 import TheoremVerdict, theorem_4_2
-from cpg_ros.tools.arguments import table
 
 
 def _root(value: complex) -> str:
@@ -217,7 +218,7 @@ class CellAnalysis(Analysis):
             state = stand(self.network)  # type: ignore[type-var]
             parts = blocks(self.network, state)  # type: ignore[arg-type]
             points = cell_hopf_points(self.network, self.along, *self.span)  # type: ignore[arg-type]
-        except (NoStand, ValueError) as error:
+        except CpgError as error:
             return [], (), None, str(error)
         return points, parts, state, ''
 

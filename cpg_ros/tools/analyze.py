@@ -14,21 +14,15 @@ from pathlib import Path
 import numpy as np
 
 from cpg_ros.dynamics.gait_assessment import verdicts
+from cpg_ros.errors import CpgError, InputError
 from cpg_ros.files.atomic_write import write_atomically
+from cpg_ros.files.plain_text import as_json
 from cpg_ros.files.progress_bar import progress_bar
 from cpg_ros.networks.network import Network
 from cpg_ros.networks.parameter_line import ParameterLine
 from cpg_ros.networks.registry import NETWORKS, PRESETS, USUAL
 from cpg_ros.tools.analysis_report import CellAnalysis, DelayAnalysis, analysed
-from cpg_ros.tools.arguments import (
-    Parser,
-    as_json,
-    assignment,
-    interval,
-    number,
-    say,
-    twice,
-)
+from cpg_ros.tools.arguments import Parser, assignment, interval, number, say, twice
 
 DESCRIPTION = '''\
 Tell what a parameter set does before it runs on a robot: the rest state and its Hopf points, the
@@ -43,6 +37,8 @@ examples:
 exit codes: 0 analysed (also where no gait was found), 2 wrong arguments.'''
 #: Delays beyond which no Hopf points are looked for, model time.
 LONGEST = 100.0
+#: No parameter is larger: beyond, the arithmetic breaks down before it tells anything.
+LARGEST = 1e6
 #: Parameters that are moved to look for Hopf points, and how far, where --along is not given.
 ALONG = {'quadruped': ('alpha=beta', (-1.0, 1.0)), 'biped': ('current', (0.0, 1.0))}
 
@@ -77,56 +73,58 @@ def parameters(name: str, preset: str | None, changes: list[tuple[str, float]]) 
     """Return a network with a preset's parameters, some of them changed.
 
     Raises:
-        ValueError: an unknown name, or a value that makes no sense; the message says which.
+        InputError: an unknown name, or a value that makes no sense; the message says which.
 
     """
     if name not in NETWORKS:
-        raise ValueError(f"--network: '{name}' is not one of {', '.join(NETWORKS)}")
+        raise InputError(f"--network: '{name}' is not one of {', '.join(NETWORKS)}")
     kind, presets = NETWORKS[name], PRESETS[name]
     chosen = USUAL[name] if preset is None else preset
     if chosen not in presets:
-        raise ValueError(f"--preset: '{chosen}' is not one of {', '.join(presets)}")
+        raise InputError(f"--preset: '{chosen}' is not one of {', '.join(presets)}")
     network = presets[chosen].network
     given = [member for key, _ in changes for member in kind.groups.get(key, (key,))]
     if twice(given):
-        raise ValueError(f'--set: {twice(given)} is given twice')
+        raise InputError(f'--set: {twice(given)} is given twice')
     for key, value in changes:
         if key not in (*kind.parameters(), *kind.groups):
             known = ', '.join((*kind.groups, *kind.parameters()))
-            raise ValueError(f"--set: '{key}' is not a parameter of the {name} network: {known}")
+            raise InputError(f"--set: '{key}' is not a parameter of the {name} network: {known}")
         if not np.isfinite(value):
-            raise ValueError(f'--set: {key} is {value:g}, it must be finite')
+            raise InputError(f'--set: {key} is {value:g}, it must be finite')
+        if abs(value) > LARGEST:
+            raise InputError(f'--set: {key} is {value:g}, it must be at most {LARGEST:g}')
         members = kind.groups.get(key, (key,))
         network = replace(network, **dict.fromkeys(members, value))  # type: ignore[type-var]
     if network.as_dict().get('tau', 1.0) <= 0.0:
-        raise ValueError(f'--set: tau is {network.delay:g}, a delay must be positive')
+        raise InputError(f'--set: tau is {network.delay:g}, a delay must be positive')
     if network.delay > kind.longest_delay > 0.0:
-        raise ValueError(f'--set: tau is {network.delay:g}, delays go up to '
+        raise InputError(f'--set: tau is {network.delay:g}, delays go up to '
                          f'{kind.longest_delay:g}: take another unit of time')
     if network.as_dict().get('c', 1.0) == 0.0:
-        raise ValueError('--set: c is 0: left and right legs would not be coupled, and no delay '
+        raise InputError('--set: c is 0: left and right legs would not be coupled, and no delay '
                          'would matter')
     return network
 
 
 def _analysed(chosen) -> DelayAnalysis | CellAnalysis:
     if chosen.plot is not None and not chosen.plot.absolute().parent.is_dir():
-        raise ValueError(f'--plot: there is no folder {chosen.plot.parent}')
+        raise InputError(f'--plot: there is no folder {chosen.plot.parent}')
     network = parameters(chosen.network, chosen.preset, chosen.set)
     longest = 2.0 * network.delay if chosen.longest_delay is None else chosen.longest_delay
     if not 0.0 <= longest <= LONGEST:
-        raise ValueError(f'--longest-delay: {longest:g} is not from 0 to {LONGEST:g}')
+        raise InputError(f'--longest-delay: {longest:g} is not from 0 to {LONGEST:g}')
     text, span = ALONG.get(network.name, ('tau', (0.0, max(longest, 1.01 * network.delay))))
     try:
         along = ParameterLine.parse(chosen.along or text, type(network))
-    except ValueError as error:
-        raise ValueError(f'--along: {error}') from error
+    except InputError as error:
+        raise InputError(f'--along: {error}') from error
     if chosen.range is not None:
         span = chosen.range
     elif network.delay and along.names != ('tau',):
-        raise ValueError(f'--along: {along} needs a --range')
+        raise InputError(f'--along: {along} needs a --range')
     if not np.isfinite(span).all() or span[0] >= span[1]:
-        raise ValueError(f'--range: {span[0]:g}:{span[1]:g} is not from low to high')
+        raise InputError(f'--range: {span[0]:g}:{span[1]:g} is not from low to high')
     with progress_bar('gaits', len(network.gaits())) as bar:
         found = verdicts(network, bar)
     return analysed(network, found, along, span, longest)
@@ -142,7 +140,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             from cpg_ros.tools.analysis_plot import picture
             write_atomically(chosen.plot, picture(found, chosen.plot.suffix))
         said = as_json(found.as_dict()) if chosen.json else found.text()
-    except (ValueError, OSError) as error:
+    except (CpgError, OSError) as error:
         print(f'analyze: {error}', file=sys.stderr)
         return 2
     except KeyboardInterrupt:

@@ -12,11 +12,13 @@ from pathlib import Path
 
 from cpg_ros.checks.robot_template import robot_from
 from cpg_ros.checks.urdf_match import RobotCheck, checked
+from cpg_ros.errors import CpgError, InputError
+from cpg_ros.files.plain_text import as_json
 from cpg_ros.networks.registry import PRESETS
 from cpg_ros.robots.robot import Robot
 from cpg_ros.robots.robot_file import find_robot, write_robot
 from cpg_ros.robots.urdf import load_urdf
-from cpg_ros.tools.arguments import Parser, as_json, number, say
+from cpg_ros.tools.arguments import Parser, number, say
 
 DESCRIPTION = '''\
 Compare a robot file with the robot's URDF: joints that the URDF does not have or that cannot
@@ -56,17 +58,17 @@ def _parser() -> Parser:
 
 def _checked(chosen) -> RobotCheck:
     if (chosen.robot is None) == (chosen.make is None):
-        raise ValueError('give either a robot file or --make FILE')
+        raise InputError('give either a robot file or --make FILE')
     for option, value, highest in (('frequency', chosen.frequency, 10.0),
                                    ('amplitude', chosen.amplitude, 3.0)):
         if value is not None and not (isfinite(value) and 0.0 <= value <= highest):
-            raise ValueError(f'--{option}: {value:g} is not from 0 to {highest:g}')
+            raise InputError(f'--{option}: {value:g} is not from 0 to {highest:g}')
     urdf = load_urdf(chosen.urdf)
     robot = find_robot(chosen.robot) if chosen.make is None else _made(chosen, urdf)
     known = [name for network in robot.networks for name in PRESETS[network]]
     for name in chosen.gaits:
         if name not in known:
-            raise ValueError(f"--gaits: '{name}' is not one of "
+            raise InputError(f"--gaits: '{name}' is not one of "
                              f'{", ".join(dict.fromkeys(known))}')
     return checked(robot, urdf, (chosen.robot or str(chosen.make), str(chosen.urdf)),
                    list(dict.fromkeys(chosen.gaits)), chosen.frequency, chosen.amplitude)
@@ -74,9 +76,9 @@ def _checked(chosen) -> RobotCheck:
 
 def _made(chosen, urdf) -> Robot:
     if chosen.make.suffix not in ('.yaml', '.yml'):
-        raise ValueError(f'--make: {chosen.make} is not called .yaml')
+        raise InputError(f'--make: {chosen.make} is not called .yaml')
     if chosen.make.exists():
-        raise ValueError(f'--make: {chosen.make} is there already')
+        raise InputError(f'--make: {chosen.make} is there already')
     robot, says = robot_from(urdf, chosen.make.stem)
     write_robot(chosen.make, robot, COMMENT.format(urdf=chosen.urdf.name, says=says))
     print(f'check_robot: wrote {chosen.make}, check what it takes each joint for:\n{says}',
@@ -92,7 +94,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except OSError as error:
         print(f'check_robot: {error.filename}: {error.strerror}', file=sys.stderr)
         return 2
-    except ValueError as error:
+    except CpgError as error:
         print(f'check_robot: {error}', file=sys.stderr)
         return 2
     except KeyboardInterrupt:

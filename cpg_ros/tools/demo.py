@@ -22,6 +22,7 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.signals import SignalHandlerOptions
 
+from cpg_ros.errors import CpgError
 from cpg_ros.tools.arguments import Parser, say
 
 TOUR = ('trot', 'walk', 'pace', 'bound', 'jump', 'pronk', 'trot')
@@ -31,7 +32,7 @@ PATIENCE = 120.0
 RATE = 500
 
 
-class DemoError(RuntimeError):
+class DemoError(CpgError):
     """The demonstration cannot go on; one line for the user."""
 
 

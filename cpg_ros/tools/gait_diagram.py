@@ -15,6 +15,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from cpg_ros.dynamics.orbit import Orbit, solve_preset
+from cpg_ros.errors import CpgError, InputError
 from cpg_ros.motion.phase_readout import evaluate, phase_map
 from cpg_ros.networks.registry import NETWORKS, PRESETS
 from cpg_ros.robots.robot import HARMONICS
@@ -87,7 +88,12 @@ def draw(axes: Axes, orbit: Orbit, title: str) -> None:
 
 
 def picture(network: str, path: Path) -> None:
-    """Write the picture of a network's gaits, each from the preset of its name."""
+    """Write the picture of a network's gaits, each from the preset of its name.
+
+    Raises:
+        InputError: matplotlib does not write such files.
+
+    """
     matplotlib.use('Agg')
     from matplotlib import pyplot
     presets = {name: preset for name, preset in PRESETS[network].items() if name == preset.gait}
@@ -105,7 +111,11 @@ def picture(network: str, path: Path) -> None:
     bars = ('Bars: the cell is above the middle of its range.' if network == 'biped' else
             'Bars: the leg stands, while the signal that drives it falls.')
     figure.suptitle(f'{bars} Lines: the cell. Periods in model time.', fontsize=10)
-    figure.savefig(path, dpi=130)
+    try:
+        figure.savefig(path, dpi=130)
+    except ValueError as error:
+        # The ending of the file is of no format that matplotlib writes.
+        raise InputError(str(error)) from error
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -118,7 +128,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     chosen = parser.parse_args(arguments)
     try:
         picture(chosen.network, chosen.picture)
-    except (OSError, ValueError) as error:
+    except (OSError, CpgError) as error:
         print(f'{chosen.picture}: {error}', file=sys.stderr)
         return 1
     return 0

@@ -1,4 +1,4 @@
-"""Executable ``inversion``, given a bag or a CSV file: a recording in, a gait out.
+"""Executable ``inversion``: a recording in, a gait out; or the node that does it on call.
 
 ``inversion --bag walk_bag --robot go1.yaml --out fitted.yaml --report report.html`` finds the
 steady gait of a recording, fits a network's gait and the joints' readouts to it, and writes what
@@ -10,9 +10,12 @@ from argparse import RawDescriptionHelpFormatter
 from collections.abc import Sequence
 from pathlib import Path
 
+from cpg_ros.errors import CpgError, InputError
 from cpg_ros.files.atomic_write import write_atomically
+from cpg_ros.files.plain_text import as_json
 from cpg_ros.files.progress_bar import progress_bar
 from cpg_ros.files.yaml_reader import shown
+from cpg_ros.gaits.stride import NoSteadyGait
 from cpg_ros.inversion.paper_fit import PaperFit, paper_fits
 from cpg_ros.inversion.parameter_files import write_fitted
 from cpg_ros.inversion.recording_fit import Inverted, inverted, preset_of
@@ -24,7 +27,7 @@ from cpg_ros.recordings.recording import Recording
 from cpg_ros.recordings.servo import Servo
 from cpg_ros.robots.robot import Robot
 from cpg_ros.robots.robot_file import find_robot
-from cpg_ros.tools.arguments import Parser, as_json, assignment, say, twice
+from cpg_ros.tools.arguments import Parser, assignment, say, twice
 
 DESCRIPTION = '''\
 Find the steady gait of a recording and the parameters of a network that move a robot like it.
@@ -123,10 +126,14 @@ def _checked(parser: Parser, chosen) -> None:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Invert a recording; return the exit code."""
-    from cpg_ros.gaits.stride import NoSteadyGait
+    """Invert the recording that is named, or run the node; return the exit code."""
+    given = sys.argv[1:] if arguments is None else list(arguments)
+    if not given or given[0] == '--ros-args':
+        # Without ROS installed, recordings can be inverted all the same.
+        from cpg_ros.nodes.inversion_node import run
+        return run(None if arguments is None else given)
     parser = _parser()
-    chosen = parser.parse_args(sys.argv[1:] if arguments is None else arguments)
+    chosen = parser.parse_args(given)
     _checked(parser, chosen)
     try:
         robot = None if chosen.robot is None else find_robot(chosen.robot)
@@ -134,7 +141,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if chosen.paper and (robot is None or 'delayed' not in robot.networks
                              or chosen.network not in (None, 'delayed')
                              or sorted(robot.cells) != list(range(CELLS))):
-            raise ValueError('--paper: the paper has one joint for each of the eight cells of the '
+            raise InputError('--paper: the paper has one joint for each of the eight cells of the '
                              'delayed network: a --robot file has to say which, such as goat')
         recording = _recording(chosen, robot)
         with progress_bar('fitting', 100) as bar:
@@ -146,7 +153,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except NoSteadyGait as error:
         print(f'inversion: {error}', file=sys.stderr)
         return 1
-    except (ValueError, OSError) as error:
+    except (CpgError, OSError) as error:
         print(f'inversion: {error}', file=sys.stderr)
         return 2
     except KeyboardInterrupt:
@@ -158,7 +165,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             'error': one.fit.cost, 'synchronisation_errors': one.errors} for one in fits]}
             if chosen.paper else {})}))
     else:
-        from cpg_ros.tools.inversion_report import as_table, as_text
+        from cpg_ros.inversion.fit_report import as_table, as_text
         said = '\n'.join([as_text(found), *as_table(fits)])
         say(f'{said}\nwritten: {", ".join(map(str, written))}' if written else said)
     return 0
@@ -170,7 +177,7 @@ def _paper(chosen, found: Inverted, starts: list[dict[str, float]]) -> list[Pape
         return []
     network = preset_of(found.fit.network.name, chosen.preset or found.fit.gait).network
     if not isinstance(network, Delayed):
-        raise ValueError(f'--paper: the paper has the delayed network, not the {network.name}')
+        raise InputError(f'--paper: the paper has the delayed network, not the {network.name}')
     return paper_fits(found.stride, found.fit.cells, network, found.fit.gait,
                       list(found.fit.parameters), starts)
 
@@ -179,7 +186,7 @@ def _written(chosen, found: Inverted, robot) -> list[Path]:
     written = [] if chosen.out is None else write_fitted(chosen.out, found, robot)
     if chosen.report is not None:
         # matplotlib takes half a second, and only pages need it.
-        from cpg_ros.tools.inversion_report import as_html
+        from cpg_ros.inversion.fit_report import as_html
         write_atomically(chosen.report, as_html(found))
         written.append(chosen.report)
     return written

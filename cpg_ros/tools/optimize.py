@@ -11,8 +11,9 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
+from cpg_ros.errors import CpgError
 from cpg_ros.networks.preset_files import write_presets
-from cpg_ros.search.nsga2 import Front, NothingFound, NotInstalled, optimise
+from cpg_ros.search.nsga2 import Front, NothingFound, optimise
 from cpg_ros.search.pareto_front import draw_front, write_front
 from cpg_ros.search.search_space import NETWORKS
 from cpg_ros.tools.arguments import Parser, assignment, interval, say, twice
@@ -113,12 +114,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
         command = shlex.join(['optimize', *arguments])
         write_presets(chosen.out / 'preset.yaml', front.space.network,
                       {name: front.chosen.preset}, f'Found by: {command}')
-    except (ValueError, NotInstalled, OSError) as error:
-        print(f'optimize: {error}', file=sys.stderr)
-        return 2
     except NothingFound as error:
         print(f'optimize: {error}', file=sys.stderr)
         return 1
+    except (CpgError, OSError) as error:
+        print(f'optimize: {error}', file=sys.stderr)
+        return 2
     except KeyboardInterrupt:
         print('optimize: stopped', file=sys.stderr)
         return 130

@@ -7,30 +7,12 @@ from dataclasses import asdict
 from html import escape
 from typing import Any
 
+from cpg_ros.files.page_style import STYLE
 from cpg_ros.papers.reproduction import Reproduction
 from cpg_ros.papers.row import Row
 
 #: Widest columns of the table on a terminal: quantity, published, computed.
 WIDEST = (58, 30, 30)
-
-STYLE = '''
-body { font: 15px/1.45 system-ui, sans-serif; margin: 2em auto; max-width: 78em; padding: 0 1em;
-       color: #1a202c; background: #fff; }
-h1 { font-size: 1.5em; } h2 { font-size: 1.2em; margin-top: 2em; }
-table { border-collapse: collapse; width: 100%; font-size: 0.9em; }
-th, td { text-align: left; vertical-align: top; padding: 0.25em 0.6em;
-         border-bottom: 1px solid #e2e8f0; overflow-wrap: anywhere; }
-th { position: sticky; top: 0; background: #f7fafc; }
-td.value { font-variant-numeric: tabular-nums; }
-td.note { color: #4a5568; font-size: 0.92em; }
-td.verdict { white-space: nowrap; font-weight: 600; }
-tr.agrees td.verdict { color: #276749; }
-tr.erratum { background: #fffaf0; } tr.erratum td.verdict a { color: #9c4221; }
-tr.fails { background: #fff5f5; } tr.fails td.verdict { color: #c53030; }
-figure { display: inline-block; margin: 0.5em 1em 1em 0; max-width: 100%; }
-figure img { max-width: 100%; border: 1px solid #e2e8f0; }
-figcaption { font-size: 0.9em; color: #4a5568; max-width: 40em; }
-'''
 
 
 def _cut(text: str, width: int) -> str:

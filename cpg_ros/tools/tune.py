@@ -7,20 +7,16 @@ upright, measures how to steer them, and writes the robot file with its part ``g
 import argparse
 import shlex
 import sys
-from collections.abc import Callable, Sequence
-from dataclasses import replace
-from functools import partial
+from collections.abc import Sequence
 from pathlib import Path
 
-from cpg_ros.files.progress_bar import progress_bar
-from cpg_ros.networks.registry import PRESETS
-from cpg_ros.robots.robot import Robot
-from cpg_ros.robots.robot_file import RobotError, find_robot, write_robot
+from cpg_ros.errors import CpgError
+from cpg_ros.files.plain_text import table
+from cpg_ros.robots.robot_file import find_robot, write_robot
 from cpg_ros.simulation.gait_design import AIMS
 from cpg_ros.simulation.robot_model import SimulationError
-from cpg_ros.simulation.steering_table import STRIDES, measure
-from cpg_ros.simulation.tuning import LONG, Tuned, Tuner
-from cpg_ros.tools.arguments import Parser, say, table, twice
+from cpg_ros.simulation.tuning import LONG, Tuned, tune
+from cpg_ros.tools.arguments import Parser, say, twice
 
 DESCRIPTION = '''\
 Tune a robot's gaits in simulation: foot paths of a few lengths and times, turned into the joints'
@@ -65,39 +61,6 @@ def figures(tuned: Sequence[Tuned]) -> list[str]:
     return table(rows, '<>>>>>>>>>>')
 
 
-def _onward(bar: Callable[[int], None], begun: int, done: int) -> None:
-    bar(begun + done)
-
-
-def tune(robot: Robot, model: str, gaits: Sequence[str], evaluations: int, seed: int
-         ) -> tuple[Robot, list[Tuned]]:
-    """Tune some gaits of a robot.
-
-    Raises:
-        SimulationError: the simulation cannot be built, or a gait cannot be had.
-
-    """
-    tuner = Tuner(robot, model)
-    known = PRESETS[robot.networks[0]]
-    for gait in gaits:
-        if gait not in known:
-            raise SimulationError(f'the network {robot.networks[0]} has no gait {gait}')
-    motions, found = dict(robot.motions), []
-    each = evaluations + len(STRIDES)
-    with progress_bar('tuning', each * len(gaits)) as bar:
-        for k, gait in enumerate(gaits):
-            begun = k * each
-            one = tuner.tune(gait, evaluations, seed, partial(_onward, bar, begun))
-            steering = None
-            if not AIMS[gait].hops:
-                steering = measure(tuner.batch, tuner.program(gait, one.motion),
-                                   partial(_onward, bar, begun + evaluations))
-            one = replace(one, motion=replace(one.motion, steering=steering))
-            motions[gait] = one.motion
-            found.append(one)
-    return replace(robot, motions=motions), found
-
-
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the search; return the exit code."""
     arguments = sys.argv[1:] if arguments is None else arguments
@@ -120,12 +83,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
         write_robot(chosen.out, robot, '\n'.join([
             f'Gaits made by: {command}',
             f'{LONG:g} s in simulation from the stand:', *lines]))
-    except (RobotError, OSError) as error:
-        print(f'tune: {error}', file=sys.stderr)
-        return 2
     except SimulationError as error:
         print(f'tune: {error}', file=sys.stderr)
         return 1
+    except (CpgError, OSError) as error:
+        print(f'tune: {error}', file=sys.stderr)
+        return 2
     except KeyboardInterrupt:
         print('tune: stopped, nothing is written', file=sys.stderr)
         return 130

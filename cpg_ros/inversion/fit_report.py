@@ -6,16 +6,16 @@ from html import escape
 
 from matplotlib.figure import Figure
 
+from cpg_ros.files.page_style import STYLE
+from cpg_ros.files.plain_text import table
+from cpg_ros.inversion import fit_figures
 from cpg_ros.inversion.paper_fit import PaperFit
 from cpg_ros.inversion.recording_fit import Inverted
-from cpg_ros.tools import inversion_figures
-from cpg_ros.tools.arguments import table
-from cpg_ros.tools.reproduction_report import STYLE
 
-FIGURES = (('Recorded and fitted', inversion_figures.joints),
-           ('Error over the cycle', inversion_figures.errors),
-           ('Phases', inversion_figures.phases),
-           ('Convergence', inversion_figures.convergence))
+FIGURES = (('Recorded and fitted', fit_figures.joints),
+           ('Error over the cycle', fit_figures.errors),
+           ('Phases', fit_figures.phases),
+           ('Convergence', fit_figures.convergence))
 
 
 def _stride(found: Inverted) -> list[str]:

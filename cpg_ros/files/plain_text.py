@@ -1,0 +1,33 @@
+"""Plain text: JSON of what is known, and tables in aligned columns."""
+
+import json
+import math
+from typing import Any
+
+
+def finite(tree: Any) -> Any:
+    """Return the tree with None for numbers that JSON does not know."""
+    if isinstance(tree, dict):
+        return {key: finite(value) for key, value in tree.items()}
+    if isinstance(tree, list | tuple):
+        return [finite(value) for value in tree]
+    return None if isinstance(tree, float) and not math.isfinite(tree) else tree
+
+
+def as_json(tree: Any) -> str:
+    """Return a tree of plain types as JSON."""
+    return json.dumps(finite(tree), indent=2)
+
+
+def table(rows: list[tuple[str, ...]], right: str = '') -> list[str]:
+    """Align rows in columns, the first row being the head.
+
+    Args:
+        rows: texts.
+        right: for each column '<' or '>', '<' for those not given.
+
+    """
+    widths = [max(len(row[k]) for row in rows) for k in range(len(rows[0]))]
+    sides = right.ljust(len(widths), '<')
+    return ['  '.join(f'{text:{side}{width}}' for text, side, width
+                      in zip(row, sides, widths, strict=True)).rstrip() for row in rows]

@@ -1,0 +1,40 @@
+"""What is a user's mistake is reported as one, and nothing else is."""
+
+import inspect
+
+import pytest
+from modules import modules
+
+from cpg_ros.errors import CpgError
+from cpg_ros.motion import plan as planning
+from cpg_ros.networks.registry import PRESETS
+from cpg_ros.robots.robot_file import find_robot
+from cpg_ros.tools import analyze, inversion
+
+
+def test_every_error_of_the_package_is_of_the_family():
+    found = {one for module in modules() for _, one in inspect.getmembers(module, inspect.isclass)
+             if issubclass(one, BaseException) and one.__module__.startswith('cpg_ros')}
+    assert len(found) > 10
+    assert all(issubclass(one, CpgError) for one in found)
+
+
+def broken(*_, **__):
+    raise ValueError('shapes (3,) and (4,) not aligned')
+
+
+def test_a_mistake_in_a_solver_is_not_a_refusal(monkeypatch):
+    monkeypatch.setattr(planning, 'gait_of', broken)
+    preset = PRESETS['delayed']['trot']
+    with pytest.raises(ValueError, match='not aligned') as error:
+        planning.plan(find_robot('quadruped'), 'trot', preset, preset.network)
+    assert not isinstance(error.value, CpgError)
+
+
+def test_a_mistake_in_the_program_is_not_one_in_the_arguments(monkeypatch, tmp_path):
+    monkeypatch.setattr(analyze, 'verdicts', broken)
+    with pytest.raises(ValueError, match='not aligned'):
+        analyze.main(['--network', 'delayed'])
+    monkeypatch.setattr(inversion, 'read_csv', broken)
+    with pytest.raises(ValueError, match='not aligned'):
+        inversion.main(['--csv', str(tmp_path / 'walk.csv')])
