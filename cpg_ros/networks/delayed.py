@@ -77,6 +77,19 @@ class Delayed(Network):
         return Symmetry.of(Z4_Z2, {'omega': Fraction(j, 4), 'kappa': Fraction(k, 2)},
                            variables=1, odd=True)
 
+    def obstacle(self, gait: str) -> str:
+        """Say what in c rules a gait out: its sign, or that no delay makes it oscillate."""
+        j, k = GAITS[gait]
+        if j % 2 == 0 and self.c * (-1) ** k >= 0.0:
+            wanted = 'positive' if k else 'negative'
+            return f'c {self.c:g} gives no {gait}: c must be {wanted}'
+        # Roots of lambda = A + B exp(-lambda tau) cross where |B| > |Re A|.
+        least = abs(self.a + self.b + self.d * (1.0, 0.0, -1.0)[j])
+        if abs(self.c) <= least:
+            return (f'|c| {abs(self.c):g} gives no {gait} at any delay: it must be above '
+                    f'{least:.4f}')
+        return ''
+
     def sufficient_gain(self, rate: float) -> float:
         """Return a symmetry gain with which every gait attracts, 1/model time.
 

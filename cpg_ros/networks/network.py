@@ -136,6 +136,10 @@ class Network(ABC):
         """
         return None
 
+    def obstacle(self, gait: str) -> str:
+        """Say what in the parameters rules a gait out, where that is known beforehand, or ''."""
+        return ''
+
     def broken(self, gait: str) -> str:
         """Name parameters that would have to be equal for the gait, or '' if all are."""
         values = self.as_dict()

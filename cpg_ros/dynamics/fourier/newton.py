@@ -1,0 +1,181 @@
+"""Gaits of networks with a delay as exact periodic orbits, by Fourier collocation.
+
+On a gait every cell is one of a few waveforms, shifted by a known phase, so the delay equations of
+all cells collapse to a periodic problem for one cell of each: with theta = t / T in cycles,
+``u'(theta)/T = f(u(theta), u_w(theta + phi), u_w(theta + phi - tau/T))`` for what a cell hears,
+solved at even nodes with the period as unknown. Phase zero is where cell 1 peaks.
+"""
+
+from functools import lru_cache
+
+import numpy as np
+
+from cpg_ros.dynamics.fourier import collocation
+from cpg_ros.dynamics.fourier.orbit import FourierOrbit
+from cpg_ros.dynamics.periodic import NoOrbit
+from cpg_ros.networks.equations import equations_of, values_of
+from cpg_ros.networks.network import Network
+from cpg_ros.networks.symmetry import Symmetry
+
+NODES = 63
+MOST_NODES = 255
+#: Newton stops at this residual; a waveform is resolved when its last harmonics are this small.
+TOLERANCE = 1e-12
+RESOLVED = 1e-12
+#: Below this range Newton has fallen to the rest state.
+SMALLEST = 1e-7
+
+
+@lru_cache(maxsize=64)
+def _heard(network: type[Network], symmetry: Symmetry
+           ) -> list[tuple[bool, list[tuple[int, float]]]]:
+    """For each argument: whether it is delayed, and which row each wave hears at what shift."""
+    found = []
+    for one in equations_of(network).arguments:
+        source = range(network.cells) if one.source is None else one.source
+        places = []
+        for cell in symmetry.first:
+            other = source[cell]
+            places.append((int(symmetry.waves[other]) * network.variables + one.variable,
+                           float(symmetry.phases[other] - symmetry.phases[cell])))
+        found.append((one.delayed, places))
+    return found
+
+
+def equations(network: Network, symmetry: Symmetry, u: np.ndarray, period: float
+              ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Evaluate the equations on the nodes and the phase condition.
+
+    Args:
+        network: parameters.
+        symmetry: of the gait.
+        u: waveforms on the nodes, a row for each variable of each wave, shape (rows, n).
+        period: in model time.
+
+    Returns:
+        Residual (rows n + 1,), its Jacobian in (u, T), and its derivative by the parameters.
+
+    """
+    rows, n = u.shape
+    variables, tau, kind = network.variables, network.delay, equations_of(type(network))
+    waves, derive = rows // variables, collocation.derivative_matrix(n)
+    heard = _heard(type(network), symmetry)
+    states, slopes, matrices = [], [], []
+    for delayed, places in heard:
+        found = [(u[row], None, None) if not delayed and shift == 0.0 else
+                 _shifted(u[row], n, shift - tau / period if delayed else shift, delayed)
+                 for row, shift in places]
+        states.append(np.array([state for state, _, _ in found]))
+        slopes.append([slope for _, slope, _ in found])
+        matrices.append([matrix for _, _, matrix in found])
+    p = [value[symmetry.first][:, None] if value.ndim else value for value in values_of(network)]
+    rates, by_argument = kind.slopes(states, p)
+    rise = u @ derive.T
+
+    residual = np.empty(rows * n + 1)
+    left = residual[:-1].reshape(waves, variables, n)
+    for v, rate in enumerate(rates):
+        left[:, v] = rise[v::variables] / period - rate
+    residual[-1] = rise[0, 0]
+
+    jacobian = np.zeros((rows * n + 1, rows * n + 1))
+    blocks = jacobian[:-1, :-1].reshape(rows, n, rows, n)
+    by_period = np.zeros((rows, n))
+    by_delay = np.zeros((rows, n))
+    for row in range(rows):
+        blocks[row, :, row] = derive / period
+        by_period[row] = -rise[row] / period**2
+    nodes = np.arange(n)
+    for (v, k), slope in by_argument.items():
+        slope = np.broadcast_to(slope, (waves, n))
+        delayed, places = heard[k]
+        for wave, (source, _) in enumerate(places):
+            row, matrix = wave * variables + v, matrices[k][wave]
+            if matrix is None:
+                blocks[row, nodes, source, nodes] -= slope[wave]
+                continue
+            blocks[row, :, source] -= slope[wave][:, None] * matrix
+            if delayed:
+                by_shift = slope[wave] * slopes[k][wave]
+                by_period[row] -= by_shift * tau / period**2
+                by_delay[row] += by_shift / period
+    jacobian[:-1, -1] = by_period.ravel()
+    jacobian[-1, :n] = derive[0]
+    return residual, jacobian, _by_parameter(network, symmetry, states, p, by_delay)
+
+
+def _shifted(row: np.ndarray, n: int, shift: float, delayed: bool
+             ) -> tuple[np.ndarray, np.ndarray | None, np.ndarray]:
+    value, slope = collocation.shift_matrices(n, shift)
+    return value @ row, slope @ row if delayed else None, value
+
+
+def _by_parameter(network: Network, symmetry: Symmetry, states: list[np.ndarray],
+                  p: list[np.ndarray], by_delay: np.ndarray) -> np.ndarray:
+    names, kind = network.parameters(), equations_of(type(network))
+    rows, n = by_delay.shape
+    variables = network.variables
+    out = np.zeros((rows, n, len(names)))
+    for (v, r), slope in kind.by_parameter(states, p).items():
+        slope = np.broadcast_to(slope, (rows // variables, n))
+        row = kind.rows[r]
+        for wave, cell in enumerate(symmetry.first):
+            name = network.groups[row][cell] if row in network.groups else row
+            out[wave * variables + v, :, names.index(name)] -= slope[wave]
+    if network.delay_parameter:
+        out[..., names.index(network.delay_parameter)] += by_delay
+    return np.vstack([out.reshape(rows * n, -1), np.zeros(len(names))])
+
+
+def complete(network: Network, symmetry: Symmetry, u: np.ndarray, period: float,
+             residual: np.ndarray, jacobian: np.ndarray, by_parameter: np.ndarray) -> FourierOrbit:
+    """Complete a solution by its derivatives; the last three are those of the equations."""
+    derivatives = -np.linalg.solve(jacobian, by_parameter)
+    names = network.parameters()
+    # One cell of each wave has seen only those of its family's weights that end on it.
+    for family in network.families(symmetry):
+        if len(family) > 1:
+            members = [names.index(name) for name in family]
+            derivatives[:, members] = derivatives[:, members].mean(axis=1, keepdims=True)
+    shape = (u.shape[0] // network.variables, network.variables, u.shape[1])
+    return FourierOrbit(network, symmetry, period, float(np.abs(residual[:-1]).max()),
+                        derivatives[-1], u.reshape(shape),
+                        derivatives[:-1].reshape(*shape, len(names)))
+
+
+def newton(network: Network, symmetry: Symmetry, u: np.ndarray, period: float
+           ) -> FourierOrbit | None:
+    """Newton from a guess, doubling the nodes until the waveforms are resolved.
+
+    Raises:
+        NoOrbit: they would need more nodes than there may be.
+
+    """
+    while True:
+        for _ in range(12):
+            residual, jacobian, by_parameter = equations(network, symmetry, u, period)
+            size = float(np.abs(residual[:-1]).max())
+            rates = np.abs(u @ collocation.derivative_matrix(u.shape[1]).T).max() / period
+            if size <= TOLERANCE * max(1.0, float(rates)):
+                break
+            # numpy's solver, unlike scipy's, releases the interpreter lock: a node publishes
+            # while it solves.
+            try:
+                step = np.linalg.solve(jacobian, residual)
+            except np.linalg.LinAlgError:
+                return None
+            u, period = u - step[:-1].reshape(u.shape), period - float(step[-1])
+            # A period that leaves the range of the delay has run away, and so has a waveform.
+            if not (1e-3 * network.delay < period < 1e3 * network.delay
+                    and np.abs(u).max() < 1e3):
+                return None
+        else:
+            return None
+        if np.ptp(u[0]) < SMALLEST:
+            return None
+        if max(collocation.tail(row) for row in u) <= RESOLVED:
+            break
+        if u.shape[1] >= MOST_NODES:
+            raise NoOrbit(f'the waveform is too steep for {MOST_NODES} nodes')
+        u = np.array([collocation.resample(row, 2 * row.size + 1) for row in u])
+    return complete(network, symmetry, u, period, residual, jacobian, by_parameter)
