@@ -9,7 +9,7 @@ H/K is cyclic (eq. 2.2). So a gait is a homomorphism from a subgroup H into the 
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
-from functools import cached_property
+from functools import cache, cached_property
 from itertools import product
 
 import numpy as np
@@ -133,9 +133,7 @@ class Symmetry:
         for name in shifts:
             if name not in group.elements:
                 raise InputError(f"'{name}' is not one of {', '.join(group.elements)}")
-        exact = {name: Fraction(shift).limit_denominator(64) % 1
-                 for name, shift in shifts.items()}
-        return cls(group, tuple(group.generated(exact).items()), variables, odd)
+        return _generated(group, tuple(shifts.items()), variables, odd)
 
     @property
     def h(self) -> tuple[str, ...]:
@@ -169,6 +167,13 @@ class Symmetry:
                     image = self.group.elements[name][cell]
                     waves[image], phases[image] = wave, float(shift)
         return waves, phases
+
+    @cached_property
+    def _hash(self) -> int:
+        return hash((self.group, self.shifts, self.variables, self.odd))
+
+    def __hash__(self) -> int:
+        return self._hash
 
     @property
     def waves(self) -> np.ndarray:
@@ -213,3 +218,10 @@ class Symmetry:
                 seen |= row != 0.0
                 rows.append(row / np.linalg.norm(row))
         return np.kron(np.eye(self.variables), np.array(rows))
+
+
+@cache
+def _generated(group: Group, shifts: tuple[tuple[str, Fraction | float], ...], variables: int,
+               odd: bool) -> Symmetry:
+    exact = {name: Fraction(shift).limit_denominator(64) % 1 for name, shift in shifts}
+    return Symmetry(group, tuple(group.generated(exact).items()), variables, odd)

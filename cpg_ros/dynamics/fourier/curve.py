@@ -10,7 +10,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from cpg_ros.dynamics.fourier import collocation
-from cpg_ros.dynamics.fourier.newton import MOST_NODES, NODES, RESOLVED, complete, equations
+from cpg_ros.dynamics.fourier.newton import (
+    MOST_NODES,
+    NODES,
+    RESOLVED,
+    by_parameter,
+    complete,
+    equations,
+)
 from cpg_ros.dynamics.fourier.orbit import FourierOrbit
 from cpg_ros.dynamics.periodic import NoOrbit
 from cpg_ros.networks.network import Network
@@ -51,11 +58,11 @@ class FourierCurve:
     def step(self, z: np.ndarray, border: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Newton's increment normal to the border, and the tangent."""
         network = self.along.at(self.network, z[-1])
-        residual, jacobian, by_parameter = equations(network, self.symmetry, self._rows(z),
-                                                     float(z[-2]))
+        residual, jacobian, point = equations(network, self.symmetry, self._rows(z),
+                                              float(z[-2]))
         matrix = np.zeros((z.size, z.size))
         matrix[:-1, :-1] = jacobian
-        matrix[:-1, -1] = by_parameter @ self.along.direction(network)
+        matrix[:-1, -1] = by_parameter(network, self.symmetry, point) @ self.along.direction(network)
         matrix[-1] = self._weights(z.size) * border
         right = np.zeros((z.size, 2))
         right[:-1, 0], right[-1, 1] = -residual, 1.0

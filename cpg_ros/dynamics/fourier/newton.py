@@ -22,6 +22,8 @@ MOST_NODES = 255
 #: Newton stops at this residual; a waveform is resolved when its last harmonics are this small.
 TOLERANCE = 1e-12
 RESOLVED = 1e-12
+#: States, parameters and derivative by the delay at a solution; see ``equations``.
+Point = tuple[list[np.ndarray], list[np.ndarray], np.ndarray]
 #: Below this range Newton has fallen to the rest state.
 SMALLEST = 1e-7
 
@@ -43,7 +45,7 @@ def _heard(network: type[Network], symmetry: Symmetry
 
 
 def equations(network: Network, symmetry: Symmetry, u: np.ndarray, period: float
-              ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+              ) -> tuple[np.ndarray, np.ndarray, Point]:
     """Evaluate the equations on the nodes and the phase condition.
 
     Args:
@@ -53,7 +55,7 @@ def equations(network: Network, symmetry: Symmetry, u: np.ndarray, period: float
         period: in model time.
 
     Returns:
-        Residual (rows n + 1,), its Jacobian in (u, T), and its derivative by the parameters.
+        Residual (rows n + 1,), its Jacobian in (u, T), and what ``by_parameter`` needs.
 
     """
     rows, n = u.shape
@@ -85,9 +87,9 @@ def equations(network: Network, symmetry: Symmetry, u: np.ndarray, period: float
     for row in range(rows):
         blocks[row, :, row] = derive / period
         by_period[row] = -rise[row] / period**2
-    nodes = np.arange(n)
+    nodes, flat = np.arange(n), np.zeros((waves, n))
     for (v, k), slope in by_argument.items():
-        slope = np.broadcast_to(slope, (waves, n))
+        slope = slope + flat
         delayed, places = heard[k]
         for wave, (source, _) in enumerate(places):
             row, matrix = wave * variables + v, matrices[k][wave]
@@ -101,7 +103,7 @@ def equations(network: Network, symmetry: Symmetry, u: np.ndarray, period: float
                 by_delay[row] += by_shift / period
     jacobian[:-1, -1] = by_period.ravel()
     jacobian[-1, :n] = derive[0]
-    return residual, jacobian, _by_parameter(network, symmetry, states, p, by_delay)
+    return residual, jacobian, (states, p, by_delay)
 
 
 def _shifted(row: np.ndarray, n: int, shift: float, delayed: bool
@@ -110,8 +112,9 @@ def _shifted(row: np.ndarray, n: int, shift: float, delayed: bool
     return value @ row, slope @ row if delayed else None, value
 
 
-def _by_parameter(network: Network, symmetry: Symmetry, states: list[np.ndarray],
-                  p: list[np.ndarray], by_delay: np.ndarray) -> np.ndarray:
+def by_parameter(network: Network, symmetry: Symmetry, point: Point) -> np.ndarray:
+    """Derivative of the residual by the parameters, shape (rows n + 1, parameters)."""
+    states, p, by_delay = point
     names, kind = network.parameters(), equations_of(type(network))
     rows, n = by_delay.shape
     variables = network.variables
@@ -128,9 +131,9 @@ def _by_parameter(network: Network, symmetry: Symmetry, states: list[np.ndarray]
 
 
 def complete(network: Network, symmetry: Symmetry, u: np.ndarray, period: float,
-             residual: np.ndarray, jacobian: np.ndarray, by_parameter: np.ndarray) -> FourierOrbit:
+             residual: np.ndarray, jacobian: np.ndarray, point: Point) -> FourierOrbit:
     """Complete a solution by its derivatives; the last three are those of the equations."""
-    derivatives = -np.linalg.solve(jacobian, by_parameter)
+    derivatives = -np.linalg.solve(jacobian, by_parameter(network, symmetry, point))
     names = network.parameters()
     # One cell of each wave has seen only those of its family's weights that end on it.
     for family in network.families(symmetry):
@@ -153,7 +156,7 @@ def newton(network: Network, symmetry: Symmetry, u: np.ndarray, period: float
     """
     while True:
         for _ in range(12):
-            residual, jacobian, by_parameter = equations(network, symmetry, u, period)
+            residual, jacobian, point = equations(network, symmetry, u, period)
             size = float(np.abs(residual[:-1]).max())
             rates = np.abs(u @ collocation.derivative_matrix(u.shape[1]).T).max() / period
             if size <= TOLERANCE * max(1.0, float(rates)):
@@ -178,4 +181,4 @@ def newton(network: Network, symmetry: Symmetry, u: np.ndarray, period: float
         if u.shape[1] >= MOST_NODES:
             raise NoOrbit(f'the waveform is too steep for {MOST_NODES} nodes')
         u = np.array([collocation.resample(row, 2 * row.size + 1) for row in u])
-    return complete(network, symmetry, u, period, residual, jacobian, by_parameter)
+    return complete(network, symmetry, u, period, residual, jacobian, point)

@@ -9,8 +9,7 @@ it multiplies the transverse multipliers by exp(-g T) exactly.
 import numpy as np
 
 from cpg_ros.dynamics.isotypic_split import split
-from cpg_ros.dynamics.mesh.collocation import WEIGHTS
-from cpg_ros.dynamics.mesh.newton import Reduced, transfer
+from cpg_ros.dynamics.mesh.newton import Reduced, summed, transfer
 from cpg_ros.dynamics.mesh.orbit import MeshOrbit
 
 
@@ -40,9 +39,8 @@ def mesh_multipliers(orbit: MeshOrbit) -> tuple[np.ndarray, np.ndarray]:
 def _propagated(jacobians: np.ndarray, lengths: np.ndarray) -> np.ndarray:
     """Solution of the linear equation over all intervals, shape (d, d)."""
     d = jacobians.shape[-1]
-    stages, _ = transfer(jacobians, lengths, np.zeros((*jacobians.shape[:3], 0)))
-    steps = np.eye(d) + lengths[:, None, None] * np.einsum('s,nsij,nsjk->nik', WEIGHTS,
-                                                           jacobians, stages)
+    answers = transfer(jacobians, lengths, np.zeros((*jacobians.shape[:3], 0)))
+    steps = np.eye(d) + summed(jacobians, lengths, answers)
     whole = np.eye(d)
     for step in steps:
         whole = step @ whole

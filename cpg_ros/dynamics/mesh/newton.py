@@ -23,8 +23,9 @@ from cpg_ros.networks.symmetry import Symmetry
 #: A mesh is fine enough when its polynomials end with terms of this share of the whole.
 RESOLVED = 1e-11
 FEWEST, MOST_INTERVALS = 12, 300
-#: Newton stops at steps this small, against the size of the states and the period.
-TOLERANCE = 1e-10
+#: Newton stops at steps this small, against the size of the states and the period: what is left
+#: is of the order of their square.
+TOLERANCE = 1e-7
 #: Below this range the orbit has fallen to an equilibrium.
 SMALLEST = 1e-5
 
@@ -57,8 +58,7 @@ class Solution:
     length: float
 
 
-def transfer(jacobians: np.ndarray, lengths: np.ndarray, sources: np.ndarray
-             ) -> tuple[np.ndarray, np.ndarray]:
+def transfer(jacobians: np.ndarray, lengths: np.ndarray, sources: np.ndarray) -> np.ndarray:
     """Solve the linear problem of every interval: ``dY = 1 dy + L h A J dY + g``.
 
     Args:
@@ -67,17 +67,27 @@ def transfer(jacobians: np.ndarray, lengths: np.ndarray, sources: np.ndarray
         sources: g at the nodes for k right-hand sides, shape (n, S, d, k).
 
     Returns:
-        Nodes' answer to dy, shape (n, S, d, d), and to the sources, shape (n, S, d, k).
+        Nodes' answer to dy, then to the sources, shape (n, S, d, d + k).
 
     """
     n, s, d = jacobians.shape[:3]
-    matrix = -np.einsum('st,ntij->nsitj', collocation.A, lengths[:, None, None, None] * jacobians)
+    matrix = np.empty((n, s, d, s, d))
+    np.multiply(-collocation.A[:, None, :, None],
+                (lengths[:, None, None, None] * jacobians).transpose(0, 2, 1, 3)[:, None],
+                out=matrix)
     matrix = matrix.reshape(n, s * d, s * d)
     matrix[:, np.arange(s * d), np.arange(s * d)] += 1.0
-    ones = np.broadcast_to(np.eye(d), (n, s, d, d))
-    right = np.concatenate([ones, sources], axis=-1).reshape(n, s * d, -1)
-    found = np.linalg.solve(matrix, right).reshape(n, s, d, -1)
-    return found[..., :d], found[..., d:]
+    right = np.empty((n, s, d, d + sources.shape[-1]))
+    right[..., :d], right[..., d:] = np.eye(d), sources
+    return np.linalg.solve(matrix, right.reshape(n, s * d, -1)).reshape(right.shape)
+
+
+def summed(jacobians: np.ndarray, lengths: np.ndarray, answers: np.ndarray) -> np.ndarray:
+    """Integrate ``J dY`` over every interval, dY the answers at the nodes, (n, d, k)."""
+    n, s, d = jacobians.shape[:3]
+    weighted = lengths[:, None, None, None] * collocation.WEIGHTS[:, None] * jacobians.transpose(
+        0, 2, 1, 3)
+    return weighted.reshape(n, d, s * d) @ answers.reshape(n, s * d, -1)
 
 
 def linearised(reduced: Reduced, now: Solution, extra: np.ndarray | None = None):
@@ -88,28 +98,29 @@ def linearised(reduced: Reduced, now: Solution, extra: np.ndarray | None = None)
     """
     h = np.diff(now.mesh)
     slopes, jacobians, _ = reduced.linearised(now.stages)
-    step = now.length * h
-    by_length = h[:, None, None] * np.einsum('st,ntd->nsd', collocation.A, slopes)
-    gap = now.points[:-1, None] + now.length * by_length - now.stages
-    ends = np.stack([h[:, None] * (collocation.WEIGHTS @ slopes),
-                     now.points[:-1] + step[:, None] * (collocation.WEIGHTS @ slopes)
-                     - now.points[1:]], axis=-1)
-    sources = np.stack([by_length, gap], axis=-1)
+    step, d = now.length * h, slopes.shape[-1]
+    by_length = h[:, None, None] * (collocation.A @ slopes)
+    rise = h[:, None] * (collocation.WEIGHTS @ slopes)
+    sources = [by_length[..., None],
+               (now.points[:-1, None] + now.length * by_length - now.stages)[..., None]]
+    ends = [rise[..., None],
+            (now.points[:-1] + now.length * rise - now.points[1:])[..., None]]
     if extra is not None:
-        sources = np.concatenate([sources, step[:, None, None, None] * np.einsum(
-            'st,ntdp->nsdp', collocation.A, extra)], axis=-1)
-        ends = np.concatenate([ends, step[:, None, None] * np.einsum(
-            't,ntdp->ndp', collocation.WEIGHTS, extra)], axis=-1)
-    by_start, by_source = transfer(jacobians, step, sources)
-    weighted = step[:, None, None, None] * collocation.WEIGHTS[:, None, None] * jacobians
-    phi = np.eye(h_size := jacobians.shape[-1]) + np.einsum('nsij,nsjk->nik', weighted, by_start)
-    rest = ends + np.einsum('nsij,nsjk->nik', weighted, by_source)
-    p, r = np.empty((h.size + 1, h_size, h_size)), np.zeros((h.size + 1, h_size, rest.shape[-1]))
-    p[0] = np.eye(h_size)
-    for k in range(h.size):
-        p[k + 1] = phi[k] @ p[k]
-        r[k + 1] = phi[k] @ r[k] + rest[k]
-    return p, r, by_start, by_source
+        n, s = extra.shape[:2]
+        flat = extra.reshape(n, s, -1)
+        sources.append(step[:, None, None, None] * (collocation.A @ flat).reshape(extra.shape))
+        ends.append(step[:, None, None] * (collocation.WEIGHTS @ flat).reshape(n, d, -1))
+    answers = transfer(jacobians, step, np.concatenate(sources, axis=-1))
+    steps = summed(jacobians, step, answers)
+    steps[..., :d] += np.eye(d)
+    steps[..., d:] += np.concatenate(ends, axis=-1)
+    reached = np.zeros((h.size + 1, d, steps.shape[-1]))
+    reached[0, :, :d] = np.eye(d)
+    for k, (phi, rest) in enumerate(zip(steps[..., :d], steps[..., d:], strict=True)):
+        ahead = reached[k + 1]
+        np.matmul(phi, reached[k], out=ahead)
+        ahead[:, d:] += rest
+    return reached[..., :d], reached[..., d:], answers[..., :d], answers[..., d:]
 
 
 def bordered(reduced: Reduced, now: Solution, p: np.ndarray, r: np.ndarray) -> np.ndarray:
@@ -196,7 +207,7 @@ def remeshed(reduced: Reduced, now: Solution, fewest: int = FEWEST) -> np.ndarra
     ends = collocation.last_share(slopes) * now.length * h / np.abs(now.points).max()
     if ends.max() <= RESOLVED:
         return None
-    wanted = 1.15 * (ends**(1.0 / collocation.S)).mean() / RESOLVED**(1.0 / collocation.S) * h.size
+    wanted = 1.25 * (ends**(1.0 / collocation.S)).mean() / RESOLVED**(1.0 / collocation.S) * h.size
     # Not a number where the solution is not finite.
     if not max(fewest, wanted) <= MOST_INTERVALS:
         raise NoOrbit(f'the waveform is too steep for {MOST_INTERVALS} intervals')

@@ -142,7 +142,11 @@ def solve(network: Network, gait: str, near: MeshOrbit | None = None) -> MeshOrb
         return near
     orbit = None
     if near.symmetry == symmetry:
-        orbit = _accepted(collocate(network, symmetry, _on_cycles(near), near.period))
+        try:
+            return beside(network, near)
+        except NoOrbit:
+            # Not near enough.
+            pass
     if orbit is None:
         start = near(np.array(0.0))
         if near.symmetry != symmetry and near.symmetry.h == symmetry.h:
