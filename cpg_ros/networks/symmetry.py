@@ -9,7 +9,7 @@ H/K is cyclic (eq. 2.2). So a gait is a homomorphism from a subgroup H into the 
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
-from functools import cached_property
+from functools import cache, cached_property
 from itertools import product
 
 import numpy as np
@@ -133,9 +133,9 @@ class Symmetry:
         for name in shifts:
             if name not in group.elements:
                 raise InputError(f"'{name}' is not one of {', '.join(group.elements)}")
-        exact = {name: Fraction(shift).limit_denominator(64) % 1
-                 for name, shift in shifts.items()}
-        return cls(group, tuple(group.generated(exact).items()), variables, odd)
+        exact = tuple((name, Fraction(shift).limit_denominator(64) % 1)
+                      for name, shift in shifts.items())
+        return _built(group, exact, variables, odd)
 
     @property
     def h(self) -> tuple[str, ...]:
@@ -213,3 +213,9 @@ class Symmetry:
                 seen |= row != 0.0
                 rows.append(row / np.linalg.norm(row))
         return np.kron(np.eye(self.variables), np.array(rows))
+
+
+@cache
+def _built(group: Group, shifts: tuple[tuple[str, Fraction], ...], variables: int, odd: bool
+           ) -> Symmetry:
+    return Symmetry(group, tuple(group.generated(dict(shifts)).items()), variables, odd)
