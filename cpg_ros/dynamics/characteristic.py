@@ -1,21 +1,75 @@
-"""Characteristic roots of the delayed network's rest state, all of them, by Lambert's W.
+"""Characteristic roots of a linear equation with a delay, ``h' = L0 h(t) + L1 h(t - tau)``.
 
-In the symmetry class (j, k) the characteristic equation is ``lambda = A + B exp(-lambda tau)``
-(docs/theory.md, section Roots and Hopf points), so ``(lambda - A) tau`` is a branch of W at
-``B tau exp(-A tau)``: ``lambda_n = A + W_n(B tau exp(-A tau)) / tau``. Real parts
-fall as n goes from 0 to either side.
+They are where ``Delta(lambda) = lambda - L0 - L1 exp(-lambda tau)`` is singular. Without a delay
+they are eigenvalues. With one variable ``(lambda - A) tau`` is a branch of Lambert's W at
+``B tau exp(-A tau)``: ``lambda_n = A + W_n(B tau exp(-A tau)) / tau``, whose real parts fall as n
+goes from 0 to either side. With several the infinitesimal generator is discretised on Chebyshev
+points (Breda, Maset & Vermiglio 2005), and what it gives is refined by Newton's method on det Delta.
 """
 
 import numpy as np
 from scipy.special import lambertw
 
-from cpg_ros.networks.delayed import MODES, Delayed, Mode
-
 #: Beyond this exponent exp leaves the range of doubles, and W is taken from a logarithm.
 LARGEST = 690.0
+#: Chebyshev points at first and at most, and by how much Newton's method may move a root that
+#: they have resolved, against its size.
+POINTS, MOST_POINTS, RESOLVED = 24, 192, 1e-6
+#: Roots looked at first where all to the right of a line are wanted.
+FIRST = 9
 
 
-def _branches(a: complex, b: float, tau: float, n: np.ndarray) -> np.ndarray:
+def rightmost_first(values: np.ndarray) -> np.ndarray:
+    """Sort roots by falling real part, of a pair that with positive imaginary part first."""
+    return values[np.lexsort((-values.imag, -np.round(values.real, 12)))]
+
+
+def characteristic_roots(now: np.ndarray, past: np.ndarray, delay: float, count: int,
+                         real: bool = False) -> np.ndarray:
+    """Return the rightmost roots, 1/model time.
+
+    Args:
+        now: L0, shape (n, n).
+        past: L1, shape (n, n).
+        delay: tau, model time, not negative.
+        count: how many roots to return.
+        real: whether the matrices are real, though their type be complex.
+
+    Returns:
+        Complex numbers by falling real part, shape (count,), or fewer where there are no more.
+
+    """
+    if real:
+        now, past = now.real, past.real
+    if delay == 0.0 or not past.any():
+        roots = np.linalg.eigvals(now + past).astype(complex)
+    elif len(now) == 1:
+        a, b = complex(now[0, 0]), complex(past[0, 0])
+        roots = a + _branches(a, b, delay, np.arange(-count, count + 1)) / delay
+    else:
+        roots = _discretised(now, past, delay, count)
+    return rightmost_first(roots)[:count]
+
+
+def roots_right_of(bound: float, now: np.ndarray, past: np.ndarray, delay: float,
+                   real: bool = False) -> np.ndarray:
+    """Return all roots whose real part is above a bound, by falling real part."""
+    count = FIRST
+    while True:
+        roots = characteristic_roots(now, past, delay, count, real)
+        if len(roots) < count or roots[-1].real <= bound:
+            return roots[roots.real > bound]
+        count *= 2
+
+
+def characteristic_matrix(root: complex, now: np.ndarray, past: np.ndarray, delay: float
+                          ) -> tuple[np.ndarray, np.ndarray]:
+    """Return Delta and its derivative ``1 + tau L1 exp(-lambda tau)``, shapes (n, n)."""
+    unit, late = np.eye(len(now)), past * np.exp(-root * delay)
+    return root * unit - now - late, unit + delay * late
+
+
+def _branches(a: complex, b: complex, tau: float, n: np.ndarray) -> np.ndarray:
     """W_n(b tau exp(-a tau)), shape like n."""
     exponent = -a * tau
     if abs(exponent.real) <= LARGEST:
@@ -31,33 +85,45 @@ def _branches(a: complex, b: float, tau: float, n: np.ndarray) -> np.ndarray:
     return w if exponent.real > 0.0 else np.where(n == 0, 0.0, w)
 
 
-def characteristic_roots(network: Delayed, mode: Mode, count: int = 9) -> np.ndarray:
-    """Return the mode's rightmost roots, 1/model time.
-
-    Args:
-        network: parameters; c must not be zero.
-        mode: the symmetry class.
-        count: how many roots to return; those of 2 count + 1 branches are looked at.
-
-    Returns:
-        Complex numbers by falling real part, shape (count,).
-
-    """
-    a, b = mode.eigenvalue_terms(network)
-    roots = a + _branches(complex(a), b, network.tau, np.arange(-count, count + 1)) / network.tau
-    return roots[np.argsort(-roots.real, kind='stable')][:count]
+def _generator(now: np.ndarray, past: np.ndarray, delay: float, points: int) -> np.ndarray:
+    """The generator on Chebyshev points of [-tau, 0], n components at each, those of 0 first."""
+    k = np.arange(points + 1)
+    x = np.cos(np.pi * k / points)
+    weights = np.where((k == 0) | (k == points), 2.0, 1.0) * (-1.0) ** k
+    slope = np.outer(weights, 1.0 / weights) / (x[:, None] - x + np.eye(points + 1))
+    slope -= np.diag(slope.sum(axis=1))
+    n = len(now)
+    whole = np.kron(2.0 / delay * slope, np.eye(n)).astype(now.dtype)
+    whole[:n] = 0.0
+    whole[:n, :n] = now
+    whole[:n, -n:] += past
+    return whole
 
 
-def unstable_roots(network: Delayed, mode: Mode) -> np.ndarray:
-    """Return the mode's roots with positive real part, by falling real part."""
-    count = 9
+def _discretised(now: np.ndarray, past: np.ndarray, delay: float, count: int) -> np.ndarray:
+    """Return at least count rightmost roots, with more points until these are resolved."""
+    points = max(POINTS, 2 * count)
     while True:
-        roots = characteristic_roots(network, mode, count)
-        if roots[-1].real <= 0.0:
-            return roots[roots.real > 0.0]
-        count *= 2
+        rough = rightmost_first(np.linalg.eigvals(
+            _generator(now, past, delay, points)).astype(complex))[:count + 1]
+        exact = np.array([_refined(root, now, past, delay) for root in rough])
+        moved = np.abs(exact - rough) <= RESOLVED * (1.0 + np.abs(exact))
+        if moved.all() or points >= MOST_POINTS:
+            return exact
+        points *= 2
 
 
-def leading_roots(network: Delayed) -> dict[Mode, complex]:
-    """Return each mode's rightmost root, 1/model time."""
-    return {mode: complex(characteristic_roots(network, mode, 1)[0]) for mode in MODES}
+def _refined(root: complex, now: np.ndarray, past: np.ndarray, delay: float) -> complex:
+    """Newton's method on det Delta, whose logarithm has the slope tr(Delta^-1 Delta')."""
+    for _ in range(8):
+        matrix, slope = characteristic_matrix(root, now, past, delay)
+        try:
+            move = 1.0 / np.trace(np.linalg.solve(matrix, slope))
+        except np.linalg.LinAlgError:
+            break
+        if not abs(move) < 0.1 * (1.0 + abs(root)):
+            break
+        root -= move
+        if abs(move) < 1e-14 * (1.0 + abs(root)):
+            break
+    return complex(root)

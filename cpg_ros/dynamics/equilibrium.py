@@ -1,154 +1,205 @@
-"""Stands of the Morris-Lecar networks: equilibria at which all cells are equal.
+"""Equilibria at which all cells are equal: the stand of a network.
 
-Every symmetry of the network fixes them (Buono & Golubitsky 2001, section 5.1). A cell's rates are
-linear in its second variable w, ``v' = f0(v) + f1(v) w`` and ``w' = g0(v) + g1(v) w``, couplings
-included, so stands are the roots of ``f0 g1 - f1 g0`` in v, which has no poles.
+Every symmetry of the network fixes them (Buono & Golubitsky 2001, section 5.1), so they are those
+of one cell that hears itself. Where its rates are linear in all variables but one, x, they are
+``f0(x) + F1(x) y``, couplings included, and equilibria are roots of ``det(f0, F1)`` in x, which
+has no poles.
 """
 
+from collections.abc import Iterator
 from dataclasses import replace
-from functools import lru_cache
-from typing import TypeVar
+from functools import cache, lru_cache
 
 import numpy as np
 
 from cpg_ros.dynamics.sign_changes import crossings
 from cpg_ros.errors import CpgError, InputError
-from cpg_ros.networks.biped import Biped
-from cpg_ros.networks.quadruped import Quadruped
+from cpg_ros.networks.equations import equations_of
+from cpg_ros.networks.field import Field
+from cpg_ros.networks.network import Network
 
-CellNetwork = TypeVar('CellNetwork', bound=Quadruped | Biped)
-
-#: Parameters that are not couplings.
-OWN = ('current', 'phi')
-#: Where stands are looked for: close to where the cell's functions bend, and far out.
+#: Where equilibria are looked for: close to where the cell's functions bend, and far out.
 _FAR = np.geomspace(3.0, 100.0, 400)[1:]
 GRID = np.concatenate([-_FAR[::-1], np.linspace(-3.0, 3.0, 2001), _FAR])
-#: Longest way of v and w in a step along a branch, and how far it may miss, against their size.
+#: How many states are tried where there is no such x.
+STARTS = 400
+#: Longest way of the state in a step along a branch, and how far it may miss, against its size.
 LONGEST, MISS = 0.1, 0.01
-#: A stand that has gone further does not come back.
+#: An equilibrium that has gone further does not come back.
 FURTHEST = 1e3
 #: Shortest step, in the share of the coupling: at a fold nothing lies beyond it.
 SHORTEST = 1e-5
 
 
-class NoStand(CpgError):
+class NoEquilibrium(CpgError):
     """The stand cannot be followed from the uncoupled cells to these couplings."""
 
 
-def cell_terms(network: Quadruped | Biped, v: np.ndarray) -> np.ndarray:
-    """Terms of a cell's rates where all cells are equal, ``v' = f0 + f1 w``, ``w' = g0 + g1 w``.
-
-    Args:
-        network: parameters.
-        v: first variable, shape (...), real or complex.
-
-    Returns:
-        f0, f1, g0, g1, shape (4, ...).
-
-    """
-    v = np.asarray(v)
-    nothing, one = (cell_rates(network, np.stack([v, w + 0.0 * v], axis=-1)) for w in (0.0, 1.0))
-    slope = one - nothing
-    return np.stack([nothing[..., 0], slope[..., 0], nothing[..., 1], slope[..., 1]])
+def one_cell(network: Network) -> Field:
+    """Return the right-hand side for one cell where all are in its state."""
+    return Field(network, np.zeros(network.cells, dtype=int))
 
 
-def cell_rates(network: Quadruped | Biped, cell: np.ndarray) -> np.ndarray:
-    """Rates of v and w where all cells are in one state, shape (..., 2) like the state."""
-    return network.rates(everywhere(network, cell))[..., ::network.cells]
-
-
-def cell_jacobian(network: Quadruped | Biped, cell: np.ndarray) -> np.ndarray:
-    """Derivative of those rates if all cells move together, shape (2, 2)."""
-    whole = network.jacobian(everywhere(network, cell))
-    return whole.reshape(2, network.cells, 2, network.cells)[:, 0].sum(axis=-1)
-
-
-def everywhere(network: Quadruped | Biped, cell: np.ndarray) -> np.ndarray:
-    """State of the network with all cells in one state (v, w), shape (..., components)."""
+def everywhere(network: Network, cell: np.ndarray) -> np.ndarray:
+    """State of the network with all cells in one state, shape (..., components)."""
     return np.repeat(cell, network.cells, axis=-1)
 
 
-def stands(network: Quadruped | Biped) -> np.ndarray:
-    """Find all stands with v from -100 to 100, states (v, w) by rising v, shape (n, 2).
+def odd(network: Network) -> bool:
+    """Whether the network has the symmetry x -> -x."""
+    return network.symmetry(network.gaits()[0]).odd
+
+
+def named(network: Network, cell: np.ndarray) -> dict[str, float]:
+    """Name the variables of a cell: variable -> value."""
+    names = network.variable_names or tuple(f'x{k + 1}' for k in range(network.variables))
+    return dict(zip(names, map(float, cell), strict=True))
+
+
+def equilibria(network: Network) -> np.ndarray:
+    """Find equilibria with equal cells, states of a cell by rising first variable.
+
+    All of them with x from -100 to 100 where the rates are linear in all variables but an x;
+    otherwise those that Newton's method reaches from many states.
+
+    Returns:
+        States, shape (n, variables).
 
     Raises:
-        ValueError: a parameter is not finite.
+        InputError: a parameter is not finite.
 
     """
     _check(network)
-
-    def balance(v: np.ndarray) -> np.ndarray:
-        f0, f1, g0, g1 = cell_terms(network, v)
-        return f0 * g1 - f1 * g0
-
-    found = []
-    for v in crossings(lambda x: float(balance(np.array(x))), GRID, balance(GRID)):
-        _, _, g0, g1 = cell_terms(network, np.array(v))
-        # Where w' does not feel w, a root is none of both equations.
-        if g1 != 0.0 and np.isfinite(g0 / g1):
-            found.append(_newton(network, np.array([v, -g0 / g1])))
-    return np.array([state for state in found if state is not None]).reshape(-1, 2)
+    field, scanned = one_cell(network), _scanned(type(network))
+    starts = _scattered(network.variables) if scanned is None else _roots(field, scanned)
+    found: list[np.ndarray] = []
+    for start in starts:
+        state = _newton(field, start, 8 if scanned is not None else 50)
+        if state is not None and not any(np.allclose(state, known, 1e-9, 1e-9) for known in found):
+            found.append(state)
+    return np.array(sorted(found, key=tuple)).reshape(-1, network.variables)
 
 
-def stand(network: CellNetwork) -> np.ndarray:
-    """Find the stand that the uncoupled cells' equilibrium becomes, (v, w) of a cell, shape (2,).
+@cache
+def _scanned(network: type[Network]) -> int | None:
+    """A variable x such that the rates are linear in all others, or None."""
+    equations = equations_of(network)
+    with np.errstate(all='ignore'):
+        # Only which derivatives there are matters, not where.
+        second = equations.second([np.array(0.0)] * len(equations.arguments),
+                                  [np.array(1.0)] * len(equations.rows))
+    pairs = [{equations.arguments[k].variable for k in places} for _, *places in second]
+    return next((x for x in range(network.variables) if all(x in pair for pair in pairs)), None)
+
+
+def _roots(field: Field, scanned: int) -> Iterator[np.ndarray]:
+    """States close to those at which ``f0 + F1 y`` vanishes for a y."""
+    n = field.kept.size
+    others = [k for k in range(n) if k != scanned]
+
+    def terms(x: np.ndarray) -> np.ndarray:
+        """f0 and F1, side by side, shape (..., n, n)."""
+        states = np.zeros((n, *np.shape(x), n))
+        states[..., scanned] = x
+        for k, other in enumerate(others):
+            states[k + 1, ..., other] = 1.0
+        rates = field.rates(states)
+        rates[1:] -= rates[0]
+        return np.moveaxis(rates, 0, -1)
+
+    def balance(x: np.ndarray) -> np.ndarray:
+        return np.linalg.det(terms(x))
+
+    for x in crossings(lambda x: float(balance(np.array(x))), GRID, balance(GRID)):
+        matrix = terms(np.array(x))
+        state = np.full(n, x)
+        if others:
+            state[others] = np.linalg.lstsq(matrix[:, 1:], -matrix[:, 0], rcond=None)[0]
+        yield state
+
+
+def _scattered(n: int) -> np.ndarray:
+    rng = np.random.default_rng(0)
+    return rng.uniform(-1.0, 1.0, (STARTS, n)) * rng.choice([1.0, 3.0, 30.0], (STARTS, 1))
+
+
+def equilibrium(network: Network) -> np.ndarray:
+    """Find the equilibrium that the uncoupled cells' becomes, a cell's state, shape (variables,).
 
     It is followed while all couplings grow from 0 to their values (Buono & Golubitsky 2001,
-    proposition 5.1). Where coupling is diffusive it stays where it is.
+    proposition 5.1). Where coupling is diffusive it stays where it is; with the symmetry x -> -x
+    it is 0.
 
     Raises:
-        NoStand: it is lost in a fold on the way, or the uncoupled cell has several equilibria.
-        ValueError: a parameter is not finite.
+        NoEquilibrium: it is lost in a fold on the way, or the uncoupled cell has several
+            equilibria.
+        InputError: a parameter is not finite.
 
     """
+    if odd(network):
+        return np.zeros(network.variables)
     _check(network)
     alone = _coupled(network, 0.0)
     state, share, step, grow = _uncoupled(alone), 0.0, 0.25, 2.0
-    slope = cell_jacobian(alone, state)
+    field = one_cell(alone)
+    slope, weights = _slope(field, state), _weights(network)
     while share < 1.0:
         step = min(step, 1.0 - share)
-        # The rates are linear in the couplings: this difference is their derivative.
-        push = cell_rates(network, state) - cell_rates(alone, state)
-        way = -step * np.linalg.solve(slope, push)
-        size, there, new = 1.0 + np.abs(state).max(), _coupled(network, share + step), None
+        way = -step * np.linalg.solve(slope, field.by_parameter(state) @ weights)
+        size, new = 1.0 + np.abs(state).max(), None
+        there = one_cell(_coupled(network, share + step))
         if np.abs(way).max() <= LONGEST * size:
             new = _newton(there, state + way)
         # Beyond a fold the determinant has the other sign.
         if (new is not None and np.abs(new - state - way).max() <= MISS * size
-                and np.linalg.det(cell_jacobian(there, new)) * np.linalg.det(slope) > 0.0):
-            state, slope = new, cell_jacobian(there, new)
+                and np.linalg.det(_slope(there, new)) * np.linalg.det(slope) > 0.0):
+            state, slope, field = new, _slope(there, new), there
             share, step, grow = share + step, grow * step, 2.0
         else:
             step, grow = 0.5 * step, 1.0
         if step < SHORTEST < 1.0 - share or size > FURTHEST:
             how = 'in a fold' if size <= FURTHEST else 'to infinity'
-            raise NoStand(f'the stand is lost {how} at {share:.4f} of the couplings, '
-                          f'v {state[0]:.4f}, w {state[1]:.4f}')
+            place = ', '.join(f'{name} {value:.4f}' for name, value
+                              in named(network, state).items())
+            raise NoEquilibrium(f'the stand is lost {how} at {share:.4f} of the couplings, '
+                                f'{place}')
     return state
 
 
-def _coupled(network: CellNetwork, share: float) -> CellNetwork:
+def _coupled(network: Network, share: float) -> Network:
     """Return the network with a share of its couplings."""
-    if share == 1.0:
-        return network
-    return replace(network, **{  # type: ignore[arg-type]
-        name: share * value for name, value in network.as_dict().items() if name not in OWN})
+    values = network.as_dict()
+    return network if share == 1.0 else replace(network, **{  # type: ignore[type-var]
+        name: share * values[name] for name in network.couplings})
+
+
+def _weights(network: Network) -> np.ndarray:
+    """How fast the parameters grow with the share of the couplings, shape (parameters,)."""
+    return np.array([value if name in network.couplings else 0.0
+                     for name, value in network.as_dict().items()])
 
 
 @lru_cache(maxsize=64)
-def _uncoupled(alone: Quadruped | Biped) -> np.ndarray:
-    found = stands(alone)
+def _uncoupled(alone: Network) -> np.ndarray:
+    found = equilibria(alone)
     if len(found) != 1:
-        raise NoStand(f'an uncoupled cell has {len(found)} equilibria: none is the stand')
+        raise NoEquilibrium(f'an uncoupled cell has {len(found)} equilibria: none is the stand')
     return found[0]
 
 
-def _newton(network: Quadruped | Biped, cell: np.ndarray) -> np.ndarray | None:
-    """Solve for a stand near a state; None where there is none."""
+def _slope(field: Field, cell: np.ndarray) -> np.ndarray:
+    """Derivative of a cell's rates if all cells move together, shape (variables, variables)."""
+    _, now, past = field.linearised(cell)
+    return now + past if past.size else now
+
+
+def _newton(field: Field, cell: np.ndarray, most: int = 8) -> np.ndarray | None:
+    """Solve for an equilibrium near a state; None where there is none."""
+    size = np.inf
     with np.errstate(all='ignore'):
-        for _ in range(8):
+        for _ in range(most):
             try:
-                move = np.linalg.solve(cell_jacobian(network, cell), cell_rates(network, cell))
+                move = np.linalg.solve(_slope(field, cell), field.rates(cell))
             except np.linalg.LinAlgError:
                 return None
             cell = cell - move
@@ -160,7 +211,7 @@ def _newton(network: Quadruped | Biped, cell: np.ndarray) -> np.ndarray | None:
     return cell if size < 1e-11 else None
 
 
-def _check(network: Quadruped | Biped) -> None:
+def _check(network: Network) -> None:
     for name, value in network.as_dict().items():
         if not np.isfinite(value):
             raise InputError(f'{name} is {value}')

@@ -1,176 +1,276 @@
-"""Hopf points of the delayed network's rest state, mode by mode, and their normal forms.
+"""Hopf points of the equilibrium of any network, with their normal forms.
 
-In the symmetry class (j, k) the characteristic equation is ``lambda = A + B exp(-lambda tau)``
-with ``A = a + b + d i^(-j)`` and ``B = c (-1)^k``; its crossings are known in closed form
-(docs/theory.md, section Roots and Hopf points). The normal forms are in the paper's time, t/tau,
-and in mu = tau - tau_c; the section after that derives the correct one.
+On the centre manifold ``x = rest + z q + conj(z q) + ...`` with the eigenvector q of the class,
+the same for every cell but for the character chi. B(x, y) of two classes lies in the class of the
+product of their characters, so the reduction needs the characteristic matrices Delta of the
+classes 1 and chi^2 only (Kuznetsov, *Elements of Applied Bifurcation Theory*, eq. 5.62; with a
+delay Diekmann et al., *Delay Equations*, chapter IX)::
+
+    k2 = <p, C(q, q, q*) + 2 B(q, Delta_1(0)^-1 B(q, q*))
+             + B(q*, Delta_chi^2(2 i omega)^-1 B(q, q))> / 2
+
+with ``Delta q = 0``, ``p Delta = 0`` and ``<p, Delta'(i omega) q> = 1``.
 """
 
-import cmath
-import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
-from cpg_ros.dynamics.characteristic import unstable_roots
+from cpg_ros.dynamics.characteristic import (
+    characteristic_matrix,
+    roots_right_of,
+)
+from cpg_ros.dynamics.delay_crossings import delay_crossings
+from cpg_ros.dynamics.equilibrium import equilibrium, everywhere
+from cpg_ros.dynamics.expansion import Expansion
+from cpg_ros.dynamics.isotypic import Block, block_of, blocks, character, power
 from cpg_ros.dynamics.normal_form import NormalForm
-from cpg_ros.networks.delayed import GAITS, MODES, Delayed, Mode
+from cpg_ros.networks.network import Network
+from cpg_ros.networks.parameter_line import ParameterLine
 
-#: A root this close to the imaginary axis, against its own size, is the crossing one.
-ON_AXIS = 1e-7
+#: Roots this close to the imaginary axis lie on it, 1/model time or against omega.
+ON_AXIS = 1e-8
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class HopfPoint:
-    """A crossing of the imaginary axis by a pair of roots as the delay grows.
+    """A crossing of the imaginary axis by a pair of roots.
 
     Attributes:
-        network: the parameters, its delay the critical one.
-        mode: the symmetry class (j, k) of the wave that is born.
-        n: how many turns more than the smallest the delay holds.
-        omega: angular frequency, rad per model time.
+        network: there.
+        line: on which it lies.
+        value: of the parameters there; of the delay, model time.
+        block: the critical class's block, with its gait, mode and wave.
+        omega: of the critical root i omega, rad per model time, positive.
+        rest: state of every cell at the equilibrium, shape (variables,).
+        n: where the delay moves, how many turns more than the smallest it holds.
 
     """
 
-    network: Delayed
-    mode: Mode
-    n: int
+    network: Network
+    line: ParameterLine
+    value: float
+    block: Block
     omega: float
-
-    @property
-    def tau(self) -> float:
-        """Critical delay, model time."""
-        return self.network.tau
+    rest: np.ndarray
+    n: int = 0
 
     @property
     def gait(self) -> str:
-        """Name of the primary gait, whichever way its wave runs."""
-        j = 1 if self.mode.j == 3 else self.mode.j
-        return next(gait for gait, class_ in GAITS.items() if class_ == (j, self.mode.k))
+        """The primary gait that branches off, whichever way its wave runs."""
+        return self.block.gait
+
+    @property
+    def mode(self) -> tuple[int, ...]:
+        """The class (j, k)."""
+        return self.block.mode
 
     @property
     def wave(self) -> str:
-        """How the wave of walk and jump runs round the rings: '' for the gaits that stand."""
-        return ('', 'LF leads LH', '', 'LH leads LF')[self.mode.j]
+        """How the wave runs, as in the block."""
+        return self.block.wave
+
+    @cached_property
+    def _eigenvectors(self) -> tuple[np.ndarray, np.ndarray]:
+        """Q of one cell with <q, q> = 1 over all cells, and p with <p, Delta' q> = 1."""
+        matrix, slope = characteristic_matrix(1j * self.omega, self.block.now, self.block.past,
+                                              self.network.delay)
+        left, _, right = np.linalg.svd(matrix)
+        q, p = right[-1].conj(), left[:, -1].conj()
+        largest = q[np.abs(q).argmax()]
+        q = q * (largest.conjugate() / abs(largest)) / np.sqrt(self.network.cells)
+        return q, p / (p @ slope @ q)
+
+    @property
+    def vector(self) -> np.ndarray:
+        """Q of one cell, shape (variables,); over the whole network <q, q> = 1."""
+        return self._eigenvectors[0]
 
     @cached_property
     def normal_form(self) -> NormalForm:
-        """``q = 1 + tau B e``, ``k1 = i omega / q``, ``k2 = -tau (b + d i^(-j) + B e) / q``.
+        """In model time, mu = value' - value; z belongs to q."""
+        expansion, delay = Expansion(self.network, self.rest), self.network.delay
+        axis, chi, (q, p) = 1j * self.omega, self.block.vector, self._eigenvectors
+        one, twice = np.ones_like(chi), character(power(self.block.symmetry, 2))
+        still = characteristic_matrix(0.0, *expansion.linear(one), delay)[0]
+        double = characteristic_matrix(2.0 * axis, *expansion.linear(twice), delay)[0]
+        ahead = expansion.heard(q, chi, axis)
+        back, second = ahead.conj(), expansion.second
+        flat = expansion.heard(np.linalg.solve(still, second(ahead, back)), one)
+        fast = expansion.heard(np.linalg.solve(double, second(ahead, ahead)), twice, 2.0 * axis)
+        k2 = 0.5 * (p @ (expansion.third(ahead, ahead, back) + 2.0 * second(ahead, flat)
+                         + second(back, fast)))
 
-        e = exp(-i omega tau). Each cell is ``2 r cos`` on the orbit.
+        moves = expansion.heard(np.linalg.solve(still, expansion.along(self.line)), one)
+        now, past = expansion.linear_along(self.line, chi)
+        late = np.exp(-axis * delay)
+        change = (now + past * late) @ q + second(moves, ahead)
+        if self.network.delay_parameter in self.line.names:
+            sign = self.line.signs[self.line.names.index(self.network.delay_parameter)]
+            change = change - sign * axis * late * (self.block.past @ q)
+        return NormalForm(complex(p @ change), complex(k2))
+
+    @property
+    def in_delays(self) -> NormalForm:
+        """In time over the delay, as Liu & Zhang (2024) have it, which the delay scales as well.
+
+        z is half the amplitude of a cell's first variable.
         """
-        a, b = self.mode.eigenvalue_terms(self.network)
-        tau = self.network.tau
-        past = b * cmath.exp(-1j * self.omega * tau)
-        q = 1.0 + tau * past
-        return NormalForm(1j * self.omega / q, -tau * (a - self.network.a + past) / q)
-
-    @cached_property
-    def published(self) -> NormalForm:
-        """The normal form as Liu & Zhang (2024) print it, section 2; erratum 1.
-
-        ``D = 1/(8 (-1 + c e))``, ``k1 = 8 D (-a - b - d + c e)``, ``k2 = -8 tau D (-b + c e - d)``
-        with e = exp(i omega tau), whatever the mode.
-        """
-        a, b, c, d, tau = self.network.as_dict().values()
-        past = c * cmath.exp(1j * self.omega * tau)
-        eight = 1.0 / (-1.0 + past)
-        return NormalForm(eight * (-a - b - d + past), -tau * eight * (-b + past - d))
+        form, delay = self.normal_form, self.network.delay
+        return NormalForm(1j * self.omega + delay * form.k1,
+                          delay * form.k2 / abs(self.vector[0])**2)
 
     @property
     def direction(self) -> int:
-        """1 where the roots enter the right half plane as the delay grows, -1 where they leave."""
+        """1 where the critical pair moves to the right as the value grows, -1 to the left."""
         return 1 if self.normal_form.k1.real > 0.0 else -1
 
     @property
     def supercritical(self) -> bool:
-        """Whether the orbits attract on the centre manifold: k2 < 0 (theorem 2.1)."""
+        """Whether the orbits attract on the centre manifold."""
         return self.normal_form.supercritical
 
-    def _others(self, mode: Mode) -> int:
-        """Roots of a mode with positive real part, but for the crossing one."""
-        roots = unstable_roots(self.network, mode)
+    @property
+    def lyapunov(self) -> float:
+        """First Lyapunov coefficient l1 = Re k2 / omega (Kuznetsov, eq. 3.20; <q, q> = 1)."""
+        return self.normal_form.k2.real / self.omega
+
+    @cached_property
+    def _others(self) -> tuple[tuple[Block, np.ndarray], ...]:
+        """All blocks with their roots on the axis and right of it, but for the critical pair."""
+        close, found = ON_AXIS * max(1.0, self.omega), []
+        ours = dict(self.block.symmetry.shifts)
+        conjugate = dict(power(self.block.symmetry, -1).shifts)
+        for other in blocks(self.network, self.rest):
+            roots = roots_right_of(-close, other.now, other.past, self.network.delay, other.real)
+            mine = dict(other.symmetry.shifts)
+            for critical, owner in ((1j * self.omega, ours), (-1j * self.omega, conjugate)):
+                if mine == owner and len(roots):
+                    roots = np.delete(roots, np.abs(roots - critical).argmin())
+            found.append((other, roots))
+        return tuple(found)
+
+    def _right(self, within: bool) -> int:
         close = ON_AXIS * max(1.0, self.omega)
-        return int(np.sum((roots.real > close) | (abs(abs(roots.imag) - self.omega) > close)))
+        return int(sum((roots.real > close).sum() for other, roots in self._others
+                       if within or not other.within(self.block)))
 
-    @cached_property
-    def unstable_transverse_roots(self) -> int:
-        """Roots with positive real part outside the gait's class: none would have to be there."""
-        own = {self.mode, Mode(-self.mode.j % 4, self.mode.k)}
-        return sum(self._others(mode) for mode in MODES if mode not in own)
-
-    @cached_property
+    @property
     def unstable_roots(self) -> int:
-        """All other roots with positive real part."""
-        own = {self.mode, Mode(-self.mode.j % 4, self.mode.k)}
-        return self.unstable_transverse_roots + sum(self._others(mode) for mode in own)
+        """How many of the other roots have a positive real part."""
+        return self._right(within=True)
 
-    def amplitude(self, tau: float) -> float:
-        """Amplitude of every cell on the orbit near onset, ``2 sqrt(-k1 mu / k2)``.
+    @property
+    def unstable_transverse_roots(self) -> int:
+        """How many of these lie outside the gait's class: none would have to be there."""
+        return self._right(within=False)
+
+    @property
+    def simple(self) -> bool:
+        """Whether no other root lies on the imaginary axis."""
+        return all((roots.real > ON_AXIS * max(1.0, self.omega)).all()
+                   for _, roots in self._others)
+
+    @property
+    def stable(self) -> bool:
+        """Whether the bifurcation is stable in the sense of Buono & Golubitsky (section 4).
+
+        Critical roots simple, all others to the left; the orbits attract if the bifurcation is
+        supercritical as well.
+        """
+        return self.simple and self.unstable_roots == 0
+
+    def amplitude(self, value: float) -> float:
+        """Amplitude of every cell's first variable near onset, half its range: 2 |q_1| r.
 
         Raises:
-            ValueError: at this delay the normal form has no orbit.
+            NoOrbit: the orbits lie on the other side.
 
         """
-        return 2.0 * self.normal_form.radius(tau - self.tau)
+        return 2.0 * abs(self.vector[0]) * self.normal_form.radius(value - self.value)
 
-    def period(self, tau: float) -> float:
-        """Period of the orbit near onset, model time; the error is of second order in mu.
+    def period(self, value: float) -> float:
+        """Period near onset in model time, to first order in value' - value.
 
         Raises:
-            ValueError: at this delay the normal form has no orbit.
+            NoOrbit: the orbits lie on the other side.
 
         """
-        turning = self.omega * self.tau + self.normal_form.shift(tau - self.tau)
-        return 2.0 * math.pi * tau / turning
+        return 2.0 * np.pi / (self.omega + self.normal_form.shift(value - self.value))
+
+    def path(self, value: float, theta: np.ndarray) -> np.ndarray:
+        """States near onset at times in cycles: ``rest + 2 Re(q z)``, shape (m, components).
+
+        Raises:
+            NoOrbit: the orbits lie on the other side.
+
+        """
+        network = self.line.at(self.network, value)
+        turning = np.exp(2j * np.pi * (np.asarray(theta)[:, None] + self.block.symmetry.phases))
+        swing = self.normal_form.radius(value - self.value) * np.concatenate(
+            [entry * turning for entry in self.vector], axis=1)
+        return everywhere(network, equilibrium(network)) + 2.0 * swing.real
 
 
-def _crossing(network: Delayed, mode: Mode, omega: float, n: int) -> HopfPoint:
-    """``tau_n = (-arg((i omega - A)/B) mod 2 pi + 2 pi n) / omega``."""
-    a, b = mode.eigenvalue_terms(network)
-    angle = -cmath.phase((1j * omega - a) / b) % (2.0 * math.pi)
-    return HopfPoint(replace(network, tau=(angle + 2.0 * math.pi * n) / omega), mode, n, omega)
-
-
-def _frequencies(network: Delayed, mode: Mode) -> list[float]:
-    """``omega = Im A +- sqrt(c^2 - (Re A)^2) > 0``, the fast one first."""
-    a, b = mode.eigenvalue_terms(network)
-    square = b * b - a.real * a.real
-    if square <= 0.0:
-        return []
-    return [omega for omega in (a.imag + math.sqrt(square), a.imag - math.sqrt(square))
-            if omega > 0.0]
-
-
-def hopf_point(network: Delayed, mode: Mode) -> HopfPoint | None:
-    """Return the first delay at which the mode's fast wave crosses, or None if it never does."""
-    omegas = _frequencies(network, mode)
-    return _crossing(network, mode, omegas[0], 0) if omegas else None
-
-
-def hopf_points(network: Delayed, longest: float) -> list[HopfPoint]:
-    """Return every Hopf point of all eight modes with a delay up to a bound, by their delays.
+def hopf_at(network: Network, line: ParameterLine, mode: tuple[int, ...], omega: float
+            ) -> HopfPoint:
+    """Return a Hopf point whose place is known.
 
     Args:
-        network: parameters; its own delay does not matter. c must not be zero.
-        longest: bound of the delay, model time.
+        network: at the point.
+        line: the parameters by which the pair crosses.
+        mode: the critical class.
+        omega: about that of the critical root i omega, to tell it from others of its block.
+
+    """
+    rest = equilibrium(network)
+    block = next(block for block in blocks(network, rest) if block.mode == mode)
+    roots = roots_right_of(-ON_AXIS * max(1.0, omega), block.now, block.past, network.delay,
+                           block.real)
+    root = roots[np.abs(roots - 1j * omega).argmin()]
+    return HopfPoint(network, line, line.value(network), block, float(root.imag), rest)
+
+
+def first_hopf(network: Network, gait: str) -> HopfPoint | None:
+    """Return where a primary gait is born as the delay grows; None if at no delay, or without one.
+
+    Of the delays at which a pair of roots of the gait's class moves to the right, the smallest.
+
+    Args:
+        network: parameters; its own delay does not matter.
+        gait: one of its gaits.
+
+    Raises:
+        InputError: an unknown gait.
+        NoEquilibrium: the network has no equilibrium.
+
+    """
+    symmetry, delay = network.symmetry(gait), network.delay_parameter
+    if not delay or len(symmetry.shifts) < len(symmetry.group.elements):
+        return None
+    rest, line = equilibrium(network), ParameterLine((delay,), (1.0,))
+    block = block_of(Expansion(network, rest), symmetry)
+    found = born_at(block, rest, line)
+    if len(rest) > 1:
+        found = [point for point in found if point.direction > 0]
+    # With one variable the fast wave is the one that is born; the slow one ends.
+    return min(found[:1] if len(rest) == 1 else found, key=lambda point: point.value,
+               default=None)
+
+
+def born_at(block: Block, rest: np.ndarray, line: ParameterLine) -> list[HopfPoint]:
+    """Return a block's Hopf points as the delay moves, with the smallest delays, fast ones first.
+
+    Args:
+        block: whose own delay does not matter.
+        rest: state of every cell at the equilibrium, shape (variables,).
+        line: of the delay alone.
 
     """
     found = []
-    for mode in MODES:
-        for omega in _frequencies(network, mode):
-            n = 0
-            while (point := _crossing(network, mode, omega, n)).tau <= longest:
-                found.append(point)
-                n += 1
-    return sorted(found, key=lambda point: point.tau)
-
-
-def weakened(network: Delayed, gain: float) -> Delayed:
-    """Return the network with every tanh replaced by gain * tanh.
-
-    The rest state of this network is, to first harmonic, an oscillation of the given one whose
-    amplitude makes the describing function of tanh equal to gain.
-    """
-    return replace(network, b=gain * network.b, c=gain * network.c, d=gain * network.d)
+    for omega, tau in delay_crossings(block.now, block.past):
+        there = line.at(block.network, tau)
+        found.append(HopfPoint(there, line, tau, Block(there, block.symmetry, block.now,
+                                                       block.past), omega, rest))
+    return found

@@ -1,23 +1,24 @@
-"""Isotypic blocks of the linearisation at a stand: one 2x2 matrix for each symmetry class.
+"""Isotypic blocks of the linearisation at an equilibrium: small matrices, one for each class.
 
 The cells are permuted by an abelian group, simply and transitively, so each of its characters
-chi has the eigenvector (chi(cell)) once for v and once for w, and the linearisation J falls into
-``L_chi = sum_i J_1i chi(i)`` (Buono & Golubitsky 2001, section 5.2). Oscillations of a class are
-primary gaits: ``x_i ~ chi(i) exp(i omega t)``, so the character is the gait (Table 5).
+chi has the eigenvector (chi(cell)) once for each variable, and the linearisation falls into
+``L_chi = sum_i J_1i chi(i)`` (Buono & Golubitsky 2001, section 5.2), once for the state now and
+once for that a delay ago. Oscillations of a class are primary gaits:
+``x_i ~ chi(i) exp(i omega t)``, so the character is the gait (Table 5).
 """
 
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cache, cached_property
+from itertools import product
 
 import numpy as np
 
-from cpg_ros.dynamics.equilibrium import everywhere
+from cpg_ros.dynamics.characteristic import characteristic_roots
+from cpg_ros.dynamics.expansion import Expansion
 from cpg_ros.errors import InputError
-from cpg_ros.networks import biped, quadruped
-from cpg_ros.networks.biped import Biped
-from cpg_ros.networks.quadruped import Quadruped
-from cpg_ros.networks.symmetry import D2, Z4_Z2, Symmetry
+from cpg_ros.networks.network import Network
+from cpg_ros.networks.symmetry import Group, Symmetry
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,99 +26,157 @@ class Block:
     """The linearisation in a symmetry class.
 
     Attributes:
-        gait: that oscillates in this class.
-        mode: (j, k). Quadruped: shifts j/4 of omega and k/2 of kappa, as in L_jk of the paper.
-            Biped: shifts j/2 of rho and k/2 of tau.
+        network: parameters.
         symmetry: what the class's oscillation has, the shifts of the whole group.
-        matrix: L_chi, complex, shape (2, 2), acting on (v, w).
+        now: L0, complex, shape (variables, variables), by the state now.
+        past: L1, by the state a delay ago.
 
     """
 
-    gait: str
-    mode: tuple[int, int]
+    network: Network
     symmetry: Symmetry
-    matrix: np.ndarray
+    now: np.ndarray
+    past: np.ndarray
+
+    @cached_property
+    def gait(self) -> str:
+        """The network's gait that oscillates in this class, whichever way its wave runs."""
+        mine = dict(self.symmetry.shifts)
+        senses = [mine, {name: -shift % 1 for name, shift in mine.items()}]
+        return next((gait for gait in self.network.gaits()
+                     if dict(self.network.symmetry(gait).shifts) in senses), '')
+
+    @property
+    def mode(self) -> tuple[int, ...]:
+        """(j, k): shifts j/m and k/n of the group's generators, of the orders m and n."""
+        shifts, group = dict(self.symmetry.shifts), self.symmetry.group
+        return tuple(int(shifts[name] * group.order(name)) for name, _ in group.generators)
 
     @property
     def name(self) -> str:
         """Name as in Buono & Golubitsky's Table 6, ``L_21``."""
-        return f'L_{self.mode[0]}{self.mode[1]}'
+        return f'L_{"".join(map(str, self.mode))}'
 
     @property
     def real(self) -> bool:
-        """Whether the class is its own conjugate: its eigenvalues are real or a pair."""
+        """Whether the class is its own conjugate: its roots are real or in pairs."""
         return all(2 * shift % 1 == 0 for _, shift in self.symmetry.shifts)
 
     @property
     def wave(self) -> str:
-        """How the wave of walk and jump runs round the rings: '' for the gaits that stand."""
-        return '' if self.real else ('LF leads LH' if self.mode[0] == 1 else 'LH leads LF')
+        """Which leg leads the first one, or follows it, if by neither 0 nor 1/2; else ''.
+
+        Tells the two senses of a wave apart, by the first cells of the legs of the network's
+        first assignment.
+        """
+        legs = next(iter(self.network.legs.values()))
+        first, *others = ((leg.upper(), cells[0] - 1) for leg, cells in legs.items())
+        for leg, cell in others:
+            ahead = (self.symmetry.phases[cell] - self.symmetry.phases[first[1]]) % 1.0
+            if ahead not in (0.0, 0.5):
+                return f'{leg} leads {first[0]}' if ahead < 0.5 else f'{first[0]} leads {leg}'
+        return ''
 
     @property
     def vector(self) -> np.ndarray:
         """The character's value for every cell, shape (cells,)."""
-        return _values(self.symmetry)
-
-    @cached_property
-    def eigenvalues(self) -> np.ndarray:
-        """Both eigenvalues, rightmost first, in 1/model time, shape (2,)."""
-        matrix = self.matrix.real if self.real else self.matrix
-        return rightmost_first(np.linalg.eigvals(matrix).astype(complex))
+        return character(self.symmetry)
 
     @property
     def leading(self) -> complex:
-        """The rightmost eigenvalue; of a conjugate pair that with positive imaginary part."""
-        return complex(self.eigenvalues[0])
+        """The rightmost root; of a conjugate pair that with positive imaginary part."""
+        return complex(self.roots(1)[0])
 
-    def power(self, n: int) -> tuple[int, int]:
-        """Mode of the class of the n-th power of the character; -1 for the conjugate."""
-        orders = (4, 2) if self.symmetry.group is Z4_Z2 else (2, 2)
-        return (n * self.mode[0] % orders[0], n * self.mode[1] % orders[1])
+    def roots(self, count: int) -> np.ndarray:
+        """Return the rightmost roots, at most as many as there are, 1/model time, (count,)."""
+        return characteristic_roots(self.now, self.past, self.network.delay, count, self.real)
 
     def within(self, other: 'Block') -> bool:
-        """Whether the class lies in the other's Fix(K): it keeps that gait's spatial symmetry."""
-        return set(other.symmetry.k) <= set(self.symmetry.k)
+        """Whether the class lies in the other's gait's class: what stays as it is under K.
 
-
-def blocks(network: Quadruped | Biped, state: np.ndarray) -> tuple[Block, ...]:
-    """Split the linearisation at a stand (v, w): 8 blocks of the quadruped, 4 of the biped.
-
-    Raises:
-        ValueError: weights differ that the network's symmetry carries into one another.
-
-    """
-    known = characters(type(network))
-    if unequal := network.broken(known[0][0]):
-        raise InputError(f'{unequal} differ: the network has not the symmetry of its gaits')
-    whole = network.jacobian(everywhere(network, np.asarray(state, dtype=float)))
-    row = whole.reshape(2, network.cells, 2, network.cells)[:, 0]
-    return tuple(Block(gait, mode, symmetry, row @ _values(symmetry))
-                 for gait, mode, symmetry in known)
+        With x -> -x what a shift of 1/2 turns round has to be turned round, too.
+        """
+        mine = dict(self.symmetry.shifts)
+        kept = (Fraction(0), Fraction(1, 2)) if self.symmetry.odd else (Fraction(0),)
+        return all(mine[name] == shift for name, shift in other.symmetry.shifts if shift in kept)
 
 
 @cache
-def characters(network: type[Quadruped] | type[Biped]
-               ) -> tuple[tuple[str, tuple[int, int], Symmetry], ...]:
-    """All characters of the network's group: gait, (j, k), and the shifts of its elements."""
-    if issubclass(network, Quadruped):
-        group, orders = Z4_Z2, {'omega': 4, 'kappa': 2}
-        gaits = {mode: gait for gait, mode in quadruped.GAITS.items()}
-        gaits |= {(3, k): gaits[1, k] for k in (0, 1)}
-    else:
-        group, orders = D2, {'rho': 2, 'tau': 2}
-        gaits = {(int(2 * biped.GAITS[gait]['rho']), int(2 * biped.GAITS[gait]['tau'])): gait
-                 for gait in biped.PRIMARY}
-    return tuple((gaits[mode], mode, Symmetry.of(group, {
-        name: Fraction(power, order)
-        for (name, order), power in zip(orders.items(), mode, strict=True)}))
-        for mode in sorted(gaits))
+def character(symmetry: Symmetry) -> np.ndarray:
+    """Values of a character for the cells, without error of rounding where they are powers of i."""
+    turns = 4.0 * symmetry.phases
+    exact = np.array([1.0, 1j, -1.0, -1j])[np.round(turns).astype(int) % 4]
+    return np.where(turns == np.round(turns), exact, np.exp(0.5j * np.pi * turns))
 
 
-def _values(symmetry: Symmetry) -> np.ndarray:
-    """Values of a character for the cells: powers of i, without error of rounding."""
-    return np.round(np.exp(2j * np.pi * symmetry.phases))
+@cache
+def characters(group: Group, variables: int, odd: bool) -> tuple[Symmetry, ...]:
+    """All characters of a network's group, as the symmetries of oscillations.
+
+    Raises:
+        InputError: the group has not one element for each cell that takes the first one there,
+            or its elements do not commute.
+
+    """
+    elements = list(group.elements.values())
+    if sorted(element[0] for element in elements) != list(range(group.cells)):
+        raise InputError(f'the group has {len(elements)} symmetries of {group.cells} cells; '
+                         f'exactly one must take the first cell to each cell')
+    if any(a[b[i]] != b[a[i]] for a in elements for b in elements for i in range(group.cells)):
+        raise InputError('the group is not abelian')
+    orders = {name: group.order(name) for name, _ in group.generators}
+    found = []
+    for turns in product(*(range(order) for order in orders.values())):
+        shifts = {name: Fraction(turn, order)
+                  for (name, order), turn in zip(orders.items(), turns, strict=True)}
+        try:
+            found.append(Symmetry.of(group, shifts, variables, odd))
+        except InputError:
+            # Generators that are not independent: these shifts contradict one another.
+            continue
+    return tuple(found)
 
 
-def rightmost_first(values: np.ndarray) -> np.ndarray:
-    """Sort eigenvalues by falling real part, of a pair that with positive imaginary part first."""
-    return values[np.lexsort((-values.imag, -np.round(values.real, 12)))]
+def power(symmetry: Symmetry, n: int) -> Symmetry:
+    """Return the n-th power of a character; -1 for the conjugate."""
+    return Symmetry.of(symmetry.group, {name: n * shift % 1 for name, shift in symmetry.shifts},
+                       symmetry.variables, symmetry.odd)
+
+
+def block_of(expansion: Expansion, symmetry: Symmetry) -> Block:
+    """Return the block of one class.
+
+    Args:
+        expansion: at the equilibrium.
+        symmetry: the class's, the shifts of the whole group.
+
+    """
+    return Block(expansion.network, symmetry, *expansion.linear(character(symmetry)))
+
+
+def blocks(network: Network, state: np.ndarray) -> tuple[Block, ...]:
+    """Split the linearisation at an equilibrium, one block for each cell, by rising mode.
+
+    Args:
+        network: parameters.
+        state: of every cell, shape (variables,).
+
+    Raises:
+        InputError: weights differ that the network's symmetry carries into one another, or its
+            group does not take the first cell to each cell in exactly one way.
+
+    """
+    return tuple(block_of(Expansion(network, np.asarray(state, dtype=float)), symmetry)
+                 for symmetry in classes(network))
+
+
+def classes(network: Network) -> tuple[Symmetry, ...]:
+    """Return the symmetries of the classes, as blocks has them; it raises the same."""
+    known = network.symmetry(network.gaits()[0])
+    found = characters(known.group, network.variables, known.odd)
+    values = network.as_dict()
+    for family in network.families(found[0]):
+        if len({values[name] for name in family}) > 1:
+            raise InputError(f'{", ".join(family)} differ: the network has not the symmetry of '
+                             'its gaits')
+    return found

@@ -75,6 +75,10 @@ class Biped(Network):
     groups: ClassVar[dict[str, tuple[str, ...]]] = {
         f'w_{letter}': names for letter, names in WEIGHTS.items()}
 
+    couplings: ClassVar[tuple[str, ...]] = tuple(
+        name for names in WEIGHTS.values() for name in names)
+    variable_names: ClassVar[tuple[str, ...]] = ('v', 'w')
+
     @classmethod
     def symmetric(cls, current: float, phi: float, a: float, b: float, c: float) -> 'Biped':
         """Build the network with D2 symmetry: one weight for each coupling, as in Table 2."""

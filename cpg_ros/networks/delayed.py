@@ -48,6 +48,7 @@ class Delayed(Network):
         'c': Range(-20.0, 20.0, "weight of the opposite leg's cell, delayed [1/model time]"),
         'd': Range(-20.0, 20.0, 'weight of the cell before it on the same side [1/model time]'),
         'tau': Range(STEP, MAX_DELAY, 'delay between opposite legs [model time]')}
+    couplings: ClassVar[tuple[str, ...]] = ('c', 'd')
     legs: ClassVar[dict[str, dict[str, tuple[int, ...]]]] = {
         'implicit': {'lh': (1, 7), 'rh': (2, 8), 'lf': (3, 5), 'rf': (4, 6)}}
 

@@ -42,6 +42,8 @@ class Network(ABC):
         legs: assignment of cells to legs -> leg -> cells numbered from 1, the first of which
             gives the leg's phase; the first assignment is the usual one.
         groups: name -> parameters that can be set together under it.
+        couplings: parameters without which no cell hears another.
+        variable_names: of a cell, where they have names of their own.
 
     """
 
@@ -54,6 +56,8 @@ class Network(ABC):
     ranges: ClassVar[dict[str, Range]]
     legs: ClassVar[dict[str, dict[str, tuple[int, ...]]]]
     groups: ClassVar[dict[str, tuple[str, ...]]] = {}
+    couplings: ClassVar[tuple[str, ...]] = ()
+    variable_names: ClassVar[tuple[str, ...]] = ()
 
     def as_dict(self) -> dict[str, float]:
         """Return the parameters by name, in their own order."""

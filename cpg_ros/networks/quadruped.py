@@ -50,6 +50,8 @@ class Quadruped(Network):
             ('beta', 'w', 'the cell before it on the same side'),
             ('gamma', 'v', 'the opposite cell'), ('delta', 'w', 'the opposite cell'),
             ('xi', 'v', 'the cell across its ring'), ('eta', 'w', 'the cell across its ring'))}
+    couplings: ClassVar[tuple[str, ...]] = ('alpha', 'beta', 'gamma', 'delta', 'xi', 'eta')
+    variable_names: ClassVar[tuple[str, ...]] = ('v', 'w')
     #: The assignments of Table 3 and of Theorem 3.3 (Table 4).
     legs: ClassVar[dict[str, dict[str, tuple[int, ...]]]] = {
         'implicit': {'lh': (1, 7), 'rh': (2, 8), 'lf': (3, 5), 'rf': (4, 6)},
