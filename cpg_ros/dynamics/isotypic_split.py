@@ -6,12 +6,14 @@ mix. The states that all of them leave alone are the gait's class.
 """
 
 from fractions import Fraction
+from functools import cache
 
 import numpy as np
 
 from cpg_ros.networks.symmetry import Symmetry
 
 
+@cache
 def split(symmetry: Symmetry) -> tuple[np.ndarray, list[np.ndarray]]:
     """Return orthonormal columns of the gait's class, and of the subspaces transverse to it."""
     cells = symmetry.group.cells

@@ -22,8 +22,8 @@ MOST_NODES = 255
 #: Newton stops at this residual; a waveform is resolved when its last harmonics are this small.
 TOLERANCE = 1e-12
 RESOLVED = 1e-12
-#: States, parameters and derivative by the delay at a solution; see ``equations``.
-Point = tuple[list[np.ndarray], list[np.ndarray], np.ndarray]
+#: States, parameters, derivative by the delay, and slopes in theta; see ``equations``.
+Point = tuple[list[np.ndarray], list[np.ndarray], np.ndarray, np.ndarray]
 #: Below this range Newton has fallen to the rest state.
 SMALLEST = 1e-7
 
@@ -64,12 +64,14 @@ def equations(network: Network, symmetry: Symmetry, u: np.ndarray, period: float
     heard = _heard(type(network), symmetry)
     states, slopes, matrices = [], [], []
     for delayed, places in heard:
-        found = [(u[row], None, None) if not delayed and shift == 0.0 else
-                 _shifted(u[row], n, shift - tau / period if delayed else shift, delayed)
-                 for row, shift in places]
-        states.append(np.array([state for state, _, _ in found]))
-        slopes.append([slope for _, slope, _ in found])
-        matrices.append([matrix for _, _, matrix in found])
+        late = tau / period if delayed else 0.0
+        pairs = [None if shift == late == 0.0 else collocation.shift_matrices(n, shift - late)
+                 for _, shift in places]
+        matrices.append([None if pair is None else pair[0] for pair in pairs])
+        states.append(np.array([u[row] if pair is None else pair[0] @ u[row]
+                                for (row, _), pair in zip(places, pairs, strict=True)]))
+        slopes.append([pair[1] @ u[row] if delayed and pair is not None else None
+                       for (row, _), pair in zip(places, pairs, strict=True)])
     p = [value[symmetry.first][:, None] if value.ndim else value for value in values_of(network)]
     rates, by_argument = kind.slopes(states, p)
     rise = u @ derive.T
@@ -103,18 +105,12 @@ def equations(network: Network, symmetry: Symmetry, u: np.ndarray, period: float
                 by_delay[row] += by_shift / period
     jacobian[:-1, -1] = by_period.ravel()
     jacobian[-1, :n] = derive[0]
-    return residual, jacobian, (states, p, by_delay)
-
-
-def _shifted(row: np.ndarray, n: int, shift: float, delayed: bool
-             ) -> tuple[np.ndarray, np.ndarray | None, np.ndarray]:
-    value, slope = collocation.shift_matrices(n, shift)
-    return value @ row, slope @ row if delayed else None, value
+    return residual, jacobian, (states, p, by_delay, rise)
 
 
 def by_parameter(network: Network, symmetry: Symmetry, point: Point) -> np.ndarray:
     """Derivative of the residual by the parameters, shape (rows n + 1, parameters)."""
-    states, p, by_delay = point
+    states, p, by_delay, _ = point
     names, kind = network.parameters(), equations_of(type(network))
     rows, n = by_delay.shape
     variables = network.variables
@@ -158,8 +154,7 @@ def newton(network: Network, symmetry: Symmetry, u: np.ndarray, period: float
         for _ in range(12):
             residual, jacobian, point = equations(network, symmetry, u, period)
             size = float(np.abs(residual[:-1]).max())
-            rates = np.abs(u @ collocation.derivative_matrix(u.shape[1]).T).max() / period
-            if size <= TOLERANCE * max(1.0, float(rates)):
+            if size <= TOLERANCE * max(1.0, float(np.abs(point[3]).max()) / period):
                 break
             # numpy's solver, unlike scipy's, releases the interpreter lock: a node publishes
             # while it solves.

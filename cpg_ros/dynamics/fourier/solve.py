@@ -1,7 +1,6 @@
 """Finding the orbit of a gait of a network with a delay: from another, or from its onset."""
 
-import cmath
-import math
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -25,30 +24,37 @@ def _delayed(network: Network, delay: float) -> Network:
     return replace(network, **{network.delay_parameter: delay})  # type: ignore[type-var]
 
 
-def _describing(network: Network, symmetry: Symmetry, amplitude: float
-                ) -> tuple[complex, complex]:
-    """Return A and B of ``lambda = A + B exp(-lambda tau)``, each cell's rate by its first
-    harmonic where all cells are amplitude * cos, with their phases.
+Describing = Callable[[float], tuple[complex, complex]]
 
-    At this amplitude the network is, to first harmonic, a linear one (describing functions).
+
+def _describing(network: Network, symmetry: Symmetry) -> Describing:
+    """Return A and B of ``lambda = A + B exp(-lambda tau)`` as functions of an amplitude.
+
+    Each cell's rate by its first harmonic where all cells are amplitude * cos, with their
+    phases: at this amplitude the network is, to first harmonic, a linear one.
     """
     kind, cosine = equations_of(type(network)), np.cos(np.arange(POINTS) * (2.0 * np.pi / POINTS))
     p = [value[0] if value.ndim else value for value in values_of(network)]
     # One row for each argument, in which all others are at rest.
-    states = amplitude * np.eye(len(kind.arguments))[..., None] * cosine
-    gains = kind.rates(list(states), p)[0] @ cosine * (2.0 / POINTS / amplitude)
-    sums = [0.0 + 0.0j, 0.0 + 0.0j]
-    for one, gain in zip(kind.arguments, gains, strict=True):
-        other = 0 if one.source is None else one.source[0]
-        ahead = symmetry.phases[other] - symmetry.phases[0]
-        sums[one.delayed] += gain * cmath.exp(2j * math.pi * ahead)
-    return sums[0], sums[1]
+    rows = np.eye(len(kind.arguments))[..., None] * cosine
+    first = [0 if one.source is None else one.source[0] for one in kind.arguments]
+    turns = np.exp(2j * np.pi * (symmetry.phases[first] - symmetry.phases[0]))
+    late = np.array([one.delayed for one in kind.arguments])
+    cosine = cosine * (2.0 / POINTS)
+
+    def terms(amplitude: float) -> tuple[complex, complex]:
+        gains = kind.rates(list(amplitude * rows), p)[0] @ cosine / amplitude * turns
+        return complex(gains[~late].sum()), complex(gains[late].sum())
+
+    return terms
 
 
 def _first_harmonic(network: Network, symmetry: Symmetry) -> tuple[np.ndarray, float] | None:
     """Waveform and period by harmonic balance; for one variable a cell that swings about 0."""
+    describing = _describing(network, symmetry)
+
     def onset(amplitude: float) -> tuple[float, float]:
-        a, b = _describing(network, symmetry, amplitude)
+        a, b = describing(amplitude)
         omegas = frequencies(a, b)
         return (critical_delay(a, b, omegas[0]), omegas[0]) if omegas else (1e3, 0.0)
 
@@ -179,7 +185,7 @@ def _onset(network: Network, gait: str) -> float | None:
     """The gait's first critical delay."""
     symmetry = network.symmetry(gait)
     if symmetry.odd and network.variables == 1:
-        a, b = _describing(network, symmetry, 1e-9)
+        a, b = _describing(network, symmetry)(1e-9)
         omegas = frequencies(a, b)
         return critical_delay(a, b, omegas[0]) if omegas else None
     point = first_hopf(network, gait)
