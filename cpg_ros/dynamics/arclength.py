@@ -201,9 +201,10 @@ def fold(after: Place, step: float) -> Place | None:
     try:
         for reach in (1.1, 1.4, 2.0):
             if rate(-reach * step) * after.rate < 0.0:
-                return along(after, brentq(rate, -reach * step, 0.0, xtol=1e-9 * step,
-                                           rtol=1e-12))
-    except np.linalg.LinAlgError:
+                found = along(after, brentq(rate, -reach * step, 0.0, xtol=1e-9 * step,
+                                            rtol=1e-12))
+                return None if found is None else resolved(found.curve, found.z, found.tangent)
+    except (np.linalg.LinAlgError, NoOrbit):
         # Where two curves cross, as at a gain of symmetry, Newton's method may fail.
         return None
     return None
