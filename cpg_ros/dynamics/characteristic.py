@@ -4,7 +4,8 @@ They are where ``Delta(lambda) = lambda - L0 - L1 exp(-lambda tau)`` is singular
 they are eigenvalues. With one variable ``(lambda - A) tau`` is a branch of Lambert's W at
 ``B tau exp(-A tau)``: ``lambda_n = A + W_n(B tau exp(-A tau)) / tau``, whose real parts fall as n
 goes from 0 to either side. With several the infinitesimal generator is discretised on Chebyshev
-points (Breda, Maset & Vermiglio 2005), and what it gives is refined by Newton's method on det Delta.
+points (Breda, Maset & Vermiglio 2005), and what it gives is refined by Newton's method on
+det Delta.
 """
 
 import numpy as np

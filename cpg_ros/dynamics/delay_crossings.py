@@ -18,7 +18,7 @@ ON_CIRCLE = 1e-7
 
 
 def frequencies(a: complex, b: complex) -> list[float]:
-    """Return omega > 0 of the crossings, ``Im A +- sqrt(|B|^2 - (Re A)^2)``, the fast one first."""
+    """Return omega > 0 of the crossings, ``Im A +- sqrt(|B|^2 - (Re A)^2)``, fast one first."""
     square = abs(b)**2 - a.real**2
     if square <= 0.0:
         return []

@@ -14,8 +14,7 @@ import numpy as np
 
 from cpg_ros.dynamics.sign_changes import crossings
 from cpg_ros.errors import CpgError, InputError
-from cpg_ros.networks.equations import equations_of
-from cpg_ros.networks.field import Field
+from cpg_ros.networks.equations import equations_of, values_of
 from cpg_ros.networks.network import Network
 
 #: Where equilibria are looked for: close to where the cell's functions bend, and far out.
@@ -35,9 +34,63 @@ class NoEquilibrium(CpgError):
     """The stand cannot be followed from the uncoupled cells to these couplings."""
 
 
-def one_cell(network: Network) -> Field:
-    """Return the right-hand side for one cell where all are in its state."""
-    return Field(network, np.zeros(network.cells, dtype=int))
+class Quotient:
+    """A network in which all cells are alike: a cell that hears itself, now as a delay ago."""
+
+    def __init__(self, network: Network) -> None:
+        """Take the parameters; of those that each cell has of its own, the first cell's."""
+        equations = self._equations = equations_of(type(network))
+        self.size = network.variables
+        self._variables = [one.variable for one in equations.arguments]
+        self._whole = [float(value.flat[0]) for value in values_of(network)]
+        self._coupled = [(network.groups[row][0] if row in equations.groups else row)
+                         in network.couplings for row in equations.rows]
+        self._p = self._whole
+
+    def set_share(self, share: float) -> None:
+        """Set the share of the couplings that is there."""
+        self._p = [share * value if coupled else value
+                   for value, coupled in zip(self._whole, self._coupled, strict=True)]
+
+    def rates(self, states: np.ndarray) -> np.ndarray:
+        """Rates at states, shape (..., variables)."""
+        found = self._equations.rates([states[..., v] for v in self._variables], self._p)
+        return np.stack(np.broadcast_arrays(*found, states[..., 0])[:-1], axis=-1)
+
+    def linearised(self, state: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Rates, shape (variables,), and their Jacobian, if all cells move together."""
+        rates, slopes = self._equations.slopes([state[v] for v in self._variables], self._p)
+        jacobian = np.zeros((self.size, self.size))
+        for (v, k), slope in slopes.items():
+            jacobian[v, self._variables[k]] += slope
+        return np.array(rates, dtype=float), jacobian
+
+    def push(self, state: np.ndarray) -> np.ndarray:
+        """Derivative of the rates by the share of the couplings, shape (variables,)."""
+        out = np.zeros(self.size)
+        found = self._equations.by_parameter([state[v] for v in self._variables], self._p)
+        for (v, r), slope in found.items():
+            if self._coupled[r]:
+                out[v] += slope * self._whole[r]
+        return out
+
+    def newton(self, state: np.ndarray, most: int = 8) -> np.ndarray | None:
+        """Solve for an equilibrium near a state; None where there is none."""
+        size = np.inf
+        with np.errstate(all='ignore'):
+            for _ in range(most):
+                rates, slope = self.linearised(state)
+                try:
+                    move = np.linalg.solve(slope, rates)
+                except np.linalg.LinAlgError:
+                    return None
+                state = state - move
+                size = np.abs(move).max() / (1.0 + np.abs(state).max())
+                if not size < 1e3:
+                    return None
+                if size < 1e-14:
+                    break
+        return state if size < 1e-11 else None
 
 
 def everywhere(network: Network, cell: np.ndarray) -> np.ndarray:
@@ -70,14 +123,14 @@ def equilibria(network: Network) -> np.ndarray:
 
     """
     _check(network)
-    field, scanned = one_cell(network), _scanned(type(network))
-    starts = _scattered(network.variables) if scanned is None else _roots(field, scanned)
+    cell, scanned = Quotient(network), _scanned(type(network))
+    starts = _scattered(cell.size) if scanned is None else _roots(cell, scanned)
     found: list[np.ndarray] = []
     for start in starts:
-        state = _newton(field, start, 8 if scanned is not None else 50)
+        state = cell.newton(start, 8 if scanned is not None else 50)
         if state is not None and not any(np.allclose(state, known, 1e-9, 1e-9) for known in found):
             found.append(state)
-    return np.array(sorted(found, key=tuple)).reshape(-1, network.variables)
+    return np.array(sorted(found, key=tuple)).reshape(-1, cell.size)
 
 
 @cache
@@ -92,9 +145,9 @@ def _scanned(network: type[Network]) -> int | None:
     return next((x for x in range(network.variables) if all(x in pair for pair in pairs)), None)
 
 
-def _roots(field: Field, scanned: int) -> Iterator[np.ndarray]:
+def _roots(cell: Quotient, scanned: int) -> Iterator[np.ndarray]:
     """States close to those at which ``f0 + F1 y`` vanishes for a y."""
-    n = field.kept.size
+    n = cell.size
     others = [k for k in range(n) if k != scanned]
 
     def terms(x: np.ndarray) -> np.ndarray:
@@ -103,7 +156,7 @@ def _roots(field: Field, scanned: int) -> Iterator[np.ndarray]:
         states[..., scanned] = x
         for k, other in enumerate(others):
             states[k + 1, ..., other] = 1.0
-        rates = field.rates(states)
+        rates = cell.rates(states)
         rates[1:] -= rates[0]
         return np.moveaxis(rates, 0, -1)
 
@@ -139,23 +192,27 @@ def equilibrium(network: Network) -> np.ndarray:
     if odd(network):
         return np.zeros(network.variables)
     _check(network)
-    alone = _coupled(network, 0.0)
-    state, share, step, grow = _uncoupled(alone), 0.0, 0.25, 2.0
-    field = one_cell(alone)
-    slope, weights = _slope(field, state), _weights(network)
+    cell = Quotient(network)
+    cell.set_share(0.0)
+    state = _uncoupled(replace(  # type: ignore[type-var]
+        network, **dict.fromkeys(network.couplings, 0.0)))
+    share, step, grow = 0.0, 0.25, 2.0
+    slope = cell.linearised(state)[1]
     while share < 1.0:
         step = min(step, 1.0 - share)
-        way = -step * np.linalg.solve(slope, field.by_parameter(state) @ weights)
+        way = -step * np.linalg.solve(slope, cell.push(state))
         size, new = 1.0 + np.abs(state).max(), None
-        there = one_cell(_coupled(network, share + step))
+        cell.set_share(share + step)
         if np.abs(way).max() <= LONGEST * size:
-            new = _newton(there, state + way)
+            new = cell.newton(state + way)
+        ahead = slope if new is None else cell.linearised(new)[1]
         # Beyond a fold the determinant has the other sign.
         if (new is not None and np.abs(new - state - way).max() <= MISS * size
-                and np.linalg.det(_slope(there, new)) * np.linalg.det(slope) > 0.0):
-            state, slope, field = new, _slope(there, new), there
+                and np.linalg.det(ahead) * np.linalg.det(slope) > 0.0):
+            state, slope = new, ahead
             share, step, grow = share + step, grow * step, 2.0
         else:
+            cell.set_share(share)
             step, grow = 0.5 * step, 1.0
         if step < SHORTEST < 1.0 - share or size > FURTHEST:
             how = 'in a fold' if size <= FURTHEST else 'to infinity'
@@ -166,49 +223,12 @@ def equilibrium(network: Network) -> np.ndarray:
     return state
 
 
-def _coupled(network: Network, share: float) -> Network:
-    """Return the network with a share of its couplings."""
-    values = network.as_dict()
-    return network if share == 1.0 else replace(network, **{  # type: ignore[type-var]
-        name: share * values[name] for name in network.couplings})
-
-
-def _weights(network: Network) -> np.ndarray:
-    """How fast the parameters grow with the share of the couplings, shape (parameters,)."""
-    return np.array([value if name in network.couplings else 0.0
-                     for name, value in network.as_dict().items()])
-
-
 @lru_cache(maxsize=64)
 def _uncoupled(alone: Network) -> np.ndarray:
     found = equilibria(alone)
     if len(found) != 1:
         raise NoEquilibrium(f'an uncoupled cell has {len(found)} equilibria: none is the stand')
     return found[0]
-
-
-def _slope(field: Field, cell: np.ndarray) -> np.ndarray:
-    """Derivative of a cell's rates if all cells move together, shape (variables, variables)."""
-    _, now, past = field.linearised(cell)
-    return now + past if past.size else now
-
-
-def _newton(field: Field, cell: np.ndarray, most: int = 8) -> np.ndarray | None:
-    """Solve for an equilibrium near a state; None where there is none."""
-    size = np.inf
-    with np.errstate(all='ignore'):
-        for _ in range(most):
-            try:
-                move = np.linalg.solve(_slope(field, cell), field.rates(cell))
-            except np.linalg.LinAlgError:
-                return None
-            cell = cell - move
-            size = np.abs(move).max() / (1.0 + np.abs(cell).max())
-            if not size < 1e3:
-                return None
-            if size < 1e-14:
-                break
-    return cell if size < 1e-11 else None
 
 
 def _check(network: Network) -> None:

@@ -38,11 +38,11 @@ class Expansion:
 
     @cached_property
     def _second(self) -> Mapping[tuple[int, ...], float]:
-        return self._equations.second(self._x, self._p)
+        return {**self._equations.second(self._x, self._p)}
 
     @cached_property
     def _third(self) -> Mapping[tuple[int, ...], float]:
-        return self._equations.third(self._x, self._p)
+        return {**self._equations.third(self._x, self._p)}
 
     def linear(self, chi: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """L0 and L1 of a class, complex: ``h' = L0 h(t) + L1 h(t - tau)``, (variables, variables).

@@ -12,7 +12,7 @@ delay Diekmann et al., *Delay Equations*, chapter IX)::
 with ``Delta q = 0``, ``p Delta = 0`` and ``<p, Delta'(i omega) q> = 1``.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -73,7 +73,7 @@ class HopfPoint:
 
     @cached_property
     def _eigenvectors(self) -> tuple[np.ndarray, np.ndarray]:
-        """Q of one cell with <q, q> = 1 over all cells, and p with <p, Delta' q> = 1."""
+        """Return q of one cell with <q, q> = 1 over all cells, and p with <p, Delta' q> = 1."""
         matrix, slope = characteristic_matrix(1j * self.omega, self.block.now, self.block.past,
                                               self.network.delay)
         left, _, right = np.linalg.svd(matrix)
@@ -84,7 +84,7 @@ class HopfPoint:
 
     @property
     def vector(self) -> np.ndarray:
-        """Q of one cell, shape (variables,); over the whole network <q, q> = 1."""
+        """Eigenvector q of one cell, shape (variables,); over the whole network <q, q> = 1."""
         return self._eigenvectors[0]
 
     @cached_property
@@ -213,25 +213,6 @@ class HopfPoint:
         return everywhere(network, equilibrium(network)) + 2.0 * swing.real
 
 
-def hopf_at(network: Network, line: ParameterLine, mode: tuple[int, ...], omega: float
-            ) -> HopfPoint:
-    """Return a Hopf point whose place is known.
-
-    Args:
-        network: at the point.
-        line: the parameters by which the pair crosses.
-        mode: the critical class.
-        omega: about that of the critical root i omega, to tell it from others of its block.
-
-    """
-    rest = equilibrium(network)
-    block = next(block for block in blocks(network, rest) if block.mode == mode)
-    roots = roots_right_of(-ON_AXIS * max(1.0, omega), block.now, block.past, network.delay,
-                           block.real)
-    root = roots[np.abs(roots - 1j * omega).argmin()]
-    return HopfPoint(network, line, line.value(network), block, float(root.imag), rest)
-
-
 def first_hopf(network: Network, gait: str) -> HopfPoint | None:
     """Return where a primary gait is born as the delay grows; None if at no delay, or without one.
 
@@ -251,26 +232,26 @@ def first_hopf(network: Network, gait: str) -> HopfPoint | None:
         return None
     rest, line = equilibrium(network), ParameterLine((delay,), (1.0,))
     block = block_of(Expansion(network, rest), symmetry)
-    found = born_at(block, rest, line)
-    if len(rest) > 1:
-        found = [point for point in found if point.direction > 0]
-    # With one variable the fast wave is the one that is born; the slow one ends.
-    return min(found[:1] if len(rest) == 1 else found, key=lambda point: point.value,
-               default=None)
+    points = [crossing_at(block, line, rest, omega, tau)
+              for omega, tau in delay_crossings(block.now, block.past)]
+    # With one variable the fast wave is the one that is born, and the slow one ends.
+    born = points[:1] if len(rest) == 1 else [one for one in points if one.direction > 0]
+    return min(born, key=lambda one: one.value, default=None)
 
 
-def born_at(block: Block, rest: np.ndarray, line: ParameterLine) -> list[HopfPoint]:
-    """Return a block's Hopf points as the delay moves, with the smallest delays, fast ones first.
+def crossing_at(block: Block, line: ParameterLine, rest: np.ndarray, omega: float, tau: float,
+                n: int = 0) -> HopfPoint:
+    """Return the Hopf point of a block at a delay.
 
     Args:
-        block: whose own delay does not matter.
-        rest: state of every cell at the equilibrium, shape (variables,).
+        block: of a network with any delay.
         line: of the delay alone.
+        rest: state of every cell at the equilibrium, shape (variables,).
+        omega: rad per model time.
+        tau: a delay at which the block's roots cross, and n turns more.
+        n: how many turns.
 
     """
-    found = []
-    for omega, tau in delay_crossings(block.now, block.past):
-        there = line.at(block.network, tau)
-        found.append(HopfPoint(there, line, tau, Block(there, block.symmetry, block.now,
-                                                       block.past), omega, rest))
-    return found
+    tau += 2.0 * np.pi * n / omega
+    there = line.at(block.network, tau)
+    return HopfPoint(there, line, tau, replace(block, network=there), omega, rest, n)

@@ -103,7 +103,7 @@ class Block:
 
 @cache
 def character(symmetry: Symmetry) -> np.ndarray:
-    """Values of a character for the cells, without error of rounding where they are powers of i."""
+    """Values of a character for the cells, powers of i without error of rounding."""
     turns = 4.0 * symmetry.phases
     exact = np.array([1.0, 1j, -1.0, -1j])[np.round(turns).astype(int) % 4]
     return np.where(turns == np.round(turns), exact, np.exp(0.5j * np.pi * turns))

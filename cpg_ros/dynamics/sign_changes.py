@@ -40,6 +40,8 @@ def crossings(function: Callable[[float], float], grid: np.ndarray,
             at = int(np.searchsorted(places, lowest.x))
             places.insert(at, float(lowest.x))
             found.insert(at, side * lowest.fun)
-    return [float(brentq(function, left, right, xtol=EXACT, rtol=EXACT))
-            for left, right, a, b in zip(places, places[1:], found, found[1:], strict=False)
-            if np.isfinite(a + b) and (a >= 0.0) != (b >= 0.0)]
+    signs = np.sign(found)
+    signs[signs == 0.0] = 1.0
+    # Not a number where there is no value, whose product differs from -1.
+    return [float(brentq(function, places[k], places[k + 1], xtol=EXACT, rtol=EXACT))
+            for k in np.flatnonzero(signs[:-1] * signs[1:] == -1.0)]
