@@ -16,7 +16,6 @@ from cpg_ros.dynamics.mesh_orbit import MeshOrbit
 from cpg_ros.dynamics.periodic import NoOrbit
 from cpg_ros.integration.simulate import simulate
 from cpg_ros.networks.network import Network, Preset
-from cpg_ros.networks.registry import PRESETS
 from cpg_ros.networks.symmetry import Symmetry
 
 #: Periods the network gets to find its gait, held by a lock of this gain (1/model time).
@@ -166,9 +165,9 @@ def solve(network: Network, gait: str, near: MeshOrbit | None = None) -> MeshOrb
             raise ValueError(f'{name} is {value}, not a finite number')
     _check(network, gait)
     if near is None:
-        if gait not in PRESETS[network.name]:
+        if gait not in network.presets():
             raise NoOrbit(f'no preset of {gait} is known to start from')
-        near = from_preset(PRESETS[network.name][gait])
+        near = from_preset(network.presets()[gait])
     if near.network == network and near.symmetry == symmetry:
         return near
     orbit = None

@@ -10,12 +10,14 @@ import cmath
 import math
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import cast
 
 import numpy as np
 
 from cpg_ros.dynamics.characteristic import unstable_roots
 from cpg_ros.dynamics.normal_form import NormalForm
 from cpg_ros.networks.delayed import GAITS, MODES, Delayed, Mode
+from cpg_ros.networks.network import Network
 
 #: A root this close to the imaginary axis, against its own size, is the crossing one.
 ON_AXIS = 1e-7
@@ -77,6 +79,27 @@ class HopfPoint:
         past = c * cmath.exp(1j * self.omega * tau)
         eight = 1.0 / (-1.0 + past)
         return NormalForm(eight * (-a - b - d + past), -tau * eight * (-b + past - d))
+
+    @property
+    def slopes(self) -> dict[str, float]:
+        """Derivatives of the critical delay by the other parameters, by name.
+
+        From ``i omega = A + B exp(-i omega tau)``, differentiated: real and imaginary part are
+        two equations for the changes of omega and tau.
+        """
+        turn = (1, -1j, -1, 1j)[self.mode.j]
+        b = self.mode.eigenvalue_terms(self.network)[1]
+        past = np.exp(-1j * self.omega * self.tau)
+        left = np.array([1j + 1j * self.tau * b * past, 1j * self.omega * b * past])
+        right = np.array([1.0, 1.0, past * (-1) ** self.mode.k, turn])
+        found = np.linalg.solve(np.array([left.real, left.imag]),
+                                np.array([right.real, right.imag]))[1]
+        return dict(zip(('a', 'b', 'c', 'd'), found.tolist(), strict=True))
+
+    @property
+    def drifts(self) -> bool:
+        """Whether the gait's own class has a positive real root at every delay."""
+        return self.mode.j % 2 == 0 and self.mode.eigenvalue_terms(self.network)[1] >= 0.0
 
     @property
     def direction(self) -> int:
@@ -147,6 +170,13 @@ def hopf_point(network: Delayed, mode: Mode) -> HopfPoint | None:
     """Return the first delay at which the mode's fast wave crosses, or None if it never does."""
     omegas = _frequencies(network, mode)
     return _crossing(network, mode, omegas[0], 0) if omegas else None
+
+
+def critical_point(network: Network, gait: str) -> HopfPoint | None:
+    """Return where a gait is born as the delay grows; None at no delay, or of no network's."""
+    if not network.delay_parameter:
+        return None
+    return hopf_point(cast(Delayed, network), network.symmetry(gait))
 
 
 def hopf_points(network: Delayed, longest: float) -> list[HopfPoint]:

@@ -4,12 +4,8 @@ import numpy as np
 
 from cpg_ros.dynamics.periodic import Orbit
 from cpg_ros.dynamics.stability import stability
-from cpg_ros.motion.phase_readout import phase_map
+from cpg_ros.motion.joint_readout import joint_readout
 from cpg_ros.motion.plan import STEPS_A_PERIOD
-from cpg_ros.motion.readout import TURN, lead_table
-
-#: Points of a cycle by which a waveform's humps are counted.
-POINTS = 512
 
 
 def refusal(orbit: Orbit, harmonics: int) -> str:
@@ -27,11 +23,8 @@ def refusal(orbit: Orbit, harmonics: int) -> str:
     if flaw:
         return f'it does not attract: {flaw}'
     try:
-        if orbit.network.variables == 1:
-            theta = np.arange(POINTS) / POINTS
-            lead_table(orbit.waveform(theta), orbit.waveform(theta, 1) / TURN)
-        else:
-            phase_map(orbit, harmonics)
+        joint_readout(orbit, np.zeros(1, dtype=int), np.zeros((1, 6)), np.zeros(1, dtype=int),
+                      harmonics)
     except ValueError as error:
         return f'it cannot drive joints: {error}'
     return ''

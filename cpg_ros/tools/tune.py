@@ -13,7 +13,7 @@ from functools import partial
 from pathlib import Path
 
 from cpg_ros.files.progress_bar import progress_bar
-from cpg_ros.networks.registry import PRESETS
+from cpg_ros.networks.registry import NETWORKS
 from cpg_ros.robots.robot import Robot
 from cpg_ros.robots.robot_file import RobotError, find_robot, write_robot
 from cpg_ros.simulation.gait_design import AIMS
@@ -78,7 +78,7 @@ def tune(robot: Robot, model: str, gaits: Sequence[str], evaluations: int, seed:
 
     """
     tuner = Tuner(robot, model)
-    known = PRESETS[robot.networks[0]]
+    known = NETWORKS[robot.networks[0]].presets()
     for gait in gaits:
         if gait not in known:
             raise SimulationError(f'the network {robot.networks[0]} has no gait {gait}')
