@@ -82,8 +82,12 @@ def is_path(name: str) -> bool:
     return name.endswith('.py') or '/' in name
 
 
-def find_network(name: str) -> type[Network]:
+def find_network(name: str, folder: Path | None = None) -> type[Network]:
     """Return a network by its name, or the one that a file defines; from then on it has a name.
+
+    Args:
+        name: of a network, or path of a file.
+        folder: that relative paths start from, instead of the working directory.
 
     Raises:
         NetworkError: there is no such network or file, or what it states cannot be used; the
@@ -91,7 +95,14 @@ def find_network(name: str) -> type[Network]:
 
     """
     if is_path(name):
-        return _of_file(Path(name).expanduser().resolve())
+        try:
+            path = ((folder or Path()) / Path(name).expanduser()).resolve()
+            there = path.is_file()
+        except (OSError, RuntimeError, ValueError) as error:
+            raise NetworkError(' '.join(f'{name}: {error}'.split())) from error
+        if not there:
+            raise NetworkError(f'{path}: there is no such file')
+        return _of_file(path)
     if name not in NETWORKS:
         raise NetworkError(f"'{name}' is not one of {', '.join(NETWORKS)}")
     return NETWORKS[name]
@@ -131,8 +142,6 @@ def _of_entry_point(point: EntryPoint) -> type[Network]:
 
 @cache
 def _of_file(path: Path) -> type[Network]:
-    if not path.is_file():
-        raise NetworkError(f'{path}: there is no such file')
     # A dataclass looks its module up by name, and so does what unpickles it.
     name = f'cpg_ros_network_{path.stem}_{crc32(bytes(path)):x}'
     spec = importlib.util.spec_from_file_location(name, path)

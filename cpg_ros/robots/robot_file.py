@@ -40,14 +40,10 @@ class _Reader(Reader):
         names, found = value if isinstance(value, list) else [value], []
         for k, name in enumerate(self.items(names, 'network')):
             where = f'network[{k}]' if isinstance(value, list) else 'network'
-            name = self.text(name, where)
             try:
-                # The path of a network's file is that from the robot file.
-                kind = find_network(str(self.path.parent / Path(name).expanduser())
-                                    if name.endswith('.py') else name)
+                found.append(find_network(self.text(name, where), self.path.parent).name)
             except NetworkError as error:
                 raise self.fail(where, str(error)) from error
-            found.append(kind.name)
         return tuple(found)
 
     def place(self, tree: Mapping[str, Any], where: str, key: str, words: tuple[str, str],

@@ -1,8 +1,8 @@
 """Footfall (Hildebrand) diagrams: when legs stand, or muscles are active, over two strides.
 
 ``python -m cpg_ros.tools.gait_diagram gaits.png --network biped`` draws a network's gaits from
-their orbits. A quadruped's leg stands while the signal that drives it falls, from peak to trough;
-a muscle, of a biped's legs, is active while its cell is above the middle of its range.
+their orbits. A leg stands while the signal that drives it falls, from peak to trough; where cells
+drive muscles, a muscle is active while its cell is above the middle of its range.
 """
 
 import argparse
