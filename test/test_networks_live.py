@@ -147,7 +147,7 @@ def test_a_network_in_a_file_has_parameters_of_its_own(tmp_path, start):
     _, watcher = start('-p', f'network:={path}', '-p', f'robot:={robot}', '-p', 'twin.c:=6.0')
     assert watcher.get('network', 'gait', 'twin.c', 'twin.tau') == [str(path), 'trot', 6.0, 0.4]
     assert watcher.set(gait='walk', **{'twin.c': 6.2})[0].successful
-    refused = watcher.set(gait='trot', **{'twin.tau': 0.2})[0]
+    refused = watcher.set_together(gait='trot', **{'twin.tau': 0.2})
     # DESIGN 2.1: the trot's critical delay.
     assert not refused.successful and '0.2852' in refused.reason
     path.write_text(TWIN.replace("'twin'", "'biped'"))

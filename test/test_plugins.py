@@ -104,7 +104,7 @@ def test_presets_stand_beside_the_file(tmp_path):
 @pytest.mark.parametrize(('old', 'new', 'words'), [
     ("name = 'NAME'", "name = 'biped'", "the name 'biped' is that of another network"),
     ("name = 'NAME'", "name = 'a b'", "name: 'a b' is not of letters"),
-    ("'implicit'", "'implicit': {'p': (1, 7)}, 'more'", 'legs: more: it has other legs than the first'),
+    ("'implicit'", "'implicit': {'p': (1, 7)}, 'more'", 'legs: more: it has other legs than'),
     ('(1, 7)', '(1, 9)', 'legs: implicit: p has the cell 9, and there are 8'),
     ('(1, 7)', '()', 'legs: implicit: p has no cell'),
     ('sides = {}', "sides = {'lh': 'left'}", "sides: 'lh' is not one of p, q, r, s"),
