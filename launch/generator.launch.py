@@ -6,7 +6,8 @@ from cpg_ros.nodes.launch_arguments import declared, started
 from launch import LaunchDescription
 
 ARGUMENTS = {
-    'network': ('delayed', str, 'delayed, quadruped or biped'),
+    'network': ('delayed', str, 'delayed, quadruped, biped, or the path of a Python file with '
+                'one'),
     'gait': ('', str, "gait, or the name of a preset; empty for the network's usual one"),
     'presets': ('', str, 'file with further presets; empty for none'),
     'robot': ('', str, "robot file, or a shipped name; empty for the network's usual one"),

@@ -6,6 +6,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from cpg_ros.dynamics.mesh_newton import collocate
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import solve_bvp, solve_ivp
@@ -14,7 +15,6 @@ from scipy.optimize import brentq, fsolve
 from cpg_ros.dynamics import arclength
 from cpg_ros.dynamics.continuation import follow, from_hopf
 from cpg_ros.dynamics.floquet import multipliers
-from cpg_ros.dynamics.mesh_newton import collocate
 from cpg_ros.dynamics.orbit import NoOrbit, solve_orbit, solve_preset
 from cpg_ros.integration.simulate import simulate
 from cpg_ros.networks.biped import Biped

@@ -20,6 +20,22 @@ PHASES = {'quadruped': {'pronk': (0, 0, 0, 0), 'pace': (0, .5, 0, .5), 'bound': 
                         'walk': (0, .5, .75, .25)},
           'biped': {'walk': (0, .5), 'run': (0, .5), 'two_legged_jump': (0, 0),
                     'two_legged_hop': (0, 0), 'skip': (0, .5)}}
+TWIN = '''
+from dataclasses import dataclass
+
+from cpg_ros.networks.delayed import PRESETS, Delayed
+from cpg_ros.networks.network import Preset
+
+
+@dataclass(frozen=True)
+class Twin(Delayed):
+    name = 'twin'
+
+    @classmethod
+    def presets(cls):
+        return {name: Preset(one.gait, cls(**one.network.as_dict()))
+                for name, one in PRESETS.items()}
+'''
 DEFAULT = {'quadruped': 'trot', 'biped': 'walk'}
 
 
@@ -123,6 +139,22 @@ def test_a_group_of_weights_is_set_together():
     finally:
         watcher.end()
         process.end()
+
+
+def test_a_network_in_a_file_has_parameters_of_its_own(tmp_path, start):
+    (path := tmp_path / 'twin.py').write_text(TWIN)
+    text = (CONFIG / 'quadruped.yaml').read_text()
+    (robot := tmp_path / 'robot.yaml').write_text(text.replace('[delayed, quadruped]', 'twin'))
+    _, watcher = start('-p', f'network:={path}', '-p', f'robot:={robot}', '-p', 'twin.c:=6.0')
+    assert watcher.get('network', 'gait', 'twin.c', 'twin.tau') == [str(path), 'trot', 6.0, 0.4]
+    assert watcher.set(gait='walk', **{'twin.c': 6.2})[0].successful
+    refused = watcher.set_together(gait='trot', **{'twin.tau': 0.2})
+    # DESIGN 2.1: the trot's critical delay.
+    assert not refused.successful and '0.2852' in refused.reason
+    path.write_text(TWIN.replace("'twin'", "'biped'"))
+    process = start('-p', f'network:={path}', watch=False)
+    assert process.wait() == 1 and 'Traceback' not in process.log
+    assert f"network {path}: the name 'biped' is that of another network" in process.log
 
 
 def test_presets_of_a_file_are_gaits_like_the_shipped_ones(tmp_path, start):

@@ -8,13 +8,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-
 from cpg_ros.dynamics.cell_orbit import richer
+
 from cpg_ros.dynamics.floquet import multipliers
 from cpg_ros.dynamics.orbit import solve_preset
 from cpg_ros.gaits.waveform_comparison import lag, shape_difference, shifted, steadiness
 from cpg_ros.motion.phase_readout import PhaseReadout
-from cpg_ros.networks.biped import GAITS, PRESETS, PRIMARY, WEIGHTS, Biped
+from cpg_ros.networks.biped import GAITS, PRIMARY, WEIGHTS, Biped
 from cpg_ros.networks.preset_files import read_presets
 from cpg_ros.networks.quadruped import Quadruped
 from cpg_ros.networks.registry import PRESETS as ALL_PRESETS
@@ -24,6 +24,7 @@ from cpg_ros.search import verification as polish
 from cpg_ros.search.pareto_front import write_front
 from cpg_ros.tools import optimize
 
+PRESETS = ALL_PRESETS['biped']
 SECONDARY = tuple(gait for gait in GAITS if gait not in PRIMARY)
 FIXED = {'current': 0.229, 'phi': 0.254}
 SMALL = ('--gait', 'walk', '--fix', 'current=0.229', 'phi=0.254', '--population', '24',

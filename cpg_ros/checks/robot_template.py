@@ -14,7 +14,7 @@ import numpy as np
 from cpg_ros.checks.urdf_match import unlimited
 from cpg_ros.gaits.leg_names import Legs, legs_of
 from cpg_ros.motion.plan import plan
-from cpg_ros.networks.registry import NETWORKS, PRESETS
+from cpg_ros.networks.registry import NETWORKS, SHIPPED
 from cpg_ros.robots.robot import HARMONICS, Joint, Robot
 from cpg_ros.robots.robot_file import LARGEST
 from cpg_ros.robots.urdf import UrdfError, UrdfJoint, chain, direction
@@ -39,8 +39,9 @@ def robot_from(urdf: Mapping[str, UrdfJoint], name: str) -> tuple[Robot, str]:
 
     """
     legs = legs_of([joint.name for joint in urdf.values() if not joint.flaw])
-    networks = ('delayed', 'quadruped') if len(legs) == 4 else ('biped',)
-    assignment, cells = next(iter(NETWORKS[networks[0]].legs.items()))
+    usual = {name: next(iter(kind.legs.items())) for name, kind in SHIPPED.items()}
+    assignment, cells = next(one for one in usual.values() if set(one[1]) == set(legs))
+    networks = tuple(name for name, one in usual.items() if one == (assignment, cells))
     joints, says = {}, []
     for leg in legs:
         joints[leg], said = _leg(urdf, legs, leg, cells[leg][0])
@@ -117,7 +118,7 @@ def _fitting(robot: Robot) -> Robot:
     offset = robot.column('offset')
     for network in robot.networks:
         for gait in NETWORKS[network].gaits():
-            preset = PRESETS[network][gait]
+            preset = NETWORKS[network].presets()[gait]
             program = plan(unlimited(robot), gait, preset, preset.network, 1.0)
             room = np.stack([offset - low, high - offset, fast])
             needed = np.stack([-program.span[0], program.span[1], program.speed])

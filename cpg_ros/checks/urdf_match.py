@@ -9,7 +9,7 @@ from typing import Any
 from cpg_ros.files.plain_text import table
 from cpg_ros.gaits.leg_names import LegsError, legs_of, role_of
 from cpg_ros.motion.plan import Refused, plan
-from cpg_ros.networks.registry import NETWORKS, PRESETS
+from cpg_ros.networks.registry import NETWORKS
 from cpg_ros.robots.robot import Joint, Motion, Robot
 from cpg_ros.robots.urdf import UrdfJoint
 
@@ -137,7 +137,7 @@ def checked(robot: Robot, urdf: Mapping[str, UrdfJoint], names: tuple[str, str],
     joints = tuple(JointCheck(joint, urdf.get(joint.name), tuple(
         _faults(joint, urdf.get(joint.name), near.get(joint.name, '')))) for joint in robot.joints)
     chosen = [(network, name) for network in robot.networks for name in
-              (gaits or NETWORKS[network].gaits()) if name in PRESETS[network]]
+              (gaits or NETWORKS[network].gaits()) if name in NETWORKS[network].presets()]
     return RobotCheck(*names, joints, tuple(
         _gait(robot, urdf, network, name, frequency, amplitude) for network, name in chosen),
         tuple(_notes(robot, urdf)))
@@ -166,7 +166,7 @@ def _faults(joint: Joint, urdf: UrdfJoint | None, near: str) -> Iterator[str]:
 
 def _gait(robot: Robot, urdf: Mapping[str, UrdfJoint], network: str, name: str,
           frequency: float | None, amplitude: float) -> GaitCheck:
-    preset = PRESETS[network][name]
+    preset = NETWORKS[network].presets()[name]
     if frequency is None:
         frequency = _fastest(robot.motion(name, preset.gait))
     try:

@@ -20,8 +20,6 @@ from cpg_ros.networks.parameter_line import ParameterLine
 #: Hopf points are looked at up to this many times the delay, and so many turns more than the
 #: first of their kind.
 FURTHEST, TURNS = 4.0, 1
-#: Cells of the biped, by what they drive.
-MUSCLES = ('left_flexor', 'right_flexor', 'left_extensor', 'right_extensor')
 
 
 @dataclass(frozen=True)
@@ -52,15 +50,12 @@ class GaitAssessment:
 
     @property
     def phases(self) -> dict[str, float]:
-        """Phase of each leg's first cell, or of each of a biped's muscles, in cycles."""
+        """Phase of each leg's first cell, or of each muscle, in cycles."""
         orbit = self._orbit
         network = type(orbit.network)
-        if network.cells == len(MUSCLES):
-            places = dict(zip(MUSCLES, range(network.cells), strict=True))
-        else:
-            legs = next(iter(network.legs.values()))
-            places = {leg: cells[0] - 1 for leg, cells in legs.items()}
-        return {name: float(orbit.phases[cell]) for name, cell in places.items()}
+        legs = next(iter(network.legs.values()))
+        told = network.muscles or {leg: cells[0] for leg, cells in legs.items()}
+        return {name: float(orbit.phases[cell - 1]) for name, cell in told.items()}
 
     @cached_property
     def multipliers(self) -> Multipliers:

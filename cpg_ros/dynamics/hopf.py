@@ -122,6 +122,27 @@ class HopfPoint:
                           delay * form.k2 / abs(self.vector[0])**2)
 
     @property
+    def slopes(self) -> dict[str, float]:
+        """Derivatives of the critical delay by the other parameters, by name.
+
+        From ``i omega = A + B exp(-i omega tau)``, differentiated: real and imaginary part are
+        two equations for the changes of omega and tau.
+        """
+        turn = (1, -1j, -1, 1j)[self.mode.j]
+        b = self.mode.eigenvalue_terms(self.network)[1]
+        past = np.exp(-1j * self.omega * self.tau)
+        left = np.array([1j + 1j * self.tau * b * past, 1j * self.omega * b * past])
+        right = np.array([1.0, 1.0, past * (-1) ** self.mode.k, turn])
+        found = np.linalg.solve(np.array([left.real, left.imag]),
+                                np.array([right.real, right.imag]))[1]
+        return dict(zip(('a', 'b', 'c', 'd'), found.tolist(), strict=True))
+
+    @property
+    def drifts(self) -> bool:
+        """Whether the gait's own class has a positive real root at every delay."""
+        return self.mode.j % 2 == 0 and self.mode.eigenvalue_terms(self.network)[1] >= 0.0
+
+    @property
     def direction(self) -> int:
         """1 where the critical pair moves to the right as the value grows, -1 to the left."""
         return 1 if self.normal_form.k1.real > 0.0 else -1

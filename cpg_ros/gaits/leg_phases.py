@@ -17,7 +17,6 @@ import numpy as np
 from cpg_ros.gaits.leg_names import role_of
 from cpg_ros.gaits.recognition import nearest_gait, recognise
 from cpg_ros.networks.network import Network
-from cpg_ros.networks.registry import PRESETS
 
 #: Largest distance of a gait that is one, RMS over the legs in cycles. A quarter of the way from
 #: one gait to the next has about 0.05.
@@ -162,7 +161,7 @@ def _shift(pairs: list[tuple[str, str]], c: Mapping[str, np.ndarray]
 
 
 def _symmetry(network: type[Network], gait: str) -> Any:
-    return PRESETS[network.name][gait].network.symmetry(gait)
+    return network.presets()[gait].network.symmetry(gait)
 
 
 def _apart(phases: np.ndarray, wanted: np.ndarray, waves: np.ndarray) -> float:
@@ -203,8 +202,10 @@ def named(phases: Mapping[str, float], network: type[Network]) -> Named:
         notes.append(f"the legs move alike in {', '.join(same)}: only which of a leg's cells "
                      'drives which joint tells them apart')
     order = [leg for leg, _ in sorted(phases.items(), key=lambda item: -item[1] % 1.0)]
-    if nearest == 'walk' and len(order) == 4:
-        kind = 'lateral' if order[1] == order[0][0] + 'f' else 'diagonal'
+    if nearest == 'walk' and len(order) == len(network.girdles) == 4:
+        # After a hind leg comes the fore one of its side, or the other; after a fore one not.
+        beside = network.sides[order[1]] == network.sides[order[0]]
+        kind = 'lateral' if beside == (network.girdles[order[0]] == 'hind') else 'diagonal'
         notes.append(f'{kind} sequence: {", ".join(order).upper()}')
     return Named(nearest if apart[nearest] <= TOLERANCE else None, nearest, apart[nearest],
                  margin, tuple(same), tuple(notes))

@@ -24,8 +24,8 @@ class Stepper:
     """
 
     def __init__(self, network: Network, history: History, step: float | None = None,
-                 max_delay: float | None = None, gain: float = 0.0, symmetry: Symmetry | None = None
-                 ) -> None:
+                 max_delay: float | None = None, gain: float = 0.0,
+                 symmetry: Symmetry | None = None) -> None:
         """Start at model time 0 from a history.
 
         Args:

@@ -1,7 +1,8 @@
 """Coordinates in which a trust region moves: the delay is measured by the gait's critical one.
 
 Close to where a gait is born its shape is the same all along the Hopf set, which is curved. With
-tau over its critical value for a coordinate that valley is straight, and the set's edge a bound.
+the delay over its critical value for a coordinate that valley is straight, and the set's edge a
+bound.
 """
 
 from collections.abc import Sequence
@@ -10,11 +11,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from cpg_ros.dynamics.hopf import HopfPoint, hopf_point
+from cpg_ros.dynamics.hopf import HopfPoint, critical_point
 from cpg_ros.dynamics.periodic import NoOrbit
 from cpg_ros.inversion.free_parameters import Free, with_values, within_hopf_set
 from cpg_ros.inversion.trust_region import Evaluate, Trial, descend
-from cpg_ros.networks.delayed import Delayed
 from cpg_ros.networks.network import Network
 
 #: Least share of the critical delay by which the delay is above it.
@@ -23,32 +23,18 @@ ABOVE = 1e-7
 NEAR, LATE, FACTORS = 1.03, (1.03, 1.3, 2.0, 4.0), (0.45, 0.7, 1.4, 2.0, 3.0)
 
 
-def critical_slopes(point: HopfPoint) -> np.ndarray:
-    """Derivatives of the critical delay by a, b, c and d, shape (4,).
-
-    From ``i omega = A + B exp(-i omega tau)``, differentiated: real and imaginary part are two
-    equations for the changes of omega and tau.
-    """
-    turn = (1, -1j, -1, 1j)[point.mode.j]
-    b = point.mode.eigenvalue_terms(point.network)[1]
-    past = np.exp(-1j * point.omega * point.tau)
-    left = np.array([1j + 1j * point.tau * b * past, 1j * point.omega * b * past])
-    right = np.array([1.0, 1.0, past * (-1) ** point.mode.k, turn])
-    return np.linalg.solve(np.array([left.real, left.imag]),
-                           np.array([right.real, right.imag]))[1]
-
-
 class Coordinates:
     """Free numbers of a fit, and what the trust region moves instead.
 
-    The phase, which comes last, and all numbers but a free delay of the delayed network are
-    their own coordinates. A delay with bounds of its own is, too.
+    The phase, which comes last, and all numbers but a free delay are their own coordinates. A
+    delay with bounds of its own is, too.
     """
 
     def __init__(self, network: Network, gait: str, free: Sequence[Free]) -> None:
         self._network, self._gait, self.free = network, gait, tuple(free)
-        whole = network.ranges.get('tau')
-        self._delay = next((k for k, one in enumerate(free) if whole and one.name == 'tau'
+        whole = network.ranges.get(network.delay_parameter)
+        self._delay = next((k for k, one in enumerate(free) if whole
+                            and one.name == network.delay_parameter
                             and (one.low, one.high) == (whole.low, whole.high)), -1)
 
     @property
@@ -58,13 +44,11 @@ class Coordinates:
 
     def _onset(self, values: np.ndarray) -> HopfPoint:
         there = with_values(self._network, self.free, values[:len(self.free)])
-        if not isinstance(there, Delayed):
-            raise TypeError(f'the network {there.name} has no delay')
-        point = None
-        if np.isfinite(values).all() and there.c != 0.0:
-            point = hopf_point(replace(there, tau=1.0), there.symmetry(self._gait))
+        point = critical_point(there, self._gait) if np.isfinite(values).all() else None
         if point is None:
-            raise NoOrbit(f'c {there.c:g} gives no {self._gait} at any delay')
+            known = there.as_dict()
+            said = ', '.join(f'{name} {known[name]:g}' for name in there.needed)
+            raise NoOrbit(f'{said} gives no {self._gait} at any delay')
         return point
 
     def of(self, values: np.ndarray) -> np.ndarray:
@@ -81,7 +65,7 @@ class Coordinates:
             found[self._delay] *= self._onset(found).tau
             one = self.free[self._delay]
             if not one.low <= found[self._delay] <= one.high:
-                raise NoOrbit(f'tau {found[self._delay]:g} is not within {one.low:g} to '
+                raise NoOrbit(f'{one.name} {found[self._delay]:g} is not within {one.low:g} to '
                               f'{one.high:g}')
         return found
 
@@ -90,9 +74,9 @@ class Coordinates:
         found = np.eye(coordinates.size)
         if not self.straight:
             point, k = self._onset(coordinates), self._delay
-            by_name = dict(zip(('a', 'b', 'c', 'd'), critical_slopes(point), strict=True))
+            slopes = point.slopes
             for j, one in enumerate(self.free):
-                found[k, j] = coordinates[k] * by_name.get(one.name, 0.0)
+                found[k, j] = coordinates[k] * slopes.get(one.name, 0.0)
             found[k, k] = point.tau
         return found
 

@@ -6,9 +6,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from cpg_ros.dynamics.hopf import hopf_point
 from cpg_ros.errors import InputError
-from cpg_ros.networks.delayed import Delayed
 from cpg_ros.networks.network import Network
 
 N = TypeVar('N', bound=Network)
@@ -94,20 +92,17 @@ def with_values(network: N, free: Sequence[Free], values: Sequence[float] | np.n
 def within_hopf_set(network: Network, gait: str, one: Free) -> Free:
     """Narrow the bounds of a single free number to where its gait is born before the delay.
 
-    Only the delayed network tells that in closed form; the others' bounds stay.
+    The bounds of networks without a delay stay.
     """
-    if not isinstance(network, Delayed):
+    if not network.delay_parameter:
         return one
 
     def excess(value: float) -> float:
         there = with_values(network, (one,), (value,))
-        if there.tau <= 0.0 or there.symmetry(gait) != network.symmetry(gait):
+        if there.delay <= 0.0 or there.symmetry(gait) != network.symmetry(gait):
             return -1.0
-        b = there.symmetry(gait).eigenvalue_terms(there)[1]
-        if there.symmetry(gait).j % 2 == 0 and b >= 0.0:
-            return -1.0
-        point = hopf_point(there, there.symmetry(gait))
-        return -1.0 if point is None else there.tau - point.tau
+        point = critical_point(there, gait)
+        return -1.0 if point is None or point.drifts else there.delay - point.tau
 
     here, ends = one.value(network), []
     for end in (one.low, one.high):

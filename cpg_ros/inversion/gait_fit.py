@@ -6,13 +6,12 @@ from functools import cached_property
 import numpy as np
 
 from cpg_ros.dynamics.gait_assessment import GaitAssessment
-from cpg_ros.dynamics.hopf import HopfPoint, hopf_point
+from cpg_ros.dynamics.hopf import HopfPoint, critical_point
 from cpg_ros.dynamics.periodic import Orbit
 from cpg_ros.inversion.identifiability import Estimate
 from cpg_ros.inversion.trust_region import Trial
 from cpg_ros.inversion.variable_projection import basis
 from cpg_ros.inversion.waveform_harmonics import signals
-from cpg_ros.networks.delayed import Delayed
 from cpg_ros.networks.network import Network
 
 #: Phases between recording and orbit that are tried.
@@ -127,9 +126,7 @@ class Fit:
     @cached_property
     def hopf(self) -> HopfPoint | None:
         """Where the gait is born as the delay grows; None for networks without delay."""
-        if isinstance(self.network, Delayed):
-            return hopf_point(self.network, self.network.symmetry(self.gait))
-        return None
+        return critical_point(self.network, self.gait)
 
     @cached_property
     def verdict(self) -> GaitAssessment:

@@ -25,8 +25,6 @@ from cpg_ros.motion.runnable import refusal
 from cpg_ros.networks.network import Network
 from cpg_ros.robots.robot import HARMONICS
 
-#: What is usually fitted.
-USUAL = {'delayed': ('c', 'tau'), 'quadruped': ('alpha', 'beta'), 'biped': ('current', 'phi')}
 #: A frequency is never known better than to this share.
 KNOWN_FREQUENCY = 1e-4
 #: Relative change at which a trust region stops, and at which the last one does.
@@ -70,7 +68,7 @@ def invert(cycle: MeanCycle, cells: Mapping[str, int], network: Network, gait: s
     if not starts:
         raise ValueError('there is no start')
     joints = joints_of(cycle, cells, network)
-    numbers = free_numbers(network, gait, free or USUAL[network.name], bounds)
+    numbers = free_numbers(network, gait, free or network.free, bounds)
     taken = len(joints.names) * (1 + WEIGHTS[order]) + len(numbers) + 1
     if joints.theta.size < 2 * (1 + WEIGHTS[order]) or joints.data.size <= taken:
         raise InputError(f'{joints.theta.size} instants of {len(joints.names)} joints do not '

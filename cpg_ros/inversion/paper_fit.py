@@ -15,6 +15,8 @@ from cpg_ros.errors import InputError
 from cpg_ros.inversion.cycle_fit import CycleFit, cycle_samples, fit_cycle
 from cpg_ros.inversion.fit_data import MeanCycle
 from cpg_ros.networks.delayed import CELLS, Delayed
+from cpg_ros.networks.network import Network
+from cpg_ros.robots.robot import Robot
 
 #: Instants of a cycle, and phases between recording and orbit that are tried.
 POINTS, SHIFTS = 20, 60
@@ -47,7 +49,20 @@ class PaperFit:
                 for name, column in zip(self.joints, self.fit.errors.T, strict=True)}
 
 
-def paper_fits(cycle: MeanCycle, cells: Mapping[str, int], network: Delayed, gait: str,
+def refuse_others(robot: Robot | None, network: str) -> None:
+    """Refuse robots and networks (by name, '' for the robot's) that are not those of the paper.
+
+    Raises:
+        ValueError: the network is another one, or not each of its cells has one joint.
+
+    """
+    if (robot is None or Delayed.name not in robot.networks or network not in ('', Delayed.name)
+            or sorted(robot.cells) != list(range(CELLS))):
+        raise InputError('--paper: the paper has one joint for each of the eight cells of the '
+                         f'{Delayed.name} network: a --robot file has to say which, such as goat')
+
+
+def paper_fits(cycle: MeanCycle, cells: Mapping[str, int], network: Network, gait: str,
                free: Sequence[str], starts: Sequence[Mapping[str, float]] = ({},)
                ) -> list[PaperFit]:
     """Fit parameters to eight joints, once from each start.
@@ -61,10 +76,14 @@ def paper_fits(cycle: MeanCycle, cells: Mapping[str, int], network: Delayed, gai
         starts: free parameter -> value to start from; {} starts from the network's own values.
 
     Raises:
-        InputError: a cell has no joint or several, or what fit_cycle cannot use.
+        InputError: another network, a cell with no joint or several, or what fit_cycle cannot
+            use.
         NoOrbit: a start has no such gait.
 
     """
+    if not isinstance(network, Delayed):
+        raise InputError(f'--paper: the paper has the {Delayed.name} network, not the '
+                         f'{network.name}')
     by_cell = sorted(cells, key=lambda name: cells[name])
     if [cells[name] for name in by_cell] != list(range(1, CELLS + 1)):
         raise InputError('the paper takes one joint for each of the eight cells: a robot file '

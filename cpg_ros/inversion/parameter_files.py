@@ -10,7 +10,7 @@ from cpg_ros.errors import InputError
 from cpg_ros.files.atomic_write import write_atomically
 from cpg_ros.inversion.recording_fit import Inverted
 from cpg_ros.motion.plan import Refused, plan
-from cpg_ros.networks.registry import NETWORKS, PRESETS
+from cpg_ros.networks.registry import reference
 from cpg_ros.robots.robot import Joint, Robot
 from cpg_ros.robots.robot_file import write_robot
 
@@ -43,15 +43,15 @@ def fitted_robot(found: Inverted, robot: Robot | None) -> Robot:
         legs = {leg: tuple(_moved(joint, found) for joint in joints)
                 for leg, joints in robot.legs.items()}
         moved = Robot(robot.name, (fit.network.name,), robot.assignment, fit.harmonics, legs,
-                      robot.order)
-        preset = PRESETS[fit.network.name][fit.gait]
+                      robot.order, sides=robot.sides, girdles=robot.girdles)
+        preset = fit.network.presets()[fit.gait]
         try:
             plan(moved, fit.gait, preset, fit.network, found.stride.frequency)
         except Refused as error:
             raise Refused(f'{found.recording.source}: robot {robot.name} cannot do this: '
                           f'{error}') from error
         return moved
-    network = NETWORKS[fit.network.name]
+    network = type(fit.network)
     assignment = next(iter(network.legs))
     for leg in network.legs[assignment]:
         if leg not in found.legs:
@@ -92,7 +92,7 @@ def parameter_tree(found: Inverted, robot: Path) -> dict[str, Any]:
     """Return the generator's parameters as ``--params-file`` takes them, for any node name."""
     fit = found.fit
     return {'/**': {'ros__parameters': {
-        'network': fit.network.name, 'robot': str(robot), 'gait': fit.gait,
+        'network': reference(fit.network.name), 'robot': str(robot), 'gait': fit.gait,
         'frequency': float(found.stride.frequency), 'amplitude': 1.0,
         fit.network.name: {name: float(value)
                            for name, value in fit.network.as_dict().items()}}}}

@@ -1,6 +1,6 @@
 """A recording inverted: its steady stride, the gait fitted to it, and how well that does."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,8 +10,8 @@ from cpg_ros.gaits.stride import Stride, find_stride
 from cpg_ros.inversion.fit_data import cells_of
 from cpg_ros.inversion.gait_fit import Fit
 from cpg_ros.inversion.invert import invert
-from cpg_ros.networks.network import Preset
-from cpg_ros.networks.registry import NETWORKS, PRESETS
+from cpg_ros.networks.preset_files import Preset
+from cpg_ros.networks.registry import SHIPPED, NetworkError, find_network
 from cpg_ros.recordings.recording import Recording
 from cpg_ros.robots.robot import Robot
 
@@ -81,11 +81,17 @@ def preset_of(network: str, gait: str) -> Preset:
         InputError: the network has no such gait or preset.
 
     """
-    presets = PRESETS[network]
+    presets = find_network(network).presets()
     if gait not in presets:
         raise InputError(f"'{gait}' is not one of the presets of the network {network}: "
                          f'{", ".join(presets)}')
     return presets[gait]
+
+
+def network_of(legs: Iterable[str]) -> str:
+    """Name the first shipped network that has these legs."""
+    return next(name for name, kind in SHIPPED.items()
+                if set(legs) <= set(next(iter(kind.legs.values()))))
 
 
 def _legs(recording: Recording, robot: Robot | None) -> tuple[dict[str, tuple[str, ...]], str]:
@@ -113,8 +119,7 @@ def inverted(recording: Recording, robot: Robot | None = None, network: str = ''
     Args:
         recording: joints over time.
         robot: which joints belong to which legs and cells; told from their names by default.
-        network: name; by default the robot's first, or the delayed network for four legs and
-            the biped for two.
+        network: name or file; by default the robot's first, or the first that has such legs.
         gait: of the network; by default the recorded one, as it is recognised.
         free: parameters to fit; the network's usual ones by default.
         order: of the readouts, 1 to 3.
@@ -129,12 +134,12 @@ def inverted(recording: Recording, robot: Robot | None = None, network: str = ''
     """
     legs, read = _legs(recording, robot)
     if not network:
-        network = robot.networks[0] if robot is not None else (
-            'biped' if set(legs) <= set(next(iter(NETWORKS['biped'].legs.values())))
-            else 'delayed')
-    if network not in NETWORKS:
-        raise InputError(f"network '{network}' is not one of {', '.join(NETWORKS)}")
-    kind = NETWORKS[network]
+        network = robot.networks[0] if robot is not None else network_of(legs)
+    try:
+        kind = find_network(network)
+    except NetworkError as error:
+        raise InputError(f'network {error}') from error
+    network = kind.name
     cells = cells_of(robot if robot is not None else legs, kind)
     cells = {name: cell for name, cell in cells.items() if name in recording.joints}
     gains = None if robot is None else {

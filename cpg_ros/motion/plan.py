@@ -9,10 +9,12 @@ from cpg_ros.dynamics.orbit import Orbit, solve_orbit, solve_preset
 from cpg_ros.dynamics.stability import Stability, stability
 from cpg_ros.errors import CpgError
 from cpg_ros.integration.stepper import Stepper
+from cpg_ros.motion.joint_readout import joint_readout
 from cpg_ros.motion.phase_readout import PhaseReadout
 from cpg_ros.motion.readout import WaveReadout, extremes
-from cpg_ros.motion.runnable import obstacle, readout_of
-from cpg_ros.networks.network import Network, Preset
+from cpg_ros.motion.runnable import obstacle
+from cpg_ros.networks.network import Network
+from cpg_ros.networks.preset_files import Preset
 from cpg_ros.robots.robot import Motion, Robot, Steering
 
 #: Strides per second below which a robot would seem to stand (Hz).
@@ -82,7 +84,7 @@ class Program:
 
         """
         left, right, frequency = self._steering.ask(speed, turn)
-        strides = np.array([left if leg[0] == 'l' else right for leg in self.robot.legs])
+        strides = np.where(self.robot.left, left, right)
         # The table is for the gait's own frequency; a wanted one scales it.
         return strides, frequency / (self.motion.frequency or frequency)
 
@@ -143,8 +145,8 @@ def plan(robot: Robot, name: str, preset: Preset, network: Network, frequency: f
     if 0.0 < frequency < SLOWEST:
         raise Refused(f'frequency {frequency:g} is neither 0 nor at least {SLOWEST:g} Hz')
     if network.longest_delay and not network.step <= network.delay <= network.longest_delay:
-        raise Refused(f'tau {network.delay:g} must be from {network.step} to '
-                      f'{network.longest_delay:g}')
+        raise Refused(f'{network.delay_parameter} {network.delay:g} must be from {network.step} '
+                      f'to {network.longest_delay:g}')
     try:
         orbit, judged = gait_of(preset, network)
     except CpgError as error:
@@ -154,9 +156,9 @@ def plan(robot: Robot, name: str, preset: Preset, network: Network, frequency: f
 
     motion = robot.motion(name, gait)
     shift = robot.shift(motion)
-    readout, in_place = (
-        readout_of(orbit, robot.cells, amplitude * robot.weights(motion, at_rest),
-                   robot.leg_cells, robot.harmonics) for at_rest in (False, True))
+    readout, in_place = (joint_readout(
+        orbit, robot.cells, amplitude * robot.weights(motion, at_rest), robot.leg_cells,
+        robot.harmonics) for at_rest in (False, True))
     strides = frequency if frequency > 0.0 else 1.0 / orbit.period
     swings = [(readout.angles, readout.rises)]
     if motion.steering is not None:

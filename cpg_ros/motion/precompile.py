@@ -6,19 +6,24 @@ from cpg_ros.integration.simulate import simulate
 from cpg_ros.integration.stepper import Stepper
 from cpg_ros.motion.phase_readout import observe_phases
 from cpg_ros.motion.readout import confine, observe
-from cpg_ros.networks.registry import NETWORKS, PRESETS
+from cpg_ros.networks.registry import find_network
 
 
 def precompile(name: str) -> None:
-    """Run each kernel that a network needs once, on the types the generator uses."""
-    preset = next(iter(PRESETS[name].values()))
+    """Run each kernel that a network needs once, on the types the generator uses.
+
+    Args:
+        name: as find_network takes it, and errors as of that.
+
+    """
+    preset = next(iter(find_network(name).presets().values()))
     network = preset.network
     stepper = Stepper(network, np.zeros(network.components), gain=1.0,
                       symmetry=network.symmetry(preset.gait))
     stepper.advance(2.0 * network.step)
     joints, table, cells = np.zeros(1), np.zeros(4), np.zeros(1, dtype=int)
     weights = np.zeros((1, 6))
-    if NETWORKS[name].variables == 1:
+    if network.readout == 'waveform':
         observe(stepper.now, 1.0, 1.0, cells, weights, np.zeros(8), cells, table, table, joints,
                 joints, joints)
     else:

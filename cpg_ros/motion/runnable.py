@@ -6,8 +6,8 @@ import numpy as np
 
 from cpg_ros.dynamics.periodic import Orbit
 from cpg_ros.dynamics.stability import Stability, stability
-from cpg_ros.motion.phase_readout import PhaseReadout
-from cpg_ros.motion.readout import NoPhase, WaveReadout
+from cpg_ros.motion.joint_readout import joint_readout
+from cpg_ros.motion.readout import NoPhase
 
 #: A period needs this many steps for the integrator to stay on the orbit.
 STEPS_A_PERIOD = 40
@@ -25,19 +25,6 @@ class Obstacle:
 
     said: str
     aside: str
-
-
-def readout_of(orbit: Orbit, cells: np.ndarray, weights: np.ndarray, leg_cells: np.ndarray,
-               harmonics: int) -> WaveReadout | PhaseReadout:
-    """Return what reads joints off a network in its gait; arguments as in PhaseReadout.
-
-    Raises:
-        NoPhase: a waveform does not tell the phase.
-
-    """
-    if orbit.network.variables == 1:
-        return WaveReadout(orbit, cells, weights, leg_cells)
-    return PhaseReadout(orbit, cells, weights, leg_cells, harmonics)
 
 
 def obstacle(orbit: Orbit, judged: Stability, harmonics: int) -> Obstacle | None:
@@ -58,7 +45,7 @@ def obstacle(orbit: Orbit, judged: Stability, harmonics: int) -> Obstacle | None
         return Obstacle(f'exists at these parameters but does not attract: {judged.flaw}',
                         f'it does not attract: {judged.flaw}')
     try:
-        readout_of(orbit, np.empty(0, int), np.empty((0, 6)), np.zeros(1, int), harmonics)
+        joint_readout(orbit, np.empty(0, int), np.empty((0, 6)), np.zeros(1, int), harmonics)
     except NoPhase as error:
         return Obstacle(f'at these parameters cannot drive joints: {error}',
                         f'it cannot drive joints: {error}')

@@ -13,7 +13,6 @@ from typing import Any, ClassVar
 from cpg_ros.networks.equations import Cell
 from cpg_ros.networks.morris_lecar import MorrisLecar
 from cpg_ros.networks.network import Network, Range, known
-from cpg_ros.networks.preset_files import shipped
 from cpg_ros.networks.symmetry import D2, Symmetry
 from cpg_ros.networks.terms import Number
 
@@ -63,7 +62,9 @@ class Biped(Network):
 
     name: ClassVar[str] = 'biped'
     cells: ClassVar[int] = CELLS
-    variables: ClassVar[int] = 2
+    #: u is called w in reports, as in the other network of such cells.
+    states: ClassVar[tuple[str, ...]] = ('v', 'w')
+    readout: ClassVar = 'phase'
     step: ClassVar[float] = 0.02
     ranges: ClassVar[dict[str, Range]] = {
         'current': Range(0.0, 1.0, 'current into each cell'),
@@ -72,12 +73,24 @@ class Biped(Network):
            for names in WEIGHTS.values() for name in names}}
     legs: ClassVar[dict[str, dict[str, tuple[int, ...]]]] = {
         'ankle': {'left': (1, 3), 'right': (2, 4)}}
+    sides: ClassVar[dict[str, str]] = {'left': 'left', 'right': 'right'}
+    muscles: ClassVar[dict[str, int]] = {'left_flexor': 1, 'right_flexor': 2, 'left_extensor': 3,
+                                         'right_extensor': 4}
     groups: ClassVar[dict[str, tuple[str, ...]]] = {
         f'w_{letter}': names for letter, names in WEIGHTS.items()}
+    usual_gait: ClassVar[str] = 'walk'
+    usual_robot: ClassVar[str] = 'biped'
+    free: ClassVar[tuple[str, ...]] = ('current', 'phi')
+    line: ClassVar[str] = 'current'
+    span: ClassVar[tuple[float, float] | None] = (0.0, 1.0)
+    #: Weights as in the paper, current and phi a little beyond its Table 2.
+    searched: ClassVar[dict[str, tuple[float, float]]] = {
+        **dict.fromkeys(groups, (-1.0, 1.0)), 'current': (0.2, 0.32), 'phi': (0.15, 0.4)}
+    typical_cycle: ClassVar[tuple[tuple[float, float, float], ...]] = (
+        (0.1, 0.35, 0.0), (0.3, 0.15, 0.15))
 
     couplings: ClassVar[tuple[str, ...]] = tuple(
         name for names in WEIGHTS.values() for name in names)
-    variable_names: ClassVar[tuple[str, ...]] = ('v', 'w')
 
     @classmethod
     def symmetric(cls, current: float, phi: float, a: float, b: float, c: float) -> 'Biped':
@@ -119,6 +132,3 @@ class Biped(Network):
             family = tuple(dict.fromkeys(f'w_{g[j] + 1}{g[i] + 1}' for g in elements))
             found.setdefault(min(family), family)
         return tuple(found.values())
-
-
-PRESETS = shipped(Biped)

@@ -46,8 +46,12 @@ class Delayed(Network):
 
     name: ClassVar[str] = 'delayed'
     cells: ClassVar[int] = CELLS
+    states: ClassVar[tuple[str, ...]] = ('x',)
+    readout: ClassVar = 'waveform'
     delay_parameter: ClassVar[str] = 'tau'
     longest_delay: ClassVar[float] = MAX_DELAY
+    needed: ClassVar[dict[str, str]] = {
+        'c': 'left and right legs would not be coupled, and no delay would matter'}
     step: ClassVar[float] = STEP
     ranges: ClassVar[dict[str, Range]] = {
         'a': Range(-20.0, 20.0, 'linear rate of each cell [1/model time]'),
@@ -58,6 +62,13 @@ class Delayed(Network):
     couplings: ClassVar[tuple[str, ...]] = ('c', 'd')
     legs: ClassVar[dict[str, dict[str, tuple[int, ...]]]] = {
         'implicit': {'lh': (1, 7), 'rh': (2, 8), 'lf': (3, 5), 'rf': (4, 6)}}
+    sides: ClassVar[dict[str, str]] = {
+        'lh': 'left', 'rh': 'right', 'lf': 'left', 'rf': 'right'}
+    girdles: ClassVar[dict[str, str]] = {'lh': 'hind', 'rh': 'hind', 'lf': 'fore', 'rf': 'fore'}
+    usual_gait: ClassVar[str] = 'trot'
+    usual_robot: ClassVar[str] = 'quadruped'
+    free: ClassVar[tuple[str, ...]] = ('c', 'tau')
+    line: ClassVar[str] = 'tau'
 
     @staticmethod
     def equations(cell: Cell, p: Any) -> tuple[Number, ...]:
@@ -69,6 +80,11 @@ class Delayed(Network):
     def gaits(cls) -> tuple[str, ...]:
         """Names of the six primary gaits."""
         return tuple(GAITS)
+
+    @classmethod
+    def presets(cls) -> dict[str, Preset]:
+        """Return PRESETS."""
+        return PRESETS
 
     def symmetry(self, gait: str) -> Symmetry:
         """Return the gait's symmetry.

@@ -1,4 +1,4 @@
-"""What every network has: named parameters, cells with one or two variables, compiled rates.
+"""What every network states: parameters, cells, legs, gaits and presets; what is usual for it.
 
 States are vectors of ``components`` numbers, variable by variable: first that of every cell
 which the legs read (x or v), then the second one (w or u). All three networks have the form
@@ -6,17 +6,21 @@ which the legs read (x or v), then the second one (w or u). All three networks h
 """
 
 from abc import ABC, abstractmethod
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, fields
 from functools import cache
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 
 from cpg_ros.errors import InputError
 from cpg_ros.networks.equations import Cell, values_of
 from cpg_ros.networks.field import Field
+from cpg_ros.networks.preset_files import Preset, own_presets
 from cpg_ros.networks.symmetry import Symmetry
 from cpg_ros.networks.terms import Number
+
+__all__ = ['Network', 'Preset', 'Range', 'footfall_order', 'known']
 
 
 @dataclass(frozen=True)
@@ -31,33 +35,69 @@ class Range:
 class Network(ABC):
     """Parameters of a network, as a frozen dataclass of floats.
 
+    What tells one network from another stands here; everything else asks.
+
     Attributes:
         name: by which it is chosen.
         cells: how many.
-        variables: state variables of each cell.
-        delay_parameter: name of the parameter that is the delay, or ''.
+        states: names of each cell's variables, the one that legs read first.
+        variables: how many these are.
+        readout: what joints follow: the waveform itself of cells that swing as smoothly as joints
+            can, or the phase, which two variables of a cell tell, of cells that jump.
+        delay_parameter: the one that is the delay, '' for an ordinary differential equation.
         longest_delay: that may be set at run time, model time.
+        needed: parameter that must not be 0 -> what would be lost.
         step: model time per step in real time; an orbit is followed to about 1e-9 a cycle.
         ranges: parameter -> range in which it may be set at run time.
         legs: assignment of cells to legs -> leg -> cells numbered from 1, the first of which
             gives the leg's phase; the first assignment is the usual one.
+        sides: leg -> left or right; where this is not said, robot files say it.
+        girdles: leg -> fore or hind, the same; of two legs neither.
+        muscles: name -> cell from 1, where cells drive muscles: phases are told of each, and
+            diagrams draw when it is active. Otherwise both are of legs, which stand while their
+            first cell falls.
         groups: name -> parameters that can be set together under it.
         couplings: parameters without which no cell hears another.
-        variable_names: of a cell, where they have names of their own.
+        usual_gait: that it starts with; a gait's own name is that of its usual preset.
+        usual_robot: file that it starts with, or name of a shipped one.
+        free: parameters or groups that are usually fitted to a recording.
+        line: what usually moves to look for Hopf points and branches, as ParameterLine reads it.
+        span: how far, or None: up to a multiple of the delay.
+        searched: parameter or group -> bounds within which weights are usually looked for; those
+            with equal bounds are given. Empty: nothing can be looked for.
+        typical_cycle: middle, half range and lag in cycles of each variable on a cycle near which
+            that search starts.
 
     """
 
     name: ClassVar[str]
     cells: ClassVar[int]
-    variables: ClassVar[int] = 1
+    states: ClassVar[tuple[str, ...]]
+    variables: ClassVar[int]
+    readout: ClassVar[Literal['waveform', 'phase']]
     delay_parameter: ClassVar[str] = ''
     longest_delay: ClassVar[float] = 0.0
+    needed: ClassVar[dict[str, str]] = {}
     step: ClassVar[float]
     ranges: ClassVar[dict[str, Range]]
     legs: ClassVar[dict[str, dict[str, tuple[int, ...]]]]
+    sides: ClassVar[dict[str, str]] = {}
+    girdles: ClassVar[dict[str, str]] = {}
+    muscles: ClassVar[dict[str, int]] = {}
     groups: ClassVar[dict[str, tuple[str, ...]]] = {}
     couplings: ClassVar[tuple[str, ...]] = ()
-    variable_names: ClassVar[tuple[str, ...]] = ()
+    usual_gait: ClassVar[str]
+    usual_robot: ClassVar[str] = ''
+    free: ClassVar[tuple[str, ...]]
+    line: ClassVar[str]
+    span: ClassVar[tuple[float, float] | None] = None
+    searched: ClassVar[dict[str, tuple[float, float]]] = {}
+    typical_cycle: ClassVar[tuple[tuple[float, float, float], ...]] = ()
+
+    def __init_subclass__(cls, **options: Any) -> None:
+        super().__init_subclass__(**options)
+        if hasattr(cls, 'states'):
+            cls.variables = len(cls.states)
 
     def as_dict(self) -> dict[str, float]:
         """Return the parameters by name, in their own order."""
@@ -91,7 +131,7 @@ class Network(ABC):
         """
 
     def rates(self, x: np.ndarray, past: np.ndarray | None = None) -> np.ndarray:
-        """Right-hand side at states now and a delay ago (by default the same), (..., components)."""
+        """Right-hand side at states now and a delay ago, by default the same; shaped like x."""
         return Field(self).rates(x, past)
 
     def jacobian(self, x: np.ndarray, past: np.ndarray | None = None) -> np.ndarray:
@@ -115,6 +155,16 @@ class Network(ABC):
     @abstractmethod
     def gaits(cls) -> tuple[str, ...]:
         """Names of the gaits it knows."""
+
+    @classmethod
+    def presets(cls) -> dict[str, Preset]:
+        """Return the named parameter sets: of the file beside its module, or the shipped one.
+
+        Raises:
+            PresetError: there is no such file, or it cannot be used.
+
+        """
+        return own_presets(cls)
 
     @abstractmethod
     def symmetry(self, gait: str) -> Symmetry:
@@ -176,23 +226,10 @@ def _names(network: type[Network]) -> tuple[str, ...]:
     return tuple(field.name for field in fields(network))  # type: ignore[arg-type]
 
 
-@dataclass(frozen=True)
-class Preset:
-    """A named parameter set and the gait it runs.
-
-    Attributes:
-        gait: one of the network's gaits.
-        network: parameters.
-        start: a state on the gait's orbit, shape (components,), where it has to be told from
-            other orbits and from rest; None where the solver finds it by itself.
-        period: of that orbit, model time, to about a per cent.
-
-    """
-
-    gait: str
-    network: Network
-    start: tuple[float, ...] | None = None
-    period: float = 0.0
+def footfall_order(legs: Iterable[str], sides: Mapping[str, str], girdles: Mapping[str, str]
+                   ) -> list[str]:
+    """Sort legs as footfall diagrams show them: fore before hind, left before right."""
+    return sorted(legs, key=lambda leg: (girdles.get(leg) == 'hind', sides.get(leg) == 'right'))
 
 
 def known(gait: str, gaits: tuple[str, ...]) -> str:

@@ -1,7 +1,10 @@
 """Preset files: named parameter sets with the gait each of them runs and a state on its orbit."""
 
+import inspect
+from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import yaml
 
@@ -9,17 +12,38 @@ from cpg_ros.errors import CpgError
 from cpg_ros.files.atomic_write import write_atomically
 from cpg_ros.files.shared_resources import share
 from cpg_ros.files.yaml_reader import Reader
-from cpg_ros.networks.network import Network, Preset
+
+if TYPE_CHECKING:
+    from cpg_ros.networks.network import Network
 
 #: No number in a preset is larger.
 LARGEST = 1e3
+
+
+@dataclass(frozen=True)
+class Preset:
+    """A named parameter set and the gait it runs.
+
+    Attributes:
+        gait: one of the network's gaits.
+        network: parameters.
+        start: a state on the gait's orbit, shape (components,), where it has to be told from
+            other orbits and from rest; None where the solver finds it by itself.
+        period: of that orbit, model time, to about a per cent.
+
+    """
+
+    gait: str
+    network: 'Network'
+    start: tuple[float, ...] | None = None
+    period: float = 0.0
 
 
 class PresetError(CpgError):
     """A preset file cannot be used; the message names the file, the key and the reason."""
 
 
-def read_presets(path: str | Path, network: type[Network]) -> dict[str, Preset]:
+def read_presets(path: str | Path, network: 'type[Network]') -> dict[str, Preset]:
     """Read a preset file of a network: name -> preset.
 
     Raises:
@@ -70,12 +94,20 @@ def read_presets(path: str | Path, network: type[Network]) -> dict[str, Preset]:
     return found
 
 
-def shipped(network: type[Network]) -> dict[str, Preset]:
-    """Read the presets that come with the package."""
-    return read_presets(share() / 'config' / 'presets' / f'{network.name}.yaml', network)
+@cache
+def own_presets(network: 'type[Network]') -> dict[str, Preset]:
+    """Read a network's own presets: of the file beside its module, or the shipped one.
+
+    Raises:
+        PresetError: as of read_presets.
+
+    """
+    beside = Path(inspect.getfile(network)).with_suffix('.yaml')
+    shipped = share() / 'config' / 'presets' / f'{network.name}.yaml'
+    return read_presets(beside if beside.is_file() else shipped, network)
 
 
-def write_presets(path: str | Path, network: type[Network], presets: dict[str, Preset],
+def write_presets(path: str | Path, network: 'type[Network]', presets: dict[str, Preset],
                   comment: str = '') -> None:
     """Write a preset file."""
     tree: dict[str, Any] = {'network': network.name, 'presets': {}}

@@ -12,7 +12,6 @@ from typing import Any, ClassVar
 from cpg_ros.networks.equations import Cell
 from cpg_ros.networks.morris_lecar import MorrisLecar
 from cpg_ros.networks.network import Network, Range, known
-from cpg_ros.networks.preset_files import shipped
 from cpg_ros.networks.symmetry import GAITS, Z4_Z2, Symmetry
 from cpg_ros.networks.terms import Number
 
@@ -41,7 +40,8 @@ class Quadruped(Network):
 
     name: ClassVar[str] = 'quadruped'
     cells: ClassVar[int] = CELLS
-    variables: ClassVar[int] = 2
+    states: ClassVar[tuple[str, ...]] = ('v', 'w')
+    readout: ClassVar = 'phase'
     step: ClassVar[float] = 0.01
     ranges: ClassVar[dict[str, Range]] = {
         key: Range(-5.0, 5.0, f'coupling of {variable} from {source}')
@@ -51,12 +51,25 @@ class Quadruped(Network):
             ('gamma', 'v', 'the opposite cell'), ('delta', 'w', 'the opposite cell'),
             ('xi', 'v', 'the cell across its ring'), ('eta', 'w', 'the cell across its ring'))}
     couplings: ClassVar[tuple[str, ...]] = ('alpha', 'beta', 'gamma', 'delta', 'xi', 'eta')
-    variable_names: ClassVar[tuple[str, ...]] = ('v', 'w')
     #: The assignments of Table 3 and of Theorem 3.3 (Table 4).
     legs: ClassVar[dict[str, dict[str, tuple[int, ...]]]] = {
         'implicit': {'lh': (1, 7), 'rh': (2, 8), 'lf': (3, 5), 'rf': (4, 6)},
         'zigzag': {'lh': (1, 5), 'rh': (2, 6), 'lf': (3, 7), 'rf': (4, 8)},
         'crisscross': {'lh': (1, 6), 'rh': (2, 5), 'lf': (3, 8), 'rf': (4, 7)}}
+    sides: ClassVar[dict[str, str]] = {
+        'lh': 'left', 'rh': 'right', 'lf': 'left', 'rf': 'right'}
+    girdles: ClassVar[dict[str, str]] = {'lh': 'hind', 'rh': 'hind', 'lf': 'fore', 'rf': 'fore'}
+    usual_gait: ClassVar[str] = 'trot'
+    usual_robot: ClassVar[str] = 'quadruped'
+    free: ClassVar[tuple[str, ...]] = ('alpha', 'beta')
+    line: ClassVar[str] = 'alpha=beta'
+    span: ClassVar[tuple[float, float] | None] = (-1.0, 1.0)
+    #: About what Table 13 uses for most gaits, where xi and eta are 0.
+    searched: ClassVar[dict[str, tuple[float, float]]] = {
+        **dict.fromkeys(('alpha', 'beta', 'gamma', 'delta'), (-0.8, 0.8)),
+        'xi': (0.0, 0.0), 'eta': (0.0, 0.0)}
+    typical_cycle: ClassVar[tuple[tuple[float, float, float], ...]] = (
+        (0.2, 0.5, 0.0), (0.45, 0.3, 0.2))
 
     @staticmethod
     def equations(cell: Cell, p: Any) -> tuple[Number, ...]:
@@ -87,6 +100,3 @@ class Quadruped(Network):
         j, k = GAITS[known(gait, self.gaits())]
         j = 3 if j == 1 and self.alpha >= 0.0 else j
         return Symmetry.of(Z4_Z2, {'omega': Fraction(j, 4), 'kappa': Fraction(k, 2)})
-
-
-PRESETS = shipped(Quadruped)

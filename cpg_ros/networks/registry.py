@@ -1,14 +1,168 @@
-"""The networks by name, and the presets of each."""
+"""The networks by name: shipped ones, those of other packages, and those in files of users.
+
+A package offers a network by an entry point of the group ``cpg_ros.networks`` with the network's
+name: ``my_network = my_package.my_network:MyNetwork``. A file that defines one class of networks
+is named by its path; its presets stand in it or beside it, in a file of the same name but .yaml.
+"""
+
+import importlib.util
+import sys
+from collections.abc import Callable, Iterator, Mapping
+from functools import cache, cached_property
+from importlib.metadata import EntryPoint, entry_points
+from inspect import isabstract
+from pathlib import Path
+from typing import TypeVar
+from zlib import crc32
 
 from cpg_ros.networks import biped, delayed, quadruped
 from cpg_ros.networks.network import Network, Preset
+from cpg_ros.networks.network_check import flaw
 
-NETWORKS: dict[str, type[Network]] = {
+GROUP = 'cpg_ros.networks'
+#: Those that come with the package.
+SHIPPED: dict[str, type[Network]] = {
     network.name: network for network in (delayed.Delayed, quadruped.Quadruped, biped.Biped)}
 
-#: Network -> name -> preset; a gait's own name comes first and is the usual one.
-PRESETS: dict[str, dict[str, Preset]] = {
-    'delayed': delayed.PRESETS, 'quadruped': quadruped.PRESETS, 'biped': biped.PRESETS}
+Entry = TypeVar('Entry')
 
-#: Network -> the gait it usually starts with.
-USUAL = {'delayed': 'trot', 'quadruped': 'trot', 'biped': 'walk'}
+
+class NetworkError(ValueError):
+    """There is no such network, or it cannot be used; one line."""
+
+
+class _Networks(Mapping[str, type[Network]]):
+    """All networks by name; those of other packages are loaded when they are asked for."""
+
+    def __init__(self) -> None:
+        #: Network of a file -> the file.
+        self.files: dict[type[Network], Path] = {}
+
+    @cached_property
+    def _offered(self) -> dict[str, EntryPoint]:
+        return {point.name: point for point in entry_points(group=GROUP)
+                if point.name not in SHIPPED}
+
+    def __iter__(self) -> Iterator[str]:
+        return iter((*SHIPPED, *self._offered, *(network.name for network in self.files)))
+
+    def __len__(self) -> int:
+        return len(tuple(iter(self)))
+
+    def __getitem__(self, name: str) -> type[Network]:
+        """Return a network.
+
+        Raises:
+            NetworkError: the entry point of another package is of no use.
+            KeyError: there is none of this name.
+
+        """
+        own = {**SHIPPED, **{network.name: network for network in self.files}}
+        return own[name] if name in own else _of_entry_point(self._offered[name])
+
+
+class _Presets(Mapping[str, dict[str, Preset]]):
+    """Network -> name -> preset."""
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(NETWORKS)
+
+    def __len__(self) -> int:
+        return len(NETWORKS)
+
+    def __getitem__(self, name: str) -> dict[str, Preset]:
+        return NETWORKS[name].presets()
+
+
+NETWORKS, PRESETS = _Networks(), _Presets()
+
+
+def is_path(name: str) -> bool:
+    """Tell whether a network is named by its file."""
+    return name.endswith('.py') or '/' in name
+
+
+def find_network(name: str, folder: Path | None = None) -> type[Network]:
+    """Return a network by its name, or the one that a file defines; from then on it has a name.
+
+    Args:
+        name: of a network, or path of a file.
+        folder: that relative paths start from, instead of the working directory.
+
+    Raises:
+        NetworkError: there is no such network or file, or what it states cannot be used; the
+            message names the file and the reason.
+
+    """
+    if is_path(name):
+        try:
+            path = ((folder or Path()) / Path(name).expanduser()).resolve()
+            there = path.is_file()
+        except (OSError, RuntimeError, ValueError) as error:
+            raise NetworkError(' '.join(f'{name}: {error}'.split())) from error
+        if not there:
+            raise NetworkError(f'{path}: there is no such file')
+        return _of_file(path)
+    if name not in NETWORKS:
+        raise NetworkError(f"'{name}' is not one of {', '.join(NETWORKS)}")
+    return NETWORKS[name]
+
+
+def reference(name: str) -> str:
+    """Return what find_network finds a network by in another process: its name or its file."""
+    return str(NETWORKS.files.get(NETWORKS[name], name))
+
+
+def _usable(source: str, load: Callable[[], Entry]) -> Entry:
+    """Run code of others, and say in one line what goes wrong in it."""
+    try:
+        return load()
+    except Exception as error:
+        raise NetworkError(' '.join(f'{source}: {type(error).__name__}: {error}'.split())
+                           ) from error
+
+
+def _checked(source: str, network: type[Network]) -> type[Network]:
+    why = _usable(source, lambda: flaw(network))
+    if why:
+        raise NetworkError(f'{source}: {why}')
+    return network
+
+
+@cache
+def _of_entry_point(point: EntryPoint) -> type[Network]:
+    source = f"entry point '{point.name} = {point.value}'"
+    network = _usable(source, point.load)
+    if not (isinstance(network, type) and issubclass(network, Network)):
+        raise NetworkError(f'{source}: it is no class of networks')
+    if network.name != point.name:
+        raise NetworkError(f"{source}: its network has the name '{network.name}'")
+    return _checked(source, network)
+
+
+@cache
+def _of_file(path: Path) -> type[Network]:
+    # A dataclass looks its module up by name, and so does what unpickles it.
+    name = f'cpg_ros_network_{path.stem}_{crc32(bytes(path)):x}'
+    spec = importlib.util.spec_from_file_location(name, path)
+    if spec is None or spec.loader is None:
+        raise NetworkError(f'{path}: it is no Python file')
+    module = sys.modules[name] = importlib.util.module_from_spec(spec)
+    loader = spec.loader
+    try:
+        _usable(str(path), lambda: loader.exec_module(module))
+        found = [value for value in vars(module).values()
+                 if isinstance(value, type) and issubclass(value, Network)
+                 and value.__module__ == name and not isabstract(value)]
+        if len(found) != 1:
+            listed = ', '.join(network.__name__ for network in found)
+            raise NetworkError(f'{path}: it must define one class of networks, not '
+                               + (f'{len(found)}: {listed}' if found else 'none'))
+        network = _checked(str(path), found[0])
+        if network.name in NETWORKS:
+            raise NetworkError(f"{path}: the name '{network.name}' is that of another network")
+    except NetworkError:
+        del sys.modules[name]
+        raise
+    NETWORKS.files[network] = path
+    return network

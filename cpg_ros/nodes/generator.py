@@ -19,7 +19,7 @@ from cpg_ros.motion.precompile import precompile
 from cpg_ros.motion.steering import Drive
 from cpg_ros.networks.network import Network, Preset
 from cpg_ros.networks.preset_files import PresetError, read_presets
-from cpg_ros.networks.registry import NETWORKS, PRESETS
+from cpg_ros.networks.registry import NetworkError, find_network
 from cpg_ros.nodes.cmd_vel import CmdVel
 from cpg_ros.nodes.deadline_thread import Ticker
 from cpg_ros.nodes.diagnostics import Diagnostics
@@ -46,22 +46,24 @@ class Generator(StartedNode):
         """
         super().__init__(NAME)
         self._declare('network', NETWORK)
-        self._one_of('network', tuple(NETWORKS))
-        network = self._value('network')
-        compile_kernels(network)
+        try:
+            network = find_network(self._value('network'))
+        except NetworkError as error:
+            raise StartError(f'network {error}') from error
+        compile_kernels(self._value('network'))
         for name, spec in specs(network).items():
             self._declare(name, spec)
-        presets = PRESETS[network] | self._further_presets(NETWORKS[network])
+        presets = network.presets() | self._further_presets(network)
         self._one_of('gait', tuple(presets))
         self._one_of('command', COMMANDS)
         try:
             robot = find_robot(self._value('robot'))
         except RobotError as error:
             raise StartError(str(error)) from error
-        if network not in robot.networks:
+        if network.name not in robot.networks:
             raise StartError(f"robot file '{robot.name}' is for the network "
-                             f"{' or '.join(robot.networks)}, not '{network}'")
-        self._planner = Planner(NETWORKS[network], presets, robot, self._value('cmd_vel'))
+                             f"{' or '.join(robot.networks)}, not '{network.name}'")
+        self._planner = Planner(network, presets, robot, self._value('cmd_vel'))
         self._given_groups()
         for name, spec in self._planner.specs(self._value('gait')).items():
             self._declare(name, spec)

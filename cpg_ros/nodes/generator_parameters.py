@@ -11,29 +11,24 @@ from rclpy.parameter import Parameter
 from cpg_ros.errors import CpgError
 from cpg_ros.motion.plan import Program, Refused, gait_of, plan
 from cpg_ros.networks.network import Network, Preset
-from cpg_ros.networks.registry import NETWORKS, PRESETS
+from cpg_ros.networks.registry import NETWORKS
 from cpg_ros.nodes.parameter_spec import Spec
 from cpg_ros.robots.robot import Robot
 
 COMMANDS = ('none', 'joint_trajectory', 'forward_position')
-#: Network -> the robot file and the gait it starts with.
-USUAL = {'delayed': ('quadruped', 'trot'), 'quadruped': ('quadruped', 'trot'),
-         'biped': ('biped', 'walk')}
-
-
 NETWORK = Spec('delayed', 'network of cells that makes the rhythm', read_only=True,
-               constraints='one of: ' + ', '.join(NETWORKS))
+               constraints='one of: ' + ', '.join(NETWORKS)
+               + ', or the path of a Python file that defines one')
 
 
-def specs(network: str) -> dict[str, Spec]:
+def specs(network: type[Network]) -> dict[str, Spec]:
     """Return the parameters that depend on nothing but the network, in order of declaration."""
-    robot, gait = USUAL[network]
     return {
         'presets': Spec('', 'file with further presets; empty for none', read_only=True),
-        'robot': Spec(robot, 'robot file, or the name of a shipped one', read_only=True,
-                      constraints='a shipped name, or the path of a YAML file'),
-        'gait': Spec(gait, 'gait; setting it loads its preset of network parameters',
-                     constraints='one of: ' + ', '.join(PRESETS[network])
+        'robot': Spec(network.usual_robot, 'robot file, or the name of a shipped one',
+                      read_only=True, constraints='a shipped name, or the path of a YAML file'),
+        'gait': Spec(network.usual_gait, 'gait; setting it loads its preset of network '
+                     'parameters', constraints='one of: ' + ', '.join(network.presets())
                      + ', and those of the file given by presets'),
         'rate': Spec(100.0, 'messages per second on every output topic [Hz]', 1.0, 2000.0),
         'amplitude': Spec(1.0, "factor on the robot file's joint amplitudes", 0.0, 3.0),

@@ -13,7 +13,7 @@ import numpy as np
 from cpg_ros.dynamics.floquet import multipliers
 from cpg_ros.dynamics.orbit import solve_orbit
 from cpg_ros.networks.hk_theorem import label
-from cpg_ros.networks.quadruped import PRESETS, Quadruped
+from cpg_ros.networks.quadruped import Quadruped
 from cpg_ros.networks.symmetry import Z4_Z2
 from cpg_ros.papers.cell_constants import cell_constants
 from cpg_ros.papers.figures import trajectories
@@ -70,9 +70,10 @@ class Gait:
 def settled(name: str) -> Gait:
     """Simulate a gait of Table 13 from near its orbit, with every cell disturbed."""
     network = Quadruped(*(float(value) for value in TABLE_13[name]))
-    start = np.array(PRESETS[name].start)
+    preset = Quadruped.presets()[name]
+    start = np.array(preset.start)
     start = start + DISTURBANCE * np.random.default_rng(0).standard_normal(start.size)
-    span = SETTLING.get(name, USUALLY) * PRESETS[name].period
+    span = SETTLING.get(name, USUALLY) * preset.period
     return Gait(name, network, rhythm(network, start, span, Z4_Z2, primary_gaits(variables=2)))
 
 
@@ -98,8 +99,9 @@ def _table_1(gait: Gait) -> Iterator[Row]:
 
 def _reversed(gait: Gait) -> Row:
     """Start the walk as Table 1 has it, with the wave run the other way, and see what lasts."""
-    start = np.array(PRESETS[gait.name].start).reshape(2, -1)[:, [0, 1, 6, 7, 4, 5, 2, 3]]
-    seen = rhythm(gait.network, start.ravel(), REVERSAL * PRESETS[gait.name].period, Z4_Z2,
+    preset = Quadruped.presets()[gait.name]
+    start = np.array(preset.start).reshape(2, -1)[:, [0, 1, 6, 7, 4, 5, 2, 3]]
+    seen = rhythm(gait.network, start.ravel(), REVERSAL * preset.period, Z4_Z2,
                   primary_gaits(variables=2))
     return Citation(AUTHORS, 'Table 1').phases(
         'walk started with u_3(t) = u_1(t + 1/4): phase of u_3 (LF) in the end', '1/4',

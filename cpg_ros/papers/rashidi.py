@@ -10,7 +10,7 @@ from cpg_ros.dynamics.floquet import multipliers
 from cpg_ros.dynamics.orbit import solve_orbit
 from cpg_ros.gaits.mean_cycle import mean_cycle
 from cpg_ros.gaits.waveform_comparison import lag, shape_difference
-from cpg_ros.networks.biped import GAITS, PRESETS, PRIMARY, Biped
+from cpg_ros.networks.biped import GAITS, PRIMARY, Biped
 from cpg_ros.networks.hk_theorem import admissible_pairs
 from cpg_ros.networks.symmetry import D2, Symmetry
 from cpg_ros.papers.cell_constants import cell_constants
@@ -81,7 +81,7 @@ def simulated(network: Biped, start: tuple[float, ...]) -> Rhythm:
 
 def disturbed(gait: str) -> tuple[float, ...]:
     """A state near the orbit of a shipped preset, every variable disturbed."""
-    start = np.array(PRESETS[gait].start)
+    start = np.array(Biped.presets()[gait].start)
     start = start + DISTURBANCE * np.random.default_rng(0).standard_normal(start.size)
     return tuple(start.tolist())
 
@@ -98,7 +98,7 @@ def printed(gait: str) -> Biped:
 
 def settled(gait: str) -> Rhythm:
     """A gait: primary ones by Table 2, the others by the shipped presets."""
-    network = printed(gait) if gait in PRIMARY else PRESETS[gait].network
+    network = printed(gait) if gait in PRIMARY else Biped.presets()[gait].network
     assert isinstance(network, Biped)
     return simulated(network, disturbed(gait))
 
@@ -231,14 +231,14 @@ def secondary() -> Iterator[Row | Picture]:
         if gait in TABLE_5:
             yield from _table_5(gait, seen)
         if gait in NOT_REACHED:
-            found = multipliers(solve_orbit(PRESETS[gait].network, gait))
+            found = multipliers(solve_orbit(Biped.presets()[gait].network, gait))
             reached = seen.gait == gait and found.leading < 1.0
             yield Citation(AUTHORS, 'section 5').word(
                 f'the {name} in this network', 'not reached',
                 'reached' if reached else 'not reached', erratum=(18, 'reached'),
                 note=f'leading Floquet multiplier {found.leading:.3g} a cycle')
     for number, (before, gait) in TRANSITIONS.items():
-        network = PRESETS[gait].network
+        network = Biped.presets()[gait].network
         assert isinstance(network, Biped)
         seen = simulated(network, disturbed(before))
         yield Citation(AUTHORS, f'Figure {number}').word(

@@ -107,6 +107,8 @@ class Robot:
         legs: leg -> its joints.
         order: all joints' names in the order in which controllers take them.
         motions: gait or preset -> its motion.
+        sides: leg -> left or right, as the file or else a network says.
+        girdles: leg -> fore or hind, the same.
 
     """
 
@@ -117,6 +119,28 @@ class Robot:
     legs: dict[str, tuple[Joint, ...]]
     order: tuple[str, ...]
     motions: dict[str, Motion] = field(default_factory=dict)
+    sides: dict[str, str] = field(default_factory=dict)
+    girdles: dict[str, str] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        for key in ('sides', 'girdles'):
+            stated = {leg: word for name in self.networks
+                      for leg, word in getattr(NETWORKS[name], key).items()}
+            object.__setattr__(self, key, {**stated, **getattr(self, key)})
+
+    @property
+    def left(self) -> np.ndarray:
+        """Whether each leg is on the left, shape (legs,).
+
+        Raises:
+            ValueError: neither the network nor the robot file says of each leg on which side.
+
+        """
+        for leg in self.legs:
+            if leg not in self.sides:
+                raise InputError(f"robot file '{self.name}' does not say on which side the leg "
+                                 f'{leg} is (legs.{leg}.side)')
+        return np.array([self.sides[leg] == 'left' for leg in self.legs])
 
     @property
     def joints(self) -> tuple[Joint, ...]:

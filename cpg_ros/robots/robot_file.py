@@ -15,7 +15,7 @@ from cpg_ros.errors import CpgError
 from cpg_ros.files.atomic_write import write_atomically
 from cpg_ros.files.shared_resources import share
 from cpg_ros.files.yaml_reader import Reader, shown
-from cpg_ros.networks.registry import NETWORKS, PRESETS
+from cpg_ros.networks.registry import NETWORKS, NetworkError, find_network, reference
 from cpg_ros.robots.robot import (
     HARMONICS,
     WEIGHTS,
@@ -38,12 +38,26 @@ class _Reader(Reader):
     """Reads networks and joints, too."""
 
     def networks(self, value: Any) -> tuple[str, ...]:
-        names = value if isinstance(value, list) else [value]
+        names, found = value if isinstance(value, list) else [value], []
         for k, name in enumerate(self.items(names, 'network')):
             where = f'network[{k}]' if isinstance(value, list) else 'network'
-            if self.text(name, where) not in NETWORKS:
-                raise self.fail(where, f"'{name}' is not one of {', '.join(NETWORKS)}")
-        return tuple(names)
+            try:
+                found.append(find_network(self.text(name, where), self.path.parent).name)
+            except NetworkError as error:
+                raise self.fail(where, str(error)) from error
+        return tuple(found)
+
+    def place(self, tree: Mapping[str, Any], where: str, key: str, words: tuple[str, str],
+              stated: str | None) -> dict[str, str]:
+        """Return leg -> word where the file says it; what a network states must be the same."""
+        if key not in tree:
+            return {}
+        word = self.text(tree[key], f'{where}.{key}')
+        if word not in words:
+            raise self.fail(f'{where}.{key}', f"'{word}' is not one of {', '.join(words)}")
+        if stated not in (None, word):
+            raise self.fail(f'{where}.{key}', f"'{word}' is not what the network states, {stated}")
+        return {where.removeprefix('legs.'): word}
 
     def joint(self, tree: Any, where: str, leg: str, cells: tuple[int, ...]) -> Joint:
         numbers = {'offset', 'lower', 'upper', 'velocity'}
@@ -165,11 +179,15 @@ def load_robot(path: str | Path) -> Robot:
     reader.keys(tree['legs'], 'legs', set(cells))
 
     legs: dict[str, tuple[Joint, ...]] = {}
+    sides: dict[str, str] = {}
+    girdles: dict[str, str] = {}
     seen: dict[str, str] = {}
     for leg in tree['legs']:
         where = f'legs.{leg}'
-        listed = reader.items(reader.keys(tree['legs'][leg], where, {'joints'})['joints'],
-                              f'{where}.joints')
+        entry = reader.keys(tree['legs'][leg], where, {'joints'}, {'side', 'girdle'})
+        sides |= reader.place(entry, where, 'side', ('left', 'right'), first.sides.get(leg))
+        girdles |= reader.place(entry, where, 'girdle', ('fore', 'hind'), first.girdles.get(leg))
+        listed = reader.items(entry['joints'], f'{where}.joints')
         joints = []
         for k, entry in enumerate(listed):
             place = f'{where}.joints[{k}]'
@@ -195,11 +213,17 @@ def load_robot(path: str | Path) -> Robot:
                 raise reader.fail('joint_order', f"joint '{name}' of {place} is missing")
     motions = {}
     if 'gaits' in tree:
-        known = {name for network in networks for name in PRESETS[network]}
+        known = {name for network in networks for name in NETWORKS[network].presets()}
         joints_by_name = {joint.name: joint for leg in legs.values() for joint in leg}
         motions = {name: reader.motion(entry, f'gaits.{name}', joints_by_name) for name, entry
                    in reader.keys(tree['gaits'], 'gaits', set(), known).items()}
-    return Robot(path.stem, networks, assignment, harmonics, legs, tuple(order), motions)
+    robot = Robot(path.stem, networks, assignment, harmonics, legs, tuple(order), motions, sides,
+                  girdles)
+    if any(motion.steering for motion in motions.values()):
+        for leg in legs:
+            if leg not in robot.sides:
+                raise reader.fail(f'legs.{leg}.side', 'is missing: steering needs it')
+    return robot
 
 
 def find_robot(name: str) -> Robot:
@@ -220,7 +244,8 @@ def find_robot(name: str) -> Robot:
 
 def write_robot(path: str | Path, robot: Robot, comment: str = '') -> None:
     """Write a robot file that load_robot reads back; the name is that of the file."""
-    tree: dict[str, Any] = {'network': list(robot.networks), 'assignment': robot.assignment,
+    tree: dict[str, Any] = {'network': [reference(name) for name in robot.networks],
+                            'assignment': robot.assignment,
                             'harmonics': robot.harmonics, 'joint_order': list(robot.order),
                             'legs': {}}
     for leg, joints in robot.legs.items():
@@ -228,6 +253,10 @@ def write_robot(path: str | Path, robot: Robot, comment: str = '') -> None:
             {'name': joint.name, 'cell': joint.cell, 'offset': joint.offset,
              'weights': list(joint.weights), 'lower': joint.lower, 'upper': joint.upper,
              'velocity': joint.velocity} for joint in joints]}
+        for key, said in (('side', robot.sides), ('girdle', robot.girdles)):
+            if leg in said and not any(leg in getattr(NETWORKS[name], f'{key}s')
+                                       for name in robot.networks):
+                tree['legs'][leg][key] = said[leg]
     if robot.motions:
         tree['gaits'] = {name: _motion_tree(motion) for name, motion in robot.motions.items()}
     lines = ''.join(f'# {line}\n' for line in comment.splitlines())

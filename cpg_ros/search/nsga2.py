@@ -67,7 +67,7 @@ def optimise(network_name: str, gait: str, population: int = 60, generations: in
     """Look for weights that give a network a gait.
 
     Args:
-        network_name: biped or quadruped.
+        network_name: as search_space takes it.
         gait: one of the network's.
         population: parameter sets in a generation.
         generations: how many.

@@ -11,20 +11,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from cpg_ros.errors import InputError
-from cpg_ros.networks import biped, quadruped
 from cpg_ros.networks.network import Network, known
-from cpg_ros.networks.symmetry import Symmetry
+from cpg_ros.networks.registry import NETWORKS, SHIPPED, find_network, is_path
 
-NETWORKS: dict[str, type[Network]] = {
-    network.name: network for network in (biped.Biped, quadruped.Quadruped)}
+#: Shipped networks whose weights can be looked for.
+SEARCHED: dict[str, type[Network]] = {
+    name: SHIPPED[name] for name in sorted(SHIPPED) if SHIPPED[name].searched}
 #: Values have this many decimals, so that what is found can be written down as it is.
 DECIMALS = 4
-#: Weights as in Rashidi et al. (2016), current and phi a little beyond their Table 2. For the
-#: quadruped about what Table 13 of Buono & Golubitsky (2001) uses for most gaits; its couplings
-#: across the ring, xi and eta, are 0 there, and here unless they are bounded.
-WEIGHTS, CELLS = (-1.0, 1.0), {'current': (0.2, 0.32), 'phi': (0.15, 0.4)}
-COUPLINGS = {**dict.fromkeys(('alpha', 'beta', 'gamma', 'delta'), (-0.8, 0.8)),
-             'xi': (0.0, 0.0), 'eta': (0.0, 0.0)}
 
 
 @dataclass(frozen=True)
@@ -78,15 +72,19 @@ class Space:
             for member in variable.members})
 
 
-def _biped_variables(gait: str) -> list[Variable]:
-    """One variable for each orbit of couplings, then the cells' current and phi."""
-    # An orbit that is one of the paper's three couplings has the paper's name.
-    letters = {frozenset(names): f'w_{letter}' for letter, names in biped.WEIGHTS.items()}
-    families = biped.Biped.families(Symmetry.of(biped.D2, biped.GAITS[gait]))
-    orbits = sorted(tuple(sorted(family)) for family in families if family[0] not in CELLS)
-    return [*(Variable(letters.get(frozenset(members), members[0]), *WEIGHTS, members)
-              for members in orbits),
-            *(Variable(name, *limits, (name,)) for name, limits in CELLS.items())]
+def _variables(network: type[Network], gait: str) -> list[Variable]:
+    """One variable for each family of parameters, those of groups first."""
+    # A family that is a whole group has the group's name.
+    names = {frozenset(members): group for group, members in network.groups.items()}
+    families = network.families(network.presets()[gait].network.symmetry(gait))
+    found = []
+    for name, limits in network.searched.items():
+        within = network.groups.get(name, (name,))
+        found += [(name not in network.groups, Variable(
+            names.get(frozenset(family), min(family)), *limits, tuple(sorted(family))))
+            for family in families if set(family) <= set(within)]
+    return [variable for _, variable in sorted(
+        found, key=lambda one: (one[0], () if one[0] else one[1].members))]
 
 
 def search_space(network_name: str, gait: str, bounds: Mapping[str, tuple[float, float]],
@@ -94,7 +92,7 @@ def search_space(network_name: str, gait: str, bounds: Mapping[str, tuple[float,
     """Return the parameter sets among which a gait is looked for.
 
     Args:
-        network_name: biped or quadruped.
+        network_name: of a network that states what may be looked for, or its file.
         gait: one of the network's.
         bounds: variable, or any parameter that takes its value, -> lower and upper bound,
             instead of the usual ones.
@@ -104,12 +102,14 @@ def search_space(network_name: str, gait: str, bounds: Mapping[str, tuple[float,
         InputError: the network or gait is unknown, or a bound or value cannot be used.
 
     """
-    if network_name not in NETWORKS:
-        raise InputError(f"network '{network_name}' is not one of {', '.join(NETWORKS)}")
-    network = NETWORKS[network_name]
+    if not is_path(network_name) and (network_name not in NETWORKS
+                                      or not NETWORKS[network_name].searched):
+        raise InputError(f"network '{network_name}' is not one of {', '.join(SEARCHED)}")
+    network = find_network(network_name)
+    if not network.searched:
+        raise InputError(f'the network {network.name} does not state what may be looked for')
     known(gait, network.gaits())
-    variables = (_biped_variables(gait) if network is biped.Biped else
-                 [Variable(name, *limits, (name,)) for name, limits in COUPLINGS.items()])
+    variables = _variables(network, gait)
     places = {name: k for k, variable in enumerate(variables)
               for name in (*variable.members, variable.name)}
     given: dict[int, str] = {}

@@ -13,10 +13,7 @@ SPAN, KEPT = 500.0, 0.1
 #: Steps of the network's real-time step at once: still more exact than adaptive methods with
 #: their usual tolerances (benchmarks/bench_optimize.py).
 COARSER = 2.5
-#: Start: middle and half range of both variables on a typical cycle, and by how much of a cycle
-#: the second one lags; then a disturbance of every component, which breaks all symmetry.
-TYPICAL = {'biped': ((0.1, 0.35), (0.3, 0.15), 0.15),
-           'quadruped': ((0.2, 0.5), (0.45, 0.3), 0.2)}
+#: Of every component at the start, which breaks all symmetry.
 DISTURBANCE = 0.05
 #: Cycles that are averaged, and points of one.
 AVERAGED, POINTS = 3, 256
@@ -49,7 +46,7 @@ class SettledCycle:
 
 
 def start_states(networks: Sequence[Network], gait: str, seed: int) -> np.ndarray:
-    """Start every network near the gait's pattern, with the same disturbance for all.
+    """Start every network near the gait's pattern on a typical cycle, all disturbed alike.
 
     So only a gait that attracts is found. A second waveform starts smaller than the first one
     and anywhere in its cycle.
@@ -59,7 +56,6 @@ def start_states(networks: Sequence[Network], gait: str, seed: int) -> np.ndarra
 
     """
     rng = np.random.default_rng(seed)
-    (v, v_half), (w, w_half), late = TYPICAL[networks[0].name]
     sizes, offsets = np.array([1.0, rng.uniform(0.4, 1.0)]), np.array([0.0, rng.uniform()])
     disturbance = DISTURBANCE * rng.standard_normal(networks[0].components)
     found = []
@@ -67,8 +63,9 @@ def start_states(networks: Sequence[Network], gait: str, seed: int) -> np.ndarra
         symmetry = network.symmetry(gait)
         turn = 2.0 * np.pi * (symmetry.phases + offsets[symmetry.waves])
         size = sizes[symmetry.waves]
-        found.append(np.concatenate([v + v_half * size * np.cos(turn),
-                                     w + w_half * size * np.cos(turn - 2.0 * np.pi * late)]))
+        found.append(np.concatenate([
+            middle + half * size * np.cos(turn - 2.0 * np.pi * late)
+            for middle, half, late in network.typical_cycle]))
     return np.array(found) + disturbance
 
 

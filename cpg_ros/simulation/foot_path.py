@@ -10,8 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from cpg_ros.dynamics.periodic import Orbit
-from cpg_ros.motion.phase_readout import PhaseReadout
-from cpg_ros.motion.readout import WaveReadout
+from cpg_ros.motion.joint_readout import joint_readout
 from cpg_ros.robots.robot import JointMotion
 from cpg_ros.simulation.body import Body
 from cpg_ros.simulation.model_indices import Anatomy
@@ -131,11 +130,7 @@ def basis(orbit: Orbit, cell: int, harmonics: int) -> np.ndarray:
         harmonics: of a cell with two variables that joints follow.
 
     """
-    cells, one = np.full(6, cell), np.array([cell])
-    if orbit.network.variables == 1:
-        psi = WaveReadout(orbit, cells, np.eye(6), one).angles
-    else:
-        psi = PhaseReadout(orbit, cells, np.eye(6), one, harmonics).angles
+    psi = joint_readout(orbit, np.full(6, cell), np.eye(6), np.array([cell]), harmonics).angles
     # Phase 0 of a leg is where x peaks.
     return np.roll(psi, -int(psi[0].argmax()), axis=1)[:, ::psi.shape[1] // POINTS]
 

@@ -15,8 +15,6 @@ STANDING = 0.04
 SMOOTHING = 0.5
 #: Endings of the files that can be written.
 FORMATS = ('.png', '.svg', '.pdf')
-#: Rows from above, for the legs that a robot has of these.
-ROWS = ('lf', 'rf', 'lh', 'rh', 'left', 'right')
 
 
 def stances(time: np.ndarray, force: np.ndarray, least: float) -> list[tuple[float, float]]:
@@ -55,7 +53,7 @@ def plot_footfalls(path: Path, legs: Sequence[str], time: np.ndarray, forces: np
 
     Args:
         path: picture to write, .png, .svg or .pdf.
-        legs: names of the legs.
+        legs: names of the legs, from the top.
         time: of the samples, s, shape (n,), evenly spaced.
         forces: of the floor on each leg, N, shape (n, legs).
         position: of the base, m, shape (n, 2).
@@ -65,19 +63,18 @@ def plot_footfalls(path: Path, legs: Sequence[str], time: np.ndarray, forces: np
         OSError: it cannot be written.
 
     """
-    order = [leg for leg in ROWS if leg in legs] + [leg for leg in legs if leg not in ROWS]
     least = STANDING * float(forces.sum(axis=1).mean())
     figure = Figure(figsize=(max(7.0, min(24.0, 0.8 * (time[-1] - time[0]))), 4.4),
                     layout='constrained')
     above, below = figure.subplots(2, 1, sharex=True, height_ratios=[3, 2])
-    for row, leg in enumerate(order):
-        bars = stances(time, forces[:, list(legs).index(leg)], least)
+    for row in range(len(legs)):
+        bars = stances(time, forces[:, row], least)
         above.broken_barh(bars, (row - 0.36, 0.72), facecolor='black')
         share = sum(length for _, length in bars) / (time[-1] - time[0])
         above.annotate(f'{share:.0%}', (1.0, row), xycoords=('axes fraction', 'data'),
                        xytext=(4, 0), textcoords='offset points', va='center', fontsize=8)
-    above.set(yticks=range(len(order)), yticklabels=[leg.upper() for leg in order],
-              ylim=(len(order) - 0.4, -0.6), ylabel='foot on the floor',
+    above.set(yticks=range(len(legs)), yticklabels=[leg.upper() for leg in legs],
+              ylim=(len(legs) - 0.4, -0.6), ylabel='foot on the floor',
               title='Footfalls (right: share of the time on the floor)')
     below.plot(time, speed(time, position), color='tab:blue', linewidth=1.2)
     below.set(xlabel='time [s]', ylabel='speed [m/s]', xlim=(time[0], time[-1]))

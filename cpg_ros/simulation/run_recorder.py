@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from cpg_ros.networks.network import footfall_order
 from cpg_ros.simulation.body import Body
 from cpg_ros.simulation.robot_model import SimulationError, legs, load
 
@@ -79,7 +80,10 @@ class Diary:
             begun = [gait for gait in self._gaits if gait[0] <= times[0]][-1:]
             gaits = [(max(float(times[0]), when), gait) for when, gait in
                      begun + [gait for gait in self._gaits if gait[0] > times[0]]]
-            plot_footfalls(self._footfalls, legs(self._body.robot), times, forces, places, gaits)
+            robot = self._body.robot
+            measured, shown = legs(robot), footfall_order(robot.legs, robot.sides, robot.girdles)
+            plot_footfalls(self._footfalls, shown, times,
+                           forces[:, [measured.index(leg) for leg in shown]], places, gaits)
             written.append(self._footfalls)
         if self._film is not None and self._poses:
             from cpg_ros.simulation.camera import shoot

@@ -34,7 +34,7 @@ def measure(batch: Batch, program: Program,
         update: takes the number of strides measured so far.
 
     """
-    left = np.array([leg[0] == 'l' for leg in program.robot.legs])
+    left = program.robot.left
     rows = []
     for done, stride in enumerate(STRIDES):
         pace = 1.0 - SLOWER * (1.0 - abs(stride))

@@ -15,7 +15,7 @@ import numpy as np
 
 from cpg_ros.files.progress_bar import progress_bar
 from cpg_ros.motion.plan import Program, Refused, gait_of, plan
-from cpg_ros.networks.registry import PRESETS
+from cpg_ros.networks.registry import NETWORKS
 from cpg_ros.robots.robot import Motion, Robot, Steering
 from cpg_ros.simulation.batch import Batch, Scenario, targets
 from cpg_ros.simulation.foot_path import Feet
@@ -99,14 +99,15 @@ class Tuner:
 
     def motion(self, gait: str, design: Design) -> Motion:
         """Return what a design makes of the robot."""
-        preset = PRESETS[self.robot.networks[0]][gait]
-        paths = {leg: design.path(leg[1] == 'h', self.scale) for leg in self.robot.legs}
+        preset = NETWORKS[self.robot.networks[0]].presets()[gait]
+        paths = {leg: design.path(self.robot.girdles.get(leg) == 'hind', self.scale)
+                 for leg in self.robot.legs}
         return Motion(round(design.frequency / math.sqrt(self.scale), 3),
                       self.feet.joints(gait_of(preset, preset.network)[0], paths))
 
     def program(self, gait: str, motion: Motion, network: int = 0) -> Program:
         """Plan a gait with a motion on one of the robot's networks; errors as of plan."""
-        preset = PRESETS[self.robot.networks[network]][gait]
+        preset = NETWORKS[self.robot.networks[network]].presets()[gait]
         if motion.steering is None and not AIMS[gait].hops:
             # To be steered: the joints must be able to follow strides of -1, too.
             one = (1.0,)
@@ -198,7 +199,7 @@ def tune(robot: Robot, model: str, gaits: Sequence[str], evaluations: int, seed:
 
     """
     tuner = Tuner(robot, model)
-    known = PRESETS[robot.networks[0]]
+    known = NETWORKS[robot.networks[0]].presets()
     for gait in gaits:
         if gait not in known:
             raise SimulationError(f'the network {robot.networks[0]} has no gait {gait}')

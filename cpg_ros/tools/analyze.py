@@ -20,7 +20,7 @@ from cpg_ros.files.plain_text import as_json
 from cpg_ros.files.progress_bar import progress_bar
 from cpg_ros.networks.network import Network
 from cpg_ros.networks.parameter_line import ParameterLine
-from cpg_ros.networks.registry import NETWORKS, PRESETS, USUAL
+from cpg_ros.networks.registry import SHIPPED, NetworkError, find_network
 from cpg_ros.tools.analysis_report import CellAnalysis, DelayAnalysis, analysed
 from cpg_ros.tools.arguments import Parser, assignment, interval, number, say, twice
 
@@ -39,18 +39,17 @@ exit codes: 0 analysed (also where no gait was found), 2 wrong arguments.'''
 LONGEST = 100.0
 #: No parameter is larger: beyond, the arithmetic breaks down before it tells anything.
 LARGEST = 1e6
-#: Parameters that are moved to look for Hopf points, and how far, where --along is not given.
-ALONG = {'quadruped': ('alpha=beta', (-1.0, 1.0)), 'biped': ('current', (0.0, 1.0))}
 
 
 def _parser() -> Parser:
     parser = Parser(prog='analyze', description=DESCRIPTION, epilog=EPILOG,
                     formatter_class=RawDescriptionHelpFormatter)
     parser.add_argument('--network', default='delayed', metavar='NAME',
-                        help=f'{", ".join(NETWORKS)} (default: %(default)s)')
+                        help=f'{", ".join(SHIPPED)}, or the path of a Python file with one '
+                        '(default: %(default)s)')
     parser.add_argument('--preset', metavar='NAME', help='shipped set that parameters not set '
                         'are taken from (default: ' + ', '.join(
-                            f'{network} {gait}' for network, gait in USUAL.items()) + ')')
+                            f'{name} {kind.usual_gait}' for name, kind in SHIPPED.items()) + ')')
     parser.add_argument('--set', nargs='+', action='extend', default=[], type=assignment,
                         metavar='PARAMETER=VALUE', help='such as c=6.5 tau=0.4; w_a sets all '
                         'four weights of the biped')
@@ -58,11 +57,12 @@ def _parser() -> Parser:
                         'delayed network up to this delay, model time (default: twice tau)')
     parser.add_argument('--along', metavar='PARAMETERS', help='what moves for the Hopf points of '
                         'the networks without delay, and for the branches of --plot: gamma, or '
-                        'alpha=beta together, or alpha=-beta (default: tau; ' + '; '.join(
-                            f'{name}: {along}' for name, (along, _) in ALONG.items()) + ')')
+                        'alpha=beta together, or alpha=-beta (default: ' + '; '.join(
+                            f'{name}: {kind.line}' if kind.span else kind.line
+                            for name, kind in SHIPPED.items()) + ')')
     parser.add_argument('--range', type=interval, metavar='LOW:HIGH', help='how far it moves '
-                        '(default: ' + ', '.join(f'{name} {low:g}:{high:g}' for name, (
-                            _, (low, high)) in ALONG.items()) + ')')
+                        '(default: ' + ', '.join(f'{name} {kind.span[0]:g}:{kind.span[1]:g}'
+                            for name, kind in SHIPPED.items() if kind.span) + ')')
     parser.add_argument('--json', action='store_true', help='print JSON instead of tables')
     parser.add_argument('--plot', type=Path, metavar='FILE', help='draw the branches, the roots, '
                         'trajectories and footfalls (.png, .pdf or .svg)')
@@ -76,10 +76,12 @@ def parameters(name: str, preset: str | None, changes: list[tuple[str, float]]) 
         InputError: an unknown name, or a value that makes no sense; the message says which.
 
     """
-    if name not in NETWORKS:
-        raise InputError(f"--network: '{name}' is not one of {', '.join(NETWORKS)}")
-    kind, presets = NETWORKS[name], PRESETS[name]
-    chosen = USUAL[name] if preset is None else preset
+    try:
+        kind = find_network(name)
+    except NetworkError as error:
+        raise InputError(f'--network: {error}') from error
+    presets = kind.presets()
+    chosen = kind.usual_gait if preset is None else preset
     if chosen not in presets:
         raise InputError(f"--preset: '{chosen}' is not one of {', '.join(presets)}")
     network = presets[chosen].network
@@ -89,21 +91,23 @@ def parameters(name: str, preset: str | None, changes: list[tuple[str, float]]) 
     for key, value in changes:
         if key not in (*kind.parameters(), *kind.groups):
             known = ', '.join((*kind.groups, *kind.parameters()))
-            raise InputError(f"--set: '{key}' is not a parameter of the {name} network: {known}")
+            raise InputError(f"--set: '{key}' is not a parameter of the {kind.name} network: "
+                             f'{known}')
         if not np.isfinite(value):
             raise InputError(f'--set: {key} is {value:g}, it must be finite')
         if abs(value) > LARGEST:
             raise InputError(f'--set: {key} is {value:g}, it must be at most {LARGEST:g}')
         members = kind.groups.get(key, (key,))
         network = replace(network, **dict.fromkeys(members, value))  # type: ignore[type-var]
-    if network.as_dict().get('tau', 1.0) <= 0.0:
-        raise InputError(f'--set: tau is {network.delay:g}, a delay must be positive')
+    delay = kind.delay_parameter
+    if delay and network.delay <= 0.0:
+        raise InputError(f'--set: {delay} is {network.delay:g}, a delay must be positive')
     if network.delay > kind.longest_delay > 0.0:
-        raise InputError(f'--set: tau is {network.delay:g}, delays go up to '
+        raise InputError(f'--set: {delay} is {network.delay:g}, delays go up to '
                          f'{kind.longest_delay:g}: take another unit of time')
-    if network.as_dict().get('c', 1.0) == 0.0:
-        raise InputError('--set: c is 0: left and right legs would not be coupled, and no delay '
-                         'would matter')
+    for key, lost in kind.needed.items():
+        if network.as_dict()[key] == 0.0:
+            raise InputError(f'--set: {key} is 0: {lost}')
     return network
 
 
@@ -114,14 +118,14 @@ def _analysed(chosen) -> DelayAnalysis | CellAnalysis:
     longest = 2.0 * network.delay if chosen.longest_delay is None else chosen.longest_delay
     if not 0.0 <= longest <= LONGEST:
         raise InputError(f'--longest-delay: {longest:g} is not from 0 to {LONGEST:g}')
-    text, span = ALONG.get(network.name, ('tau', (0.0, max(longest, 1.01 * network.delay))))
+    span = network.span or (0.0, max(longest, 1.01 * network.delay))
     try:
-        along = ParameterLine.parse(chosen.along or text, type(network))
+        along = ParameterLine.parse(chosen.along or network.line, type(network))
     except InputError as error:
         raise InputError(f'--along: {error}') from error
     if chosen.range is not None:
         span = chosen.range
-    elif network.delay and along.names != ('tau',):
+    elif network.span is None and str(along) != network.line:
         raise InputError(f'--along: {along} needs a --range')
     if not np.isfinite(span).all() or span[0] >= span[1]:
         raise InputError(f'--range: {span[0]:g}:{span[1]:g} is not from low to high')

@@ -14,7 +14,7 @@ from cpg_ros.checks.robot_template import robot_from
 from cpg_ros.checks.urdf_match import RobotCheck, checked
 from cpg_ros.errors import CpgError, InputError
 from cpg_ros.files.plain_text import as_json
-from cpg_ros.networks.registry import PRESETS
+from cpg_ros.networks.registry import NETWORKS
 from cpg_ros.robots.robot import Robot
 from cpg_ros.robots.robot_file import find_robot, write_robot
 from cpg_ros.robots.urdf import load_urdf
@@ -65,7 +65,7 @@ def _checked(chosen) -> RobotCheck:
             raise InputError(f'--{option}: {value:g} is not from 0 to {highest:g}')
     urdf = load_urdf(chosen.urdf)
     robot = find_robot(chosen.robot) if chosen.make is None else _made(chosen, urdf)
-    known = [name for network in robot.networks for name in PRESETS[network]]
+    known = [name for network in robot.networks for name in NETWORKS[network].presets()]
     for name in chosen.gaits:
         if name not in known:
             raise InputError(f"--gaits: '{name}' is not one of "

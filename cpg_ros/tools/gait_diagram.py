@@ -1,8 +1,8 @@
 """Footfall (Hildebrand) diagrams: when legs stand, or muscles are active, over two strides.
 
 ``python -m cpg_ros.tools.gait_diagram gaits.png --network biped`` draws a network's gaits from
-their orbits. A quadruped's leg stands while the signal that drives it falls, from peak to trough;
-a biped's flexors and extensors are active while their cell is above the middle of its range.
+their orbits. A leg stands while the signal that drives it falls, from peak to trough; where cells
+drive muscles, a muscle is active while its cell is above the middle of its range.
 """
 
 import argparse
@@ -17,15 +17,24 @@ from matplotlib.axes import Axes
 from cpg_ros.dynamics.orbit import Orbit, solve_preset
 from cpg_ros.errors import CpgError, InputError
 from cpg_ros.motion.phase_readout import evaluate, phase_map
-from cpg_ros.networks.registry import NETWORKS, PRESETS
+from cpg_ros.networks.network import Network, footfall_order
+from cpg_ros.networks.registry import SHIPPED, find_network
 from cpg_ros.robots.robot import HARMONICS
 
 STRIDES = 2.0
-#: Rows from the top: what, cell from 1, and a colour for each girdle or leg.
-BLUE, ORANGE = '#2b6cb0', '#c05621'
-LEG_ROWS = (('LF', 3, BLUE), ('RF', 4, BLUE), ('LH', 1, ORANGE), ('RH', 2, ORANGE))
-MUSCLE_ROWS = (('left flexor', 1, BLUE), ('left extensor', 3, BLUE), ('right flexor', 2, ORANGE),
-               ('right extensor', 4, ORANGE))
+#: Of the fore and the hind girdle, or of one leg after the other.
+COLOURS = ('#2b6cb0', '#c05621')
+
+
+def rows(network: type[Network]) -> list[tuple[str, int, str]]:
+    """What is drawn, from the top: a leg or a muscle, its cell from 1, and its colour."""
+    legs, girdles = next(iter(network.legs.values())), network.girdles
+    if network.muscles:
+        names = {cell: name.replace('_', ' ') for name, cell in network.muscles.items()}
+        return [(names[cell], cell, COLOURS[k % 2]) for k, cells in enumerate(legs.values())
+                for cell in cells if cell in names]
+    return [(leg.upper(), legs[leg][0], COLOURS[girdles.get(leg) == 'hind'])
+            for leg in footfall_order(legs, network.sides, girdles)]
 
 
 def signal(orbit: Orbit, cell: int, theta: np.ndarray, order: int = 0) -> np.ndarray:
@@ -39,7 +48,7 @@ def signal(orbit: Orbit, cell: int, theta: np.ndarray, order: int = 0) -> np.nda
 
     """
     phase, wave = orbit.phases[cell - 1], int(orbit.waves[cell - 1])
-    if orbit.network.variables == 1:
+    if orbit.network.readout == 'waveform':
         return orbit.waveform(theta + phase, order) / orbit.peak
     return evaluate(phase_map(orbit, HARMONICS).terms[wave], theta + phase, order)
 
@@ -54,7 +63,7 @@ def active(orbit: Orbit, cell: int, strides: float = STRIDES) -> list[tuple[floa
 
     """
     theta = np.linspace(0.0, strides, int(1000 * strides) + 1)
-    if orbit.network.name == 'biped':
+    if orbit.network.muscles:
         wave = int(orbit.waves[cell - 1])
         on = orbit.waveform(theta + orbit.phases[cell - 1], 0, wave) > orbit.levels[wave, 0, 0]
     else:
@@ -68,26 +77,25 @@ def active(orbit: Orbit, cell: int, strides: float = STRIDES) -> list[tuple[floa
 
 def draw(axes: Axes, orbit: Orbit, title: str) -> None:
     """Draw one gait, with each row's cell as a line over it."""
-    biped = orbit.network.name == 'biped'
-    rows = MUSCLE_ROWS if biped else LEG_ROWS
+    drawn = rows(type(orbit.network))
     theta = np.linspace(0.0, STRIDES, 801)
-    for row, (_, cell, colour) in enumerate(rows):
-        height = len(rows) - 1 - row
+    for row, (_, cell, colour) in enumerate(drawn):
+        height = len(drawn) - 1 - row
         axes.broken_barh(active(orbit, cell), (height - 0.36, 0.72), color=colour, alpha=0.85)
         wave = int(orbit.waves[cell - 1])
         middle, half = orbit.levels[wave, 0]
         line = (orbit.waveform(theta + orbit.phases[cell - 1], 0, wave) - middle) / half
         axes.plot(theta, height + 0.33 * line, color='#1a202c', linewidth=0.9)
-    axes.set_yticks(range(len(rows)), [name for name, _, _ in reversed(rows)])
+    axes.set_yticks(range(len(drawn)), [name for name, _, _ in reversed(drawn)])
     axes.set_xlim(0.0, STRIDES)
-    axes.set_ylim(-0.55, len(rows) - 0.45)
+    axes.set_ylim(-0.55, len(drawn) - 0.45)
     axes.set_title(title, fontsize=10, loc='left')
     for side in ('top', 'right', 'left'):
         axes.spines[side].set_visible(False)
     axes.tick_params(left=False)
 
 
-def picture(network: str, path: Path) -> None:
+def picture(network: type[Network], path: Path) -> None:
     """Write the picture of a network's gaits, each from the preset of its name.
 
     Raises:
@@ -96,7 +104,7 @@ def picture(network: str, path: Path) -> None:
     """
     matplotlib.use('Agg')
     from matplotlib import pyplot
-    presets = {name: preset for name, preset in PRESETS[network].items() if name == preset.gait}
+    presets = {name: preset for name, preset in network.presets().items() if name == preset.gait}
     columns = 3
     lines = -(-len(presets) // columns)
     figure, grid = pyplot.subplots(lines, columns, figsize=(10.5, 0.4 + 2.4 * lines), sharex=True,
@@ -108,7 +116,7 @@ def picture(network: str, path: Path) -> None:
         draw(axes, orbit, f'{name.replace("_", " ")}   (period {orbit.period:.4f})')
     for axes in grid[-1]:
         axes.set_xlabel('time [strides]')
-    bars = ('Bars: the cell is above the middle of its range.' if network == 'biped' else
+    bars = ('Bars: the cell is above the middle of its range.' if network.muscles else
             'Bars: the leg stands, while the signal that drives it falls.')
     figure.suptitle(f'{bars} Lines: the cell. Periods in model time.', fontsize=10)
     try:
@@ -124,10 +132,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
                                      description=__doc__,
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument('picture', type=Path, help='file to write, .png or .pdf or .svg')
-    parser.add_argument('--network', choices=tuple(NETWORKS), default='delayed')
+    parser.add_argument('--network', default='delayed', metavar='NAME',
+                        help=f'{", ".join(SHIPPED)}, or a file (default: %(default)s)')
     chosen = parser.parse_args(arguments)
     try:
-        picture(chosen.network, chosen.picture)
+        picture(find_network(chosen.network), chosen.picture)
     except (OSError, CpgError) as error:
         print(f'{chosen.picture}: {error}', file=sys.stderr)
         return 1

@@ -10,17 +10,17 @@ from argparse import RawDescriptionHelpFormatter
 from collections.abc import Sequence
 from pathlib import Path
 
-from cpg_ros.errors import CpgError, InputError
+from cpg_ros.errors import CpgError
 from cpg_ros.files.atomic_write import write_atomically
 from cpg_ros.files.plain_text import as_json
 from cpg_ros.files.progress_bar import progress_bar
 from cpg_ros.files.yaml_reader import shown
+from cpg_ros.gaits.leg_names import BIPED, QUADRUPED
 from cpg_ros.gaits.stride import NoSteadyGait
-from cpg_ros.inversion.paper_fit import PaperFit, paper_fits
+from cpg_ros.inversion.paper_fit import PaperFit, paper_fits, refuse_others
 from cpg_ros.inversion.parameter_files import write_fitted
-from cpg_ros.inversion.recording_fit import Inverted, inverted, preset_of
-from cpg_ros.networks.delayed import CELLS, Delayed
-from cpg_ros.networks.registry import NETWORKS
+from cpg_ros.inversion.recording_fit import Inverted, inverted, network_of, preset_of
+from cpg_ros.networks.registry import SHIPPED
 from cpg_ros.recordings.bag_reader import read_bag
 from cpg_ros.recordings.csv_reader import read_csv
 from cpg_ros.recordings.recording import Recording
@@ -67,14 +67,16 @@ def _parser() -> Parser:
     parser.add_argument('--robot', metavar='FILE', help='robot file, or the name of a shipped '
                         'one: which joints belong to which legs and cells, and their limits '
                         '(default: told from the names of the joints)')
-    parser.add_argument('--network', metavar='NAME', help=f'{", ".join(NETWORKS)} (default: the '
-                        "robot's first; four legs: delayed, two legs: biped)")
+    parser.add_argument('--network', metavar='NAME', help=f'{", ".join(SHIPPED)}, or the path of '
+                        "a Python file with one (default: the robot's first; "
+                        f'four legs: {network_of(QUADRUPED)}, two legs: {network_of(BIPED)})')
     parser.add_argument('--gait', metavar='NAME', help='gait to fit (default: as recognised)')
     parser.add_argument('--preset', metavar='NAME', help="shipped set that parameters which are "
                         "not free are taken from (default: the gait's)")
     parser.add_argument('--free', nargs='+', default=[], metavar='PARAMETER',
-                        help='parameters to fit (default: delayed c tau, quadruped alpha beta, '
-                        'biped current phi)')
+                        help='parameters to fit (default: ' + ', '.join(
+                            f'{name} {" ".join(kind.free)}' for name, kind in SHIPPED.items())
+                        + ')')
     parser.add_argument('--order', type=int, choices=(1, 2, 3), default=3, metavar='N',
                         help='order of the readout, 1 to 3 (default: %(default)s)')
     parser.add_argument('--start', nargs='+', action='append', default=[], type=assignment,
@@ -138,11 +140,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         robot = None if chosen.robot is None else find_robot(chosen.robot)
         starts = [dict(start) for start in chosen.start] or [{}]
-        if chosen.paper and (robot is None or 'delayed' not in robot.networks
-                             or chosen.network not in (None, 'delayed')
-                             or sorted(robot.cells) != list(range(CELLS))):
-            raise InputError('--paper: the paper has one joint for each of the eight cells of the '
-                             'delayed network: a --robot file has to say which, such as goat')
+        if chosen.paper:
+            refuse_others(robot, chosen.network or '')
         recording = _recording(chosen, robot)
         with progress_bar('fitting', 100) as bar:
             found = inverted(recording, robot, chosen.network or '', chosen.gait or '',
@@ -176,8 +175,6 @@ def _paper(chosen, found: Inverted, starts: list[dict[str, float]]) -> list[Pape
     if not chosen.paper:
         return []
     network = preset_of(found.fit.network.name, chosen.preset or found.fit.gait).network
-    if not isinstance(network, Delayed):
-        raise InputError(f'--paper: the paper has the delayed network, not the {network.name}')
     return paper_fits(found.stride, found.fit.cells, network, found.fit.gait,
                       list(found.fit.parameters), starts)
 

@@ -15,7 +15,7 @@ from cpg_ros.errors import CpgError
 from cpg_ros.networks.preset_files import write_presets
 from cpg_ros.search.nsga2 import Front, NothingFound, optimise
 from cpg_ros.search.pareto_front import draw_front, write_front
-from cpg_ros.search.search_space import NETWORKS
+from cpg_ros.search.search_space import SEARCHED
 from cpg_ros.tools.arguments import Parser, assignment, interval, say, twice
 
 DESCRIPTION = '''\
@@ -51,9 +51,10 @@ def _parser() -> Parser:
     parser = Parser(prog='optimize', description=DESCRIPTION, epilog=EPILOG,
                      formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument('--network', default='biped', metavar='NAME',
-                        help=f'{" or ".join(NETWORKS)} (default: %(default)s)')
+                        help=f'{" or ".join(SEARCHED)}, or the path of a Python file with a '
+                        'network (default: %(default)s)')
     parser.add_argument('--gait', required=True, metavar='NAME', help='; '.join(
-        f'{name}: {" ".join(network.gaits())}' for name, network in NETWORKS.items()))
+        f'{name}: {" ".join(network.gaits())}' for name, network in SEARCHED.items()))
     parser.add_argument('--population', type=int, default=60, metavar='N',
                         help='sets in a generation (default: %(default)s)')
     parser.add_argument('--generations', type=int, default=12, metavar='N',

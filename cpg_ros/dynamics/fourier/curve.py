@@ -62,7 +62,8 @@ class FourierCurve:
                                               float(z[-2]))
         matrix = np.zeros((z.size, z.size))
         matrix[:-1, :-1] = jacobian
-        matrix[:-1, -1] = by_parameter(network, self.symmetry, point) @ self.along.direction(network)
+        slopes = by_parameter(network, self.symmetry, point)
+        matrix[:-1, -1] = slopes @ self.along.direction(network)
         matrix[-1] = self._weights(z.size) * border
         right = np.zeros((z.size, 2))
         right[:-1, 0], right[-1, 1] = -residual, 1.0

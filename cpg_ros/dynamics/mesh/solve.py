@@ -17,7 +17,6 @@ from cpg_ros.dynamics.periodic import NoOrbit, check_values, richer
 from cpg_ros.errors import InputError
 from cpg_ros.integration.simulate import simulate
 from cpg_ros.networks.network import Network, Preset
-from cpg_ros.networks.registry import PRESETS
 from cpg_ros.networks.symmetry import Symmetry
 
 #: Periods the network gets to find its gait, held by a lock of this gain (1/model time).
@@ -135,9 +134,9 @@ def solve(network: Network, gait: str, near: MeshOrbit | None = None) -> MeshOrb
     symmetry = network.symmetry(gait)
     check_values(network, gait)
     if near is None:
-        if gait not in PRESETS[network.name]:
+        if gait not in network.presets():
             raise NoOrbit(f'no preset of {gait} is known to start from')
-        near = from_preset(PRESETS[network.name][gait])
+        near = from_preset(network.presets()[gait])
     if near.network == network and near.symmetry == symmetry:
         return near
     orbit = None
