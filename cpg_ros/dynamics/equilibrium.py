@@ -105,7 +105,7 @@ def odd(network: Network) -> bool:
 
 def named(network: Network, cell: np.ndarray) -> dict[str, float]:
     """Name the variables of a cell: variable -> value."""
-    names = network.variable_names or tuple(f'x{k + 1}' for k in range(network.variables))
+    names = network.states
     return dict(zip(names, map(float, cell), strict=True))
 
 

@@ -17,10 +17,7 @@ from functools import cached_property
 
 import numpy as np
 
-from cpg_ros.dynamics.characteristic import (
-    characteristic_matrix,
-    roots_right_of,
-)
+from cpg_ros.dynamics.characteristic import characteristic_matrix, roots_right_of
 from cpg_ros.dynamics.delay_crossings import delay_crossings
 from cpg_ros.dynamics.equilibrium import equilibrium, everywhere
 from cpg_ros.dynamics.expansion import Expansion
@@ -90,7 +87,7 @@ class HopfPoint:
     @cached_property
     def normal_form(self) -> NormalForm:
         """In model time, mu = value' - value; z belongs to q."""
-        expansion, delay = Expansion(self.network, self.rest), self.network.delay
+        expansion, delay = self._expansion, self.network.delay
         axis, chi, (q, p) = 1j * self.omega, self.block.vector, self._eigenvectors
         one, twice = np.ones_like(chi), character(power(self.block.symmetry, 2))
         still = characteristic_matrix(0.0, *expansion.linear(one), delay)[0]
@@ -102,14 +99,25 @@ class HopfPoint:
         k2 = 0.5 * (p @ (expansion.third(ahead, ahead, back) + 2.0 * second(ahead, flat)
                          + second(back, fast)))
 
-        moves = expansion.heard(np.linalg.solve(still, expansion.along(self.line)), one)
-        now, past = expansion.linear_along(self.line, chi)
-        late = np.exp(-axis * delay)
-        change = (now + past * late) @ q + second(moves, ahead)
-        if self.network.delay_parameter in self.line.names:
-            sign = self.line.signs[self.line.names.index(self.network.delay_parameter)]
+        return NormalForm(self._speed(self.line), complex(k2))
+
+    @cached_property
+    def _expansion(self) -> Expansion:
+        return Expansion(self.network, self.rest)
+
+    def _speed(self, line: ParameterLine) -> complex:
+        """Derivative of the critical root by the value on a line of parameters."""
+        expansion, delay = self._expansion, self.network.delay
+        axis, chi, (q, p) = 1j * self.omega, self.block.vector, self._eigenvectors
+        one, late = np.ones_like(chi), np.exp(-axis * delay)
+        still = characteristic_matrix(0.0, *expansion.linear(one), delay)[0]
+        moves = expansion.heard(np.linalg.solve(still, expansion.along(line)), one)
+        now, past = expansion.linear_along(line, chi)
+        change = (now + past * late) @ q + expansion.second(moves, expansion.heard(q, chi, axis))
+        if self.network.delay_parameter in line.names:
+            sign = line.signs[line.names.index(self.network.delay_parameter)]
             change = change - sign * axis * late * (self.block.past @ q)
-        return NormalForm(complex(p @ change), complex(k2))
+        return complex(p @ change)
 
     @property
     def in_delays(self) -> NormalForm:
@@ -123,24 +131,20 @@ class HopfPoint:
 
     @property
     def slopes(self) -> dict[str, float]:
-        """Derivatives of the critical delay by the other parameters, by name.
+        """Derivatives of the value on the line by the network's other parameters, by name.
 
-        From ``i omega = A + B exp(-i omega tau)``, differentiated: real and imaginary part are
-        two equations for the changes of omega and tau.
+        The critical root stays on the axis: what one parameter moves it by, the line takes back.
         """
-        turn = (1, -1j, -1, 1j)[self.mode.j]
-        b = self.mode.eigenvalue_terms(self.network)[1]
-        past = np.exp(-1j * self.omega * self.tau)
-        left = np.array([1j + 1j * self.tau * b * past, 1j * self.omega * b * past])
-        right = np.array([1.0, 1.0, past * (-1) ** self.mode.k, turn])
-        found = np.linalg.solve(np.array([left.real, left.imag]),
-                                np.array([right.real, right.imag]))[1]
-        return dict(zip(('a', 'b', 'c', 'd'), found.tolist(), strict=True))
+        back = -self.normal_form.k1.real
+        return {name: self._speed(ParameterLine((name,), (1.0,))).real / back
+                for name in self.network.parameters() if name not in self.line.names}
 
     @property
     def drifts(self) -> bool:
-        """Whether the gait's own class has a positive real root at every delay."""
-        return self.mode.j % 2 == 0 and self.mode.eigenvalue_terms(self.network)[1] >= 0.0
+        """Whether the gait's own class has a real root with positive real part as well."""
+        close, block = ON_AXIS * max(1.0, self.omega), self.block
+        roots = roots_right_of(close, block.now, block.past, self.network.delay, block.real)
+        return bool((np.abs(roots.imag) <= close).any())
 
     @property
     def direction(self) -> int:

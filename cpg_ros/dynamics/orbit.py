@@ -5,6 +5,7 @@ which takes any delay, and Gauss collocation on a mesh, which takes any steepnes
 with the same functions; what they solve for are orbits and curves that know what to do.
 """
 
+from collections.abc import Callable
 from types import ModuleType
 from typing import Any
 
@@ -19,7 +20,8 @@ from cpg_ros.networks.network import Network, Preset
 from cpg_ros.networks.parameter_line import ParameterLine
 from cpg_ros.networks.symmetry import Symmetry
 
-__all__ = ['NoOrbit', 'Orbit', 'curve_from_rest', 'solve_beside', 'solve_orbit', 'solve_preset']
+__all__ = ['NoOrbit', 'Orbit', 'curve_from_rest', 'solve_beside', 'solve_from_path', 'solve_orbit',
+           'solve_preset']
 
 
 def _way(network: Network) -> tuple[ModuleType, ModuleType]:
@@ -66,6 +68,22 @@ def solve_beside(network: Network, near: Orbit) -> Orbit:
 def solve_preset(preset: Preset) -> Orbit:
     """Solve for a preset's orbit; errors as in solve_orbit."""
     found: Orbit = _way(preset.network)[0].from_preset(preset)
+    return found
+
+
+def solve_from_path(network: Network, symmetry: Symmetry,
+                    path: Callable[[np.ndarray], np.ndarray], period: float) -> Orbit | None:
+    """Solve for an orbit from a guess; None where Newton's method leads to none.
+
+    Args:
+        network: parameters.
+        symmetry: of the gait.
+        path: states, shape (m, components), as a function of times in cycles, shape (m,), that
+            begin where cell 1 peaks.
+        period: in model time.
+
+    """
+    found: Orbit | None = _way(network)[0].from_path(network, symmetry, path, period)
     return found
 
 

@@ -11,7 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from cpg_ros.dynamics.hopf import HopfPoint, critical_point
+from cpg_ros.dynamics.hopf import HopfPoint, first_hopf
 from cpg_ros.dynamics.periodic import NoOrbit
 from cpg_ros.inversion.free_parameters import Free, with_values, within_hopf_set
 from cpg_ros.inversion.trust_region import Evaluate, Trial, descend
@@ -44,7 +44,7 @@ class Coordinates:
 
     def _onset(self, values: np.ndarray) -> HopfPoint:
         there = with_values(self._network, self.free, values[:len(self.free)])
-        point = critical_point(there, self._gait) if np.isfinite(values).all() else None
+        point = first_hopf(there, self._gait) if np.isfinite(values).all() else None
         if point is None:
             known = there.as_dict()
             said = ', '.join(f'{name} {known[name]:g}' for name in there.needed)
@@ -55,14 +55,14 @@ class Coordinates:
         """Coordinates of values; NoOrbit where the gait is born at no delay."""
         found = np.array(values, dtype=float)
         if not self.straight:
-            found[self._delay] /= self._onset(found).tau
+            found[self._delay] /= self._onset(found).value
         return found
 
     def values(self, coordinates: np.ndarray) -> np.ndarray:
         """Values at coordinates; NoOrbit as in of, or where the delay leaves its range."""
         found = np.array(coordinates, dtype=float)
         if not self.straight:
-            found[self._delay] *= self._onset(found).tau
+            found[self._delay] *= self._onset(found).value
             one = self.free[self._delay]
             if not one.low <= found[self._delay] <= one.high:
                 raise NoOrbit(f'{one.name} {found[self._delay]:g} is not within {one.low:g} to '
@@ -77,7 +77,7 @@ class Coordinates:
             slopes = point.slopes
             for j, one in enumerate(self.free):
                 found[k, j] = coordinates[k] * slopes.get(one.name, 0.0)
-            found[k, k] = point.tau
+            found[k, k] = point.value
         return found
 
     def moved(self, values: np.ndarray, step: np.ndarray) -> np.ndarray:

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cpg_ros.dynamics.delayed_orbit import DelayedOrbit, solve
+from cpg_ros.dynamics.orbit import Orbit, solve_orbit
 from cpg_ros.dynamics.periodic import NoOrbit
 from cpg_ros.errors import InputError
 from cpg_ros.inversion.free_parameters import free_numbers, with_values
@@ -35,7 +35,7 @@ class CycleFit:
 
     """
 
-    orbit: DelayedOrbit
+    orbit: Orbit
     values: np.ndarray
     cost: float
     gradient: np.ndarray
@@ -53,7 +53,7 @@ class CycleFit:
         return self.trial.converged
 
 
-def cycle_samples(orbit: DelayedOrbit, theta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def cycle_samples(orbit: Orbit, theta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Sample an orbit's cells over the cycle, with derivatives by the network's parameters.
 
     Args:
@@ -101,12 +101,12 @@ def fit_cycle(samples: np.ndarray, theta: np.ndarray, start: Delayed, gait: str,
         if not one.low < value < one.high:
             raise InputError(f'{one.name} {value:g} to start from is not between {one.low:g} '
                              f'and {one.high:g}')
-    solved: dict[bytes, DelayedOrbit] = {}
+    solved: dict[bytes, Orbit] = {}
 
-    def orbit_at(values: np.ndarray) -> DelayedOrbit:
+    def orbit_at(values: np.ndarray) -> Orbit:
         key = values.tobytes()
         if key not in solved:
-            found = solve(with_values(start, free, values), gait)
+            found = solve_orbit(with_values(start, free, values), gait)
             solved.clear()
             solved[key] = found
         return solved[key]

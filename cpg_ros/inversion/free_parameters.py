@@ -6,6 +6,7 @@ from typing import TypeVar
 
 import numpy as np
 
+from cpg_ros.dynamics.hopf import first_hopf
 from cpg_ros.errors import InputError
 from cpg_ros.networks.network import Network
 
@@ -101,8 +102,8 @@ def within_hopf_set(network: Network, gait: str, one: Free) -> Free:
         there = with_values(network, (one,), (value,))
         if there.delay <= 0.0 or there.symmetry(gait) != network.symmetry(gait):
             return -1.0
-        point = critical_point(there, gait)
-        return -1.0 if point is None or point.drifts else there.delay - point.tau
+        point = first_hopf(there, gait)
+        return -1.0 if point is None or point.drifts else there.delay - point.value
 
     here, ends = one.value(network), []
     for end in (one.low, one.high):

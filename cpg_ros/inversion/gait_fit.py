@@ -6,7 +6,7 @@ from functools import cached_property
 import numpy as np
 
 from cpg_ros.dynamics.gait_assessment import GaitAssessment
-from cpg_ros.dynamics.hopf import HopfPoint, critical_point
+from cpg_ros.dynamics.hopf import HopfPoint, first_hopf
 from cpg_ros.dynamics.periodic import Orbit
 from cpg_ros.inversion.identifiability import Estimate
 from cpg_ros.inversion.trust_region import Trial
@@ -126,7 +126,7 @@ class Fit:
     @cached_property
     def hopf(self) -> HopfPoint | None:
         """Where the gait is born as the delay grows; None for networks without delay."""
-        return critical_point(self.network, self.gait)
+        return first_hopf(self.network, self.gait)
 
     @cached_property
     def verdict(self) -> GaitAssessment:

@@ -5,9 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cpg_ros.dynamics import cell_orbit
-from cpg_ros.dynamics.mesh_orbit import MeshOrbit
-from cpg_ros.dynamics.orbit import solve_orbit
+from cpg_ros.dynamics.orbit import solve_beside, solve_orbit
 from cpg_ros.dynamics.periodic import NoOrbit, Orbit
 from cpg_ros.inversion.coordinates import Coordinates
 from cpg_ros.inversion.fit_data import Joints
@@ -118,10 +116,11 @@ class Problem:
         if key not in self._solved:
             network = self._network(values)
             near = self._nearest(values)
-            if isinstance(near, MeshOrbit):
-                # A step too long for Newton's method is one too long for the trust region.
-                return self._keep(values, cell_orbit.beside(network, near))
-            return self._keep(values, solve_orbit(network, self.gait, near))
+            if near is None or network.delay_parameter:
+                # With a delay the way from the onset is as short as that from a neighbour.
+                return self._keep(values, solve_orbit(network, self.gait, near))
+            # A step too long for Newton's method is one too long for the trust region.
+            return self._keep(values, solve_beside(network, near))
         return self._solved[key]
 
     def _nearest(self, values: np.ndarray) -> Orbit | None:

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.optimize import minimize_scalar
 
-from cpg_ros.dynamics.delayed_orbit import DelayedOrbit, solve
+from cpg_ros.dynamics.orbit import Orbit, solve_orbit
 from cpg_ros.errors import InputError
 from cpg_ros.inversion.cycle_fit import CycleFit, cycle_samples, fit_cycle
 from cpg_ros.inversion.fit_data import MeanCycle
@@ -96,7 +96,7 @@ def paper_fits(cycle: MeanCycle, cells: Mapping[str, int], network: Network, gai
         if name not in free:
             raise InputError(f"start: '{name}' is not free")
     begins = [replace(network, **start) for start in starts]
-    theta = theta + _shift(solve(begins[0], gait), theta, samples)
+    theta = theta + _shift(solve_orbit(begins[0], gait), theta, samples)
     found = []
     for begin in begins:
         values = begin.as_dict()
@@ -106,7 +106,7 @@ def paper_fits(cycle: MeanCycle, cells: Mapping[str, int], network: Network, gai
     return found
 
 
-def _shift(orbit: DelayedOrbit, theta: np.ndarray, samples: np.ndarray) -> float:
+def _shift(orbit: Orbit, theta: np.ndarray, samples: np.ndarray) -> float:
     """Phase of an orbit, cycles, at which its cells come nearest to samples."""
     def gap(shift: float) -> float:
         return float(np.sum((cycle_samples(orbit, theta + shift)[0] - samples)**2))

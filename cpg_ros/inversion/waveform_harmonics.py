@@ -11,8 +11,6 @@ from functools import lru_cache
 
 import numpy as np
 
-from cpg_ros.dynamics.delayed_orbit import DelayedOrbit
-from cpg_ros.dynamics.mesh_orbit import MeshOrbit
 from cpg_ros.dynamics.periodic import Orbit
 from cpg_ros.motion.phase_readout import POINTS, evaluate, smooth_terms
 
@@ -88,25 +86,24 @@ def signals(orbit: Orbit, harmonics: int) -> Signals:
         harmonics: of a Morris-Lecar cell's waveform that joints follow.
 
     """
-    if isinstance(orbit, DelayedOrbit):
-        return _whole(orbit)
-    if isinstance(orbit, MeshOrbit):
-        waves = [_smooth(orbit, wave, harmonics) for wave in range(int(orbit.waves.max()) + 1)]
-        return Signals(*(np.array(parts) for parts in zip(*waves, strict=True)))
-    raise TypeError(f'an orbit of the kind {type(orbit).__name__} has no derivatives')
+    one = _whole if orbit.network.readout == 'waveform' else _smooth
+    waves = [one(orbit, wave, harmonics) for wave in range(int(orbit.waves.max()) + 1)]
+    return Signals(*(np.array(parts) for parts in zip(*waves, strict=True)))
 
 
-def _whole(orbit: DelayedOrbit) -> Signals:
-    """The waveform over its peak, which is its value at node 0 and stays there."""
-    terms = np.fft.rfft(orbit.values) / orbit.values.size
-    slopes = np.fft.rfft(orbit.d_values, axis=0) / orbit.values.size
+def _whole(orbit: Orbit, wave: int, harmonics: int) -> tuple[np.ndarray, np.ndarray]:
+    """The waveform over the peak of cell 1, which stays at phase 0."""
+    theta = np.arange(orbit.samples) / orbit.samples
+    terms = np.fft.rfft(orbit.waveform(theta, 0, wave)) / theta.size
+    slopes = np.fft.rfft(orbit.d_waveform(theta, wave), axis=0) / theta.size
     terms[1:] *= 2.0
     slopes[1:] *= 2.0
-    slopes = (slopes - np.multiply.outer(terms / orbit.peak, orbit.d_values[0])) / orbit.peak
-    return Signals(terms[None] / orbit.peak, slopes[None])
+    d_peak = orbit.d_waveform(np.zeros(1))[0]
+    return (terms / orbit.peak,
+            (slopes - np.multiply.outer(terms / orbit.peak, d_peak)) / orbit.peak)
 
 
-def _smooth(orbit: MeshOrbit, wave: int, harmonics: int) -> tuple[np.ndarray, np.ndarray]:
+def _smooth(orbit: Orbit, wave: int, harmonics: int) -> tuple[np.ndarray, np.ndarray]:
     """The first harmonics from -1 to 1; where they end moves the middle and half the range."""
     theta = np.arange(POINTS) / POINTS
     values = orbit.waveform(theta, 0, wave)

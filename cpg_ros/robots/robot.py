@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from cpg_ros.errors import InputError
 from cpg_ros.networks.registry import NETWORKS
 
 #: Harmonics of a Morris-Lecar cell that joints follow, if the file does not say.

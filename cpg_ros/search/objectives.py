@@ -11,9 +11,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from cpg_ros.dynamics.cell_orbit import richer
 from cpg_ros.dynamics.floquet import multipliers
-from cpg_ros.dynamics.mesh_newton import collocate
+from cpg_ros.dynamics.orbit import solve_from_path
+from cpg_ros.dynamics.periodic import richer
 from cpg_ros.gaits.waveform_comparison import lag, shape_difference, shifted, steadiness
 from cpg_ros.integration.simulate import Trajectory
 from cpg_ros.networks.network import Network
@@ -164,7 +164,7 @@ def _simulated(network: Network, gait: str, run: Trajectory) -> tuple[Score, Set
 def _proven(score: Score, cycle: SettledCycle, gait: str) -> Score:
     """Solve for the exact orbit of a set that ends near its gait, from its cycle."""
     symmetry = score.network.symmetry(gait)
-    orbit = collocate(score.network, symmetry, cycle, cycle.period)
+    orbit = solve_from_path(score.network, symmetry, cycle, cycle.period)
     if orbit is None or richer(orbit) or abs(orbit.period / cycle.period - 1.0) > SAME_PERIOD:
         # What is near the gait but not on it has no right to the estimate.
         return replace(score, stability=max(1.0, score.stability))

@@ -4,10 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cpg_ros.dynamics.cell_orbit import from_preset
 from cpg_ros.dynamics.floquet import multipliers
-from cpg_ros.dynamics.mesh_orbit import MeshOrbit
-from cpg_ros.dynamics.periodic import NoOrbit
+from cpg_ros.dynamics.orbit import solve_preset
+from cpg_ros.dynamics.periodic import NoOrbit, Orbit
 from cpg_ros.errors import CpgError
 from cpg_ros.gaits.waveform_comparison import shape_difference
 from cpg_ros.integration.simulate import Trajectory, simulate
@@ -47,18 +46,18 @@ class Chosen:
     """
 
     preset: Preset
-    orbit: MeshOrbit
+    orbit: Orbit
     errors: np.ndarray
     leading: float
     differences: tuple[float, float]
 
 
-def orbit_signals(orbit: MeshOrbit, points: int = POINTS) -> np.ndarray:
+def orbit_signals(orbit: Orbit, points: int = POINTS) -> np.ndarray:
     """States on even points of an orbit's cycle, shape (points, components)."""
     return orbit(np.arange(points) / points * orbit.period)
 
 
-def exact_preset(preset: Preset) -> tuple[Preset, MeshOrbit]:
+def exact_preset(preset: Preset) -> tuple[Preset, Orbit]:
     """Move a preset's start onto its exact orbit, to where cell 1 peaks.
 
     Returns:
@@ -68,14 +67,14 @@ def exact_preset(preset: Preset) -> tuple[Preset, MeshOrbit]:
         NoOrbit: it has no such orbit.
 
     """
-    orbit = from_preset(preset)
+    orbit = solve_preset(preset)
     start = orbit(np.array(0.0)).round(DIGITS)
     rounded = Preset(preset.gait, preset.network, tuple(start.tolist()),
                      round(orbit.period, DIGITS))
-    return rounded, from_preset(rounded)
+    return rounded, solve_preset(rounded)
 
 
-def survives(orbit: MeshOrbit, seed: int = 0) -> bool:
+def survives(orbit: Orbit, seed: int = 0) -> bool:
     """Tell whether a gait lasts in its free network under noise, started from its orbit."""
     network, symmetry = orbit.network, orbit.symmetry
     starts = np.repeat(orbit(np.zeros(1)), RUNS, axis=0)

@@ -84,10 +84,8 @@ def _guess(network: Network, gait: str) -> tuple[np.ndarray, float] | None:
     point = first_hopf(network, gait)
     if point is None or (network.delay - point.value) * point.normal_form.side <= 0.0:
         return None
-    states = point.path(network.delay, THETA)
-    columns = [variable * network.cells + cell for cell in symmetry.first
-               for variable in range(network.variables)]
-    return states[:, columns].T.copy(), point.period(network.delay)
+    return (_rows(network, symmetry, point.path(network.delay, THETA)),
+            point.period(network.delay))
 
 
 def _accepted(orbit: FourierOrbit | None) -> FourierOrbit | None:
@@ -130,6 +128,22 @@ def beside(network: Network, near: FourierOrbit) -> FourierOrbit:
     if found is None or not 0.5 < found.period / near.period < 2.0:
         raise NoOrbit('no orbit next to the known one')
     return found
+
+
+def from_path(network: Network, symmetry: Symmetry, path: Callable[[np.ndarray], np.ndarray],
+              period: float) -> FourierOrbit | None:
+    """Solve for an orbit from a guess, states over times in cycles; None where none is found."""
+    try:
+        return _accepted(newton(network, symmetry, _rows(network, symmetry, path(THETA)), period))
+    except NoOrbit:
+        return None
+
+
+def _rows(network: Network, symmetry: Symmetry, states: np.ndarray) -> np.ndarray:
+    """Pick the waveforms out of states, a row for each variable of each wave."""
+    columns = [variable * network.cells + cell for cell in symmetry.first
+               for variable in range(network.variables)]
+    return states[:, columns].T.copy()
 
 
 def from_preset(preset: Preset) -> FourierOrbit:

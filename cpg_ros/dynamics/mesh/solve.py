@@ -11,7 +11,8 @@ from functools import lru_cache
 
 import numpy as np
 
-from cpg_ros.dynamics.mesh.newton import collocate, predicted
+from cpg_ros.dynamics.mesh.newton import collocate as from_path
+from cpg_ros.dynamics.mesh.newton import predicted
 from cpg_ros.dynamics.mesh.orbit import MeshOrbit
 from cpg_ros.dynamics.periodic import NoOrbit, check_values, richer
 from cpg_ros.errors import InputError
@@ -67,7 +68,7 @@ def from_preset(preset: Preset) -> MeshOrbit:
     check_values(network, preset.gait)
     symmetry = network.symmetry(preset.gait)
     run = simulate(network, start, 1.05 * preset.period, network.step, progress=False)
-    orbit = _accepted(collocate(network, symmetry, lambda theta: run(theta * preset.period),
+    orbit = _accepted(from_path(network, symmetry, lambda theta: run(theta * preset.period),
                                 preset.period))
     if orbit is None:
         orbit = _by_itself(network, symmetry, start, preset.period)
@@ -79,7 +80,7 @@ def from_preset(preset: Preset) -> MeshOrbit:
 def _by_itself(network: Network, symmetry: Symmetry, start: np.ndarray, period: float
                ) -> MeshOrbit | None:
     found = settled(network, symmetry, start, period)
-    return None if found is None else _accepted(collocate(network, symmetry, *found))
+    return None if found is None else _accepted(from_path(network, symmetry, *found))
 
 
 def _on_cycles(orbit: MeshOrbit) -> Callable[[np.ndarray], np.ndarray]:
@@ -94,7 +95,7 @@ def _followed(known: MeshOrbit, network: Network) -> tuple[MeshOrbit | None, flo
         share = min(1.0, reached + step)
         here = replace(network, **{key: start[key] + share * (end[key] - start[key])
                                    for key in start})  # type: ignore[type-var]
-        found = _accepted(collocate(here, known.symmetry, _on_cycles(orbit), orbit.period))
+        found = _accepted(from_path(here, known.symmetry, _on_cycles(orbit), orbit.period))
         # A jump to another branch would be no continuation.
         if found is None or not 0.5 < found.period / orbit.period < 2.0:
             step *= 0.5
@@ -112,7 +113,7 @@ def beside(network: Network, near: MeshOrbit) -> MeshOrbit:
     """
     found = _accepted(predicted(network, near))
     if found is None:
-        found = _accepted(collocate(network, near.symmetry, _on_cycles(near), near.period))
+        found = _accepted(from_path(network, near.symmetry, _on_cycles(near), near.period))
     if found is None or not 0.5 < found.period / near.period < 2.0:
         raise NoOrbit('no orbit next to the known one')
     return found
