@@ -10,12 +10,12 @@ fold, where it turns round, is a point like all others.
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from scipy.optimize import brentq
 
-from cpg_ros.dynamics.periodic import NoOrbit
+from cpg_ros.errors import CpgError
 
 #: Newton stops at steps this short; what is left then is of the order of its square.
 TOLERANCE = 1e-9
@@ -26,6 +26,10 @@ FIRST, SHORTEST, LONGEST = 0.02, 1e-6, 0.2
 ALIGNED = 0.9
 #: No step may take more than this share of the amplitude, so that none leaps over the rest state.
 SHARE = 0.6
+
+
+class NoOrbit(CpgError):
+    """The parameter set has no such gait; the message says what stands against it."""
 
 
 class Curve(Protocol):
@@ -46,6 +50,9 @@ class Curve(Protocol):
 
     def amplitude(self, z: np.ndarray) -> float:
         """Half the range of what is continued; zero at a bifurcation from rest."""
+
+    def orbit(self, z: np.ndarray) -> Any:
+        """Complete a solution: the orbit, with its derivatives and its residual."""
 
     def renewed(self, z: np.ndarray, border: np.ndarray, again: bool
                 ) -> tuple['Curve', np.ndarray, np.ndarray] | None:

@@ -11,22 +11,15 @@ import numpy as np
 
 from cpg_ros.dynamics import arclength
 from cpg_ros.dynamics.arclength import Place
-from cpg_ros.dynamics.cell_orbit import richer
-from cpg_ros.dynamics.curves import FourierCurve, MeshCurve
-from cpg_ros.dynamics.delayed_orbit import NODES, DelayedOrbit
-from cpg_ros.dynamics.mesh_newton import Reduced, Solution, sampled
-from cpg_ros.dynamics.mesh_orbit import MeshOrbit
-from cpg_ros.dynamics.periodic import NoOrbit
+from cpg_ros.dynamics.orbit import curve_from_rest
+from cpg_ros.dynamics.periodic import NoOrbit, Orbit, richer
 from cpg_ros.errors import InputError
-from cpg_ros.networks.delayed import Delayed, Mode
 from cpg_ros.networks.network import Network
 from cpg_ros.networks.parameter_line import ParameterLine
 from cpg_ros.networks.symmetry import Symmetry
 
 #: Below this amplitude an orbit is as good as its Hopf point.
 REST = 2e-3
-#: Intervals of the first mesh at a Hopf point; it is made finer at once if need be.
-INTERVALS = 20
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,7 +34,7 @@ class BranchPoint:
     """
 
     value: float
-    orbit: DelayedOrbit | MeshOrbit
+    orbit: Orbit
     place: Place = field(repr=False)
 
     @property
@@ -107,7 +100,7 @@ class Branch:
         """Half the range of cell 1's first variable at the points, shape (points,)."""
         return np.array([point.amplitude for point in self.points])
 
-    def at(self, value: float) -> tuple[DelayedOrbit | MeshOrbit, ...]:
+    def at(self, value: float) -> tuple[Orbit, ...]:
         """All orbits of the branch at a value, in its order; at a fold it may be one or two.
 
         Raises:
@@ -131,7 +124,7 @@ class Branch:
         return tuple(found)
 
 
-def follow(orbit: DelayedOrbit | MeshOrbit, along: ParameterLine, low: float, high: float, *,
+def follow(orbit: Orbit, along: ParameterLine, low: float, high: float, *,
            first_step: float = arclength.FIRST, longest_step: float = arclength.LONGEST,
            most: int = 200, both: bool = True, longest: float = 20.0) -> Branch:
     """Follow a gait's orbit along a line of parameters, past folds.
@@ -156,15 +149,7 @@ def follow(orbit: DelayedOrbit | MeshOrbit, along: ParameterLine, low: float, hi
     """
     _check(orbit.network, orbit.symmetry, along, low, high)
     value, scales = along.value(orbit.network), (orbit.period, high - low)
-    curve: FourierCurve | MeshCurve
-    if isinstance(orbit, DelayedOrbit):
-        curve = FourierCurve(orbit.network, orbit.symmetry, along, scales)  # type: ignore[arg-type]
-        z = np.array([*orbit.values, orbit.period, value])
-    else:
-        curve = MeshCurve(orbit.network, orbit.symmetry, along, scales, orbit.mesh)
-        ends = np.vstack([orbit.coefficients[0], orbit.coefficients[:, -1].sum(axis=0)])
-        length = orbit.period / orbit.symmetry.order
-        z = curve.pack(Solution(orbit.mesh, ends, orbit.stages, length), length, value)
+    curve, z = orbit.curve(along, scales)
     # At a fold the value cannot be held, but the period can.
     start = (arclength.resolved(curve, z, arclength.held(z.size, -1))
              or arclength.resolved(curve, z, arclength.held(z.size, -2)))
@@ -187,9 +172,9 @@ def follow(orbit: DelayedOrbit | MeshOrbit, along: ParameterLine, low: float, hi
                   (begin, end))
 
 
-def from_hopf(network: Network, symmetry: Mode | Symmetry, omega: float,
+def from_hopf(network: Network, symmetry: Symmetry, omega: float,
               along: ParameterLine, low: float, high: float, *,
-              stand: np.ndarray | None = None, vector: np.ndarray | None = None,
+              rest: np.ndarray | None = None, vector: np.ndarray | None = None,
               amplitude: float = 0.02, first_step: float = arclength.FIRST,
               longest_step: float = arclength.LONGEST, most: int = 200, longest: float = 20.0
               ) -> Branch:
@@ -199,14 +184,15 @@ def from_hopf(network: Network, symmetry: Mode | Symmetry, omega: float,
     point is better conditioned than the reverse.
 
     Args:
-        network: at the Hopf point; of the delayed network any Hopf point of any mode.
-        symmetry: of the critical mode.
+        network: at the Hopf point.
+        symmetry: of the critical class.
         omega: its angular frequency, rad per model time.
         along: the line.
         low: least value.
         high: greatest value.
-        stand: equilibrium, shape (components,); not for the delayed network, where it is 0.
-        vector: critical eigenvector, complex, shape (components,); not for the delayed network.
+        rest: equilibrium, shape (components,); by default 0.
+        vector: critical eigenvector, complex, shape (components,); by default that of cells with
+            one variable, which their phases give.
         amplitude: of the first orbit.
         first_step: arclength of the first step, as in follow.
         longest_step: arclength of any step.
@@ -214,27 +200,24 @@ def from_hopf(network: Network, symmetry: Mode | Symmetry, omega: float,
         longest: period, over that of the Hopf point, at which the branch ends.
 
     Raises:
-        ValueError: the network is not on the line or not in the range, the line breaks the
+        InputError: the network is not on the line or not in the range, the line breaks the
             gait's symmetry, or the eigenvector does not have it.
         NoOrbit: Newton's method finds no orbit of this amplitude.
 
     """
     _check(network, symmetry, along, low, high)
     value, period = along.value(network), float(2.0 * np.pi / omega)
-    scales = (period, high - low)
-    curve: FourierCurve | MeshCurve
-    if isinstance(network, Delayed):
-        curve = FourierCurve(network, symmetry, along, scales)  # type: ignore[arg-type]
-        rest, border = np.zeros(NODES + 2), np.zeros(NODES + 2)
-        border[:-2] = np.cos(2.0 * np.pi * np.arange(NODES) / NODES)
-        rest[-2:] = period, value
-    else:
-        if stand is None or vector is None:
-            raise ValueError('a network without delay needs the stand and the eigenvector')
-        curve = MeshCurve(network, symmetry, along, scales,  # type: ignore[arg-type]
-                          np.linspace(0.0, 1.0, INTERVALS + 1))
-        rest, border = _harmonic(curve, stand, vector, period)
-    start = arclength.resolved(curve, rest + amplitude * border, border)
+    rest = np.zeros(network.components) if rest is None else rest
+    if vector is None:
+        if network.variables > 1:
+            raise InputError('cells of several variables need the eigenvector')
+        vector = np.exp(2j * np.pi * symmetry.phases)
+    # Cell 1 peaks at phase 0.
+    vector = vector / vector[0]
+    _check_vector(vector, symmetry, network)
+    curve, still, border = curve_from_rest(network, symmetry, along, (period, high - low), rest,
+                                           vector, period)
+    start = arclength.resolved(curve, still + amplitude * border, border)
     if start is None:
         raise NoOrbit(f'no orbit of amplitude {amplitude:g} was found near {along} {value:g}')
     points, turns, end = _run(start, (low, high, longest * period), {
@@ -244,36 +227,18 @@ def from_hopf(network: Network, symmetry: Mode | Symmetry, omega: float,
                   (End('rest', value, period), end))
 
 
-def _harmonic(curve: MeshCurve, stand: np.ndarray, vector: np.ndarray, period: float
-              ) -> tuple[np.ndarray, np.ndarray]:
-    """The stand as a point of the curve, and the critical oscillation, of amplitude 1."""
-    symmetry = curve.symmetry
-    reduced = Reduced(curve.network, symmetry)
-    cells, variables = curve.network.cells, curve.network.variables
-    # Cell 1 peaks at phase 0.
-    vector = vector / vector[0]
+def _check_vector(vector: np.ndarray, symmetry: Symmetry, network: Network) -> None:
+    blocks = np.arange(network.variables)[:, None] * network.cells
     for name, shift in symmetry.shifts:
-        image = np.concatenate([np.array(symmetry.group.elements[name]) + k * cells
-                                for k in range(variables)])
+        image = (np.array(symmetry.group.elements[name]) + blocks).ravel()
         turned = vector[image] - vector * np.exp(2j * np.pi * float(shift))
         if not np.abs(turned).max() <= 1e-6 * np.abs(vector).max():
-            raise ValueError(f'the eigenvector does not have the symmetry: {name} shifts it by '
+            raise InputError(f'the eigenvector does not have the symmetry: {name} shifts it by '
                              f'something else than {shift}')
-
-    def wave(places: np.ndarray) -> np.ndarray:
-        turns = np.exp(2j * np.pi * places / symmetry.order)
-        return (turns[:, None] * vector[reduced.kept]).real
-
-    def still(places: np.ndarray) -> np.ndarray:
-        return np.tile(stand[reduced.kept], (places.size, 1))
-
-    length, value = period / symmetry.order, curve.along.value(curve.network)
-    return (curve.pack(sampled(still, curve.mesh, 1.0), length, value),
-            curve.pack(sampled(wave, curve.mesh, 1.0), 0.0, 0.0))
 
 
 def _point(place: Place) -> BranchPoint:
-    return BranchPoint(place.value, place.curve.orbit(place.z), place)  # type: ignore[attr-defined]
+    return BranchPoint(place.value, place.curve.orbit(place.z), place)
 
 
 def _run(start: Place, limits: tuple[float, float, float], steps: dict
@@ -289,7 +254,7 @@ def _run(start: Place, limits: tuple[float, float, float], steps: dict
             return 'rest'
         if orbit.period > longest:
             return 'period'
-        return 'symmetry' if isinstance(orbit, MeshOrbit) and richer(orbit) else ''
+        return 'symmetry' if richer(orbit) else ''
 
     turns, why = arclength.follow(start, low, high, visit, **steps)
     last = points[-1] if points else _point(start)
@@ -304,16 +269,15 @@ def _run(start: Place, limits: tuple[float, float, float], steps: dict
     return points, turns, End(why, value, period)
 
 
-def _check(network: Network, symmetry: Mode | Symmetry, along: ParameterLine, low: float,
+def _check(network: Network, symmetry: Symmetry, along: ParameterLine, low: float,
            high: float) -> None:
     value = along.value(network)
     if along.at(network, value) != network:
         raise InputError(f'the network is not on the line {along}')
     if not low <= value <= high:
         raise InputError(f'{along} {value:g} is not from {low:g} to {high:g}')
-    if isinstance(symmetry, Symmetry):
-        other = along.at(network, high if value != high else low).as_dict()
-        for family in network.families(symmetry):
-            if len({other[name] for name in family}) > 1:
-                raise InputError(f'{along} breaks the symmetry: it needs {", ".join(family)} '
-                                 f'to be equal')
+    other = along.at(network, high if value != high else low).as_dict()
+    for family in network.families(symmetry):
+        if len({other[name] for name in family}) > 1:
+            raise InputError(f'{along} breaks the symmetry: it needs {", ".join(family)} '
+                             f'to be equal')

@@ -9,17 +9,14 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import brentq
 
-from cpg_ros.dynamics.delay_floquet import transverse, variation
-from cpg_ros.dynamics.delayed_orbit import DelayedOrbit
-from cpg_ros.dynamics.mesh_floquet import mesh_multipliers
-from cpg_ros.dynamics.mesh_orbit import MeshOrbit
 from cpg_ros.dynamics.periodic import Orbit
-from cpg_ros.networks.delayed import default_symmetry_gain
 
 #: A multiplier from here on up is 1 as far as can be told.
 ATTRACTS = 1.0 - 1e-7
 #: Gains between none and the bound among which the smallest that is enough is looked for.
 GAINS = 8
+#: Gains that are tried where no bound is known.
+MOST_GAINS = 40
 
 
 @dataclass(frozen=True)
@@ -64,11 +61,6 @@ class Multipliers:
         return max(self.leading_within, self.leading_transverse)
 
 
-def within_class(orbit: DelayedOrbit) -> float:
-    """Return the modulus of the leading multiplier within the class but the trivial one."""
-    return float(np.abs(_parted(variation(orbit)[1])[0]).max(initial=0.0))
-
-
 def multipliers(orbit: Orbit, gain: float = 0.0) -> Multipliers:
     """Compute the multipliers from the variational equation along the orbit.
 
@@ -77,16 +69,14 @@ def multipliers(orbit: Orbit, gain: float = 0.0) -> Multipliers:
         gain: of a symmetry lock, 1/model time.
 
     """
-    if isinstance(orbit, DelayedOrbit):
-        equation, inside = variation(orbit)
-        outside = transverse(equation, orbit.symmetry, gain)
-    elif isinstance(orbit, MeshOrbit):
-        inside, outside = mesh_multipliers(orbit)
-        outside = outside * np.exp(-gain * orbit.period)
-    else:
-        raise TypeError(f'multipliers of {type(orbit).__name__} are not known')
-    rest, trivial = _parted(inside)
+    rest, trivial = _parted(orbit.multipliers_within)
+    outside = orbit.multipliers_transverse(gain)
     return Multipliers(orbit.period, gain, _sorted(rest), _sorted(outside), trivial)
+
+
+def leading_within(orbit: Orbit) -> float:
+    """Return the modulus of the leading multiplier within the class but the trivial one."""
+    return float(np.abs(_parted(orbit.multipliers_within)[0]).max(initial=0.0))
 
 
 def _sorted(values: np.ndarray) -> np.ndarray:
@@ -101,21 +91,38 @@ def _parted(inside: np.ndarray) -> tuple[np.ndarray, complex]:
 
 def smallest_gain(orbit: Orbit) -> float:
     """Return the symmetry gain above which every transverse disturbance decays, 1/model time."""
-    if isinstance(orbit, MeshOrbit):
-        largest = multipliers(orbit).leading_transverse
-        return max(0.0, float(np.log(largest)) / orbit.period) if largest > 0.0 else 0.0
-    if not isinstance(orbit, DelayedOrbit):
-        raise TypeError(f'multipliers of {type(orbit).__name__} are not known')
-    equation, _ = variation(orbit)
-
     def growth(gain: float) -> float:
         """Logarithm of the leading transverse multiplier."""
-        return float(np.log(np.abs(transverse(equation, orbit.symmetry, gain)).max()))
+        largest = np.abs(orbit.multipliers_transverse(gain)).max(initial=0.0)
+        return float(np.log(largest)) if largest > 0.0 else -np.inf
 
-    # With a delay a lock need not help evenly: from the bound, which is enough, downward.
-    enough = default_symmetry_gain(orbit.network, rate=0.0)
+    if not orbit.network.delay:
+        # Transverse multipliers shrink by exp(-g T) exactly.
+        return max(0.0, growth(0.0) / orbit.period)
+    # With a delay a lock need not help evenly: from one that is enough downward.
+    enough = sufficient_gain(orbit, 0.0)
     for gain in enough * np.arange(GAINS - 1, -1, -1) / GAINS:
         if growth(gain) >= 0.0:
             return float(brentq(growth, gain, enough, xtol=1e-10))
         enough = gain
     return 0.0
+
+
+def sufficient_gain(orbit: Orbit, rate: float) -> float:
+    """Return a symmetry gain with which transverse disturbances decay at a rate, 1/model time.
+
+    The network's own bound, which holds in any state of it, also while one gait gives way to
+    another; or, where none is known, from the orbit's multipliers.
+    """
+    bound = orbit.network.sufficient_gain(rate)
+    if bound is not None:
+        return bound
+    gain = 0.0
+    for _ in range(MOST_GAINS):
+        largest = float(np.abs(orbit.multipliers_transverse(gain)).max(initial=0.0))
+        growth = np.log(largest) / orbit.period + rate if largest > 0.0 else -np.inf
+        if growth <= 1e-9:
+            break
+        # Without a delay this is exact; with one, a start.
+        gain += float(growth) if not orbit.network.delay else max(float(growth), 0.5 * gain)
+    return gain

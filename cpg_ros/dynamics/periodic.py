@@ -3,19 +3,21 @@
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 
-from cpg_ros.errors import CpgError
+from cpg_ros.dynamics.arclength import Curve, NoOrbit
+from cpg_ros.errors import InputError
 from cpg_ros.networks.network import Network
+from cpg_ros.networks.parameter_line import ParameterLine
+from cpg_ros.networks.symmetry import Symmetry
+
+__all__ = ['NoOrbit', 'Orbit', 'check_values', 'richer']
 
 #: Points of a cycle among which extremes are looked for before they are refined.
 POINTS = 1024
-
-
-class NoOrbit(CpgError):
-    """The parameter set has no such gait; the message says what stands against it."""
+#: Two signals this close, over their range, are one.
+SAME = 1e-4
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,7 +38,7 @@ class Orbit(ABC):
     """
 
     network: Network
-    symmetry: Any
+    symmetry: Symmetry
     period: float
     residual: float
     d_period: np.ndarray
@@ -45,6 +47,39 @@ class Orbit(ABC):
     def waveform(self, theta: np.ndarray, order: int = 0, wave: int = 0, variable: int = 0
                  ) -> np.ndarray:
         """A waveform, or its derivative in theta of order 1 or 2, at theta in cycles."""
+
+    @abstractmethod
+    def d_waveform(self, theta: np.ndarray, wave: int = 0, variable: int = 0) -> np.ndarray:
+        """Derivatives of a waveform by the parameters, shape theta.shape + (parameters,)."""
+
+    @property
+    @abstractmethod
+    def samples(self) -> int:
+        """Even points of a cycle that tell all there is to a waveform."""
+
+    @abstractmethod
+    def curve(self, line: ParameterLine, scales: tuple[float, float]) -> tuple[Curve, np.ndarray]:
+        """The gait's orbits along a line of parameters, and the place of this one among them.
+
+        Args:
+            line: through the orbit's network.
+            scales: against which periods and values on the line are measured.
+
+        """
+
+    @property
+    @abstractmethod
+    def multipliers_within(self) -> np.ndarray:
+        """Floquet multipliers within the gait's class, 1 among them."""
+
+    @abstractmethod
+    def multipliers_transverse(self, gain: float = 0.0) -> np.ndarray:
+        """Floquet multipliers transverse to the gait's class.
+
+        Args:
+            gain: of the symmetry lock, 1/model time.
+
+        """
 
     @property
     def phases(self) -> np.ndarray:
@@ -97,3 +132,42 @@ class Orbit(ABC):
     def derivative(self, times: np.ndarray) -> np.ndarray:
         """Slopes of all states, per model time; shape times.shape + (components,)."""
         return self._states(times, 1) / self.period
+
+
+def check_values(network: Network, gait: str) -> None:
+    """Check what every solver needs.
+
+    Raises:
+        InputError: a parameter is not finite, or the delay not positive.
+        NoOrbit: weights differ that the gait's symmetry needs to be equal.
+
+    """
+    for name, value in network.as_dict().items():
+        if not np.isfinite(value):
+            raise InputError(f'{name} is {value}, not a finite number')
+    if network.delay_parameter and network.delay <= 0.0:
+        raise InputError(f'{network.delay_parameter} is {network.delay}, it must be positive')
+    broken = network.broken(gait)
+    if broken:
+        raise NoOrbit(f'no {gait} with these weights: its symmetry needs {broken} to be equal')
+
+
+def richer(orbit: Orbit) -> str:
+    """Name a symmetry that an orbit has beyond its gait's, or '' if it has none.
+
+    Newton's method may end on an orbit with more symmetry, which every equation of the gait
+    also holds for: a walk is a skip whose two waveforms agree.
+    """
+    symmetry, points = orbit.symmetry, 64
+    x = orbit(np.arange(points) / points * orbit.period)[:, :orbit.network.cells]
+    size = np.ptp(x)
+    own = dict(symmetry.shifts)
+    for name, element in symmetry.group.elements.items():
+        order = symmetry.group.order(name)
+        for k in range(order):
+            if own.get(name) == k / order:
+                continue
+            gap = x[:, list(element)] - np.roll(x, -(points * k // order), axis=0)
+            if np.abs(gap).max() < SAME * size:
+                return f'{name} shifts it by {k}/{order} of a cycle'
+    return ''

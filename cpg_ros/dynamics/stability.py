@@ -2,12 +2,8 @@
 
 from dataclasses import dataclass
 
-import numpy as np
-
-from cpg_ros.dynamics.delayed_orbit import DelayedOrbit
-from cpg_ros.dynamics.floquet import multipliers, within_class
+from cpg_ros.dynamics.floquet import leading_within, sufficient_gain
 from cpg_ros.dynamics.periodic import Orbit
-from cpg_ros.networks.delayed import default_symmetry_gain
 
 #: Decay that the chosen gain gives transverse disturbances, per model time.
 RATE = 0.5
@@ -30,19 +26,16 @@ class Stability:
 
 
 def stability(orbit: Orbit) -> Stability:
-    """Judge an orbit by its multipliers; with a delay the gain comes from the bound on tanh.
+    """Judge an orbit by its multipliers.
 
-    That bound holds in any state of the network, also while one gait gives way to another.
+    Where the network knows a bound that holds in any of its states, the gain comes from that.
     """
-    if isinstance(orbit, DelayedOrbit):
-        leading = within_class(orbit)
-        enough = chosen = default_symmetry_gain(orbit.network, RATE)
+    bound = orbit.network.sufficient_gain(RATE)
+    if bound is None:
+        enough, chosen = (sufficient_gain(orbit, rate) for rate in (0.0, RATE))
     else:
-        found = multipliers(orbit)
-        leading, slowest = found.leading_within, found.leading_transverse
-        # Transverse multipliers shrink by exp(-g T) exactly; those of 1e-3 need no help.
-        growth = np.log(slowest) / orbit.period if slowest > 0.0 else -np.inf
-        enough, chosen = float(max(0.0, growth)), float(max(0.0, growth + RATE))
+        enough = chosen = bound
+    leading = leading_within(orbit)
     flaw = '' if leading < 1.0 else (
         f'a disturbance within its own symmetry class grows {leading:.4g} times a stride')
     return Stability(enough, chosen, flaw)

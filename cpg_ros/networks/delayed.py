@@ -8,6 +8,7 @@ equivariant under Z4 (i -> i + 2), Z2 (s) and x -> -x.
 import math
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import cache
 from typing import Any, ClassVar
 
 from cpg_ros.networks.equations import Cell
@@ -25,6 +26,12 @@ MAX_DELAY = 5.0
 #: Which cell cell i hears: i - 2 behind it now, s(i) on the other side a delay ago.
 BEHIND = tuple((i - 2) % CELLS for i in range(CELLS))
 ACROSS = tuple(i ^ 1 for i in range(CELLS))
+
+
+@cache
+def _symmetry(j: int, k: int) -> Symmetry:
+    return Symmetry.of(Z4_Z2, {'omega': Fraction(j, 4), 'kappa': Fraction(k, 2)}, variables=1,
+                       odd=True)
 
 
 @dataclass(frozen=True)
@@ -74,9 +81,20 @@ class Delayed(Network):
 
         """
         j, k = GAITS[known(gait, self.gaits())]
-        j = 3 if j == 1 and self.d >= 0.0 else j
-        return Symmetry.of(Z4_Z2, {'omega': Fraction(j, 4), 'kappa': Fraction(k, 2)},
-                           variables=1, odd=True)
+        return _symmetry(3 if j == 1 and self.d >= 0.0 else j, k)
+
+    def obstacle(self, gait: str) -> str:
+        """Say what in c rules a gait out: its sign, or that no delay makes it oscillate."""
+        j, k = GAITS[gait]
+        if j % 2 == 0 and self.c * (-1) ** k >= 0.0:
+            wanted = 'positive' if k else 'negative'
+            return f'c {self.c:g} gives no {gait}: c must be {wanted}'
+        # Roots of lambda = A + B exp(-lambda tau) cross where |B| > |Re A|.
+        least = abs(self.a + self.b + self.d * (1.0, 0.0, -1.0)[j])
+        if abs(self.c) <= least:
+            return (f'|c| {abs(self.c):g} gives no {gait} at any delay: it must be above '
+                    f'{least:.4f}')
+        return ''
 
     def sufficient_gain(self, rate: float) -> float:
         """Return a symmetry gain with which every gait attracts, 1/model time.

@@ -180,6 +180,6 @@ def equations_of(network: 'type[Network]') -> Equations:
 
 def values_of(network: 'Network') -> list[np.ndarray]:
     """Return the parameters of the equations' rows, each one number or one for each cell."""
-    values = network.as_dict()
-    return [np.array([values[name] for name in network.groups[row]]) if row in network.groups
-            else np.array(values[row]) for row in equations_of(type(network)).rows]
+    groups = network.groups
+    return [np.array([getattr(network, name) for name in groups[row]]) if row in groups
+            else np.array(getattr(network, row)) for row in equations_of(type(network)).rows]

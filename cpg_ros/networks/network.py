@@ -6,7 +6,8 @@ which the legs read (x or v), then the second one (w or u). All three networks h
 """
 
 from abc import ABC, abstractmethod
-from dataclasses import asdict, dataclass, fields
+from dataclasses import dataclass, fields
+from functools import cache
 from typing import Any, ClassVar
 
 import numpy as np
@@ -60,12 +61,12 @@ class Network(ABC):
 
     def as_dict(self) -> dict[str, float]:
         """Return the parameters by name, in their own order."""
-        return asdict(self)  # type: ignore[call-overload]
+        return {name: getattr(self, name) for name in self.parameters()}
 
     @classmethod
     def parameters(cls) -> tuple[str, ...]:
         """Names of the parameters, in their own order."""
-        return tuple(field.name for field in fields(cls))  # type: ignore[arg-type]
+        return _names(cls)
 
     @property
     def components(self) -> int:
@@ -140,6 +141,10 @@ class Network(ABC):
         """
         return None
 
+    def obstacle(self, gait: str) -> str:
+        """Say what in the parameters rules a gait out, where that is known beforehand, or ''."""
+        return ''
+
     def broken(self, gait: str) -> str:
         """Name parameters that would have to be equal for the gait, or '' if all are."""
         values = self.as_dict()
@@ -164,6 +169,11 @@ class Network(ABC):
         apart = {float((symmetry.phases[b] - symmetry.phases[a]) % 1.0) for a, b in pairs}
         return ('run-like' if alike and apart == {0.0} else
                 'walk-like' if alike and apart == {0.5} else 'neither')
+
+
+@cache
+def _names(network: type[Network]) -> tuple[str, ...]:
+    return tuple(field.name for field in fields(network))  # type: ignore[arg-type]
 
 
 @dataclass(frozen=True)

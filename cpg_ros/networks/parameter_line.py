@@ -3,6 +3,8 @@
 from dataclasses import dataclass, replace
 from typing import TypeVar
 
+import numpy as np
+
 from cpg_ros.errors import InputError
 from cpg_ros.networks.network import Network
 
@@ -55,6 +57,11 @@ class ParameterLine:
     def value(self, network: Network) -> float:
         """Where a network is on the line: the value of its first parameter."""
         return network.as_dict()[self.names[0]]
+
+    def direction(self, network: Network) -> np.ndarray:
+        """Derivative of the network's parameters by the value on the line, (parameters,)."""
+        signs = dict(zip(self.names, self.signs, strict=True))
+        return np.array([signs.get(name, 0.0) for name in network.parameters()])
 
     def at(self, network: AnyNetwork, value: float) -> AnyNetwork:
         """Return the network with the parameters set."""

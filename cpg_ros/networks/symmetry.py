@@ -133,9 +133,7 @@ class Symmetry:
         for name in shifts:
             if name not in group.elements:
                 raise InputError(f"'{name}' is not one of {', '.join(group.elements)}")
-        exact = tuple((name, Fraction(shift).limit_denominator(64) % 1)
-                      for name, shift in shifts.items())
-        return _built(group, exact, variables, odd)
+        return _generated(group, tuple(shifts.items()), variables, odd)
 
     @property
     def h(self) -> tuple[str, ...]:
@@ -169,6 +167,13 @@ class Symmetry:
                     image = self.group.elements[name][cell]
                     waves[image], phases[image] = wave, float(shift)
         return waves, phases
+
+    @cached_property
+    def _hash(self) -> int:
+        return hash((self.group, self.shifts, self.variables, self.odd))
+
+    def __hash__(self) -> int:
+        return self._hash
 
     @property
     def waves(self) -> np.ndarray:
@@ -216,6 +221,7 @@ class Symmetry:
 
 
 @cache
-def _built(group: Group, shifts: tuple[tuple[str, Fraction], ...], variables: int, odd: bool
-           ) -> Symmetry:
-    return Symmetry(group, tuple(group.generated(dict(shifts)).items()), variables, odd)
+def _generated(group: Group, shifts: tuple[tuple[str, Fraction | float], ...], variables: int,
+               odd: bool) -> Symmetry:
+    exact = {name: Fraction(shift).limit_denominator(64) % 1 for name, shift in shifts}
+    return Symmetry(group, tuple(group.generated(exact).items()), variables, odd)

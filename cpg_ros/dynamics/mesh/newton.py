@@ -13,47 +13,39 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.polynomial import polynomial
 
-from cpg_ros.dynamics import gauss
-from cpg_ros.dynamics.mesh_orbit import MeshOrbit
+from cpg_ros.dynamics.mesh import collocation
+from cpg_ros.dynamics.mesh.orbit import MeshOrbit
 from cpg_ros.dynamics.periodic import NoOrbit
+from cpg_ros.networks.field import Field
+from cpg_ros.networks.network import Network
 from cpg_ros.networks.symmetry import Symmetry
 
 #: A mesh is fine enough when its polynomials end with terms of this share of the whole.
 RESOLVED = 1e-11
 FEWEST, MOST_INTERVALS = 12, 300
-#: Newton stops at steps this small, against the size of the states and the period.
-TOLERANCE = 1e-10
+#: Newton stops at steps this small, against the size of the states and the period: what is left
+#: is of the order of their square.
+TOLERANCE = 1e-7
 #: Below this range the orbit has fallen to an equilibrium.
 SMALLEST = 1e-5
 
 
-class Reduced:
-    """A network on the gait's Fix(K): one cell of each class."""
+class Reduced(Field):
+    """A network on the gait's Fix(K): one cell of each class.
 
-    def __init__(self, network, symmetry: Symmetry) -> None:
-        classes = symmetry.classes
-        first = np.array([np.flatnonzero(classes == c)[0] for c in range(classes.max() + 1)])
-        self.network, self.symmetry = network, symmetry
-        self.classes, self.size = classes, classes.max() + 1
+    Attributes:
+        symmetry: of the gait.
+        turn: ``y(T/m) = y(0)[turn]``.
+
+    """
+
+    def __init__(self, network: Network, symmetry: Symmetry) -> None:
+        """Look at a network in a gait."""
+        super().__init__(network, symmetry.classes)
+        first = self.kept[:self.size]
         blocks = np.arange(network.variables)[:, None]
-        self.kept = (first + blocks * network.cells).ravel()
-        #: Where each component of the network finds its value in the reduced state.
-        self.place = (classes + blocks * self.size).ravel()
-        #: y(T/m) = y(0)[turn]
-        self.turn = (classes[symmetry.turn[first]] + blocks * self.size).ravel()
-        self._gather = np.eye(len(self.kept))[self.place]
-
-    def rates(self, y: np.ndarray) -> np.ndarray:
-        """Right-hand side at reduced states, shape (..., d)."""
-        return self.network.rates(y[..., self.place])[..., self.kept]
-
-    def jacobian(self, y: np.ndarray) -> np.ndarray:
-        """Its derivative, shape (..., d, d)."""
-        return self.network.jacobian(y[..., self.place])[..., self.kept, :] @ self._gather
-
-    def by_parameter(self, y: np.ndarray) -> np.ndarray:
-        """Its derivative by the network's parameters, shape (..., d, parameters)."""
-        return self.network.by_parameter(y[..., self.place])[..., self.kept, :]
+        self.symmetry = symmetry
+        self.turn = (symmetry.classes[symmetry.turn[first]] + blocks * self.size).ravel()
 
 
 @dataclass
@@ -66,8 +58,7 @@ class Solution:
     length: float
 
 
-def transfer(jacobians: np.ndarray, lengths: np.ndarray, sources: np.ndarray
-             ) -> tuple[np.ndarray, np.ndarray]:
+def transfer(jacobians: np.ndarray, lengths: np.ndarray, sources: np.ndarray) -> np.ndarray:
     """Solve the linear problem of every interval: ``dY = 1 dy + L h A J dY + g``.
 
     Args:
@@ -76,17 +67,27 @@ def transfer(jacobians: np.ndarray, lengths: np.ndarray, sources: np.ndarray
         sources: g at the nodes for k right-hand sides, shape (n, S, d, k).
 
     Returns:
-        Nodes' answer to dy, shape (n, S, d, d), and to the sources, shape (n, S, d, k).
+        Nodes' answer to dy, then to the sources, shape (n, S, d, d + k).
 
     """
     n, s, d = jacobians.shape[:3]
-    matrix = -np.einsum('st,ntij->nsitj', gauss.A, lengths[:, None, None, None] * jacobians)
+    matrix = np.empty((n, s, d, s, d))
+    np.multiply(-collocation.A[:, None, :, None],
+                (lengths[:, None, None, None] * jacobians).transpose(0, 2, 1, 3)[:, None],
+                out=matrix)
     matrix = matrix.reshape(n, s * d, s * d)
     matrix[:, np.arange(s * d), np.arange(s * d)] += 1.0
-    ones = np.broadcast_to(np.eye(d), (n, s, d, d))
-    right = np.concatenate([ones, sources], axis=-1).reshape(n, s * d, -1)
-    found = np.linalg.solve(matrix, right).reshape(n, s, d, -1)
-    return found[..., :d], found[..., d:]
+    right = np.empty((n, s, d, d + sources.shape[-1]))
+    right[..., :d], right[..., d:] = np.eye(d), sources
+    return np.linalg.solve(matrix, right.reshape(n, s * d, -1)).reshape(right.shape)
+
+
+def summed(jacobians: np.ndarray, lengths: np.ndarray, answers: np.ndarray) -> np.ndarray:
+    """Integrate ``J dY`` over every interval, dY the answers at the nodes, (n, d, k)."""
+    n, s, d = jacobians.shape[:3]
+    weighted = lengths[:, None, None, None] * collocation.WEIGHTS[:, None] * jacobians.transpose(
+        0, 2, 1, 3)
+    return weighted.reshape(n, d, s * d) @ answers.reshape(n, s * d, -1)
 
 
 def linearised(reduced: Reduced, now: Solution, extra: np.ndarray | None = None):
@@ -96,29 +97,30 @@ def linearised(reduced: Reduced, now: Solution, extra: np.ndarray | None = None)
     R_k (dL, 1, extras...).
     """
     h = np.diff(now.mesh)
-    slopes, jacobians = reduced.rates(now.stages), reduced.jacobian(now.stages)
-    step = now.length * h
-    by_length = h[:, None, None] * np.einsum('st,ntd->nsd', gauss.A, slopes)
-    gap = now.points[:-1, None] + now.length * by_length - now.stages
-    ends = np.stack([h[:, None] * (gauss.WEIGHTS @ slopes),
-                     now.points[:-1] + step[:, None] * (gauss.WEIGHTS @ slopes)
-                     - now.points[1:]], axis=-1)
-    sources = np.stack([by_length, gap], axis=-1)
+    slopes, jacobians, _ = reduced.linearised(now.stages)
+    step, d = now.length * h, slopes.shape[-1]
+    by_length = h[:, None, None] * (collocation.A @ slopes)
+    rise = h[:, None] * (collocation.WEIGHTS @ slopes)
+    sources = [by_length[..., None],
+               (now.points[:-1, None] + now.length * by_length - now.stages)[..., None]]
+    ends = [rise[..., None],
+            (now.points[:-1] + now.length * rise - now.points[1:])[..., None]]
     if extra is not None:
-        sources = np.concatenate([sources, step[:, None, None, None] * np.einsum(
-            'st,ntdp->nsdp', gauss.A, extra)], axis=-1)
-        ends = np.concatenate([ends, step[:, None, None] * np.einsum(
-            't,ntdp->ndp', gauss.WEIGHTS, extra)], axis=-1)
-    by_start, by_source = transfer(jacobians, step, sources)
-    weighted = step[:, None, None, None] * gauss.WEIGHTS[:, None, None] * jacobians
-    phi = np.eye(h_size := jacobians.shape[-1]) + np.einsum('nsij,nsjk->nik', weighted, by_start)
-    rest = ends + np.einsum('nsij,nsjk->nik', weighted, by_source)
-    p, r = np.empty((h.size + 1, h_size, h_size)), np.zeros((h.size + 1, h_size, rest.shape[-1]))
-    p[0] = np.eye(h_size)
-    for k in range(h.size):
-        p[k + 1] = phi[k] @ p[k]
-        r[k + 1] = phi[k] @ r[k] + rest[k]
-    return p, r, by_start, by_source
+        n, s = extra.shape[:2]
+        flat = extra.reshape(n, s, -1)
+        sources.append(step[:, None, None, None] * (collocation.A @ flat).reshape(extra.shape))
+        ends.append(step[:, None, None] * (collocation.WEIGHTS @ flat).reshape(n, d, -1))
+    answers = transfer(jacobians, step, np.concatenate(sources, axis=-1))
+    steps = summed(jacobians, step, answers)
+    steps[..., :d] += np.eye(d)
+    steps[..., d:] += np.concatenate(ends, axis=-1)
+    reached = np.zeros((h.size + 1, d, steps.shape[-1]))
+    reached[0, :, :d] = np.eye(d)
+    for k, (phi, rest) in enumerate(zip(steps[..., :d], steps[..., d:], strict=True)):
+        ahead = reached[k + 1]
+        np.matmul(phi, reached[k], out=ahead)
+        ahead[:, d:] += rest
+    return reached[..., :d], reached[..., d:], answers[..., :d], answers[..., d:]
 
 
 def bordered(reduced: Reduced, now: Solution, p: np.ndarray, r: np.ndarray) -> np.ndarray:
@@ -127,7 +129,7 @@ def bordered(reduced: Reduced, now: Solution, p: np.ndarray, r: np.ndarray) -> n
     matrix = np.zeros((d + 1, d + 1))
     matrix[:d, :d] = p[-1] - np.eye(d)[reduced.turn]
     matrix[:d, d] = r[-1, :, 0]
-    matrix[d, :d] = reduced.jacobian(now.points[0])[0]
+    matrix[d, :d] = reduced.linearised(now.points[0])[1][0]
     return matrix
 
 
@@ -167,13 +169,13 @@ def _newton(reduced: Reduced, now: Solution, steps: int = 15) -> bool:
 def sampled(path: Callable[[np.ndarray], np.ndarray], mesh: np.ndarray, length: float
             ) -> Solution:
     """Take a guess at the points of a mesh from a path over the places 0 to 1."""
-    inner = mesh[:-1, None] + np.diff(mesh)[:, None] * gauss.NODES
+    inner = mesh[:-1, None] + np.diff(mesh)[:, None] * collocation.NODES
     return Solution(mesh, path(mesh), path(inner.ravel()).reshape(*inner.shape, -1), length)
 
 
 def _coefficients(reduced: Reduced, now: Solution) -> np.ndarray:
     """Of the polynomials on each interval, shape (S + 1, n, d)."""
-    return gauss.power_coefficients(now.points[:-1], reduced.rates(now.stages),
+    return collocation.power_coefficients(now.points[:-1], reduced.rates(now.stages),
                                     now.length * np.diff(now.mesh))
 
 
@@ -202,17 +204,17 @@ def remeshed(reduced: Reduced, now: Solution, fewest: int = FEWEST) -> np.ndarra
 
     """
     h, slopes = np.diff(now.mesh), reduced.rates(now.stages)
-    ends = gauss.last_share(slopes) * now.length * h / np.abs(now.points).max()
+    ends = collocation.last_share(slopes) * now.length * h / np.abs(now.points).max()
     if ends.max() <= RESOLVED:
         return None
-    wanted = 1.15 * (ends**(1.0 / gauss.S)).mean() / RESOLVED**(1.0 / gauss.S) * h.size
+    wanted = 1.25 * (ends**(1.0 / collocation.S)).mean() / RESOLVED**(1.0 / collocation.S) * h.size
     # Not a number where the solution is not finite.
     if not max(fewest, wanted) <= MOST_INTERVALS:
         raise NoOrbit(f'the waveform is too steep for {MOST_INTERVALS} intervals')
-    return gauss.spread(now.mesh, ends**(1.0 / gauss.S) / h, max(fewest, int(wanted)))
+    return collocation.spread(now.mesh, ends**(1.0 / collocation.S) / h, max(fewest, int(wanted)))
 
 
-def collocate(network, symmetry: Symmetry, path: Callable[[np.ndarray], np.ndarray],
+def collocate(network: Network, symmetry: Symmetry, path: Callable[[np.ndarray], np.ndarray],
               period: float) -> MeshOrbit | None:
     """Solve for an orbit from a guess; None where Newton's method leads to none.
 
@@ -230,12 +232,12 @@ def collocate(network, symmetry: Symmetry, path: Callable[[np.ndarray], np.ndarr
         return path(places / symmetry.order)[:, reduced.kept]
 
     bend = np.abs(np.diff(reduced.rates(guess(coarse)), axis=0)).max(axis=1)
-    now = sampled(guess, gauss.spread(coarse, np.sqrt(bend + 1e-3 * bend.max() + 1e-12), 30),
+    now = sampled(guess, collocation.spread(coarse, np.sqrt(bend + 1e-3 * bend.max() + 1e-12), 30),
                   period / symmetry.order)
     return _refined(reduced, now)
 
 
-def predicted(network, near: MeshOrbit) -> MeshOrbit | None:
+def predicted(network: Network, near: MeshOrbit) -> MeshOrbit | None:
     """Solve for an orbit from what the derivatives of a known one predict; None as in collocate.
 
     The mesh of the known one is taken over, so that little is left to do.
@@ -248,7 +250,7 @@ def predicted(network, near: MeshOrbit) -> MeshOrbit | None:
     change = np.subtract([*network.as_dict().values()], [*near.network.as_dict().values()])
     coefficients = near.coefficients + near.d_coefficients @ change
     points = np.vstack([coefficients[0], coefficients[:, -1].sum(axis=0)])
-    stages = polynomial.polyval(gauss.NODES, coefficients).transpose(0, 2, 1)
+    stages = polynomial.polyval(collocation.NODES, coefficients).transpose(0, 2, 1)
     length = (near.period + float(near.d_period @ change)) / near.symmetry.order
     if not length > 0.0:
         return None
@@ -287,10 +289,10 @@ def completed(reduced: Reduced, now: Solution) -> MeshOrbit:
     inner = (by_start @ moved[:-1, None] + by_source[..., :1] * d_length + by_source[..., 2:])
     h = np.diff(now.mesh)
     # Slopes in place: d(L F)/dp at the nodes.
-    slopes = reduced.rates(now.stages)
-    d_slopes = now.length * (reduced.jacobian(now.stages) @ inner + extra) \
+    slopes, jacobians, _ = reduced.linearised(now.stages)
+    d_slopes = now.length * (jacobians @ inner + extra) \
         + slopes[..., None] * d_length
-    d_coefficients = h[:, None, None] * np.einsum('sq,nsdp->qndp', gauss.INTEGRALS, d_slopes)
+    d_coefficients = h[:, None, None] * np.einsum('sq,nsdp->qndp', collocation.INTEGRALS, d_slopes)
     d_coefficients[0] += moved[:-1]
 
     d_period, m = reduced.symmetry.order * d_length, reduced.symmetry.order

@@ -1,4 +1,4 @@
-"""Finding the orbit of a gait of the Morris-Lecar networks, from the nearest one known.
+"""Finding the orbit of a gait of a network without delay, from the nearest one known.
 
 From the given start Newton's method is tried at once; failing that, the network is left to find
 its gait by itself, held in its symmetry; failing that, the orbit is followed from the known
@@ -11,9 +11,9 @@ from functools import lru_cache
 
 import numpy as np
 
-from cpg_ros.dynamics.mesh_newton import collocate, predicted
-from cpg_ros.dynamics.mesh_orbit import MeshOrbit
-from cpg_ros.dynamics.periodic import NoOrbit
+from cpg_ros.dynamics.mesh.newton import collocate, predicted
+from cpg_ros.dynamics.mesh.orbit import MeshOrbit
+from cpg_ros.dynamics.periodic import NoOrbit, check_values, richer
 from cpg_ros.errors import InputError
 from cpg_ros.integration.simulate import simulate
 from cpg_ros.networks.network import Network, Preset
@@ -22,29 +22,6 @@ from cpg_ros.networks.symmetry import Symmetry
 
 #: Periods the network gets to find its gait, held by a lock of this gain (1/model time).
 SETTLING, HOLD = 30, 1.0
-#: Two signals this close, over their range, are one.
-SAME = 1e-4
-
-
-def richer(orbit: MeshOrbit) -> str:
-    """Name a symmetry that an orbit has beyond its gait's, or '' if it has none.
-
-    Newton's method may end on an orbit with more symmetry, which every equation of the gait
-    also holds for: a walk is a skip whose two waveforms agree.
-    """
-    symmetry, points = orbit.symmetry, 64
-    x = orbit(np.arange(points) / points * orbit.period)[:, :orbit.network.cells]
-    size = np.ptp(x)
-    own = dict(symmetry.shifts)
-    for name, element in symmetry.group.elements.items():
-        order = symmetry.group.order(name)
-        for k in range(order):
-            if own.get(name) == k / order:
-                continue
-            gap = x[:, list(element)] - np.roll(x, -(points * k // order), axis=0)
-            if np.abs(gap).max() < SAME * size:
-                return f'{name} shifts it by {k}/{order} of a cycle'
-    return ''
 
 
 def _accepted(orbit: MeshOrbit | None) -> MeshOrbit | None:
@@ -88,7 +65,7 @@ def from_preset(preset: Preset) -> MeshOrbit:
     if preset.start is None:
         raise InputError(f'the preset of {preset.gait} has no start')
     network, start = preset.network, np.array(preset.start)
-    _check(network, preset.gait)
+    check_values(network, preset.gait)
     symmetry = network.symmetry(preset.gait)
     run = simulate(network, start, 1.05 * preset.period, network.step, progress=False)
     orbit = _accepted(collocate(network, symmetry, lambda theta: run(theta * preset.period),
@@ -98,12 +75,6 @@ def from_preset(preset: Preset) -> MeshOrbit:
     if orbit is None:
         raise NoOrbit(f'no {preset.gait} was found from the start given')
     return orbit
-
-
-def _check(network: Network, gait: str) -> None:
-    broken = network.broken(gait)
-    if broken:
-        raise NoOrbit(f'no {gait} with these weights: its symmetry needs {broken} to be equal')
 
 
 def _by_itself(network: Network, symmetry: Symmetry, start: np.ndarray, period: float
@@ -162,10 +133,7 @@ def solve(network: Network, gait: str, near: MeshOrbit | None = None) -> MeshOrb
 
     """
     symmetry = network.symmetry(gait)
-    for name, value in network.as_dict().items():
-        if not np.isfinite(value):
-            raise InputError(f'{name} is {value}, not a finite number')
-    _check(network, gait)
+    check_values(network, gait)
     if near is None:
         if gait not in PRESETS[network.name]:
             raise NoOrbit(f'no preset of {gait} is known to start from')
@@ -174,7 +142,11 @@ def solve(network: Network, gait: str, near: MeshOrbit | None = None) -> MeshOrb
         return near
     orbit = None
     if near.symmetry == symmetry:
-        orbit = _accepted(collocate(network, symmetry, _on_cycles(near), near.period))
+        try:
+            return beside(network, near)
+        except NoOrbit:
+            # Not near enough.
+            pass
     if orbit is None:
         start = near(np.array(0.0))
         if near.symmetry != symmetry and near.symmetry.h == symmetry.h:

@@ -7,11 +7,10 @@ it multiplies the transverse multipliers by exp(-g T) exactly.
 """
 
 import numpy as np
-from scipy.linalg import null_space
 
-from cpg_ros.dynamics.gauss import WEIGHTS
-from cpg_ros.dynamics.mesh_newton import Reduced, transfer
-from cpg_ros.dynamics.mesh_orbit import MeshOrbit
+from cpg_ros.dynamics.isotypic_split import split
+from cpg_ros.dynamics.mesh.newton import Reduced, summed, transfer
+from cpg_ros.dynamics.mesh.orbit import MeshOrbit
 
 
 def mesh_multipliers(orbit: MeshOrbit) -> tuple[np.ndarray, np.ndarray]:
@@ -21,30 +20,27 @@ def mesh_multipliers(orbit: MeshOrbit) -> tuple[np.ndarray, np.ndarray]:
     """
     symmetry, network = orbit.symmetry, orbit.network
     states = orbit.stages[..., Reduced(network, symmetry).place]
-    jacobians = network.jacobian(states)  # type: ignore[attr-defined]
+    jacobians = network.jacobian(states)
     lengths = np.diff(orbit.mesh) * orbit.period / symmetry.order
     blocks = np.arange(network.variables)[:, None] * network.cells
     turn = np.eye(network.components)[(symmetry.turn + blocks).ravel()]
     found = []
-    for columns in (symmetry.basis.T, null_space(symmetry.basis)):
-        if not columns.shape[1]:
-            found.append(np.zeros(0, dtype=complex))
-            continue
+    inside, outside = split(symmetry)
+    for columns in (inside, *outside):
         step = _propagated(columns.T @ jacobians @ columns, lengths)
         # After T/m the cells have changed places; m of these make a period. After m changes a
         # cell is another one of its class, which only matters outside Fix(K).
         change, m = columns.T @ turn @ columns, symmetry.order
         found.append(np.linalg.eigvals(np.linalg.matrix_power(change, m)
                                        @ np.linalg.matrix_power(change.T @ step, m)))
-    return found[0], found[1]
+    return found[0], np.concatenate([np.zeros(0, dtype=complex), *found[1:]])
 
 
 def _propagated(jacobians: np.ndarray, lengths: np.ndarray) -> np.ndarray:
     """Solution of the linear equation over all intervals, shape (d, d)."""
     d = jacobians.shape[-1]
-    stages, _ = transfer(jacobians, lengths, np.zeros((*jacobians.shape[:3], 0)))
-    steps = np.eye(d) + lengths[:, None, None] * np.einsum('s,nsij,nsjk->nik', WEIGHTS,
-                                                           jacobians, stages)
+    answers = transfer(jacobians, lengths, np.zeros((*jacobians.shape[:3], 0)))
+    steps = np.eye(d) + summed(jacobians, lengths, answers)
     whole = np.eye(d)
     for step in steps:
         whole = step @ whole

@@ -1,36 +1,23 @@
-"""Floquet multipliers of the delayed network's gaits: the variational equation, spectrally.
+"""Floquet multipliers of the gaits of networks with a delay: the variational equation, spectrally.
 
-``z' = (J(t) - g (1 - P)) z + K(t) z(t - tau)`` along the orbit, g the symmetry lock. What two
-symmetries of every gait do, omega^2 (i -> i + 4) and kappa (s), is multiply z by +-1 in each of
-four subspaces, which the equation keeps apart; the gait's class is one of them (walk, jump) or
-half of one. A history is held at Chebyshev points of equal elements of [-tau, 0]. Elements of the
-same length march over a period, so that a delayed value always lies at a point; the monodromy
-matrix takes the values of one history to those a period later (Breda, Maset & Vermiglio 2012).
+Along a gait a disturbance obeys ``z' = D(t) z + B(t) z(t - tau)`` with T-periodic Jacobians, which
+keep the subspaces apart that symmetry does (dynamics.isotypic_split). A history is held at
+Chebyshev points of equal elements of [-tau, 0]. Elements of the same length march over a period,
+so that a delayed value always lies at a point; the monodromy matrix takes the values of one
+history to those a period later (Breda, Maset & Vermiglio 2012).
 """
 
 import numpy as np
 
-from cpg_ros.dynamics.delayed_orbit import DelayedOrbit
-from cpg_ros.networks.delayed import CELLS, Mode
+from cpg_ros.dynamics.fourier.orbit import FourierOrbit
+from cpg_ros.dynamics.isotypic_split import split
+from cpg_ros.networks.field import Field
 
 #: Polynomial degree on an element, and how much of a period one holds at most.
 DEGREE, SPAN = 20, 0.3
 #: Elements are halved until the trivial multiplier is 1 to this.
 TRIVIAL = 1e-9
 HALVINGS = 4
-
-
-def subspaces(mode: Mode) -> tuple[np.ndarray, list[np.ndarray]]:
-    """Return orthonormal columns of the gait's class, and of the subspaces transverse to it."""
-    inside, outside = mode.basis.T, []
-    i = np.arange(CELLS)
-    for half, side in ((1, 1), (1, -1), (-1, 1), (-1, -1)):
-        both = 0.5 * half**(i // 4) * side**(i % 2) * (i // 2 % 2 == np.arange(2)[:, None])
-        rest = both.T - inside @ (inside.T @ both.T)
-        columns, sizes, _ = np.linalg.svd(rest, full_matrices=False)
-        if (sizes > 0.5).any():
-            outside.append(columns[:, sizes > 0.5])
-    return inside, outside
 
 
 def _differentiation(degree: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -61,19 +48,20 @@ def _interpolation(places: np.ndarray) -> np.ndarray:
 class Variation:
     """The variational equation along an orbit, on elements of which n hold a delay."""
 
-    def __init__(self, orbit: DelayedOrbit, n: int) -> None:
+    def __init__(self, orbit: FourierOrbit, n: int) -> None:
         network = orbit.network
         self.n, self.period, self.length = n, orbit.period, network.delay / n
         self.count = int(np.ceil(self.period / self.length * (1.0 - 1e-12)))
         times = (np.arange(self.count)[:, None] + POINTS[1:]) * self.length
-        self.now = network.jacobian(orbit(times))
-        self.past = network.delayed_jacobian(orbit(times - network.delay))
+        _, self.now, self.past = Field(network).linearised(orbit(times),
+                                                           orbit(times - network.delay))
+        self.inside, self.outside = split(orbit.symmetry)
 
     def monodromy(self, columns: np.ndarray, gain: float) -> np.ndarray:
         """Return the matrix that takes a history in a subspace to the one a period later.
 
         Args:
-            columns: orthonormal, shape (8, d).
+            columns: orthonormal, shape (components, d).
             gain: symmetry lock, 1/model time; 0 within the class.
 
         Returns:
@@ -107,20 +95,18 @@ class Variation:
         nearby = values[elements[:, None] * degree + np.arange(degree + 1)]
         return np.einsum('mk,mkds->mds', rows, nearby).reshape(size, size)
 
+    def transverse(self, gain: float) -> np.ndarray:
+        """Return the multipliers transverse to the gait's class under a symmetry lock."""
+        return np.concatenate([np.zeros(0), *(np.linalg.eigvals(self.monodromy(columns, gain))
+                                              for columns in self.outside)])
 
-def variation(orbit: DelayedOrbit) -> tuple[Variation, np.ndarray]:
+
+def variation(orbit: FourierOrbit) -> tuple[Variation, np.ndarray]:
     """Return the variational equation, fine enough, and the multipliers within the class."""
-    inside = subspaces(orbit.symmetry)[0]
     n = max(1, int(np.ceil(orbit.network.delay / (SPAN * orbit.period))))
     for halving in range(HALVINGS):
         equation = Variation(orbit, n * 2**halving)
-        within = np.linalg.eigvals(equation.monodromy(inside, 0.0))
+        within = np.linalg.eigvals(equation.monodromy(equation.inside, 0.0))
         if np.abs(within - 1.0).min() <= TRIVIAL:
             break
     return equation, within
-
-
-def transverse(equation: Variation, mode: Mode, gain: float) -> np.ndarray:
-    """Return the multipliers transverse to the gait's class under a symmetry lock."""
-    return np.concatenate([np.linalg.eigvals(equation.monodromy(columns, gain))
-                           for columns in subspaces(mode)[1]])

@@ -25,7 +25,7 @@ def derivative_matrix(n: int) -> np.ndarray:
     return _tables(n)[2]
 
 
-@lru_cache(maxsize=4)
+@lru_cache(maxsize=16)
 def shift_matrices(n: int, shift: float) -> tuple[np.ndarray, np.ndarray]:
     """Matrices that take nodal values of u to those of u(theta + shift) and u'(theta + shift)."""
     waves, index, _ = _tables(n)

@@ -1,8 +1,8 @@
-"""The periodic orbits of a gait along a line of parameters, as curves for continuation.
+"""The orbits of a gait along a line of parameters on a mesh, as a curve for continuation.
 
-Both have their orbit's own collocation equations, the parameter as one more unknown and the
-border as one more equation. Unknowns are counted against their scales: states against 1, where
-the cells of every network saturate, the period and the parameter against what is given.
+Their collocation equations, the parameter as one more unknown and the border as one more equation.
+Unknowns are counted against their scales: states against 1, where cells saturate, the period and
+the parameter against what is given.
 """
 
 from collections.abc import Callable
@@ -10,15 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from cpg_ros.dynamics import fourier as collocation
-from cpg_ros.dynamics.delayed_orbit import (
-    MOST_NODES,
-    RESOLVED,
-    DelayedOrbit,
-    complete,
-    equations,
-)
-from cpg_ros.dynamics.mesh_newton import (
+from cpg_ros.dynamics.mesh.newton import (
     FEWEST,
     Reduced,
     Solution,
@@ -30,85 +22,13 @@ from cpg_ros.dynamics.mesh_newton import (
     remeshed,
     sampled,
 )
-from cpg_ros.dynamics.mesh_orbit import MeshOrbit
-from cpg_ros.dynamics.periodic import NoOrbit
-from cpg_ros.networks.delayed import Delayed, Mode
+from cpg_ros.dynamics.mesh.orbit import MeshOrbit
 from cpg_ros.networks.network import Network
 from cpg_ros.networks.parameter_line import ParameterLine
 from cpg_ros.networks.symmetry import Symmetry
 
-
-def _direction(along: ParameterLine, network: Network) -> np.ndarray:
-    """Derivative of the network's parameters by the value on the line, shape (parameters,)."""
-    signs = dict(zip(along.names, along.signs, strict=True))
-    return np.array([signs.get(name, 0.0) for name in network.parameters()])
-
-
-@dataclass(frozen=True, eq=False)
-class FourierCurve:
-    """Orbits of the delayed network: unknowns u at n nodes, T, and the value on the line.
-
-    Attributes:
-        network: any on the line.
-        symmetry: mode of the gait.
-        along: the line.
-        scales: of period and value.
-
-    """
-
-    network: Delayed
-    symmetry: Mode
-    along: ParameterLine
-    scales: tuple[float, float]
-
-    def product(self, one: np.ndarray, other: np.ndarray) -> float:
-        """Mean over the cycle plus period plus value."""
-        return float(self._weights(one.size) * one @ other)
-
-    def _weights(self, size: int) -> np.ndarray:
-        weights = np.full(size, 1.0 / (size - 2))
-        weights[-2:] = np.array(self.scales)**-2.0
-        return weights
-
-    def step(self, z: np.ndarray, border: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Newton's increment normal to the border, and the tangent."""
-        network = self.along.at(self.network, z[-1])
-        residual, jacobian, by_parameter = equations(network, self.symmetry, z[:-2], z[-2])
-        matrix = np.zeros((z.size, z.size))
-        matrix[:-1, :-1] = jacobian
-        matrix[:-1, -1] = by_parameter @ _direction(self.along, network)
-        matrix[-1] = self._weights(z.size) * border
-        right = np.zeros((z.size, 2))
-        right[:-1, 0], right[-1, 1] = -residual, 1.0
-        found = np.linalg.solve(matrix, right)
-        return found[:, 0], found[:, 1]
-
-    def amplitude(self, z: np.ndarray) -> float:
-        """The peak of x_1."""
-        return float(z[0])
-
-    def renewed(self, z: np.ndarray, border: np.ndarray, again: bool
-                ) -> tuple['FourierCurve', np.ndarray, np.ndarray] | None:
-        """Twice the nodes where the waveform asks for it, from its highest peak."""
-        u, n = z[:-2], z.size - 2
-        fine = collocation.resample(u, 4 * n)
-        start = 0.0 if fine.max() <= u[0] + 1e-9 * np.ptp(u) else fine.argmax() / (4 * n)
-        more = collocation.tail(u) > RESOLVED
-        if not more and not start:
-            return None
-        if more and n >= MOST_NODES:
-            raise NoOrbit(f'the waveform is too steep for {MOST_NODES} nodes')
-        nodes = 2 * n + 1 if more else n
-        theta = start + np.arange(nodes) / nodes
-        moved = [np.concatenate([collocation.evaluate(part[:-2], theta), part[-2:]])
-                 for part in (z, border)]
-        return self, moved[0], moved[1]
-
-    def orbit(self, z: np.ndarray) -> DelayedOrbit:
-        """Complete a solution by its derivatives and its residual."""
-        network, u, period = self.along.at(self.network, float(z[-1])), z[:-2], float(z[-2])
-        return complete(network, self.symmetry, u, period,
-                        *equations(network, self.symmetry, u, period))
+#: Intervals of the first mesh at a Hopf point; it is made finer at once if need be.
+INTERVALS = 20
 
 
 @dataclass(frozen=True, eq=False)
@@ -156,7 +76,7 @@ class MeshCurve:
     def step(self, z: np.ndarray, border: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Newton's increment normal to the border, and the tangent."""
         reduced, now = self._solution(z)
-        way = _direction(self.along, self.network)
+        way = self.along.direction(self.network)
         extra = reduced.by_parameter(now.stages) @ way
         p, r, by_start, by_source = linearised(reduced, now, extra[..., None])
         d = p.shape[-1]
@@ -240,3 +160,34 @@ class MeshCurve:
     def orbit(self, z: np.ndarray) -> MeshOrbit:
         """Complete a solution by its derivatives and its residual."""
         return completed(*self._solution(z))
+
+
+def from_rest(network: Network, symmetry: Symmetry, line: ParameterLine,
+              scales: tuple[float, float], rest: np.ndarray, vector: np.ndarray, period: float
+              ) -> tuple[MeshCurve, np.ndarray, np.ndarray]:
+    """The orbits near a Hopf point: their curve, the rest state on it, and the oscillation.
+
+    Args:
+        network: at the Hopf point.
+        symmetry: of the critical class.
+        line: of parameters.
+        scales: as of the curve.
+        rest: the equilibrium, shape (components,).
+        vector: critical eigenvector, complex, shape (components,), that of cell 1's first
+            variable 1.
+        period: of the critical oscillation, model time.
+
+    """
+    curve = MeshCurve(network, symmetry, line, scales, np.linspace(0.0, 1.0, INTERVALS + 1))
+    reduced = Reduced(network, symmetry)
+
+    def wave(places: np.ndarray) -> np.ndarray:
+        turns = np.exp(2j * np.pi * places / symmetry.order)
+        return (turns[:, None] * vector[reduced.kept]).real
+
+    def still(places: np.ndarray) -> np.ndarray:
+        return np.tile(rest[reduced.kept], (places.size, 1))
+
+    return (curve, curve.pack(sampled(still, curve.mesh, 1.0), period / symmetry.order,
+                              line.value(network)),
+            curve.pack(sampled(wave, curve.mesh, 1.0), 0.0, 0.0))

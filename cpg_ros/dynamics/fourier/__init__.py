@@ -1,0 +1,1 @@
+"""Periodic orbits as trigonometric polynomials: for networks with a delay."""

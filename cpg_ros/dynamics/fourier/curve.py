@@ -1,0 +1,125 @@
+"""The orbits of a gait along a line of parameters as waveforms, a curve for continuation.
+
+Their collocation equations, the parameter as one more unknown and the border as one more equation.
+Unknowns are counted against their scales: states against 1, where cells saturate, the period and
+the parameter against what is given.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from cpg_ros.dynamics.fourier import collocation
+from cpg_ros.dynamics.fourier.newton import (
+    MOST_NODES,
+    NODES,
+    RESOLVED,
+    by_parameter,
+    complete,
+    equations,
+)
+from cpg_ros.dynamics.fourier.orbit import FourierOrbit
+from cpg_ros.dynamics.periodic import NoOrbit
+from cpg_ros.networks.network import Network
+from cpg_ros.networks.parameter_line import ParameterLine
+from cpg_ros.networks.symmetry import Symmetry
+
+
+@dataclass(frozen=True, eq=False)
+class FourierCurve:
+    """Orbits by waveforms: unknowns u at n nodes of each row, T, and the value on the line.
+
+    Attributes:
+        network: any on the line.
+        symmetry: of the gait.
+        along: the line.
+        scales: of period and value.
+
+    """
+
+    network: Network
+    symmetry: Symmetry
+    along: ParameterLine
+    scales: tuple[float, float]
+
+    def _rows(self, z: np.ndarray) -> np.ndarray:
+        """The waveforms, a row for each variable of each wave, shape (rows, n)."""
+        return z[:-2].reshape((int(self.symmetry.waves.max()) + 1) * self.network.variables, -1)
+
+    def product(self, one: np.ndarray, other: np.ndarray) -> float:
+        """Mean over the cycle and the rows plus period plus value."""
+        return float(self._weights(one.size) * one @ other)
+
+    def _weights(self, size: int) -> np.ndarray:
+        weights = np.full(size, 1.0 / (size - 2))
+        weights[-2:] = np.array(self.scales)**-2.0
+        return weights
+
+    def step(self, z: np.ndarray, border: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Newton's increment normal to the border, and the tangent."""
+        network = self.along.at(self.network, z[-1])
+        residual, jacobian, point = equations(network, self.symmetry, self._rows(z),
+                                              float(z[-2]))
+        matrix = np.zeros((z.size, z.size))
+        matrix[:-1, :-1] = jacobian
+        matrix[:-1, -1] = by_parameter(network, self.symmetry, point) @ self.along.direction(network)
+        matrix[-1] = self._weights(z.size) * border
+        right = np.zeros((z.size, 2))
+        right[:-1, 0], right[-1, 1] = -residual, 1.0
+        found = np.linalg.solve(matrix, right)
+        return found[:, 0], found[:, 1]
+
+    def amplitude(self, z: np.ndarray) -> float:
+        """Half the range of cell 1's first variable; of an odd one its peak."""
+        row = self._rows(z)[0]
+        return float(row[0] if self.symmetry.odd else 0.5 * np.ptp(row))
+
+    def renewed(self, z: np.ndarray, border: np.ndarray, again: bool
+                ) -> tuple['FourierCurve', np.ndarray, np.ndarray] | None:
+        """Twice the nodes where the waveforms ask for it, from cell 1's highest peak."""
+        rows = self._rows(z)
+        n = rows.shape[1]
+        fine = collocation.resample(rows[0], 4 * n)
+        start = (0.0 if fine.max() <= rows[0, 0] + 1e-9 * np.ptp(rows[0])
+                 else fine.argmax() / (4 * n))
+        more = max(collocation.tail(row) for row in rows) > RESOLVED
+        if not more and not start:
+            return None
+        if more and n >= MOST_NODES:
+            raise NoOrbit(f'the waveform is too steep for {MOST_NODES} nodes')
+        nodes = 2 * n + 1 if more else n
+        theta = start + np.arange(nodes) / nodes
+        moved = [np.concatenate([*(collocation.evaluate(row, theta) for row in self._rows(part)),
+                                 part[-2:]]) for part in (z, border)]
+        return self, moved[0], moved[1]
+
+    def orbit(self, z: np.ndarray) -> FourierOrbit:
+        """Complete a solution by its derivatives and its residual."""
+        network, u, period = self.along.at(self.network, float(z[-1])), self._rows(z), float(z[-2])
+        return complete(network, self.symmetry, u, period,
+                        *equations(network, self.symmetry, u, period))
+
+
+def from_rest(network: Network, symmetry: Symmetry, line: ParameterLine,
+              scales: tuple[float, float], rest: np.ndarray, vector: np.ndarray, period: float
+              ) -> tuple[FourierCurve, np.ndarray, np.ndarray]:
+    """The orbits near a Hopf point: their curve, the rest state on it, and the oscillation.
+
+    Args:
+        network: at the Hopf point.
+        symmetry: of the critical class.
+        line: of parameters.
+        scales: as of the curve.
+        rest: the equilibrium, shape (components,).
+        vector: critical eigenvector, complex, shape (components,), that of cell 1's first
+            variable 1.
+        period: of the critical oscillation, model time.
+
+    """
+    columns = [variable * network.cells + cell for cell in symmetry.first
+               for variable in range(network.variables)]
+    turns = np.exp(2j * np.pi * np.arange(NODES) / NODES)
+    wave = np.multiply.outer(vector[columns], turns).real
+    return (FourierCurve(network, symmetry, line, scales),
+            np.concatenate([np.repeat(rest[columns], NODES), [period, line.value(network)]]),
+            np.concatenate([wave.ravel(), [0.0, 0.0]]))

@@ -1,0 +1,179 @@
+"""Gaits of networks with a delay as exact periodic orbits, by Fourier collocation.
+
+On a gait every cell is one of a few waveforms, shifted by a known phase, so the delay equations of
+all cells collapse to a periodic problem for one cell of each: with theta = t / T in cycles,
+``u'(theta)/T = f(u(theta), u_w(theta + phi), u_w(theta + phi - tau/T))`` for what a cell hears,
+solved at even nodes with the period as unknown. Phase zero is where cell 1 peaks.
+"""
+
+from functools import lru_cache
+
+import numpy as np
+
+from cpg_ros.dynamics.fourier import collocation
+from cpg_ros.dynamics.fourier.orbit import FourierOrbit
+from cpg_ros.dynamics.periodic import NoOrbit
+from cpg_ros.networks.equations import equations_of, values_of
+from cpg_ros.networks.network import Network
+from cpg_ros.networks.symmetry import Symmetry
+
+NODES = 63
+MOST_NODES = 255
+#: Newton stops at this residual; a waveform is resolved when its last harmonics are this small.
+TOLERANCE = 1e-12
+RESOLVED = 1e-12
+#: States, parameters, derivative by the delay, and slopes in theta; see ``equations``.
+Point = tuple[list[np.ndarray], list[np.ndarray], np.ndarray, np.ndarray]
+#: Below this range Newton has fallen to the rest state.
+SMALLEST = 1e-7
+
+
+@lru_cache(maxsize=64)
+def _heard(network: type[Network], symmetry: Symmetry
+           ) -> list[tuple[bool, list[tuple[int, float]]]]:
+    """For each argument: whether it is delayed, and which row each wave hears at what shift."""
+    found = []
+    for one in equations_of(network).arguments:
+        source = range(network.cells) if one.source is None else one.source
+        places = []
+        for cell in symmetry.first:
+            other = source[cell]
+            places.append((int(symmetry.waves[other]) * network.variables + one.variable,
+                           float(symmetry.phases[other] - symmetry.phases[cell])))
+        found.append((one.delayed, places))
+    return found
+
+
+def equations(network: Network, symmetry: Symmetry, u: np.ndarray, period: float
+              ) -> tuple[np.ndarray, np.ndarray, Point]:
+    """Evaluate the equations on the nodes and the phase condition.
+
+    Args:
+        network: parameters.
+        symmetry: of the gait.
+        u: waveforms on the nodes, a row for each variable of each wave, shape (rows, n).
+        period: in model time.
+
+    Returns:
+        Residual (rows n + 1,), its Jacobian in (u, T), and what ``by_parameter`` needs.
+
+    """
+    rows, n = u.shape
+    variables, tau, kind = network.variables, network.delay, equations_of(type(network))
+    waves, derive = rows // variables, collocation.derivative_matrix(n)
+    heard = _heard(type(network), symmetry)
+    states, slopes, matrices = [], [], []
+    for delayed, places in heard:
+        late = tau / period if delayed else 0.0
+        pairs = [None if shift == late == 0.0 else collocation.shift_matrices(n, shift - late)
+                 for _, shift in places]
+        matrices.append([None if pair is None else pair[0] for pair in pairs])
+        states.append(np.array([u[row] if pair is None else pair[0] @ u[row]
+                                for (row, _), pair in zip(places, pairs, strict=True)]))
+        slopes.append([pair[1] @ u[row] if delayed and pair is not None else None
+                       for (row, _), pair in zip(places, pairs, strict=True)])
+    p = [value[symmetry.first][:, None] if value.ndim else value for value in values_of(network)]
+    rates, by_argument = kind.slopes(states, p)
+    rise = u @ derive.T
+
+    residual = np.empty(rows * n + 1)
+    left = residual[:-1].reshape(waves, variables, n)
+    for v, rate in enumerate(rates):
+        left[:, v] = rise[v::variables] / period - rate
+    residual[-1] = rise[0, 0]
+
+    jacobian = np.zeros((rows * n + 1, rows * n + 1))
+    blocks = jacobian[:-1, :-1].reshape(rows, n, rows, n)
+    by_period = np.zeros((rows, n))
+    by_delay = np.zeros((rows, n))
+    for row in range(rows):
+        blocks[row, :, row] = derive / period
+        by_period[row] = -rise[row] / period**2
+    nodes, flat = np.arange(n), np.zeros((waves, n))
+    for (v, k), slope in by_argument.items():
+        slope = slope + flat
+        delayed, places = heard[k]
+        for wave, (source, _) in enumerate(places):
+            row, matrix = wave * variables + v, matrices[k][wave]
+            if matrix is None:
+                blocks[row, nodes, source, nodes] -= slope[wave]
+                continue
+            blocks[row, :, source] -= slope[wave][:, None] * matrix
+            if delayed:
+                by_shift = slope[wave] * slopes[k][wave]
+                by_period[row] -= by_shift * tau / period**2
+                by_delay[row] += by_shift / period
+    jacobian[:-1, -1] = by_period.ravel()
+    jacobian[-1, :n] = derive[0]
+    return residual, jacobian, (states, p, by_delay, rise)
+
+
+def by_parameter(network: Network, symmetry: Symmetry, point: Point) -> np.ndarray:
+    """Derivative of the residual by the parameters, shape (rows n + 1, parameters)."""
+    states, p, by_delay, _ = point
+    names, kind = network.parameters(), equations_of(type(network))
+    rows, n = by_delay.shape
+    variables = network.variables
+    out = np.zeros((rows, n, len(names)))
+    for (v, r), slope in kind.by_parameter(states, p).items():
+        slope = np.broadcast_to(slope, (rows // variables, n))
+        row = kind.rows[r]
+        for wave, cell in enumerate(symmetry.first):
+            name = network.groups[row][cell] if row in network.groups else row
+            out[wave * variables + v, :, names.index(name)] -= slope[wave]
+    if network.delay_parameter:
+        out[..., names.index(network.delay_parameter)] += by_delay
+    return np.vstack([out.reshape(rows * n, -1), np.zeros(len(names))])
+
+
+def complete(network: Network, symmetry: Symmetry, u: np.ndarray, period: float,
+             residual: np.ndarray, jacobian: np.ndarray, point: Point) -> FourierOrbit:
+    """Complete a solution by its derivatives; the last three are those of the equations."""
+    derivatives = -np.linalg.solve(jacobian, by_parameter(network, symmetry, point))
+    names = network.parameters()
+    # One cell of each wave has seen only those of its family's weights that end on it.
+    for family in network.families(symmetry):
+        if len(family) > 1:
+            members = [names.index(name) for name in family]
+            derivatives[:, members] = derivatives[:, members].mean(axis=1, keepdims=True)
+    shape = (u.shape[0] // network.variables, network.variables, u.shape[1])
+    return FourierOrbit(network, symmetry, period, float(np.abs(residual[:-1]).max()),
+                        derivatives[-1], u.reshape(shape),
+                        derivatives[:-1].reshape(*shape, len(names)))
+
+
+def newton(network: Network, symmetry: Symmetry, u: np.ndarray, period: float
+           ) -> FourierOrbit | None:
+    """Newton from a guess, doubling the nodes until the waveforms are resolved.
+
+    Raises:
+        NoOrbit: they would need more nodes than there may be.
+
+    """
+    while True:
+        for _ in range(12):
+            residual, jacobian, point = equations(network, symmetry, u, period)
+            size = float(np.abs(residual[:-1]).max())
+            if size <= TOLERANCE * max(1.0, float(np.abs(point[3]).max()) / period):
+                break
+            # numpy's solver, unlike scipy's, releases the interpreter lock: a node publishes
+            # while it solves.
+            try:
+                step = np.linalg.solve(jacobian, residual)
+            except np.linalg.LinAlgError:
+                return None
+            u, period = u - step[:-1].reshape(u.shape), period - float(step[-1])
+            # A period that leaves the range of the delay has run away, and so has a waveform.
+            if not (1e-3 * network.delay < period < 1e3 * network.delay
+                    and np.abs(u).max() < 1e3):
+                return None
+        else:
+            return None
+        if np.ptp(u[0]) < SMALLEST:
+            return None
+        if max(collocation.tail(row) for row in u) <= RESOLVED:
+            break
+        if u.shape[1] >= MOST_NODES:
+            raise NoOrbit(f'the waveform is too steep for {MOST_NODES} nodes')
+        u = np.array([collocation.resample(row, 2 * row.size + 1) for row in u])
+    return complete(network, symmetry, u, period, residual, jacobian, point)

@@ -1,0 +1,1 @@
+"""Periodic orbits as polynomials on a mesh: for networks without delay."""
