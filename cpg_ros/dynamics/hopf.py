@@ -17,10 +17,7 @@ from functools import cached_property
 
 import numpy as np
 
-from cpg_ros.dynamics.characteristic import (
-    characteristic_matrix,
-    roots_right_of,
-)
+from cpg_ros.dynamics.characteristic import characteristic_matrix
 from cpg_ros.dynamics.delay_crossings import delay_crossings
 from cpg_ros.dynamics.equilibrium import equilibrium, everywhere
 from cpg_ros.dynamics.expansion import Expansion
@@ -87,6 +84,16 @@ class HopfPoint:
         """Eigenvector q of one cell, shape (variables,); over the whole network <q, q> = 1."""
         return self._eigenvectors[0]
 
+    @property
+    def eigenvector(self) -> np.ndarray:
+        """Eigenvector q of the whole network, shape (components,)."""
+        return np.kron(self.vector, self.block.vector)
+
+    @property
+    def state(self) -> np.ndarray:
+        """Equilibrium of the whole network, shape (components,)."""
+        return everywhere(self.network, self.rest)
+
     @cached_property
     def normal_form(self) -> NormalForm:
         """In model time, mu = value' - value; z belongs to q."""
@@ -143,7 +150,7 @@ class HopfPoint:
         ours = dict(self.block.symmetry.shifts)
         conjugate = dict(power(self.block.symmetry, -1).shifts)
         for other in blocks(self.network, self.rest):
-            roots = roots_right_of(-close, other.now, other.past, self.network.delay, other.real)
+            roots = other.right_of(-close)
             mine = dict(other.symmetry.shifts)
             for critical, owner in ((1j * self.omega, ours), (-1j * self.omega, conjugate)):
                 if mine == owner and len(roots):
