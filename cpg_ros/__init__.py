@@ -14,7 +14,7 @@ os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
 if TYPE_CHECKING:
     from cpg_ros.dynamics.continuation import follow
     from cpg_ros.dynamics.floquet import multipliers
-    from cpg_ros.dynamics.hopf import hopf_points
+    from cpg_ros.dynamics.hopf_search import hopf_points
     from cpg_ros.dynamics.orbit import NoOrbit, solve_orbit
     from cpg_ros.errors import CpgError
     from cpg_ros.integration.simulate import simulate
@@ -36,7 +36,7 @@ _PLACES = {
     'NETWORKS': 'networks.registry', 'PRESETS': 'networks.registry', 'CpgError': 'errors',
     'NoOrbit': 'dynamics.orbit', 'Pattern': 'motion.pattern', 'Stepper': 'integration.stepper',
     'find_robot': 'robots.robot_file', 'follow': 'dynamics.continuation',
-    'hopf_points': 'dynamics.hopf', 'inverted': 'inversion.recording_fit',
+    'hopf_points': 'dynamics.hopf_search', 'inverted': 'inversion.recording_fit',
     'multipliers': 'dynamics.floquet', 'plan': 'motion.plan', 'read_bag': 'recordings.bag_reader',
     'read_csv': 'recordings.csv_reader', 'simulate': 'integration.simulate',
     'solve_orbit': 'dynamics.orbit'}

@@ -8,6 +8,7 @@ cell s as ``h chi(s)``, and a delay ago as ``exp(-lambda tau)`` times that.
 from collections.abc import Mapping
 from functools import cached_property
 from itertools import permutations
+from typing import Any
 
 import numpy as np
 
@@ -37,12 +38,12 @@ class Expansion:
         return self._equations.slopes(self._x, self._p)[1]
 
     @cached_property
-    def _second(self) -> Mapping[tuple[int, ...], float]:
-        return {**self._equations.second(self._x, self._p)}
+    def _second(self) -> Mapping[Any, float]:
+        return self._equations.second(self._x, self._p)
 
     @cached_property
-    def _third(self) -> Mapping[tuple[int, ...], float]:
-        return {**self._equations.third(self._x, self._p)}
+    def _third(self) -> Mapping[Any, float]:
+        return self._equations.third(self._x, self._p)
 
     def linear(self, chi: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """L0 and L1 of a class, complex: ``h' = L0 h(t) + L1 h(t - tau)``, (variables, variables).
@@ -84,7 +85,7 @@ class Expansion:
         """Third derivative of the rates, C(a, b, c), shape (variables,)."""
         return self._multilinear(self._third, a, b, c)
 
-    def _multilinear(self, derivatives: Mapping[tuple[int, ...], float], *sets: np.ndarray
+    def _multilinear(self, derivatives: Mapping[Any, float], *sets: np.ndarray
                      ) -> np.ndarray:
         out = np.zeros(self.network.variables, dtype=complex)
         for (v, *places), value in derivatives.items():

@@ -9,11 +9,12 @@ from functools import cached_property
 from typing import Any
 
 from cpg_ros.dynamics.continuation import from_hopf
+from cpg_ros.dynamics.equilibrium import NoEquilibrium
 from cpg_ros.dynamics.floquet import Multipliers, multipliers, smallest_gain
-from cpg_ros.dynamics.hopf import hopf_point, hopf_points
+from cpg_ros.dynamics.hopf import first_hopf
+from cpg_ros.dynamics.hopf_search import hopf_points
 from cpg_ros.dynamics.orbit import NoOrbit, Orbit, solve_orbit
 from cpg_ros.dynamics.stability import stability
-from cpg_ros.networks.delayed import Delayed
 from cpg_ros.networks.network import Network
 from cpg_ros.networks.parameter_line import ParameterLine
 
@@ -104,65 +105,75 @@ def verdicts(network: Network, done: Callable[[int], None] = lambda count: None
         done: told how many gaits are done.
 
     Raises:
-        ValueError: a parameter that is not finite, or a delay that is not positive.
+        InputError: a parameter that is not finite, or a delay that is not positive.
 
     """
     found = {}
     for count, gait in enumerate(network.gaits()):
         done(count)
         try:
-            found[gait] = GaitAssessment(gait, solve_orbit(network, gait))
-        except NoOrbit as error:
-            found[gait] = (_beyond(network, gait, str(error)) if isinstance(network, Delayed)
-                           else GaitAssessment(gait, None, str(error)))
+            try:
+                found[gait] = GaitAssessment(gait, solve_orbit(network, gait))
+            except NoOrbit as error:
+                found[gait] = _beyond(network, gait, str(error))
+        except NoEquilibrium as error:
+            found[gait] = GaitAssessment(gait, None, str(error))
     done(len(found))
     return found
 
 
-def _beyond(network: Delayed, gait: str, why: str) -> GaitAssessment:
+def _beyond(network: Network, gait: str, why: str) -> GaitAssessment:
     """Look for an orbit that the solver does not reach from the first onset.
 
     Those born with unstable roots in their own class, and those beyond a fold, lie on the
-    branches of the gait's Hopf points.
+    branches of the gait's Hopf points as the delay moves.
     """
-    points = [point for point in hopf_points(network, FURTHEST * network.tau)
-              if point.mode == network.symmetry(gait)]
-    along = ParameterLine.parse('tau', Delayed)
-    for point in points:
-        if (point.tau < network.tau) != (point.normal_form.side > 0) or point.n > TURNS:
+    name, delay = network.delay_parameter, network.delay
+    if not name:
+        return GaitAssessment(gait, None, why)
+    line, shifts = ParameterLine((name,), (1.0,)), set(network.symmetry(gait).shifts)
+    for point in hopf_points(network, line, 0.0, FURTHEST * delay):
+        if set(point.block.symmetry.shifts) != shifts:
             continue
-        low, high = sorted((0.9 * point.tau, network.tau)) if point.normal_form.side > 0 else (
-            0.5 * network.tau, 1.1 * point.tau)
+        if (point.value < delay) != (point.normal_form.side > 0) or point.n > TURNS:
+            continue
+        low, high = sorted((0.9 * point.value, delay)) if point.normal_form.side > 0 else (
+            0.5 * delay, 1.1 * point.value)
         try:
-            branch = from_hopf(point.network, point.mode, point.omega, along, low, high, most=80)
-            orbits = branch.at(network.tau)
+            branch = from_hopf(point.network, point.block.symmetry, point.omega, line, low, high,
+                               rest=point.state, vector=point.eigenvector, most=80)
+            orbits = branch.at(delay)
         except NoOrbit:
             continue
         if orbits:
             return GaitAssessment(gait, orbits[-1])
-    first = hopf_point(network, network.symmetry(gait))
-    if first is not None and first.tau > network.tau:
-        why = f"tau {network.tau:g} is below the {gait}'s critical delay {first.tau:.4f}"
+    first = first_hopf(network, gait)
+    if first is not None and first.value > delay:
+        why = f"{name} {delay:g} is below the {gait}'s critical delay {first.value:.4f}"
     return GaitAssessment(gait, None, why)
 
 
-def nearest_threshold(network: Delayed) -> str:
-    """Name what would have to change for a gait, of a delayed network that has none.
+def nearest_threshold(network: Network) -> str:
+    """Name what would have to change for a gait, of a network with a delay that has none.
 
-    The critical delay that is nearest above the delay; where no delay has one, the |c| that is
-    nearest.
+    The critical delay that is nearest above the delay; where no delay has one, what the network
+    says has to be larger.
     """
-    points = {gait: hopf_point(network, network.symmetry(gait)) for gait in network.gaits()}
-    ahead = {gait: point.tau for gait, point in points.items()
-             if point is not None and point.tau >= network.tau}
+    name, delay = network.delay_parameter, network.delay
+    points = {gait: first_hopf(network, gait) for gait in network.gaits()}
+    ahead = {gait: point.value for gait, point in points.items()
+             if point is not None and point.value >= delay}
     if ahead:
-        gait = min(ahead, key=lambda name: ahead[name])
-        return (f"the nearest threshold is the {gait}'s critical delay {ahead[gait]:.4f} (tau is "
-                f'{network.tau:g})')
-    needed = {gait: abs(network.symmetry(gait).eigenvalue_terms(network)[0].real)
-              for gait, point in points.items() if point is None}
+        gait = min(ahead, key=lambda one: ahead[one])
+        return (f"the nearest threshold is the {gait}'s critical delay {ahead[gait]:.4f} ({name} "
+                f'is {delay:g})')
+    needed = {gait: coupling for gait, point in points.items()
+              if point is None and (coupling := network.least_coupling(gait)) is not None}
     if needed:
-        gait = min(needed, key=lambda name: needed[name])
-        return (f'the nearest threshold is |c| {needed[gait]:.4f}, above which the {gait} has a '
-                f'critical delay (|c| is {abs(network.c):g})')
-    return 'every critical delay is below tau, but no orbit was found this far from onset'
+        gait = min(needed, key=lambda one: needed[one].least)
+        what, value, least = needed[gait]
+        return (f'the nearest threshold is {what} {least:.4f}, above which the {gait} has a '
+                f'critical delay ({what} is {value:g})')
+    if not any(points.values()):
+        return 'no delay gives one'
+    return f'every critical delay is below {name}, but no orbit was found this far from onset'

@@ -17,7 +17,7 @@ from functools import cached_property
 
 import numpy as np
 
-from cpg_ros.dynamics.characteristic import characteristic_matrix, roots_right_of
+from cpg_ros.dynamics.characteristic import characteristic_matrix
 from cpg_ros.dynamics.delay_crossings import delay_crossings
 from cpg_ros.dynamics.equilibrium import equilibrium, everywhere
 from cpg_ros.dynamics.expansion import Expansion
@@ -84,6 +84,16 @@ class HopfPoint:
         """Eigenvector q of one cell, shape (variables,); over the whole network <q, q> = 1."""
         return self._eigenvectors[0]
 
+    @property
+    def eigenvector(self) -> np.ndarray:
+        """Eigenvector q of the whole network, shape (components,)."""
+        return np.kron(self.vector, self.block.vector)
+
+    @property
+    def state(self) -> np.ndarray:
+        """Equilibrium of the whole network, shape (components,)."""
+        return everywhere(self.network, self.rest)
+
     @cached_property
     def normal_form(self) -> NormalForm:
         """In model time, mu = value' - value; z belongs to q."""
@@ -142,8 +152,8 @@ class HopfPoint:
     @property
     def drifts(self) -> bool:
         """Whether the gait's own class has a real root with positive real part as well."""
-        close, block = ON_AXIS * max(1.0, self.omega), self.block
-        roots = roots_right_of(close, block.now, block.past, self.network.delay, block.real)
+        close = ON_AXIS * max(1.0, self.omega)
+        roots = self.block.right_of(close)
         return bool((np.abs(roots.imag) <= close).any())
 
     @property
@@ -168,7 +178,7 @@ class HopfPoint:
         ours = dict(self.block.symmetry.shifts)
         conjugate = dict(power(self.block.symmetry, -1).shifts)
         for other in blocks(self.network, self.rest):
-            roots = roots_right_of(-close, other.now, other.past, self.network.delay, other.real)
+            roots = other.right_of(-close)
             mine = dict(other.symmetry.shifts)
             for critical, owner in ((1j * self.omega, ours), (-1j * self.omega, conjugate)):
                 if mine == owner and len(roots):

@@ -10,7 +10,6 @@ from itertools import pairwise
 
 import numpy as np
 
-from cpg_ros.dynamics.characteristic import characteristic_roots, roots_right_of
 from cpg_ros.dynamics.delay_crossings import delay_crossings
 from cpg_ros.dynamics.equilibrium import NoEquilibrium, equilibrium
 from cpg_ros.dynamics.hopf import ON_AXIS, HopfPoint, crossing_at
@@ -70,7 +69,7 @@ def hopf_at(network: Network, line: ParameterLine, mode: tuple[int, ...], omega:
     rest = equilibrium(network)
     block = next(block for block in blocks(network, rest) if block.mode == mode)
     # Its real part is zero but for rounding, unless the caller was wrong by more.
-    roots = roots_right_of(-1e-3, block.now, block.past, network.delay, block.real)
+    roots = block.right_of(-1e-3)
     root = roots[np.abs(roots - 1j * omega).argmin()]
     return HopfPoint(network, line, line.value(network), block, float(root.imag), rest)
 
@@ -99,8 +98,7 @@ def _on_grid(network: Network, line: ParameterLine, low: float, high: float) -> 
     def roots(value: float, which: int, count: int) -> np.ndarray:
         if not split(value):
             return np.full(count, np.nan, dtype=complex)
-        one = split(value)[which]
-        return characteristic_roots(one.now, one.past, one.network.delay, count, one.real)
+        return split(value)[which].roots(count)
 
     grid = _with_edges([float(value) for value in np.linspace(low, high, GRID)],
                        lambda value: bool(split(value)))
@@ -131,8 +129,7 @@ def _followed(along: list[Block]) -> int:
     """How many roots of a class can cross on the grid: without a delay, all."""
     if not any(one.past.any() for one in along):
         return along[0].network.variables
-    return SPARE + max(len(roots_right_of(0.0, one.now, one.past, one.network.delay, one.real))
-                       for one in along)
+    return SPARE + max(len(one.right_of(0.0)) for one in along)
 
 
 def _with_edges(grid: list[float], exists: Callable[[float], bool]) -> list[float]:

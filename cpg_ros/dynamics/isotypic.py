@@ -14,7 +14,7 @@ from itertools import product
 
 import numpy as np
 
-from cpg_ros.dynamics.characteristic import characteristic_roots
+from cpg_ros.dynamics.characteristic import characteristic_roots, roots_right_of
 from cpg_ros.dynamics.expansion import Expansion
 from cpg_ros.errors import InputError
 from cpg_ros.networks.network import Network
@@ -90,6 +90,10 @@ class Block:
     def roots(self, count: int) -> np.ndarray:
         """Return the rightmost roots, at most as many as there are, 1/model time, (count,)."""
         return characteristic_roots(self.now, self.past, self.network.delay, count, self.real)
+
+    def right_of(self, bound: float) -> np.ndarray:
+        """Return all roots whose real part is above a bound, rightmost first."""
+        return roots_right_of(bound, self.now, self.past, self.network.delay, self.real)
 
     def within(self, other: 'Block') -> bool:
         """Whether the class lies in the other's gait's class: what stays as it is under K.

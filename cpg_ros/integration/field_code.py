@@ -1,30 +1,18 @@
 """Kernel code for a network's right-hand side, written from its equations.
 
 It takes ``lanes`` copies of the network at once, component ``cell * lanes + lane`` of each
-variable, in short loops over all cells and lanes, which compilers turn into vector instructions:
-one for every elementary function, then one for every rate. What depends on delayed states alone is
-worked out apart (drive), since two stages of a step share it. A function of what another cell has
-is worked out where it is and then fetched, so that it is worked out once.
+variable. What depends on delayed states alone is worked out apart (drive), since two stages of a
+step share it.
 """
 
 from collections.abc import Sequence
-from itertools import groupby, takewhile
 from typing import Any
 
 import sympy
-from sympy.printing.pycode import PythonCodePrinter
 
-from cpg_ros.networks.derivation import expressions, print_float
-from cpg_ros.networks.equations import Argument, Equations, Source
-
-
-class _Printer(PythonCodePrinter):
-    """Python, numbers to the last digit."""
-
-    _print_Float = print_float
-
-
-_PRINTER = _Printer({'fully_qualified_modules': False})
+from cpg_ros.integration.loops import Program, Writer
+from cpg_ros.networks.derivation import expressions
+from cpg_ros.networks.equations import Equations
 
 
 def _share_exponentials(parts: list[Any]) -> tuple[list[Any], dict[Any, Any]]:
@@ -51,28 +39,34 @@ def _share_exponentials(parts: list[Any]) -> tuple[list[Any], dict[Any, Any]]:
     return [part.xreplace(known) for part in parts], powers
 
 
-class _Program:
-    """Loops that work out expressions of arguments that are all heard at one time."""
+def _split(rates: list[Any], delayed: set[Any], now: set[Any]) -> tuple[list[Any], list[Any]]:
+    """Part rates into what is heard a delay ago and the rest.
 
-    def __init__(self, arguments: Sequence[tuple[Any, Argument]], powers: dict[Any, Any]
-                 ) -> None:
-        self._arguments, self._powers = dict(arguments), powers
-        self.functions: list[tuple[Any, Any]] = []
-        self.fetched: list[tuple[Any, Any, Source]] = []
+    Returns:
+        Expressions in delayed arguments, and the rates with symbols (d0 ...) in place of them.
 
-    def own(self, variable: int) -> Any:
-        """The symbol of a cell's own variable."""
-        return sympy.Symbol(f'z{variable}', real=True)
+    """
+    driven: list[Any] = []
 
-    def _fetch(self, what: Any, source: Source) -> Any:
-        for symbol, known, place in self.fetched:
-            if known == what and place == source:
-                return symbol
-        symbol = sympy.Symbol(f'g{len(self.fetched)}', real=True)
-        self.fetched.append((symbol, what, source))
-        return symbol
+    def symbol_of(part: Any) -> Any:
+        if part not in driven:
+            driven.append(part)
+        return sympy.Symbol(f'd{driven.index(part)}', real=True)
 
-    def _function(self, call: Any) -> Any:
+    rest = []
+    for rate in rates:
+        alone = [term for term in sympy.Add.make_args(rate)
+                 if term.free_symbols & delayed and not term.free_symbols & now]
+        left = rate - sympy.Add(*alone)
+        if alone:
+            left = left + symbol_of(sympy.Add(*alone))
+        mixed = {symbol: symbol_of(symbol) for symbol in sorted(
+            left.free_symbols & delayed, key=str)}
+        rest.append(left.xreplace(mixed))
+    return driven, rest
+
+
+def _function(self, call: Any) -> Any:
         for symbol, known in self.functions:
             if known == call:
                 return symbol
@@ -273,7 +267,7 @@ def kernel_source(equations: Equations) -> str:
         if not results:
             continue
         results, powers = _share_exponentials(results)
-        program = _Program([(symbol, one) for symbol, one in arguments
+        program = Program([(symbol, one) for symbol, one in arguments
                             if one.delayed == (name == 'drive')], powers)
         lowered = [program.lowered(part) for part in results]
         used = {str(symbol) for part in (*lowered, *(call for _, call in program.functions),
@@ -287,7 +281,7 @@ def kernel_source(equations: Equations) -> str:
         slices += [f'p_{row} = p[{r}]' for r, row in enumerate(equations.rows)
                    if f'p_{row}' in used]
         slices += [f'o{k} = out[{k} * m:{k + 1} * m]' for k in range(len(results))]
-        writer = _Writer(program)
+        writer = Writer(program)
         most, extra = max(most, writer.arrays), max(extra, writer.extra)
         writer.loops([(f'o{k}', part) for k, part in enumerate(lowered)])
         head = ('n, past, p, lanes, work, out' if name == 'drive'
@@ -301,5 +295,5 @@ def kernel_source(equations: Equations) -> str:
     head = ''.join(line + '\n' for line in (
         f'from math import {", ".join(others)}' if others else '',
         f'from cpg_ros.integration.jit import {", ".join(known)}' if known else '') if line)
-    return (f'{head}\nDRIVEN, WORK, EXTRA = {len(driven)}, {most}, {extra}\n\n\ndef compiled(decorate):\n{code}\n'
-            f'    return {"drive" if driven else None}, field\n')
+    return (f'{head}\nDRIVEN, WORK, EXTRA = {len(driven)}, {most}, {extra}\n\n\n'
+            f'def compiled(decorate):\n{code}\n    return {"drive" if driven else None}, field\n')

@@ -180,6 +180,10 @@ def _compiled(decorate, equations):
     return past_state, restart, steps_of
 
 
+# Stand-ins for the functions of a network, which ``_with`` puts in their place.
+_past_state = _restart = _steps = _steps_of_one = None
+
+
 def _with(function, names):
     """Copy a function that is to use other functions instead of its module's of these names.
 
@@ -242,8 +246,8 @@ def _cached(digest, network, components, **functions):
         """The same as integrate for a single trajectory, built in one piece, loops unrolled."""
         digest  # noqa: B018
         np.random.seed(seed)
-        return _steps_of_one(components, 1, p, tau, gain, basis, step, x, after, before, head, steps,
-                             noise, states, slopes, row, every)
+        return _steps_of_one(components, 1, p, tau, gain, basis, step, x, after, before, head,
+                             steps, noise, states, slopes, row, every)
 
     def integrate(p, tau, gain, basis, step, x, after, before, head, steps, noise, seed,
                   states, slopes, row, every):

@@ -68,7 +68,7 @@ def _judged(found: Inverted) -> list[str]:
     fit = found.fit
     said = []
     if fit.hopf is not None:
-        said.append(f'The {fit.gait} is born at the critical delay {fit.hopf.tau:.4f}; '
+        said.append(f'The {fit.gait} is born at the critical delay {fit.hopf.value:.4f}; '
                     f'{fit.network.delay_parameter} is {fit.network.delay:.4f}.')
     verdict = fit.verdict
     said.append(

@@ -66,7 +66,7 @@ class Inverted:
                         'iterations': trial.iterations, 'cost': trial.cost, 'why': trial.why}
                        for trial in fit.starts],
             'period': fit.orbit.period,
-            'critical_delay': None if fit.hopf is None else fit.hopf.tau,
+            'critical_delay': None if fit.hopf is None else fit.hopf.value,
             'stable': verdict.stable, 'stable_with_default_gain': verdict.stable_with_default_gain,
             'source': self.recording.source, 'legs': {leg: list(names) for leg, names
                                                       in self.legs.items()},

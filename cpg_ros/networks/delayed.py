@@ -12,7 +12,7 @@ from functools import cache
 from typing import Any, ClassVar
 
 from cpg_ros.networks.equations import Cell
-from cpg_ros.networks.network import Network, Preset, Range, known
+from cpg_ros.networks.network import LeastCoupling, Network, Preset, Range, known
 from cpg_ros.networks.symmetry import GAITS, Z4_Z2, Symmetry
 from cpg_ros.networks.terms import Number, tanh
 
@@ -105,12 +105,15 @@ class Delayed(Network):
         if j % 2 == 0 and self.c * (-1) ** k >= 0.0:
             wanted = 'positive' if k else 'negative'
             return f'c {self.c:g} gives no {gait}: c must be {wanted}'
-        # Roots of lambda = A + B exp(-lambda tau) cross where |B| > |Re A|.
-        least = abs(self.a + self.b + self.d * (1.0, 0.0, -1.0)[j])
-        if abs(self.c) <= least:
-            return (f'|c| {abs(self.c):g} gives no {gait} at any delay: it must be above '
-                    f'{least:.4f}')
+        text, value, least = self.least_coupling(gait)
+        if value <= least:
+            return f'{text} {value:g} gives no {gait} at any delay: it must be above {least:.4f}'
         return ''
+
+    def least_coupling(self, gait: str) -> LeastCoupling:
+        """Roots of ``lambda = A + B exp(-lambda tau)`` cross where |B| > |Re A|."""
+        least = abs(self.a + self.b + self.d * (1.0, 0.0, -1.0)[GAITS[gait][0]])
+        return LeastCoupling('|c|', abs(self.c), least)
 
     def sufficient_gain(self, rate: float) -> float:
         """Return a symmetry gain with which every gait attracts, 1/model time.

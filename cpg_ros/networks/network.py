@@ -9,7 +9,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, fields
 from functools import cache
-from typing import Any, ClassVar, Literal
+from typing import Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
 
@@ -30,6 +30,14 @@ class Range:
     low: float
     high: float
     text: str
+
+
+class LeastCoupling(NamedTuple):
+    """A coupling, such as '|c|', its value, and how much is needed."""
+
+    text: str
+    value: float
+    least: float
 
 
 class Network(ABC):
@@ -189,6 +197,10 @@ class Network(ABC):
             rate: at which disturbances outside the gait's class are to decay, 1/model time.
 
         """
+        return None
+
+    def least_coupling(self, gait: str) -> LeastCoupling | None:
+        """Return how strong a coupling must be for a gait to be born at some delay, if known."""
         return None
 
     def obstacle(self, gait: str) -> str:

@@ -7,7 +7,7 @@ the orbits attract then depends on the first Lyapunov coefficient besides.
 
 from dataclasses import dataclass
 
-from cpg_ros.dynamics.equilibrium import stand
+from cpg_ros.dynamics.equilibrium import equilibrium
 from cpg_ros.dynamics.isotypic import blocks
 from cpg_ros.networks.network import known
 from cpg_ros.networks.quadruped import GAITS, Quadruped
@@ -72,7 +72,7 @@ def theorem_4_2(network: Quadruped, gait: str) -> TheoremVerdict:
 
     Raises:
         InputError: the gait is not one of the six, or a parameter is not finite.
-        NoStand: the network has no stand.
+        NoEquilibrium: the network has no stand.
 
     """
     mirror, along, across = SIGNS[known(gait, tuple(GAITS))]
@@ -89,7 +89,7 @@ def theorem_4_2(network: Quadruped, gait: str) -> TheoremVerdict:
     met = all(sign * value > 0.0 for _, sign, value in signs if sign)
 
     overlooked = []
-    split = blocks(network, stand(network))
+    split = blocks(network, equilibrium(network))
     if max(block.leading.real for block in split if block.gait == gait) > EQUAL:
         overlooked.append('the critical pair is the rightmost of its class')
     # Where beta = alpha all real blocks have the discriminant of the critical one.

@@ -1,25 +1,23 @@
 """What ``analyze`` has to say about a parameter set: as text, and as JSON."""
 
 import math
-from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
-from cpg_ros.dynamics.cell_hopf import CellHopf, cell_hopf_points
-from cpg_ros.dynamics.characteristic import leading_roots, unstable_roots
-from cpg_ros.dynamics.equilibrium import stand
+import numpy as np
+
+from cpg_ros.dynamics.equilibrium import equilibrium, named, odd
 from cpg_ros.dynamics.gait_assessment import GaitAssessment, nearest_threshold
-from cpg_ros.dynamics.hopf import HopfPoint, hopf_points
+from cpg_ros.dynamics.hopf import HopfPoint
+from cpg_ros.dynamics.hopf_search import hopf_points
 from cpg_ros.dynamics.isotypic import Block, blocks
 from cpg_ros.errors import CpgError
 from cpg_ros.files.plain_text import table
-from cpg_ros.networks.delayed import MODES, Delayed
 from cpg_ros.networks.network import Network
 from cpg_ros.networks.parameter_line import ParameterLine
-from cpg_ros.networks.quadruped import Quadruped
-from cpg_ros.papers.theorem_4_2 import TheoremVerdict, theorem_4_2
+from cpg_ros.papers.commentary import COMMENTARIES, Commentary
 
 
 def _root(value: complex) -> str:
@@ -29,19 +27,26 @@ def _root(value: complex) -> str:
     return f'{value.real:.4f} +- {abs(value.imag):.4f}i'
 
 
+def _state(network: Network, rest: np.ndarray) -> str:
+    return ', '.join(f'{name} {value:.4f}' for name, value in named(network, rest).items())
+
+
 def _yes(value: bool) -> str:
     return 'yes' if value else 'no'
 
 
 @dataclass(frozen=True, eq=False)
-class Analysis(ABC):
+class Analysis:
     """A parameter set with its gaits.
+
+    Where the network has a delay, its Hopf points are those at which the delay is critical.
 
     Attributes:
         network: the parameters.
         gaits: gait -> verdict.
-        along: parameters that move for Hopf points and branches.
+        along: parameters that move for branches, and for Hopf points without a delay.
         span: from where to where.
+        longest: bound of the delay for Hopf points, model time.
 
     """
 
@@ -49,11 +54,43 @@ class Analysis(ABC):
     gaits: Mapping[str, GaitAssessment]
     along: ParameterLine
     span: tuple[float, float]
+    longest: float
+
+    @cached_property
+    def _found(self) -> tuple[list[HopfPoint], tuple[Block, ...], np.ndarray, str]:
+        """Hopf points, blocks and equilibrium; or why there are none."""
+        try:
+            rest = equilibrium(self.network)
+            parts = blocks(self.network, rest)
+            span = (0.0, self.longest) if self.delay else self.span
+            points = hopf_points(self.network, self.line, *span) if span[0] < span[1] else []
+        except CpgError as error:
+            return [], (), np.array([]), str(error)
+        return points, parts, rest, ''
 
     @property
-    @abstractmethod
-    def hopf(self) -> list:
-        """Hopf points of rest, by rising parameter."""
+    def delay(self) -> str:
+        """Name of the delay, or ''."""
+        return self.network.delay_parameter
+
+    @property
+    def line(self) -> ParameterLine:
+        """Parameters that move for Hopf points."""
+        return ParameterLine((self.delay,), (1.0,)) if self.delay else self.along
+
+    @property
+    def hopf(self) -> list[HopfPoint]:
+        """Hopf points of the equilibrium, by rising parameter."""
+        return self._found[0]
+
+    @property
+    def blocks(self) -> tuple[Block, ...]:
+        """The linearisation at the equilibrium, by symmetry class."""
+        return self._found[1]
+
+    @property
+    def _commentary(self) -> Commentary:
+        return COMMENTARIES.get(self.network.name, Commentary())
 
     @property
     def existing(self) -> list[GaitAssessment]:
@@ -104,7 +141,8 @@ class Analysis(ABC):
     def _conclusion(self) -> str:
         """The whole in a sentence or two."""
         if not self.existing:
-            return 'This set gives no gait.'
+            nearest = f'; {nearest_threshold(self.network)}' if self.delay else ''
+            return f'This set gives no gait{nearest}.'
         by_itself = [verdict.gait for verdict in self.existing if verdict.stable]
         locked = [verdict.gait for verdict in self.existing
                   if not verdict.stable and verdict.stable_with_default_gain]
@@ -125,184 +163,88 @@ class Analysis(ABC):
         return '\n'.join([f'{self.network.name}: {self.parameters}', '', *self._rest(), '',
                           *self._gaits(), '', self._conclusion()])
 
-    @abstractmethod
     def _rest(self) -> list[str]:
-        """Lines on the rest state and its Hopf points."""
+        """Lines on the equilibrium and its Hopf points."""
+        _, parts, rest, why = self._found
+        if why:
+            return [f'Stand: {why}.']
+        lines = [*(self._roots(parts, rest) if self.delay else self._eigenvalues(parts, rest)), '']
+        where = (f'up to a delay of {self.longest:g}' if self.delay else
+                 f'with {self.along} from {self.span[0]:g} to {self.span[1]:g}')
+        return [*lines, *(self._points(where) if self.hopf else [f'No Hopf point {where}.'])]
 
-    def as_dict(self) -> dict[str, Any]:
-        """Everything in plain types."""
-        return {'network': self.network.name, 'params': self.network.as_dict(),
-                'gaits': {gait: verdict.as_dict() for gait, verdict in self.gaits.items()}}
-
-
-@dataclass(frozen=True, eq=False)
-class DelayAnalysis(Analysis):
-    """Of the delayed network.
-
-    Attributes:
-        longest: bound of the delay for Hopf points, model time.
-
-    """
-
-    longest: float = 0.0
-
-    @cached_property
-    def hopf(self) -> list[HopfPoint]:
-        """Hopf points of rest, by rising delay."""
-        assert isinstance(self.network, Delayed)
-        return hopf_points(self.network, self.longest)
-
-    def _rest(self) -> list[str]:
-        assert isinstance(self.network, Delayed)
-        unstable = sum(len(unstable_roots(self.network, mode)) for mode in MODES)
-        mode, leading = max(leading_roots(self.network).items(), key=lambda item: item[1].real)
+    def _roots(self, parts: tuple[Block, ...], rest: np.ndarray) -> list[str]:
+        """With a delay: how many of all roots are to the right, and the rightmost."""
+        unstable = sum(len(block.right_of(0.0)) for block in parts)
+        block = max(parts, key=lambda one: one.leading.real)
         count = f'{unstable or "no"} root{"s" if unstable != 1 else ""}'
-        lines = [f'Rest: {count} with positive real part; the rightmost is {_root(leading)} '
-                 f'per model time, of mode ({mode.j}, {mode.k}).', '']
-        if not self.hopf:
-            return [*lines, f'No Hopf point up to a delay of {self.longest:g}.']
-        rows: list[tuple[str, ...]] = [(
-            'gait', 'wave', 'tau', 'omega', 'period', 'k1', 'k2', "k1'", "k2'", 'type', 'orbits',
-            'others', 'transverse')]
-        for point in self.hopf:
-            form, printed = point.normal_form, point.published
-            rows.append((
-                point.gait, point.wave, f'{point.tau:.4f}', f'{point.omega:.4f}',
-                f'{math.tau / point.omega:.4f}', f'{form.k1.real:.4f}',
-                f'{form.k2.real:.4f}', f'{printed.k1.real:.4f}', f'{printed.k2.real:.4f}',
-                'supercritical' if point.supercritical else 'subcritical',
-                'above' if form.side > 0 else 'below', str(point.unstable_roots),
-                str(point.unstable_transverse_roots)))
-        return [*lines, f'Hopf points up to a delay of {self.longest:g} (tau and period in model '
-                "time; omega in rad per model time; k1', k2' as",
-                'Liu & Zhang print them, which is wrong; others: further roots with positive real '
-                'part, transverse: of them outside the class):',
-                *(f'  {line}' for line in table(rows, '<<>>>>>>><<>>'))]
+        place = '' if odd(self.network) else f' at {_state(self.network, rest)}'
+        return [f'Rest{place}: {count} with positive real part; the rightmost is '
+                f'{_root(block.leading)} per model time, of mode '
+                f'({", ".join(map(str, block.mode))}).']
 
-    def _conclusion(self) -> str:
-        assert isinstance(self.network, Delayed)
-        if self.existing:
-            return super()._conclusion()
-        return f'This set gives no gait; {nearest_threshold(self.network)}.'
+    def _eigenvalues(self, parts: tuple[Block, ...], rest: np.ndarray) -> list[str]:
+        rows: list[tuple[str, ...]] = [('class', 'gait', 'rightmost eigenvalue')]
+        rows += [(block.name, block.gait, _root(block.leading)) for block in parts]
+        return [f'Stand: {_state(self.network, rest)}; eigenvalues per model time by symmetry '
+                'class:', *(f'  {line}' for line in table(rows))]
+
+    def _points(self, where: str) -> list[str]:
+        """Table of the Hopf points."""
+        said, heads = self._commentary, () if self.delay else ('l1',)
+        rows: list[tuple[str, ...]] = [(
+            'gait', 'wave', str(self.line), 'omega', 'period', 'k1', 'k2', *heads, *said.heads,
+            'type', 'orbits', 'others', 'transverse')]
+        for point in self.hopf:
+            numbers = {'omega': point.omega, 'period': math.tau / point.omega,
+                       **self._form(point), **said.numbers(point)}
+            rows.append((
+                point.gait, point.wave, f'{point.value:.4f}',
+                *(f'{number:.4f}' for number in numbers.values()),
+                'supercritical' if point.supercritical else 'subcritical',
+                'above' if point.normal_form.side > 0 else 'below', str(point.unstable_roots),
+                str(point.unstable_transverse_roots)))
+        explained = (
+            f'{self.delay} and period in model time; omega in rad per model time; '
+            f'{said.explained}others: further roots with positive real part, transverse: of them '
+            'outside the class' if self.delay else
+            f'omega in rad per model time; {said.explained}others: further eigenvalues with '
+            'positive\nreal part, transverse: of them outside the class')
+        middle = len(rows[0]) - 6
+        lines = [*f'Hopf points {where} ({explained}):'.split('\n'),
+                 *(f'  {line}' for line in table(rows, '<<' + '>' * middle + '<<>>'))]
+        remarks = [f'  {self.line} {point.value:.4f}: {remark}' for point in self.hopf
+                   if (remark := said.remark(point)[0])]
+        return [*lines, '', said.title, *remarks] if remarks else lines
+
+    def _form(self, point: HopfPoint) -> dict[str, float]:
+        """Coefficients of the normal form; with a delay in time over the delay."""
+        if self.delay:
+            return {'k1': point.in_delays.k1.real, 'k2': point.in_delays.k2.real}
+        return {'k1': point.normal_form.k1.real, 'k2': point.normal_form.k2.real,
+                'lyapunov': point.lyapunov}
 
     def as_dict(self) -> dict[str, Any]:
         """Everything in plain types."""
-        assert isinstance(self.network, Delayed)
-        said = super().as_dict()
+        _, parts, rest, why = self._found
+        said: dict[str, Any] = {
+            'network': self.network.name, 'params': self.network.as_dict(),
+            'gaits': {gait: verdict.as_dict() for gait, verdict in self.gaits.items()}}
         said['hopf'] = [{
-            'gait': point.gait, 'mode': [point.mode.j, point.mode.k], 'wave': point.wave,
-            'n': point.n, 'omega': point.omega, 'tau': point.tau,
-            'k1': point.normal_form.k1.real, 'k2': point.normal_form.k2.real,
-            'k1_published': point.published.k1.real, 'k2_published': point.published.k2.real,
+            'gait': point.gait, 'mode': list(point.mode), 'wave': point.wave,
+            **({'n': point.n, 'omega': point.omega, self.delay: point.value} if self.delay else
+               {'along': str(self.along), 'value': point.value, 'omega': point.omega}),
+            **self._form(point), **self._commentary.numbers(point),
             'direction': point.direction, 'supercritical': point.supercritical,
             'stable_on_centre_manifold': point.supercritical,
             'unstable_roots': point.unstable_roots,
-            'unstable_transverse_roots': point.unstable_transverse_roots}
-            for point in self.hopf]
-        said['rest'] = {'leading_roots': [
-            {'mode': [mode.j, mode.k], 'real': root.real, 'imag': root.imag}
-            for mode, root in leading_roots(self.network).items()]}
-        if not self.existing:
+            'unstable_transverse_roots': point.unstable_transverse_roots,
+            **self._commentary.remark(point)[1]} for point in self.hopf]
+        said['rest'] = {'why': why} if why else {
+            **({} if odd(self.network) else {'stand': named(self.network, rest)}),
+            'leading_roots': [{
+                'mode': list(block.mode), **({} if self.delay else {'gait': block.gait}),
+                'real': block.leading.real, 'imag': block.leading.imag} for block in parts]}
+        if self.delay and not self.existing:
             said['nearest_threshold'] = nearest_threshold(self.network)
         return said
-
-
-@dataclass(frozen=True, eq=False)
-class CellAnalysis(Analysis):
-    """Of a network of Morris-Lecar cells."""
-
-    @cached_property
-    def _found(self) -> tuple[list[CellHopf], tuple[Block, ...], Any, str]:
-        """Hopf points, blocks and stand; or why there are none."""
-        try:
-            state = stand(self.network)  # type: ignore[type-var]
-            parts = blocks(self.network, state)  # type: ignore[arg-type]
-            points = cell_hopf_points(self.network, self.along, *self.span)  # type: ignore[arg-type]
-        except CpgError as error:
-            return [], (), None, str(error)
-        return points, parts, state, ''
-
-    @property
-    def hopf(self) -> list[CellHopf]:
-        """Hopf points of the stand, by rising parameter."""
-        return self._found[0]
-
-    @property
-    def blocks(self) -> tuple[Block, ...]:
-        """The linearisation at the stand, by symmetry class."""
-        return self._found[1]
-
-    def _rest(self) -> list[str]:
-        points, parts, state, why = self._found
-        if why:
-            return [f'Stand: {why}.']
-        rows: list[tuple[str, ...]] = [('class', 'gait', 'rightmost eigenvalue')]
-        rows += [(block.name, block.gait, _root(block.leading)) for block in parts]
-        lines = [f'Stand: v {state[0]:.4f}, w {state[1]:.4f}; eigenvalues per model time by '
-                 'symmetry class:', *(f'  {line}' for line in table(rows)), '']
-        where = f'{self.along} from {self.span[0]:g} to {self.span[1]:g}'
-        if not points:
-            return [*lines, f'No Hopf point with {where}.']
-        rows = [('gait', 'wave', str(self.along), 'omega', 'period', 'k1', 'k2', 'l1', 'type',
-                 'orbits', 'others', 'transverse')]
-        for point in points:
-            form = point.normal_form
-            rows.append((
-                point.gait, point.wave, f'{point.value:.4f}', f'{point.omega:.4f}',
-                f'{math.tau / point.omega:.4f}', f'{form.k1.real:.4f}',
-                f'{form.k2.real:.4f}', f'{point.lyapunov:.4f}',
-                'supercritical' if point.supercritical else 'subcritical',
-                'above' if form.side > 0 else 'below', str(point.unstable_roots),
-                str(point.unstable_transverse_roots)))
-        lines += [f'Hopf points with {where} (omega in rad per model time; others: further '
-                  'eigenvalues with positive', 'real part, transverse: of them outside the '
-                  'class):', *(f'  {line}' for line in table(rows, '<<>>>>>><<>>'))]
-        said = [f'  {self.along} {point.value:.4f}: {verdict}' for point in points
-                if (verdict := self._theorem(point)) is not None]
-        return [*lines, '', 'Buono & Golubitsky at these points:', *said] if said else lines
-
-    @staticmethod
-    def _theorem(point: CellHopf) -> TheoremVerdict | None:
-        """What theorem 4.2 says of a Hopf point, which is one on the quadruped."""
-        network = point.network
-        return theorem_4_2(network, point.gait) if isinstance(network, Quadruped) else None
-
-    def as_dict(self) -> dict[str, Any]:
-        """Everything in plain types."""
-        points, parts, state, why = self._found
-        said = super().as_dict()
-        said['hopf'] = [{
-            'gait': point.gait, 'mode': list(point.mode), 'wave': point.wave,
-            'along': str(self.along), 'value': point.value, 'omega': point.omega,
-            'k1': point.normal_form.k1.real, 'k2': point.normal_form.k2.real,
-            'lyapunov': point.lyapunov, 'direction': point.direction,
-            'supercritical': point.supercritical,
-            'stable_on_centre_manifold': point.supercritical,
-            'unstable_roots': point.unstable_roots,
-            'unstable_transverse_roots': point.unstable_transverse_roots,
-            **({} if (theorem := self._theorem(point)) is None else {
-                'theorem_4_2': {'applies': theorem.applies, 'stable': theorem.stable,
-                                'says': str(theorem)}})} for point in points]
-        said['rest'] = {'why': why} if why else {
-            'stand': {'v': float(state[0]), 'w': float(state[1])},
-            'leading_roots': [{'mode': list(block.mode), 'gait': block.gait,
-                               'real': block.leading.real, 'imag': block.leading.imag}
-                              for block in parts]}
-        return said
-
-
-def analysed(network: Network, gaits: Mapping[str, GaitAssessment], along: ParameterLine,
-             span: tuple[float, float], longest: float) -> DelayAnalysis | CellAnalysis:
-    """Put together what is known of a parameter set.
-
-    Args:
-        network: the parameters.
-        gaits: gait -> verdict.
-        along: parameters that move.
-        span: from where to where they do.
-        longest: bound of the delay for Hopf points, model time.
-
-    """
-    if isinstance(network, Delayed):
-        return DelayAnalysis(network, gaits, along, span, longest)
-    return CellAnalysis(network, gaits, along, span)

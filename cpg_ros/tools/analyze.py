@@ -21,7 +21,7 @@ from cpg_ros.files.progress_bar import progress_bar
 from cpg_ros.networks.network import Network
 from cpg_ros.networks.parameter_line import ParameterLine
 from cpg_ros.networks.registry import SHIPPED, NetworkError, find_network
-from cpg_ros.tools.analysis_report import CellAnalysis, DelayAnalysis, analysed
+from cpg_ros.tools.analysis_report import Analysis
 from cpg_ros.tools.arguments import Parser, assignment, interval, number, say, twice
 
 DESCRIPTION = '''\
@@ -111,7 +111,7 @@ def parameters(name: str, preset: str | None, changes: list[tuple[str, float]]) 
     return network
 
 
-def _analysed(chosen) -> DelayAnalysis | CellAnalysis:
+def _analysed(chosen) -> Analysis:
     if chosen.plot is not None and not chosen.plot.absolute().parent.is_dir():
         raise InputError(f'--plot: there is no folder {chosen.plot.parent}')
     network = parameters(chosen.network, chosen.preset, chosen.set)
@@ -131,7 +131,7 @@ def _analysed(chosen) -> DelayAnalysis | CellAnalysis:
         raise InputError(f'--range: {span[0]:g}:{span[1]:g} is not from low to high')
     with progress_bar('gaits', len(network.gaits())) as bar:
         found = verdicts(network, bar)
-    return analysed(network, found, along, span, longest)
+    return Analysis(network, found, along, span, longest)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -1,0 +1,59 @@
+"""What the papers say of Hopf points of their networks, to stand beside what is computed."""
+
+from typing import Any, cast
+
+from cpg_ros.dynamics.hopf import HopfPoint
+from cpg_ros.networks.quadruped import Quadruped
+from cpg_ros.papers.published_normal_form import published_normal_form
+from cpg_ros.papers.theorem_4_2 import theorem_4_2
+
+
+class Commentary:
+    """Of a network on which no paper says anything.
+
+    Attributes:
+        heads: of columns in a table of Hopf points.
+        explained: what these columns are.
+        title: above the remarks.
+
+    """
+
+    heads: tuple[str, ...] = ()
+    explained = ''
+    title = ''
+
+    def numbers(self, point: HopfPoint) -> dict[str, float]:
+        """What the columns show, name -> number."""
+        return {}
+
+    def remark(self, point: HopfPoint) -> tuple[str, dict[str, Any]]:
+        """Return what there is to say in words, and in plain types; nothing."""
+        return '', {}
+
+
+class PublishedForm(Commentary):
+    """The coefficients of the normal form by the formulas of Liu & Zhang (2024)."""
+
+    heads = ("k1'", "k2'")
+    explained = "k1', k2' as\nLiu & Zhang print them, which is wrong; "
+
+    def numbers(self, point: HopfPoint) -> dict[str, float]:
+        """Both real parts."""
+        form = published_normal_form(point)
+        return {'k1_published': form.k1.real, 'k2_published': form.k2.real}
+
+
+class Theorem(Commentary):
+    """Theorem 4.2 of Buono & Golubitsky (2001)."""
+
+    title = 'Buono & Golubitsky at these points:'
+
+    def remark(self, point: HopfPoint) -> tuple[str, dict[str, Any]]:
+        """Return what the theorem says."""
+        verdict = theorem_4_2(cast(Quadruped, point.network), point.gait)
+        return str(verdict), {'theorem_4_2': {
+            'applies': verdict.applies, 'stable': verdict.stable, 'says': str(verdict)}}
+
+
+#: Network -> commentary.
+COMMENTARIES: dict[str, Commentary] = {'delayed': PublishedForm(), 'quadruped': Theorem()}
