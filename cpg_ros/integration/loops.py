@@ -6,6 +6,7 @@ compilers turn into vector instructions.
 """
 
 from collections.abc import Sequence
+from itertools import groupby
 from typing import Any
 
 import sympy
@@ -84,4 +85,112 @@ class Program:
                            for arg in call.args))
 
 
+class Writer:
+    """Writes the loops of a program as the body of a function."""
 
+    def __init__(self, program: Program) -> None:
+        self._program = program
+        self.lines: list[str] = []
+        #: Fetched array -> by how many cells it is behind the array that it is fetched from.
+        self.rings: dict[str, int] = {}
+        self._allot()
+
+    def _allot(self) -> None:
+        """Give every array its place in the room for work."""
+        program = self._program
+        behind: dict[Any, Any] = {}
+        for symbol, what, source in program.fetched:
+            turn = -source[0] % len(source)
+            ring = tuple((cell - turn) % len(source) for cell in range(len(source)))
+            if source == ring and what not in behind.values() and any(
+                    what == name for name, _ in program.functions):
+                behind[symbol] = what
+                self.rings[str(symbol)] = turn
+        self.arrays, self.extra = 0, 0
+        for symbol, *_ in (*program.functions, *program.fetched):
+            if symbol in behind.values():
+                continue
+            used = f'{self.arrays} * m + {self.extra} * lanes'
+            self.lines.append(f'{symbol} = work[{used}:{used} + m]')
+            if symbol in behind:
+                turn = self.rings[str(symbol)]
+                used += f' + {turn} * lanes'
+                self.lines.append(f'{behind[symbol]} = work[{used}:{used} + m]')
+                self.extra += turn
+            self.arrays += 1
+
+    def _elements(self, part: Any) -> str:
+        """Code of an expression at place i."""
+        names = {symbol: sympy.Symbol(f'{symbol}[i]') for symbol in part.free_symbols}
+        return str(_PRINTER.doprint(part.xreplace(names)))
+
+    def loops(self, results: Sequence[tuple[str, Any]]) -> None:
+        """Write all loops: functions, what is fetched, and results (array name, expression)."""
+        program = self._program
+        done: set[Any] = set()
+        waiting_f = list(program.functions)
+        waiting_g = list(program.fetched)
+        needed = {symbol for symbol, _ in waiting_f} | {symbol for symbol, _, _ in waiting_g}
+        while waiting_f or waiting_g:
+            ready_f = [one for one in waiting_f if not one[1].free_symbols & needed - done]
+            ready_g = [one for one in waiting_g if not one[1].free_symbols & needed - done]
+            for symbol, call in ready_f:
+                self._loop(str(symbol), self._elements(call))
+                done.add(symbol)
+                waiting_f.remove((symbol, call))
+            for symbol, what, source in ready_g:
+                self._copy(str(symbol), str(what), source)
+                done.add(symbol)
+                waiting_g.remove((symbol, what, source))
+        for name, part in results:
+            self._loop(name, self._elements(part))
+
+    def _loop(self, target: str, code: str) -> None:
+        self.lines += ['for i in range(m):', f'    {target}[i] = {code}']
+
+    def _copy(self, target: str, array: str, source: Source) -> None:
+        """Fetch what each cell hears, in blocks of cells that lie evenly in both arrays."""
+        if target in self.rings:
+            # The ring lies straight in memory: only what it begins with has to be copied.
+            turn = self.rings[target]
+            self.lines += [f'to, of = {target}[:{turn} * lanes], {array}[m - {turn} * lanes:m]',
+                           f'for i in range({turn} * lanes):', '    to[i] = of[i]']
+            return
+        for block in _blocks(source):
+            indent, here, there, length = self._places(block)
+            self.lines += [f'{indent}a, b = {here}, {there}',
+                           f'{indent}to, of = {target}[a:a + {length} * lanes], '
+                           f'{array}[b:b + {length} * lanes]',
+                           f'{indent}for i in range({length} * lanes):',
+                           f'{indent}    to[i] = of[i]']
+
+    def _places(self, block: tuple[int, int, int, int, int, int]) -> tuple[str, str, str, int]:
+        """Open a loop over a block; return the indentation, its two places, and its length."""
+        begin, there, length, count, stride, step = block
+        if count == 1:
+            return '', f'{begin} * lanes', f'{there} * lanes', length
+        self.lines.append(f'for k in range({count}):')
+        return ('    ', f'({begin} + {stride} * k) * lanes', f'({there} + {step} * k) * lanes',
+                length)
+
+
+def _blocks(source: Source) -> list[tuple[int, int, int, int, int, int]]:
+    """Part the cells into blocks (begin, source, length, how many, their stride, its step)."""
+    runs = []
+    for _, group in groupby(enumerate(source), lambda at: at[1] - at[0]):
+        run = list(group)
+        runs.append((run[0][0], run[0][1], len(run)))
+    found = []
+    while runs:
+        begin, there, length = runs[0]
+        best = [runs[0]]
+        for other in runs[1:]:
+            stride, step = other[0] - begin, other[1] - there
+            chain = [(begin + k * stride, there + k * step, length) for k in range(len(runs))]
+            missing = (k for k, one in enumerate(chain) if one not in runs)
+            best = max(best, chain[:next(missing, len(chain))], key=len)
+        stride = best[1][0] - begin if len(best) > 1 else 0
+        step = best[1][1] - there if len(best) > 1 else 0
+        found.append((begin, there, length, len(best), stride, step))
+        runs = [run for run in runs if run not in best]
+    return found
