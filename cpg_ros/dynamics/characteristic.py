@@ -47,6 +47,7 @@ def characteristic_roots(now: np.ndarray, past: np.ndarray, delay: float, count:
     elif len(now) == 1:
         a, b = complex(now[0, 0]), complex(past[0, 0])
         roots = a + _branches(a, b, delay, np.arange(-count, count + 1)) / delay
+        return roots[np.argsort(-roots.real, kind='stable')][:count]
     else:
         roots = _discretised(now, past, delay, count)
     return rightmost_first(roots)[:count]

@@ -84,7 +84,7 @@ class Block:
 
     @property
     def leading(self) -> complex:
-        """The rightmost root; of a conjugate pair that with positive imaginary part."""
+        """The rightmost root, of a conjugate pair one."""
         return complex(self.roots(1)[0])
 
     def roots(self, count: int) -> np.ndarray:

@@ -12,7 +12,7 @@ import numpy as np
 
 from cpg_ros.dynamics.equilibrium import everywhere
 from cpg_ros.dynamics.isotypic import Block, blocks
-from cpg_ros.networks.quadruped import CELL, PHI, Quadruped
+from cpg_ros.networks.quadruped import Quadruped
 from cpg_ros.papers.buono_gaits import AUTHORS
 from cpg_ros.papers.buono_tables import Tables, square_root
 from cpg_ros.papers.row import Citation, Picture, Row
@@ -33,6 +33,7 @@ SIGNS = {'L_00': '+++', 'L_01': '+-+', 'L_20': '-++', 'L_21': '--+'}
 TABLE_11 = {'L_00': 'nu + 2(alpha + gamma + xi)', 'L_01': 'nu + 2(alpha - gamma + xi)',
             'L_20': 'nu + 2(-alpha + gamma + xi)', 'L_21': 'nu - 2(alpha + gamma - xi)',
             'L_10': 'nu + 2 gamma - 2 xi', 'L_11': 'nu - 2 gamma - 2 xi'}
+UNCOUPLED = Quadruped(0.0, 0.0, 0.0, 0.0)
 #: About the stand of section 6.
 STAND = np.array([0.31, 0.52])
 
@@ -51,19 +52,20 @@ class Sample:
     def __init__(self, network: Quadruped, state: np.ndarray) -> None:
         self.network, self.state = network, state
         self.blocks: dict[str, Block] = {one.name: one for one in blocks(network, state)}
-        self.tables = Tables.at(network, CELL.jacobian(state[:1], state[1:], PHI))
+        alone = blocks(UNCOUPLED, state)[0]
+        self.tables = Tables.at(network, alone.now.real)
 
     def trace(self, name: str) -> complex:
         """Trace of a block."""
-        return complex(np.trace(self.blocks[name].matrix))
+        return complex(np.trace(self.blocks[name].now))
 
     def discriminant(self, name: str) -> complex:
         """``(tr L)^2 - 4 det L`` of a block."""
-        return complex(self.trace(name)**2 - 4.0 * np.linalg.det(self.blocks[name].matrix))
+        return complex(self.trace(name)**2 - 4.0 * np.linalg.det(self.blocks[name].now))
 
     def largest(self, name: str) -> float:
         """Largest real part of a block's eigenvalues."""
-        return float(self.blocks[name].eigenvalues.real.max())
+        return float(self.blocks[name].roots(2).real.max())
 
 
 def drawn(equal: bool = False) -> Sample:
@@ -81,7 +83,7 @@ def phases() -> Iterator[Row | Picture]:
     sample = drawn()
     whole = sample.network.jacobian(everywhere(sample.network, sample.state))
     values, vectors = np.linalg.eig(whole)
-    found = np.concatenate([one.eigenvalues for one in sample.blocks.values()])
+    found = np.concatenate([one.roots(2) for one in sample.blocks.values()])
     gap = max(np.abs(values - one).min() for one in found)
     yield Citation(AUTHORS, 'section 5.2').holds(
         'the eight blocks hold all eigenvalues of L',
@@ -89,7 +91,7 @@ def phases() -> Iterator[Row | Picture]:
         note=f'largest difference {gap:.1e}')
     at = Citation(AUTHORS, 'Table 5')
     for (j, k), (gait, printed) in TABLE_5.items():
-        eigenvalue = sample.blocks[f'L_{j}{k}'].eigenvalues[0]
+        eigenvalue = sample.blocks[f'L_{j}{k}'].roots(2)[0]
         vector = vectors[:8, np.abs(values - eigenvalue).argmin()]
         yield at.phases(f'U_{j % 2 or j}{k}: phases of cells 1 to 8, {gait}', printed,
                         np.angle(vector / vector[0]) / (2.0 * np.pi),
@@ -108,7 +110,7 @@ def tables() -> Iterator[Row | Picture]:
     printed, parts = sample.tables, sample.blocks
     for name, text in TABLE_6.items():
         yield Citation(AUTHORS, 'Table 6').formula(name, text, printed.block(*parts[name].mode),
-                                                parts[name].matrix)
+                                                parts[name].now)
     for name, signs in SIGNS.items():
         wrong, n = name == 'L_21', sample.network
         text = '(a + d) ' + _signed(signs if not wrong else '---', '+')
@@ -132,7 +134,7 @@ def tables() -> Iterator[Row | Picture]:
             erratum=(24, whole.conjugate()),
             note=f'Psi is {"positive" if whole.imag > 0.0 else "negative"}')
     for k in (0, 1):
-        real = sorted((value.real for value in parts[f'L_1{k}'].eigenvalues), reverse=True)
+        real = sorted((value.real for value in parts[f'L_1{k}'].roots(2)), reverse=True)
         for text, theirs, ours in zip(('eq. 5.4', 'eq. 5.5'), printed.real_parts(k), real,
                                       strict=True):
             yield Citation(AUTHORS, 'Proposition 5.2').formula(
@@ -150,7 +152,7 @@ def coupled_variable() -> Iterator[Row | Picture]:
     network, at = sample.network, Citation(AUTHORS, 'eq. 4.4')
     theirs = sample.tables.trace(0, 0)
     # Seen by all cells alike, delta acts on w by way of w; or, as printed, by way of v.
-    printed = sample.blocks['L_00'].matrix + network.delta * np.array([[0, 0], [1, -1]])
+    printed = sample.blocks['L_00'].now + network.delta * np.array([[0, 0], [1, -1]])
     yield at.formula('trace of L_00 if delta multiplies y', 'Table 7', theirs,
                      sample.trace('L_00').real)
     yield at.formula('trace of L_00 if delta multiplies x, as printed', 'Table 7', theirs,

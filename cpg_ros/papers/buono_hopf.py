@@ -5,16 +5,16 @@ from collections.abc import Iterator
 import numpy as np
 from scipy.optimize import brentq
 
-from cpg_ros.dynamics.cell_hopf import CellHopf, hopf_at
-from cpg_ros.dynamics.equilibrium import stand
+from cpg_ros.dynamics.equilibrium import equilibrium
+from cpg_ros.dynamics.hopf import HopfPoint
+from cpg_ros.dynamics.hopf_search import hopf_at
 from cpg_ros.networks.biped import Biped
 from cpg_ros.networks.parameter_line import ParameterLine
 from cpg_ros.networks.quadruped import GAITS, Quadruped
-from cpg_ros.papers.buono_blocks import Sample
+from cpg_ros.papers.buono_blocks import UNCOUPLED, Sample
 from cpg_ros.papers.buono_gaits import AUTHORS
 from cpg_ros.papers.row import Citation, Picture, Row
 
-UNCOUPLED = Quadruped(0.0, 0.0, 0.0, 0.0)
 #: Section 6.
 STAND, NU_0 = ('0.31', '0.52'), '-1.24'
 #: Table 12: alpha = beta, gamma = delta, xi = eta.
@@ -40,10 +40,10 @@ FAILING = ('walk', 0.05)
 
 def _sample(network: Quadruped | Biped) -> Sample:
     assert isinstance(network, Quadruped)
-    return Sample(network, stand(network))
+    return Sample(network, equilibrium(network))
 
 
-def hopf(network: Quadruped, line: str, gait: str, low: float, high: float) -> CellHopf:
+def hopf(network: Quadruped, line: str, gait: str, low: float, high: float) -> HopfPoint:
     """Find the Hopf point of a gait between two values of parameters.
 
     Args:
@@ -61,18 +61,11 @@ def hopf(network: Quadruped, line: str, gait: str, low: float, high: float) -> C
 
     there = along.at(network, float(brentq(largest, low, high, xtol=1e-13)))
     # Of the two senses of a wave the one whose critical eigenvalue turns forward.
-    mode, rank = min((((way, k), rank) for way in {j, -j % 4} for rank in (0, 1)
-                      if _turns(there, (way, k), rank) > 0.0),
-                     key=lambda one: abs(_eigenvalue(there, *one).real))
-    return hopf_at(there, along, mode, rank)
-
-
-def _eigenvalue(network: Quadruped, mode: tuple[int, int], rank: int) -> complex:
-    return complex(_sample(network).blocks[f'L_{mode[0]}{mode[1]}'].eigenvalues[rank])
-
-
-def _turns(network: Quadruped, mode: tuple[int, int], rank: int) -> float:
-    return _eigenvalue(network, mode, rank).imag
+    blocks = _sample(there).blocks
+    root, mode = min(((root, (way, k)) for way in {j, -j % 4}
+                      for root in blocks[f'L_{way}{k}'].roots(2) if root.imag > 0.0),
+                     key=lambda one: abs(one[0].real))
+    return hopf_at(there, along, mode, root.imag)
 
 
 def the_stand() -> Iterator[Row | Picture]:
@@ -82,7 +75,7 @@ def the_stand() -> Iterator[Row | Picture]:
     for name, printed, value in zip(('v_0', 'w_0'), STAND, sample.state, strict=True):
         yield at.number(f'{name} of the stand', printed, float(value))
     yield at.number('nu_0, the trace of a cell there', NU_0, sample.trace('L_00').real)
-    roots = sample.blocks['L_00'].eigenvalues
+    roots = sample.blocks['L_00'].roots(2)
     yield at.holds('the stand is a spiral sink, hypothesis 4.6',
                    bool((roots.real < 0.0).all() and (roots.imag != 0.0).all()))
 
@@ -161,7 +154,7 @@ def table_12() -> Iterator[Row | Picture]:
 
 def theorem_4_2() -> Iterator[Row | Picture]:
     """Theorem 4.2 at computed Hopf points, and the numbers of its proofs."""
-    found: dict[str, CellHopf] = {}
+    found: dict[str, HopfPoint] = {}
     for clause, gait, alpha, sign, (low, high), stable in THEOREM:
         point = hopf(Quadruped(alpha, sign * alpha, 0.0, 0.0), 'gamma=delta', gait, low, high)
         found.setdefault(gait, point)

@@ -7,12 +7,13 @@ import numpy as np
 
 from cpg_ros.dynamics import delayed_orbit
 from cpg_ros.dynamics.floquet import multipliers
-from cpg_ros.dynamics.hopf import HopfPoint, hopf_point
+from cpg_ros.dynamics.hopf import HopfPoint, first_hopf
 from cpg_ros.dynamics.periodic import NoOrbit
 from cpg_ros.inversion.cycle_fit import CycleFit, cycle_samples, fit_cycle
 from cpg_ros.networks.delayed import Delayed
 from cpg_ros.networks.symmetry import Z4_Z2
 from cpg_ros.papers.figures import trajectories
+from cpg_ros.papers.published_normal_form import published_normal_form
 from cpg_ros.papers.rhythm import primary_gaits, rhythm
 from cpg_ros.papers.row import Citation, Paper, Picture, Row
 
@@ -93,7 +94,7 @@ ONE_MINIMUM = 1e-4
 def _coefficients(example: Example, point: HopfPoint) -> Iterator[Row]:
     """Normal form: by the formula that is printed, and by the right one."""
     at = Citation(AUTHORS, example.place)
-    printed, right = point.published, point.normal_form
+    printed, right = published_normal_form(point), point.in_delays
     for name, wrong_value, value in (
             ('k1', printed.k1.real, right.k1.real), ('k2', printed.k2.real, right.k2.real),
             ('k1 k2', printed.k1.real * printed.k2.real, right.k1.real * right.k2.real)):
@@ -110,21 +111,21 @@ def _coefficients(example: Example, point: HopfPoint) -> Iterator[Row]:
 def _example(example: Example) -> Iterator[Row | Picture]:
     network, gait = example.network, example.gait
     at = Citation(AUTHORS, example.place)
-    point = hopf_point(network, network.symmetry(gait))
+    point = first_hopf(network, gait)
     if point is None:
         raise NoOrbit(f'{example.place}: no Hopf point of the {gait}')
     for name, symbol, value in (('omega', example.names[0], point.omega),
-                                ('tau', example.names[1], point.tau)):
+                                ('tau', example.names[1], point.value)):
         if name in example.numbers:
             yield at.number(f'{symbol} of the {gait}', example.numbers[name], value,
                             erratum=example.corrected.get(name))
     yield from _coefficients(example, point)
-    k1, k2 = point.normal_form.k1.real, point.normal_form.k2.real
+    k1, k2 = point.in_delays.k1.real, point.in_delays.k2.real
     yield at.word(f'direction of the bifurcation to the {gait}', 'supercritical',
                   'supercritical' if k1 * k2 < 0.0 else 'subcritical', note='theorem 2.1')
     yield at.holds(f'k1 > 0 for the {gait}', k1 > 0.0)
     yield at.holds(f'tau {network.tau:g} is above the critical delay of the {gait}',
-                   network.tau > point.tau)
+                   network.tau > point.value)
     yield at.word(f'{gait} near its onset, on the centre manifold', 'stable',
                   'stable' if k2 < 0.0 else 'unstable', note='theorem 2.1')
     roots = point.unstable_transverse_roots

@@ -10,20 +10,14 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from cpg_ros.dynamics.cell_hopf import CellHopf
-from cpg_ros.dynamics.characteristic import characteristic_roots
 from cpg_ros.dynamics.continuation import Branch, follow, from_hopf
-from cpg_ros.dynamics.delayed_orbit import DelayedOrbit
-from cpg_ros.dynamics.equilibrium import everywhere
 from cpg_ros.dynamics.floquet import ATTRACTS, multipliers
 from cpg_ros.dynamics.hopf import HopfPoint
-from cpg_ros.dynamics.mesh_orbit import MeshOrbit
 from cpg_ros.dynamics.orbit import NoOrbit, Orbit
 from cpg_ros.errors import InputError
 from cpg_ros.files.progress_bar import progress_bar
-from cpg_ros.networks.delayed import MODES, Delayed
 from cpg_ros.tools import gait_diagram as footfall
-from cpg_ros.tools.analysis_report import Analysis, CellAnalysis
+from cpg_ros.tools.analysis_report import Analysis
 
 COLOURS = {'pronk': '#805ad5', 'pace': '#2f855a', 'bound': '#b7791f', 'trot': '#c53030',
            'jump': '#00838f', 'walk': '#2b6cb0', 'run': '#c53030', 'two_legged_jump': '#00838f',
@@ -35,6 +29,12 @@ STYLES: tuple[tuple[Literal['-', '--', ':'], str], ...] = (
 #: Points of a branch at most, how far apart in arclength, how many times the first period the
 #: last may be (beyond, near a homoclinic orbit, branches wind), and how many branches are drawn.
 POINTS, LONGEST, SLOWEST, BRANCHES = 80, 0.2, 5.0, 12
+#: Roots that are drawn of each class, at most.
+ROOTS = 7
+
+
+def _colour(gait: str) -> str:
+    return COLOURS.get(gait, '#4a5568')
 
 
 def branches(analysis: Analysis) -> list[tuple[str, Branch]]:
@@ -49,7 +49,7 @@ def branches(analysis: Analysis) -> list[tuple[str, Branch]]:
         found.extend((point.gait, branch) for branch in _born(point, analysis))
     for verdict in analysis.existing:
         orbit = verdict.orbit
-        if low <= value <= high and isinstance(orbit, DelayedOrbit | MeshOrbit) and not any(
+        if low <= value <= high and orbit is not None and not any(
                 gait == verdict.gait and _holds(branch, value, orbit) for gait, branch in found):
             found.append((verdict.gait, follow(orbit, analysis.along, low, high, most=POINTS,
                                                longest_step=LONGEST, longest=SLOWEST)))
@@ -64,26 +64,20 @@ def _holds(branch: Branch, value: float, orbit: Orbit) -> bool:
         return False
 
 
-def _on_line(analysis: Analysis) -> list:
+def _on_line(analysis: Analysis) -> list[HopfPoint]:
     """Hopf points that lie on the line along which branches are drawn."""
-    if isinstance(analysis, CellAnalysis) or analysis.along.names == ('tau',):
-        return [point for point in analysis.hopf
-                if not isinstance(point, HopfPoint)
-                or analysis.span[0] <= point.tau <= analysis.span[1]]
-    return []
+    low, high = analysis.span
+    return [point for point in analysis.hopf
+            if analysis.line == analysis.along and low <= point.value <= high]
 
 
-def _born(point: HopfPoint | CellHopf, analysis: Analysis) -> list[Branch]:
+def _born(point: HopfPoint, analysis: Analysis) -> list[Branch]:
     """The branch of a Hopf point; none where the first orbit cannot be found."""
     low, high = analysis.span
     try:
-        if isinstance(point, HopfPoint):
-            return [from_hopf(point.network, point.mode, point.omega, analysis.along, low, high,
-                              most=POINTS, longest=SLOWEST, longest_step=LONGEST)]
-        vector = np.concatenate([entry * point.block.vector for entry in point.vector])
         return [from_hopf(point.network, point.block.symmetry, point.omega, analysis.along, low,
-                          high, stand=everywhere(point.network, point.stand), vector=vector,
-                          most=POINTS, longest=SLOWEST, longest_step=LONGEST)]
+                          high, rest=point.state, vector=point.eigenvector, most=POINTS,
+                          longest=SLOWEST, longest_step=LONGEST)]
     except NoOrbit:
         return []
 
@@ -113,47 +107,35 @@ def _draw_branches(axes: Axes, analysis: Analysis) -> None:
                              1 if judged.leading_within < ATTRACTS else 2)
                 done += 1
                 bar(done)
-            _draw_branch(axes, branch, kinds, COLOURS[gait])
+            _draw_branch(axes, branch, kinds, _colour(gait))
             shown.add(gait)
     for point in _on_line(analysis):
-        where = point.tau if isinstance(point, HopfPoint) else point.value
-        axes.plot(where, 0.0, marker='o', color=COLOURS[point.gait], markersize=5, clip_on=False)
+        axes.plot(point.value, 0.0, marker='o', color=_colour(point.gait), markersize=5, clip_on=False)
         shown.add(point.gait)
     here = analysis.along.value(analysis.network)
     axes.axvline(here, color='#a0aec0', linewidth=1.0, zorder=0)
     for verdict in analysis.existing:
-        axes.plot(here, verdict.amplitude, marker='D', color=COLOURS[verdict.gait], markersize=6)
+        axes.plot(here, verdict.amplitude, marker='D', color=_colour(verdict.gait), markersize=6)
         shown.add(verdict.gait)
-    handles = [Line2D([], [], color=COLOURS[gait], label=gait.replace('_', ' '))
-               for gait in COLOURS if gait in shown]
+    handles = [Line2D([], [], color=_colour(gait), label=gait.replace('_', ' '))
+               for gait in dict.fromkeys([*COLOURS, *sorted(shown)]) if gait in shown]
     handles += [Line2D([], [], color='black', linestyle=style, label=label)
                 for style, label in STYLES]
     handles += [Line2D([], [], color='black', marker=marker, linestyle='', label=label)
                 for marker, label in (('o', 'Hopf point'), ('s', 'fold'), ('D', 'this set'))]
     axes.legend(handles=handles, fontsize=7, ncols=2, frameon=False)
     axes.set_ylim(bottom=0.0)
-    axes.set_xlabel(f'{analysis.along} [model time]' if isinstance(analysis.network, Delayed)
-                    else str(analysis.along))
+    timed = analysis.along.names == (analysis.delay,)
+    axes.set_xlabel(f'{analysis.along} [model time]' if timed else str(analysis.along))
     axes.set_ylabel('amplitude of cell 1')
     axes.set_title('Branches of gaits', loc='left', fontsize=10)
 
 
 def _draw_roots(axes: Axes, analysis: Analysis) -> None:
-    if isinstance(analysis, CellAnalysis):
-        for block in analysis.blocks:
-            axes.plot(block.eigenvalues.real, block.eigenvalues.imag, 'o', alpha=0.8,
-                      color=COLOURS[block.gait], markersize=5)
-        title = "Eigenvalues of the stand"
-    else:
-        assert isinstance(analysis.network, Delayed)
-        names = {mode: gait for gait in analysis.gaits for mode in MODES
-                 if mode.k == (own := analysis.network.symmetry(gait)).k
-                 and mode.j in (own.j, -own.j % 4)}
-        for mode in MODES:
-            roots = characteristic_roots(analysis.network, mode, 7)
-            axes.plot(roots.real, roots.imag, 'o', color=COLOURS[names[mode]], alpha=0.8,
-                      markersize=5)
-        title = 'Characteristic roots of rest'
+    for block in analysis.blocks:
+        roots = block.roots(ROOTS)
+        axes.plot(roots.real, roots.imag, 'o', color=_colour(block.gait), alpha=0.8, markersize=5)
+    title = 'Characteristic roots of rest' if analysis.delay else 'Eigenvalues of the stand'
     axes.axvline(0.0, color='#718096', linewidth=1.0, zorder=0)
     axes.set_xlabel('real part [1/model time]')
     axes.set_ylabel('imaginary part [rad/model time]')
@@ -171,7 +153,7 @@ def _draw_trajectories(axes: Axes, analysis: Analysis) -> None:
         middle = cells.max() - size
         for cell, style in enumerate(('-', '--', '-.', ':')):
             axes.plot(times / orbit.period, height + (cells[:, cell] - middle) / size, style,
-                      color=COLOURS[verdict.gait], linewidth=1.1,
+                      color=_colour(verdict.gait), linewidth=1.1,
                       label=f'x{cell + 1}' if row == 0 else None)
         axes.text(0.01, height + 1.03, f'{verdict.gait.replace("_", " ")}: period '
                   f'{orbit.period:.4f}, swing {2.0 * size:.3f}', fontsize=7)
