@@ -17,7 +17,7 @@ from functools import cached_property
 
 import numpy as np
 
-from cpg_ros.dynamics.characteristic import characteristic_matrix
+from cpg_ros.dynamics.characteristic import characteristic_matrix, rightmost_first
 from cpg_ros.dynamics.delay_crossings import delay_crossings
 from cpg_ros.dynamics.equilibrium import equilibrium, everywhere
 from cpg_ros.dynamics.expansion import Expansion
@@ -171,20 +171,28 @@ class HopfPoint:
         """First Lyapunov coefficient l1 = Re k2 / omega (Kuznetsov, eq. 3.20; <q, q> = 1)."""
         return self.normal_form.k2.real / self.omega
 
+    def _but_critical(self, block: Block, roots: np.ndarray) -> np.ndarray:
+        """Leave out the critical root or pair, where it is the block's."""
+        mine = dict(block.symmetry.shifts)
+        for critical, symmetry in ((1j * self.omega, self.block.symmetry),
+                                   (-1j * self.omega, power(self.block.symmetry, -1))):
+            if mine == dict(symmetry.shifts) and len(roots):
+                roots = np.delete(roots, np.abs(roots - critical).argmin())
+        return roots
+
     @cached_property
     def _others(self) -> tuple[tuple[Block, np.ndarray], ...]:
-        """All blocks with their roots on the axis and right of it, but for the critical pair."""
-        close, found = ON_AXIS * max(1.0, self.omega), []
-        ours = dict(self.block.symmetry.shifts)
-        conjugate = dict(power(self.block.symmetry, -1).shifts)
-        for other in blocks(self.network, self.rest):
-            roots = other.right_of(-close)
-            mine = dict(other.symmetry.shifts)
-            for critical, owner in ((1j * self.omega, ours), (-1j * self.omega, conjugate)):
-                if mine == owner and len(roots):
-                    roots = np.delete(roots, np.abs(roots - critical).argmin())
-            found.append((other, roots))
-        return tuple(found)
+        """All blocks with their other roots on the axis and right of it."""
+        close = ON_AXIS * max(1.0, self.omega)
+        return tuple((one, self._but_critical(one, one.right_of(-close)))
+                     for one in blocks(self.network, self.rest))
+
+    @property
+    def leading_other(self) -> complex:
+        """The rightmost root but for the critical pair, 1/model time."""
+        return complex(rightmost_first(np.concatenate([
+            self._but_critical(one, one.roots(3))
+            for one in blocks(self.network, self.rest)]))[0])
 
     def _right(self, within: bool) -> int:
         close = ON_AXIS * max(1.0, self.omega)

@@ -8,7 +8,7 @@ from scipy.optimize import brentq
 from cpg_ros.dynamics.equilibrium import equilibrium
 from cpg_ros.dynamics.hopf import HopfPoint
 from cpg_ros.dynamics.hopf_search import hopf_at
-from cpg_ros.networks.biped import Biped
+from cpg_ros.networks.network import Network
 from cpg_ros.networks.parameter_line import ParameterLine
 from cpg_ros.networks.quadruped import GAITS, Quadruped
 from cpg_ros.papers.buono_blocks import UNCOUPLED, Sample
@@ -38,7 +38,7 @@ THEOREM = (
 FAILING = ('walk', 0.05)
 
 
-def _sample(network: Quadruped | Biped) -> Sample:
+def _sample(network: Network) -> Sample:
     assert isinstance(network, Quadruped)
     return Sample(network, equilibrium(network))
 
@@ -144,7 +144,7 @@ def table_12() -> Iterator[Row | Picture]:
     for gait, point in points.items():
         yield at.word(f'{gait}: Hopf bifurcation, by the other eigenvalues', 'stable',
                       'stable' if point.stable else 'unstable',
-                      note=f'leading one {point.others[0]:.4f}')
+                      note=f'leading one {point.leading_other:.4f}')
         yield Citation(AUTHORS, 'Proposition 5.5' if gait != 'trot' else 'Lemma 5.8').word(
             f'{gait}: the solution that branches off at Table 12', 'stable',
             'stable' if point.stable and point.supercritical else 'unstable',

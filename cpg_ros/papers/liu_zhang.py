@@ -5,9 +5,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from cpg_ros.dynamics import delayed_orbit
 from cpg_ros.dynamics.floquet import multipliers
 from cpg_ros.dynamics.hopf import HopfPoint, first_hopf
+from cpg_ros.dynamics.orbit import solve_orbit
 from cpg_ros.dynamics.periodic import NoOrbit
 from cpg_ros.inversion.cycle_fit import CycleFit, cycle_samples, fit_cycle
 from cpg_ros.networks.delayed import Delayed
@@ -134,7 +134,7 @@ def _example(example: Example) -> Iterator[Row | Picture]:
         'unstable' if roots else 'stable', erratum=(3, 'unstable'),
         note=f'roots of the rest state with positive real part outside the class of the gait: '
              f'{roots}')
-    orbit = delayed_orbit.solve(network, gait)
+    orbit = solve_orbit(network, gait)
     found = multipliers(orbit)
     yield at.word(
         f'{gait} at tau {network.tau:g}, within its symmetry class', 'stable',
@@ -220,7 +220,7 @@ def recording(example: Example, name: str) -> tuple[np.ndarray, np.ndarray]:
 
     """
     theta = np.arange(SAMPLES) / SAMPLES
-    states, slopes = cycle_samples(delayed_orbit.solve(example.network, example.gait), theta)
+    states, slopes = cycle_samples(solve_orbit(example.network, example.gait), theta)
     slope = slopes[..., example.network.parameters().index(name)]
     misfit = MISFIT * np.random.default_rng(0).standard_normal(states.shape)
     misfit -= slope * np.sum(misfit * slope) / np.sum(slope * slope)

@@ -110,7 +110,8 @@ def _draw_branches(axes: Axes, analysis: Analysis) -> None:
             _draw_branch(axes, branch, kinds, _colour(gait))
             shown.add(gait)
     for point in _on_line(analysis):
-        axes.plot(point.value, 0.0, marker='o', color=_colour(point.gait), markersize=5, clip_on=False)
+        axes.plot(point.value, 0.0, marker='o', color=_colour(point.gait), markersize=5,
+                  clip_on=False)
         shown.add(point.gait)
     here = analysis.along.value(analysis.network)
     axes.axvline(here, color='#a0aec0', linewidth=1.0, zorder=0)
