@@ -15,9 +15,9 @@ import numpy as np
 from common import emit, log
 from scipy.integrate import solve_bvp
 
-from cpg_ros.dynamics.cell_orbit import from_preset
 from cpg_ros.dynamics.floquet import multipliers
-from cpg_ros.dynamics.mesh_newton import Reduced, collocate
+from cpg_ros.dynamics.mesh.newton import Reduced
+from cpg_ros.dynamics.mesh.solve import beside, from_preset
 from cpg_ros.networks.network import Network
 from cpg_ros.networks.registry import PRESETS
 
@@ -36,7 +36,7 @@ def by_scipy(network: Network, gait: str, path, period: float) -> tuple[float, f
         return length[0] * reduced.rates(y.T).T
 
     def jacobian(s, y, length):
-        return (length[0] * reduced.jacobian(y.T).transpose(1, 2, 0),
+        return (length[0] * reduced.linearised(y.T)[1].transpose(1, 2, 0),
                 reduced.rates(y.T).T[:, None, :])
 
     def ends(left, right, length):
@@ -62,10 +62,9 @@ def main() -> None:
             path = lambda theta, known=known: known(theta * known.period)  # noqa: E731
             changed = replace(preset.network, **{
                 key: 1.02 * value for key, value in preset.network.as_dict().items()})
-            symmetry = changed.symmetry(preset.gait)
             for _ in range(REPEATS + 1):
                 began = time.perf_counter()
-                orbit = collocate(changed, symmetry, path, known.period)
+                orbit = beside(changed, known)
                 times.append(time.perf_counter() - began)
             began = time.perf_counter()
             found = multipliers(orbit)

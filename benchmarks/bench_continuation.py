@@ -17,8 +17,8 @@ from scipy.integrate import solve_bvp
 from scipy.optimize import root
 
 from cpg_ros.dynamics.continuation import Branch, follow
-from cpg_ros.dynamics.delayed_orbit import equations
-from cpg_ros.dynamics.mesh_newton import Reduced
+from cpg_ros.dynamics.fourier.newton import equations
+from cpg_ros.dynamics.mesh.newton import Reduced
 from cpg_ros.dynamics.orbit import solve_preset
 from cpg_ros.networks.parameter_line import ParameterLine
 from cpg_ros.networks.registry import NETWORKS, PRESETS

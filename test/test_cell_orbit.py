@@ -49,7 +49,7 @@ def check_solves(orbit):
     """The whole network, started on it, comes back after a period and not before."""
     start = orbit(np.array(0.0))
     end = solve_ivp(lambda t, x: orbit.network.rates(x), (0.0, orbit.period), start, 'DOP853',
-                    rtol=1e-11, atol=1e-12).y[:, -1]
+                    rtol=1e-13, atol=1e-14).y[:, -1]
     assert np.abs(end - start).max() < 1e-7 and orbit.residual < 1e-9
     times = np.random.default_rng(1).uniform(-2.0, 2.0, 200) * orbit.period
     assert np.abs(orbit.derivative(times) - orbit.network.rates(orbit(times))).max() < 1e-9

@@ -6,19 +6,20 @@ from functools import cache
 
 import numpy as np
 import pytest
-from cpg_ros.dynamics.mesh_newton import collocate
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from modes import Mode, class_of
 from scipy.integrate import solve_bvp, solve_ivp
 from scipy.optimize import brentq, fsolve
 
 from cpg_ros.dynamics import arclength
 from cpg_ros.dynamics.continuation import follow, from_hopf
 from cpg_ros.dynamics.floquet import multipliers
+from cpg_ros.dynamics.mesh.newton import collocate
 from cpg_ros.dynamics.orbit import NoOrbit, solve_orbit, solve_preset
 from cpg_ros.integration.simulate import simulate
 from cpg_ros.networks.biped import Biped
-from cpg_ros.networks.delayed import GAITS, Delayed, Mode
+from cpg_ros.networks.delayed import GAITS, Delayed
 from cpg_ros.networks.parameter_line import ParameterLine
 from cpg_ros.networks.quadruped import Quadruped
 from cpg_ros.networks.registry import NETWORKS, PRESETS
@@ -35,9 +36,10 @@ SUBCRITICAL = {'pace': (Delayed(-3.4, 3.9, -6.2, 5.4, 1.0), Mode(0, 1), 1, 0),
 
 def hopf(network, mode, sign, n):
     """A Hopf point by docs/theory.md: omega and tau, and k1 and k2 of its normal form."""
-    turn = 1j ** -mode.j
+    j, k = class_of(mode)
+    turn = 1j ** -j
     a = network.a + network.b + network.d * turn
-    b = network.c * (-1) ** mode.k
+    b = network.c * (-1) ** k
     omega = a.imag + sign * math.sqrt(network.c**2 - a.real**2)
     angle = -np.angle((1j * omega - a) / b) % (2.0 * math.pi)
     tau = (angle + 2.0 * math.pi * n) / omega
@@ -243,7 +245,7 @@ def test_pace_has_a_fold_beside_its_subcritical_hopf_point():
     assert branch.ends[0].value == pytest.approx(value, abs=1e-8)
     assert branch.ends[0].period == pytest.approx(2.0 * np.pi / root.imag, rel=1e-8)
     grown = from_hopf(network, network.symmetry('pace'), root.imag, branch.along, 0.0, 0.25,
-                      stand=state, vector=vector)
+                      rest=state, vector=vector)
     check_in_order(grown)
     assert grown.folds[0].value == pytest.approx(fold.value, rel=1e-9)
     assert grown.folds[0].orbit.period == pytest.approx(fold.orbit.period, rel=1e-7)
@@ -361,7 +363,7 @@ def test_a_hopf_point_needs_its_eigenvector():
     for gait, wrong, words in (('bound', vector, 'does not have the symmetry: '),
                                ('pace', None, 'needs the stand and the eigenvector')):
         with pytest.raises(ValueError, match=words):
-            from_hopf(network, network.symmetry(gait), root.imag, line, 0.0, 0.3, stand=state,
+            from_hopf(network, network.symmetry(gait), root.imag, line, 0.0, 0.3, rest=state,
                       vector=wrong)
     # Far from any Hopf point there is no small orbit.
     network = replace(EXAMPLE, tau=0.05)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize_scalar
 
-from cpg_ros.dynamics.delayed_orbit import solve
+from cpg_ros.dynamics.orbit import solve_orbit as solve
 from cpg_ros.dynamics.periodic import NoOrbit
 from cpg_ros.integration.simulate import simulate
 from cpg_ros.inversion.cycle_fit import cycle_samples, fit_cycle

@@ -4,12 +4,13 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from modes import MODES, Mode, eigenvalue_terms
 from scipy.special import lambertw
 
 from cpg_ros.dynamics.orbit import solve_orbit
 from cpg_ros.integration.simulate import simulate
 from cpg_ros.integration.stepper import Stepper
-from cpg_ros.networks.delayed import GAITS, MODES, PRESETS, Delayed, Mode, default_symmetry_gain
+from cpg_ros.networks.delayed import GAITS, PRESETS, Delayed
 
 SWAP = [1, 0, 3, 2, 5, 4, 7, 6]
 rates = st.floats(-4.0, 4.0)
@@ -60,10 +61,10 @@ def test_the_vector_field_keeps_each_class(mode, network, share):
 @settings(max_examples=100, deadline=None)
 @given(networks)
 def test_default_gain_outweighs_every_transverse_root_at_rest(network):
-    tau, gain = network.tau, default_symmetry_gain(network)
+    tau, gain = network.tau, network.sufficient_gain(0.5)
     assert gain >= 0.0
     for mode in MODES:
-        a, b = mode.eigenvalue_terms(network)
+        a, b = eigenvalue_terms(network, mode)
         a -= gain
         if abs(b) > 1e-6:
             roots = a + lambertw(b * tau * np.exp(-a * tau), np.arange(-3, 4)) / tau
@@ -74,7 +75,7 @@ def test_default_gain_outweighs_every_transverse_root_at_rest(network):
 def test_the_lock_changes_neither_waveform_nor_period(gait):
     network = PRESETS[gait].network
     orbit = solve_orbit(network, gait)
-    for gain in (default_symmetry_gain(network), 8.0, 30.0):
+    for gain in (network.sufficient_gain(0.5), 8.0, 30.0):
         run = simulate(network, orbit, 20.5 * orbit.period, 0.0025, lock=(gain, orbit.symmetry))
         assert np.abs(run.x - orbit(run.t)).max() < 1e-8
         assert rhythm(run, orbit.period, 0.0)[1] == pytest.approx(orbit.period, rel=1e-6)
@@ -87,7 +88,7 @@ def test_noise_with_and_without_the_lock(gait):
     orbit = solve_orbit(network, gait)
     locked, free = (simulate(network, orbit, 200.0, orbit.period / 400, noise=0.02, seed=7,
                              lock=(gain, orbit.symmetry))
-                    for gain in (default_symmetry_gain(network), 0.0))
+                    for gain in (network.sufficient_gain(0.5), 0.0))
     amplitude, period, phases = rhythm(locked, orbit.period, 100.0)
     # The first harmonic is 1 % below the peak here.
     assert np.allclose(amplitude, orbit.peak, 0.05, 0.0)
@@ -103,7 +104,7 @@ def test_a_small_disturbance_kills_the_trot_without_the_lock():
     network = PRESETS['trot'].network
     orbit = solve_orbit(network, 'trot')
     steppers = [Stepper(network, orbit, gain=gain, symmetry=orbit.symmetry)
-                for gain in (0.0, default_symmetry_gain(network))]
+                for gain in (0.0, network.sufficient_gain(0.5))]
     outside = np.eye(8)[0] - np.eye(8)[0] @ orbit.symmetry.basis.T @ orbit.symmetry.basis
     for stepper in steppers:
         stepper.disturb(1e-6 * outside / np.linalg.norm(outside))

@@ -8,10 +8,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from cpg_ros.dynamics.cell_orbit import richer
 
 from cpg_ros.dynamics.floquet import multipliers
 from cpg_ros.dynamics.orbit import solve_preset
+from cpg_ros.dynamics.periodic import richer
 from cpg_ros.gaits.waveform_comparison import lag, shape_difference, shifted, steadiness
 from cpg_ros.motion.phase_readout import PhaseReadout
 from cpg_ros.networks.biped import GAITS, PRIMARY, WEIGHTS, Biped

@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
+from modes import MODES, eigenvalue_terms
 from scipy.special import lambertw
 
 from cpg_ros.dynamics.hopf import hopf_point
 from cpg_ros.dynamics.orbit import NoOrbit, solve_orbit
-from cpg_ros.networks.delayed import GAITS, MODES, PRESETS, Delayed
+from cpg_ros.networks.delayed import GAITS, PRESETS, Delayed
 
 EXAMPLE = Delayed(-4.5, 1.0, 6.5, -2.0, 0.4)
 SWAP = [1, 0, 3, 2, 5, 4, 7, 6]
@@ -111,7 +112,7 @@ def test_hopf_points_make_the_characteristic_matrix_singular(network, mode, sign
 
 @pytest.mark.parametrize(('network', 'gait'), [row[:2] for row in ONSETS])
 def test_the_critical_delay_is_where_the_mode_turns_unstable(network, gait):
-    a, b = (mode := network.symmetry(gait)).eigenvalue_terms(network)
+    a, b = eigenvalue_terms(network, mode := network.symmetry(gait))
     critical = hopf_point(network, mode).tau
     for tau, sign in ((0.3 * critical, -1), (0.99 * critical, -1), (1.01 * critical, 1)):
         roots = a + lambertw(b * tau * np.exp(-a * tau), np.arange(-9, 10)) / tau

@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from modes import Mode
 
 from cpg_ros.dynamics.orbit import solve_orbit
 from cpg_ros.integration.simulate import simulate
 from cpg_ros.integration.stepper import Stepper
-from cpg_ros.networks.delayed import STEP, Delayed, Mode
+from cpg_ros.networks.delayed import STEP, Delayed
 
 WALK = Delayed(-4.5, 1.0, 6.5, -2.0, 0.4)
 START = np.array([0.1, -0.1, 0.1, -0.1, -0.1, 0.1, -0.1, 0.1])

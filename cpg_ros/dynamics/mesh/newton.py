@@ -25,7 +25,7 @@ RESOLVED = 1e-11
 FEWEST, MOST_INTERVALS = 12, 300
 #: Newton stops at steps this small, against the size of the states and the period: what is left
 #: is of the order of their square.
-TOLERANCE = 1e-7
+TOLERANCE = 1e-8
 #: Below this range the orbit has fallen to an equilibrium.
 SMALLEST = 1e-5
 
