@@ -5,11 +5,11 @@ from functools import cache
 import numpy as np
 import pytest
 
-from cpg_ros.dynamics import cell_hopf
-from cpg_ros.dynamics.cell_hopf import cell_hopf_points
-from cpg_ros.dynamics.equilibrium import NoStand, everywhere, stand
+from cpg_ros.dynamics import hopf_search
+from cpg_ros.dynamics.equilibrium import NoEquilibrium, equilibrium, everywhere
 from cpg_ros.dynamics.floquet import multipliers
-from cpg_ros.dynamics.mesh_newton import collocate
+from cpg_ros.dynamics.hopf_search import hopf_points
+from cpg_ros.dynamics.mesh.newton import collocate
 from cpg_ros.dynamics.sign_changes import crossings
 from cpg_ros.integration.simulate import simulate
 from cpg_ros.networks.biped import Biped
@@ -29,18 +29,18 @@ EVERY = pytest.mark.parametrize('line', range(len(LINES)))
 @cache
 def found(line):
     network, text, low, high = LINES[line]
-    return cell_hopf_points(network, ParameterLine.parse(text, type(network)), low, high)
+    return hopf_points(network, ParameterLine.parse(text, type(network)), low, high)
 
 
 def spectrum(point, value):
-    network = point.along.at(point.network, value)
-    return np.linalg.eigvals(network.jacobian(everywhere(network, stand(network))))
+    network = point.line.at(point.network, value)
+    return np.linalg.eigvals(network.jacobian(everywhere(network, equilibrium(network))))
 
 
 def exact(point, mu):
     """The orbit at a distance mu of the parameter, on the side where the orbits lie."""
     value = point.value + point.normal_form.side * mu
-    return value, collocate(point.along.at(point.network, value), point.block.symmetry,
+    return value, collocate(point.line.at(point.network, value), point.block.symmetry,
                             lambda theta: point.path(value, theta), point.period(value))
 
 
@@ -63,7 +63,7 @@ def test_points_lie_where_the_whole_linearisation_crosses(line):
         # Outside the gait's fixed-point space, which the linearisation keeps apart.
         basis = point.network.symmetry(point.gait).basis
         outside = np.eye(point.network.components) - basis.T @ basis
-        whole = point.network.jacobian(everywhere(point.network, point.stand))
+        whole = point.network.jacobian(point.state)
         transverse = np.linalg.eigvals(outside @ whole @ outside)
         assert point.unstable_transverse_roots == (transverse.real > 1e-7).sum()
         # How fast the pair crosses, by differences of the whole spectrum.
@@ -83,7 +83,7 @@ def test_no_crossing_is_missed(line):
     counts = []
     for value in grid:
         there = along.at(network, value)
-        values = np.linalg.eigvals(there.jacobian(everywhere(there, stand(there))))
+        values = np.linalg.eigvals(there.jacobian(everywhere(there, equilibrium(there))))
         # A real eigenvalue changes the sign of the determinant.
         counts.append(((values.real > 0).sum(), np.sign(np.prod(values).real)))
     for k in range(len(grid) - 1):
@@ -134,8 +134,8 @@ def test_oscillations_grow_in_simulation_as_the_pair_says(line):
     # Started along the critical eigenvector, a hundredth from onset on either side.
     point = next(point for point in found(line) if point.stable)
     for mu in (0.01, -0.01):
-        network = point.along.at(point.network, point.value + mu)
-        rest = everywhere(network, stand(network))
+        network = point.line.at(point.network, point.value + mu)
+        rest = everywhere(network, equilibrium(network))
         swing = 1e-6 * np.kron(point.vector, point.block.vector).real
         run = simulate(network, rest + swing, 60.0, network.step, progress=False)
         left = point.block.vector.conj() / network.cells
@@ -153,7 +153,7 @@ def planar(point):
     frame = np.array([point.vector.real, -point.vector.imag]).T
     radius = 0.04 / np.abs(frame).max()
     x, y = np.meshgrid(*[radius * np.cos(np.pi * (np.arange(20) + 0.5) / 20)] * 2)
-    states = point.stand + np.stack([x, y], axis=-1) @ frame.T
+    states = point.rest + np.stack([x, y], axis=-1) @ frame.T
     rates = point.network.rates(everywhere(point.network, states))[..., ::point.network.cells]
     rates = (rates @ np.linalg.inv(frame).T).reshape(-1, 2)
     powers = [(i, j) for i in range(12) for j in range(12 - i)]
@@ -191,7 +191,7 @@ def test_table_12(network, gait, text, distance):
     # Printed points are near exact ones, stable in the paper's sense; trot as in the erratum.
     along = ParameterLine.parse(text, Quadruped)
     value = along.value(network)
-    point, = (point for point in cell_hopf_points(network, along, value - 0.04, value + 0.04)
+    point, = (point for point in hopf_points(network, along, value - 0.04, value + 0.04)
               if point.gait == gait)
     assert point.value - value == pytest.approx(distance, rel=0.01)
     assert point.stable and not point.supercritical
@@ -202,7 +202,7 @@ def test_table_12(network, gait, text, distance):
 def test_hopf_points_where_the_stand_does_not_move():
     # Proof of theorem 4.3: with gamma = -alpha pace and bound branch off at alpha = -+ nu0/4.
     along = ParameterLine.parse('alpha=beta=-gamma=-delta', Quadruped)
-    bound, pace = cell_hopf_points(Quadruped(0, 0, 0, 0), along, -0.5, 0.5)
+    bound, pace = hopf_points(Quadruped(0, 0, 0, 0), along, -0.5, 0.5)
     assert (bound.gait, pace.gait) == ('bound', 'pace')
     assert pace.value == pytest.approx(1.240676187 / 4.0, abs=1e-9)
     assert bound.value == pytest.approx(-pace.value, abs=1e-12)
@@ -215,7 +215,7 @@ def test_theorem_4_2_against_the_roots(sign, alpha):
     network = Quadruped(alpha, float(f'{sign}1') * alpha, 0.0, 0.0)
     along = ParameterLine.parse('gamma=delta', Quadruped)
     judged = 0
-    for point in cell_hopf_points(network, along, -1.3, 0.4):
+    for point in hopf_points(network, along, -1.3, 0.4):
         verdict = theorem_4_2(point.network, point.gait)
         if verdict.applies and not verdict.overlooked:
             assert verdict.stable == point.stable, str(verdict)
@@ -229,7 +229,7 @@ def test_theorem_4_2_against_the_roots(sign, alpha):
     (0.01, 'jump', 0.1276, 'the critical pair is the rightmost of its class')])
 def test_theorem_4_2_fails_where_its_proof_does(alpha, gait, gamma, words):
     along = ParameterLine.parse('gamma=delta', Quadruped)
-    points = cell_hopf_points(Quadruped(alpha, -alpha, 0.0, 0.0), along, gamma - 0.01,
+    points = hopf_points(Quadruped(alpha, -alpha, 0.0, 0.0), along, gamma - 0.01,
                               gamma + 0.01)
     point = min(points, key=lambda point: (point.gait != gait, abs(point.value - gamma)))
     verdict = theorem_4_2(point.network, gait)
@@ -253,9 +253,9 @@ def test_crossings_come_in_pairs_between_points_of_the_grid():
 
 
 def test_refusals(monkeypatch):
-    monkeypatch.setattr(cell_hopf, 'GRID', 5)
+    monkeypatch.setattr(hopf_search, 'GRID', 5)
     along = ParameterLine.parse('gamma=delta', Quadruped)
     with pytest.raises(ValueError, match='low 1 must be less than high 0'):
-        cell_hopf_points(PACE, along, 1, 0)
-    with pytest.raises(NoStand, match='fold'):
-        cell_hopf_points(PACE, along, 0.6, 0.7)
+        hopf_points(PACE, along, 1, 0)
+    with pytest.raises(NoEquilibrium, match='fold'):
+        hopf_points(PACE, along, 0.6, 0.7)

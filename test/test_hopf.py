@@ -7,11 +7,15 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from cpg_ros.dynamics.characteristic import characteristic_roots, leading_roots
-from cpg_ros.dynamics.hopf import hopf_point, hopf_points
+from cpg_ros.dynamics.equilibrium import equilibrium
+from cpg_ros.dynamics.hopf import first_hopf
+from cpg_ros.dynamics.hopf_search import hopf_points
+from cpg_ros.dynamics.isotypic import blocks
 from cpg_ros.dynamics.orbit import solve_orbit
 from cpg_ros.integration.simulate import simulate
-from cpg_ros.networks.delayed import MODES, PRESETS, Delayed, Mode
+from cpg_ros.networks.delayed import PRESETS, Delayed
+from cpg_ros.networks.parameter_line import ParameterLine
+from cpg_ros.papers.published_normal_form import published_normal_form
 
 EXAMPLE_1, EXAMPLE_2 = Delayed(-4.5, 1.0, 6.5, -2.0, 0.4), Delayed(-3.0, 0.1, 4.0, 1.0, 0.7)
 GOAT_TROT, GOAT_WALK = Delayed(-2.0, 1.0, 6.43, -2.0, 0.25), Delayed(-2.0, 1.0, 6.5, -2.0, 0.245)
@@ -23,6 +27,8 @@ VERIFIED = [
     (EXAMPLE_2, 'pace', 3.5199, 0.5869, 0.8319, -0.9142, 0.5957, -0.5951),
     (GOAT_TROT, 'trot', 6.3518, 0.2227, 3.4488, -0.9010, 1.0000, -0.2227),
     (GOAT_WALK, 'walk', 8.4226, 0.2048, 3.4819, -0.8683, 0.8232, -0.1867)]
+TAU = ParameterLine(('tau',), (1.0,))
+MODES = [(j, k) for j in range(4) for k in (0, 1)]
 rates = st.floats(-4.0, 4.0)
 strengths = st.floats(0.5, 8.0) | st.floats(-8.0, -0.5)
 networks = st.builds(Delayed, st.floats(-6.0, 1.0), rates, strengths, rates,
@@ -49,6 +55,11 @@ def generator(network, points=56):
     return whole
 
 
+def classes(network):
+    """The blocks of the linearisation at rest, by mode."""
+    return {block.mode: block for block in blocks(network, equilibrium(network))}
+
+
 def rightmost(network):
     """Roots of the whole network by the discretised operator, by falling real part."""
     roots = np.linalg.eigvals(generator(network))
@@ -57,10 +68,11 @@ def rightmost(network):
 
 @pytest.mark.parametrize(('network', 'gait', 'omega', 'tau', 'k1', 'k2', 'p1', 'p2'), VERIFIED)
 def test_verified_figures(network, gait, omega, tau, k1, k2, p1, p2):
-    point = hopf_point(network, network.symmetry(gait))
+    point = first_hopf(network, gait)
+    printed = published_normal_form(point)
     assert point.gait == gait
-    found = (point.omega, point.tau, point.normal_form.k1.real, point.normal_form.k2.real,
-             point.published.k1.real, point.published.k2.real)
+    found = (point.omega, point.value, point.in_delays.k1.real, point.in_delays.k2.real,
+             printed.k1.real, printed.k2.real)
     assert found == pytest.approx((omega, tau, k1, k2, p1, p2), abs=6e-5)
     assert point.direction == 1 and point.supercritical and point.normal_form.side == 1
     # None of them is stable in the full network (erratum 3).
@@ -69,35 +81,36 @@ def test_verified_figures(network, gait, omega, tau, k1, k2, p1, p2):
 
 @pytest.mark.parametrize(('network', 'gait'), [row[:2] for row in VERIFIED[:3]])
 def test_the_normal_form_predicts_the_orbit_and_the_published_one_does_not(network, gait):
-    point = hopf_point(network, network.symmetry(gait))
+    point = first_hopf(network, gait)
     theta = np.arange(256) / 256
     late = []
     for mu in (5e-4, 1e-3):
-        orbit = solve_orbit(replace(network, tau=point.tau + mu), gait)
+        orbit = solve_orbit(replace(network, tau=point.value + mu), gait)
         first = 2.0 * abs(np.mean(orbit.waveform(theta) * np.exp(-2j * np.pi * theta)))
-        late.append(abs(point.period(point.tau + mu) - orbit.period))
+        late.append(abs(point.period(point.value + mu) - orbit.period))
         if mu == 5e-4:
-            assert point.amplitude(point.tau + mu) == pytest.approx(first, rel=1e-3)
-            assert 0.04 < abs(2.0 * point.published.radius(mu) / first - 1.0) < 0.07
+            assert point.amplitude(point.value + mu) == pytest.approx(first, rel=1e-3)
+            assert 0.04 < abs(2.0 * published_normal_form(point).radius(mu) / first - 1.0) < 0.07
     # The period's error is of second order.
     assert late[1] < 1e-5 and late[1] / late[0] == pytest.approx(4.0, rel=0.05)
     with pytest.raises(ValueError, match='no orbit'):
-        point.amplitude(point.tau - 1e-3)
+        point.amplitude(point.value - 1e-3)
 
 
 @settings(max_examples=40, deadline=None)
 @given(networks)
 def test_lambert_roots_are_those_of_the_delay_operator(network):
-    ours = np.concatenate([characteristic_roots(network, mode, 9) for mode in MODES])
+    ours = np.concatenate([block.roots(9) for block in classes(network).values()])
     # To the right of this line we have them all, and the discretisation has them exactly.
-    edge = max(max(characteristic_roots(network, mode, 9)[-1].real for mode in MODES),
+    edge = max(max(block.roots(9)[-1].real for block in classes(network).values()),
                -3.0 / network.tau)
     theirs = rightmost(network)
     theirs = theirs[(theirs.real > edge + 1e-3) & (np.abs(theirs.imag) < 30.0 / network.tau)]
     for root in theirs:
         assert np.abs(ours - root).min() < 1e-6 * max(1.0, abs(root))
-    for mode, root in leading_roots(network).items():
-        assert root == pytest.approx(characteristic_roots(network, mode, 3)[0])
+    for block in classes(network).values():
+        root = block.leading
+        assert root == pytest.approx(block.roots(3)[0])
         if root.real > edge + 1e-2 and abs(root.imag) < 25.0 / network.tau:
             assert np.abs(theirs - root).min() < 1e-6 * max(1.0, abs(root))
 
@@ -106,8 +119,8 @@ def test_lambert_roots_are_those_of_the_delay_operator(network):
 @given(networks, st.floats(0.3, 1.5))
 def test_no_critical_delay_is_missed(network, longest):
     # Every point takes one pair of roots across; between them none may cross.
-    points = hopf_points(network, longest)
-    taus = [point.tau for point in points]
+    points = hopf_points(network, TAU, 0.0, longest)
+    taus = [point.value for point in points]
     assert taus == sorted(taus) and all(0.0 < tau <= longest for tau in taus)
     # Two that all but coincide, or one at the very end, cannot be told by counting.
     assume(np.abs(np.diff([*taus, longest])).min(initial=1.0) > 1e-4)
@@ -125,29 +138,29 @@ def test_no_critical_delay_is_missed(network, longest):
 @settings(max_examples=30, deadline=None)
 @given(networks, st.integers(0, 20))
 def test_a_hopf_point_by_the_delay_operator(network, pick):
-    points = hopf_points(network, 1.5)
+    points = hopf_points(network, TAU, 0.0, 1.5)
     assume(points)
     point = points[pick % len(points)]
-    assert replace(network, tau=point.tau) == point.network
+    assert replace(network, tau=point.value) == point.network
     roots = rightmost(point.network)
     gap = np.sort(np.abs(roots - 1j * point.omega))
     assert gap[0] < 1e-6 * max(1.0, point.omega)
     # k1 is the speed of the root in the paper's time: d(tau lambda)/d tau.
-    width = 1e-4 * point.tau
+    width = 1e-4 * point.value
     assume(gap[1] > 0.3)
     moved = []
-    for tau in (point.tau - width, point.tau + width):
+    for tau in (point.value - width, point.value + width):
         near = rightmost(replace(network, tau=tau))
         moved.append(tau * near[np.abs(near - 1j * point.omega).argmin()])
     k1 = (moved[1] - moved[0]) / (2.0 * width)
-    assert k1 == pytest.approx(point.normal_form.k1, rel=1e-4, abs=1e-4)
+    assert k1 == pytest.approx(point.in_delays.k1, rel=1e-4, abs=1e-4)
     # Others with positive real part, in the class (its projector) and outside.
     others = np.array(
         [root for root in roots if abs(abs(root.imag) - point.omega) > 1e-5
          or abs(root.real) > 1e-5])
     assume(np.abs(others.real).min() > 1e-4)
     assert point.unstable_roots == int(np.sum(others.real > 0.0))
-    basis = point.mode.basis
+    basis = point.block.symmetry.basis
     outside = np.eye(8) - basis.T @ basis
     columns = np.linalg.svd(outside)[0][:, :8 - len(basis)]
     size = generator(point.network).shape[0] // 8
@@ -163,16 +176,17 @@ def test_a_hopf_point_by_the_delay_operator(network, pick):
 def test_a_simulation_crosses_at_the_critical_delay(network, gait):
     # Held in its class, a small wave decays below the critical delay and grows above, as fast
     # as the leading root says.
-    mode = network.symmetry(gait)
-    critical = hopf_point(network, mode).tau
+    mode, point = network.symmetry(gait), first_hopf(network, gait)
+    critical = point.value
     for tau, sign in ((0.97 * critical, -1.0), (1.03 * critical, 1.0)):
         here = replace(network, tau=tau)
         run = simulate(here, 1e-6 * mode.basis[0], 20.0, tau / 60, lock=(8.0, mode))
         size = np.log(np.linalg.norm(run.x, axis=1))
         windows = [size[(run.t > t) & (run.t <= t + 5.0)].max() for t in (8.0, 15.0)]
+        block = classes(here)[point.mode]
         growth = (windows[1] - windows[0]) / 7.0
         assert np.sign(growth) == sign
-        assert growth == pytest.approx(leading_roots(here)[mode].real, abs=0.03)
+        assert growth == pytest.approx(block.leading.real, abs=0.03)
 
 
 @settings(max_examples=60, deadline=None)
@@ -180,8 +194,8 @@ def test_a_simulation_crosses_at_the_critical_delay(network, gait):
                  strengths, st.floats(-20.0, 20.0), st.floats(0.0025, 50.0)),
        st.sampled_from(MODES))
 def test_roots_hold_however_large_the_exponents(network, mode):
-    a, b = mode.eigenvalue_terms(network)
-    roots = characteristic_roots(network, mode, 5)
+    block = classes(network)[mode]
+    a, b, roots = block.now[0, 0], block.past[0, 0], block.roots(5)
     assert np.isfinite(roots).all() and (np.diff(roots.real) <= 1e-9).all()
     # lambda - A = B exp(-lambda tau), in logarithms because either side may leave the range.
     with np.errstate(divide='ignore'):
@@ -196,8 +210,8 @@ def test_roots_hold_however_large_the_exponents(network, mode):
 
 
 def test_both_waves_of_a_walk_have_their_points():
-    points = [point for point in hopf_points(PRESETS['walk'].network, 0.7)
+    points = [point for point in hopf_points(PRESETS['walk'].network, TAU, 0.0, 0.7)
               if point.gait == 'walk']
     assert [(point.mode, point.wave) for point in points] == [
-        (Mode(3, 1), 'LH leads LF'), (Mode(1, 1), 'LF leads LH')]
+        ((3, 1), 'LH leads LF'), ((1, 1), 'LF leads LH')]
     assert points[1].omega == pytest.approx(points[0].omega - 4.0)

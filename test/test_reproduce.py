@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cpg_ros.dynamics.hopf import hopf_point
+from cpg_ros.dynamics.hopf import first_hopf
 from cpg_ros.dynamics.periodic import NoOrbit
 from cpg_ros.networks.quadruped import Quadruped
 from cpg_ros.papers import buono_blocks, buono_groups, liu_zhang, rashidi
@@ -185,8 +185,8 @@ def test_a_changed_published_value_fails(monkeypatch, capsys):
 
 def test_changed_numerics_of_the_delayed_network_fail(monkeypatch, capsys):
     only(monkeypatch, 'liu_zhang', liu_zhang.trot)
-    monkeypatch.setattr(liu_zhang, 'hopf_point', lambda network, mode: hopf_point(
-        replace(network, c=1.01 * network.c), mode))
+    monkeypatch.setattr(liu_zhang, 'first_hopf', lambda network, gait: first_hopf(
+        replace(network, c=1.01 * network.c), gait))
     code, rows = outcome(capsys, 'liu_zhang')
     failed = {row['quantity'] for row in rows if row['verdict'] == 'FAILS'}
     assert code == 1

@@ -8,10 +8,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import fsolve
 
-from cpg_ros.dynamics.equilibrium import NoStand, everywhere, stand, stands
+from cpg_ros.dynamics.equilibrium import NoEquilibrium, equilibria, equilibrium, everywhere
 from cpg_ros.dynamics.isotypic import blocks
 from cpg_ros.networks.biped import Biped
-from cpg_ros.networks.quadruped import CELL, PHI, Quadruped
+from cpg_ros.networks.quadruped import Quadruped
 from cpg_ros.papers.buono_tables import Tables, square_root
 
 COUPLINGS = st.builds(Quadruped, *[st.floats(-0.4, 0.4)] * 6)
@@ -26,6 +26,12 @@ def apart(found, wanted):
         gaps.append(min(abs(np.array(found) - one)))
         found.pop(int(np.abs(np.array(found) - one).argmin()))
     return max(gaps)
+
+
+def alone(state):
+    """Linearisation of an uncoupled cell, shape (2, 2)."""
+    network = Quadruped(0.0, 0.0, 0.0, 0.0)
+    return network.jacobian(everywhere(network, state))[::8, ::8]
 
 
 def scalar_roots(network):
@@ -44,16 +50,15 @@ def scalar_roots(network):
                                      Quadruped(-0.15, -0.15, -0.16, -0.16, 0.31, 0.31)])
 def test_the_stand_of_the_paper(network):
     # Section 6, to more digits; where the couplings add up to nothing it does not move.
-    state = stand(network)
+    state = equilibrium(network)
     assert state == pytest.approx([0.3096, 0.5240], abs=5e-5)
-    _, _, _, slopes = CELL.slopes(*state, PHI)
-    assert CELL.slopes(*state, PHI)[0] + slopes == pytest.approx(-1.2407, abs=5e-5)
+    assert np.trace(alone(state)) == pytest.approx(-1.2407, abs=5e-5)
 
 
 @settings(max_examples=40, deadline=None)
 @given(COUPLINGS)
 def test_stands_are_all_equilibria_with_equal_cells(network):
-    found = stands(network)
+    found = equilibria(network)
     assert np.abs(network.rates(everywhere(network, found))).max(initial=0.0) < 1e-9
     inside = found[np.abs(found[:, 0]) < 2.0]
     wanted = scalar_roots(network)
@@ -71,16 +76,17 @@ def test_the_stand_is_followed_from_the_uncoupled_cells(network):
         new, _, ok, _ = fsolve(part.rates, state, fprime=part.jacobian, full_output=True)
         lost = ok != 1 or np.abs(new - state).max() > 0.05 * (1.0 + np.abs(state).max())
         if lost:
-            with pytest.raises(NoStand, match='the stand is lost'):
-                stand(network)
+            with pytest.raises(NoEquilibrium, match='the stand is lost'):
+                equilibrium(network)
             return
         state = new
-    assert np.abs(everywhere(network, stand(network)) - state).max() < 1e-8
+    assert np.abs(everywhere(network, equilibrium(network)) - state).max() < 1e-8
 
 
 def test_a_fold_is_told():
-    with pytest.raises(NoStand, match=r'lost in a fold at 0\.785[67] of the couplings, v -0\.48'):
-        stand(Quadruped(0.3, 0.3, 0.6, 0.6))
+    with pytest.raises(NoEquilibrium,
+                       match=r'lost in a fold at 0\.785[67] of the couplings, v -0\.48'):
+        equilibrium(Quadruped(0.3, 0.3, 0.6, 0.6))
     # alpha + gamma = 0.7071: two equilibria vanish there.
     before, after = (scalar_roots(Quadruped(0.3, 0.3, gamma, gamma)) for gamma in (0.407, 0.4072))
     assert len(before) - len(after) == 2 and np.abs(before + 0.486).min() < 0.02
@@ -89,32 +95,32 @@ def test_a_fold_is_told():
 def test_the_biped_stands_where_its_cells_do():
     network = Biped.symmetric(0.229, 0.254, 0.390, -0.681, 0.489)
     alone = Biped.symmetric(0.229, 0.254, 0.0, 0.0, 0.0)
-    assert np.abs(stand(network) - stand(alone)).max() < 1e-12
+    assert np.abs(equilibrium(network) - equilibrium(alone)).max() < 1e-12
     found = fsolve(network.rates, np.repeat([0.05, 0.3], 4), fprime=network.jacobian)
-    assert np.abs(everywhere(network, stand(network)) - found).max() < 1e-9
-    with pytest.raises(NoStand, match='an uncoupled cell has 3 equilibria'):
-        stand(replace(network, current=0.095))
+    assert np.abs(everywhere(network, equilibrium(network)) - found).max() < 1e-9
+    with pytest.raises(NoEquilibrium, match='an uncoupled cell has 3 equilibria'):
+        equilibrium(replace(network, current=0.095))
     with pytest.raises(ValueError, match='phi is nan'):
-        stand(replace(network, phi=np.nan))
+        equilibrium(replace(network, phi=np.nan))
 
 
 @settings(max_examples=40, deadline=None)
 @given(st.one_of(COUPLINGS, BIPEDS))
 def test_blocks_split_the_linearisation(network):
-    for state in stands(network):
+    for state in equilibria(network):
         whole = network.jacobian(everywhere(network, state))
         split = blocks(network, state)
         for block in split:
             for column in np.eye(2):
                 assert np.allclose(whole @ np.kron(column, block.vector),
-                                   np.kron(block.matrix @ column, block.vector), 0.0,
+                                   np.kron(block.now @ column, block.vector), 0.0,
                                    1e-12 * np.abs(whole).max())
             # The gait's own symmetry: x_i(t) = x_1(t + phase T), whatever way the wave runs.
             gait = network.symmetry(block.gait)
             turned = np.exp(2j * np.pi * gait.phases)
             assert np.allclose(turned, block.vector) or np.allclose(turned, block.vector.conj())
         assert len({block.mode for block in split}) == network.cells
-        found = np.concatenate([block.eigenvalues for block in split])
+        found = np.concatenate([block.roots(2) for block in split])
         wanted = np.linalg.eigvals(whole)
         assert apart(found, wanted) < 1e-6 * np.abs(whole).max()
         assert max(block.leading.real for block in split) == pytest.approx(wanted.real.max(),
@@ -124,7 +130,7 @@ def test_blocks_split_the_linearisation(network):
 def test_unequal_weights_have_no_blocks():
     network = replace(Biped.symmetric(0.229, 0.254, 0.39, -0.681, 0.489), w_12=0.3)
     with pytest.raises(ValueError, match='w_21, w_43, w_12, w_34 differ'):
-        blocks(network, stand(network))
+        blocks(network, equilibrium(network))
 
 
 @settings(max_examples=40, deadline=None)
@@ -132,10 +138,9 @@ def test_unequal_weights_have_no_blocks():
 def test_printed_tables_and_what_is_wrong_in_them(network):
     # At any state: none of it needs a stand.
     state = np.array([0.2, 0.4])
-    a = np.array(CELL.slopes(*state, PHI)).reshape(2, 2)
-    tables = Tables.at(network, a)
+    tables = Tables.at(network, alone(state))
     for block in blocks(network, state):
-        matrix = block.matrix
+        matrix = block.now
         trace, determinant = np.trace(matrix), np.linalg.det(matrix)
         under = trace**2 - 4.0 * determinant
         assert np.allclose(tables.block(*block.mode), matrix)
@@ -147,7 +152,7 @@ def test_printed_tables_and_what_is_wrong_in_them(network):
                 assert good == (under.imag > 0.0)
             # Eqs. 5.4 and 5.5 lack the factor 1/2.
             assert np.allclose(tables.real_parts(block.mode[1]),
-                               2.0 * np.sort(block.eigenvalues.real)[::-1], 0.0, 1e-6)
+                               2.0 * np.sort(block.roots(2).real)[::-1], 0.0, 1e-6)
             continue
         assert tables.discriminant(*block.mode) == pytest.approx(under.real)
         # Table 7, L_21: xi + eta has the wrong sign.
@@ -159,7 +164,7 @@ def test_printed_tables_and_what_is_wrong_in_them(network):
 @given(*[st.floats(-0.4, 0.4)] * 3)
 def test_table_11_is_twice_the_real_part(alpha, gamma, xi):
     network, state = Quadruped(alpha, alpha, gamma, gamma, xi, xi), np.array([0.31, 0.52])
-    tables = Tables.at(network, np.array(CELL.slopes(*state, PHI)).reshape(2, 2))
+    tables = Tables.at(network, alone(state))
     for block in blocks(network, state):
         if block.mode[0] < 3:
-            assert np.allclose(tables.sigma(*block.mode), 2.0 * block.eigenvalues.real)
+            assert np.allclose(tables.sigma(*block.mode), 2.0 * block.roots(2).real)
