@@ -138,11 +138,11 @@ def _newton(reduced: Reduced, now: Solution, steps: int = 15) -> bool:
     scale = np.abs(now.points).max()
     d, longest = now.points.shape[1], 20.0 * now.length
     for _ in range(steps):
-        p, r, by_start, by_source = linearised(reduced, now)
-        right = np.empty(d + 1)
-        right[:d] = now.points[0, reduced.turn] - now.points[-1] - r[-1, :, 1]
-        right[d] = -reduced.rates(now.points[0])[0]
         try:
+            p, r, by_start, by_source = linearised(reduced, now)
+            right = np.empty(d + 1)
+            right[:d] = now.points[0, reduced.turn] - now.points[-1] - r[-1, :, 1]
+            right[d] = -reduced.rates(now.points[0])[0]
             found = np.linalg.solve(bordered(reduced, now, p, r), right)
         except np.linalg.LinAlgError:
             return False
