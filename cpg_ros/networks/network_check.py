@@ -46,6 +46,7 @@ def _names(network: type[Network]) -> Iterator[str]:
         yield from _unknown(f'groups: {group}', members, parameters)
     yield from _unknown('free', network.free, either)
     yield from _unknown('needed', network.needed, parameters)
+    yield from _unknown('couplings', network.couplings, parameters)
     yield from _unknown('readout', [network.readout], ('waveform', 'phase'))
     if network.readout == 'phase' and network.variables != 2:
         yield 'readout: the phase is told by cells with two variables'
