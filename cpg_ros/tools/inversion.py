@@ -126,14 +126,13 @@ def _checked(parser: Parser, chosen: Namespace) -> None:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Invert the recording that is named, or run the node; return the exit code."""
-    given = sys.argv[1:] if arguments is None else list(arguments)
-    if not given or given[0] == '--ros-args':
+    """Invert a recording, or run the node if the command line has none; return the exit code."""
+    if arguments is None and sys.argv[1:2] in ([], ['--ros-args']):
         # Without ROS installed, recordings can be inverted all the same.
         from cpg_ros.nodes.inversion_node import run
-        return run(None if arguments is None else given)
+        return run()
     parser = _parser()
-    chosen = parser.parse_args(given)
+    chosen = parser.parse_args(sys.argv[1:] if arguments is None else arguments)
     _checked(parser, chosen)
     try:
         robot = None if chosen.robot is None else find_robot(chosen.robot)
