@@ -130,9 +130,8 @@ class Pattern:
         """Advance by dt in s and fill position, velocity and phases."""
         if self._requests:
             self._take_requests()
-        if len(self._tracks) == 1 and not self._ramps and self._absorbed >= ABSORB:
-            self._cruise(dt)
-        else:
+        calm = len(self._tracks) == 1 and not self._ramps and self._absorbed >= ABSORB
+        if not (calm and self._cruise(dt)):
             parts = max(1, math.ceil(dt / SUBSTEP - 1e-9))
             for _ in range(parts):
                 self._step(dt / parts)
@@ -162,8 +161,11 @@ class Pattern:
         """Take note that the network's output jumps here; ``_step`` smooths it."""
         self._jump, self._absorbed = None, 0.0
 
-    def _cruise(self, dt: float) -> None:
-        """One gait, at the stand or in full swing: nothing to mix, nothing to allocate."""
+    def _cruise(self, dt: float) -> bool:
+        """One gait, at the stand or in full swing: nothing to mix, nothing to allocate.
+
+        False if the network left its orbit: the tick is to be worked out anew.
+        """
         self._slowing, self._last_rate = 1.0, None
         track, drive = self._tracks[0], self.drive
         frequency = track.program.frequency
@@ -171,14 +173,15 @@ class Pattern:
             drive.advance(dt)
             frequency *= drive.pace
         if not track.advance(frequency * dt):
+            track.phase -= frequency * dt
             self._recover(track)
-            self._step(0.0)
-            return
+            return False
         np.multiply(track.angle, self._level, out=self._wanted)
         self._wanted += self._offset
         np.multiply(track.rise, self._level * frequency, out=self._rate)
         if drive is not None:
             self._rate += self._level * drive.rate[self._leg] * track.reach
+        return True
 
     def _recover(self, track: Track) -> None:
         self.faults += 1

@@ -27,9 +27,10 @@ from cpg_ros.motion.readout import TURN, monomials
 
 #: Points of a cycle in the tables of an orbit: a cell may jump within a hundredth of a cycle.
 POINTS = 4096
-#: Pull of a cell on its phase and amplitude, per stride, and the most it adds to the phase's
-#: speed (cycles a stride): joints never run backward.
-PULL, MOST = 1.0, 0.5
+#: Pull of a cell on its phase and amplitude, per stride; over how many strides it is smoothed (so
+#: much that they come back as fast as they can without overshoot); and the most it adds to the
+#: phase's speed, cycles a stride: joints never run backward.
+PULL, SMOOTHING, MOST = 1.0, 0.25, 0.5
 #: A cell further away than this many half ranges of its orbit counts as this far.
 FURTHEST = 2.0
 #: A phase off by a quarter of this (cycles) counts as far off as a half range.
@@ -76,6 +77,7 @@ def _cached(digest):
         digest  # noqa: B018
         distance, sum_ = 0.0, 0.0
         pull = PULL / (1.0 + 2.0 * PULL * strides)
+        share = strides / (SMOOTHING + strides)
         for cell in range(waves.shape[0]):
             wave = waves[cell]
             if strides > 0.0:
@@ -111,8 +113,9 @@ def _cached(digest):
                          + (circle[2] * c1 + circle[3] * s1) * y)
                 across = ((circle[1] * c1 - circle[0] * s1) * x
                           + (circle[3] * c1 - circle[2] * s1) * y)
-                clocks[2, cell] = min(max(pull * across / TURN, -MOST), MOST)
-                clocks[5, cell] = pull * along
+                across = min(max(pull * across / TURN, -MOST), MOST)
+                clocks[2, cell] += share * (across - clocks[2, cell])
+                clocks[5, cell] += share * (pull * along - clocks[5, cell])
             terms = harmonics[wave]
             x, y, z = terms[0, 0], 0.0, 0.0
             c, s_ = 1.0, 0.0
