@@ -65,7 +65,8 @@ class Pattern:
         self._jump: tuple[np.ndarray, np.ndarray] | None = None
         self._absorbed = ABSORB
         self._recovering = False
-        self._slowing = 1.0
+        self._slowing = self._slower = 1.0
+        self._frequency = newest.program.frequency
         self._last_rate: np.ndarray | None = None
         self._level, self._level_rate = 0.0, 0.0
         self._ramp_to(float(enabled), max(ramp, SUBSTEP))
@@ -166,14 +167,16 @@ class Pattern:
 
         False if the network left its orbit: the tick is to be worked out anew.
         """
-        self._slowing, self._last_rate = 1.0, None
+        self._slowing, self._slower, self._last_rate = 1.0, 1.0, None
         track, drive = self._tracks[0], self.drive
         frequency = track.program.frequency
         if drive is not None:
             drive.advance(dt)
             frequency *= drive.pace
-        if not track.advance(frequency * dt):
-            track.phase -= frequency * dt
+        strides = 0.5 * (self._frequency + frequency) * dt
+        self._frequency = frequency
+        if not track.advance(strides):
+            track.phase -= strides
             self._recover(track)
             return False
         np.multiply(track.angle, self._level, out=self._wanted)
@@ -190,7 +193,9 @@ class Pattern:
         self._absorb()
 
     def _step(self, dt: float) -> None:
-        clock = dt * self._slowing
+        # Slowing and frequency run linearly from tick to tick, as the velocities say.
+        clock = 0.5 * dt * (self._slowing + self._slower)
+        self._slowing = self._slower
         tracks = self._tracks
         first = tracks[0]
         frequency, moving = first.program.frequency, len(tracks) > 1
@@ -204,8 +209,10 @@ class Pattern:
         if self.drive is not None:
             self.drive.advance(dt)
             frequency *= self.drive.pace
+        strides = 0.5 * (self._frequency + frequency) * clock
+        self._frequency = frequency
         for track in tracks:
-            if not track.advance(frequency * clock):
+            if not track.advance(strides):
                 self._recover(track)
 
         wanted, rate = first.angle, self._rate_of(first, frequency)
@@ -223,16 +230,16 @@ class Pattern:
             rate = self._level * rate + self._level_rate * wanted
             wanted = self._level * wanted
         if moving:
-            # The pattern slows where it would outrun the gaits, now or at the next substep.
+            # The pattern slows where it would outrun the gaits at the next substep.
             bound = np.minimum(np.max([t.program.speed + SHIFTING * np.abs(t.program.shift)
                                        for t in tracks], axis=0), self._limit)
             ahead = rate if self._last_rate is None else 2.0 * rate - self._last_rate
             fastest = np.maximum(np.abs(rate), np.abs(ahead))
             self._last_rate = rate
-            self._slowing = 1.0 / max(1.0, float(np.max(fastest / np.maximum(bound, 1e-9))))
+            self._slower = 1.0 / max(1.0, float(np.max(fastest / np.maximum(bound, 1e-9))))
             rate = self._slowing * rate
         else:
-            self._slowing, self._last_rate = 1.0, None
+            self._slowing, self._slower, self._last_rate = 1.0, 1.0, None
 
         if self._absorbed < ABSORB:
             wanted, rate = self._smooth(wanted + self._offset, rate, dt)
