@@ -150,6 +150,7 @@ class Pattern:
                 del self._tracks[:-1]
                 self._tracks[0].drift_to(what)
                 self._absorb()
+                self._step(0.0)
             elif len(self._tracks) < MOST_TRACKS:
                 how.align(self._tracks[-1].phase)
                 self._tracks.append(how)
@@ -159,7 +160,7 @@ class Pattern:
         self._requests.extend(waiting)
 
     def _absorb(self) -> None:
-        """Take note that the network's output jumps here; ``_step`` smooths it."""
+        """Take note that the network's output jumps here; the next ``_step`` smooths it."""
         self._jump, self._absorbed = None, 0.0
 
     def _cruise(self, dt: float) -> bool:
@@ -178,6 +179,7 @@ class Pattern:
         if not track.advance(strides):
             track.phase -= strides
             self._recover(track)
+            self._step(0.0)
             return False
         np.multiply(track.angle, self._level, out=self._wanted)
         self._wanted += self._offset
