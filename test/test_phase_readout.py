@@ -111,6 +111,19 @@ def test_nan_anywhere_comes_through(component):
     assert np.isnan(looks(readout, [0.0], [state])[3]).all()
 
 
+def test_a_waveform_that_repeats_within_a_cycle_is_refused():
+    orbit = solve_preset(PRESETS['quadruped']['pace'])
+
+    class Twice:
+        network, waves, phases, levels = orbit.network, orbit.waves, orbit.phases, orbit.levels
+
+        def waveform(self, theta, *arguments):
+            return orbit.waveform(2.0 * theta, *arguments)
+
+    with pytest.raises(ValueError, match='repeats within a cycle: the first harmonic'):
+        PhaseReadout(Twice(), np.arange(8), WEIGHTS, np.arange(8), 3)
+
+
 @EVERY
 def test_clocks_come_to_what_the_cells_do(network, name):
     orbit = solve_preset(PRESETS[network][name])
