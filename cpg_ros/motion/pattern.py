@@ -150,7 +150,6 @@ class Pattern:
                 del self._tracks[:-1]
                 self._tracks[0].drift_to(what)
                 self._absorb()
-                self._step(0.0)
             elif len(self._tracks) < MOST_TRACKS:
                 how.align(self._tracks[-1].phase)
                 self._tracks.append(how)
