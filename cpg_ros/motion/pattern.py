@@ -235,9 +235,8 @@ class Pattern:
             bound = np.minimum(np.max([t.program.speed + SHIFTING * np.abs(t.program.shift)
                                        for t in tracks], axis=0), self._limit)
             ahead = rate if self._last_rate is None else 2.0 * rate - self._last_rate
-            fastest = np.maximum(np.abs(rate), np.abs(ahead))
             self._last_rate = rate
-            self._slower = 1.0 / max(1.0, float(np.max(fastest / np.maximum(bound, 1e-9))))
+            self._slower = 1.0 / max(1.0, float(np.max(np.abs(ahead) / np.maximum(bound, 1e-9))))
             rate = self._slowing * rate
         else:
             self._slowing, self._slower, self._last_rate = 1.0, 1.0, None
