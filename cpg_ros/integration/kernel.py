@@ -18,6 +18,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
 from types import FunctionType
+from typing import Any
 
 import numpy as np
 from numba import njit, prange
@@ -181,7 +182,10 @@ def _compiled(decorate, equations):
 
 
 # Stand-ins for the functions of a network, which ``_with`` puts in their place.
-_past_state = _restart = _steps = _steps_of_one = None
+_past_state: Any = None
+_restart: Any = None
+_steps: Any = None
+_steps_of_one: Any = None
 
 
 def _with(function, names):

@@ -16,7 +16,7 @@ from cpg_ros.networks.derivation import print_float
 from cpg_ros.networks.equations import Argument, Source
 
 
-class _Printer(PythonCodePrinter):
+class _Printer(PythonCodePrinter):  # type: ignore[misc]
     """Python, numbers to the last digit."""
 
     _print_Float = print_float

@@ -17,7 +17,7 @@ def print_float(printer: Any, value: Any) -> str:
     return repr(float(value))
 
 
-class _Printer(NumPyPrinter):
+class _Printer(NumPyPrinter):  # type: ignore[misc]
     """Numpy, numbers to the last digit."""
 
     _print_Float = print_float

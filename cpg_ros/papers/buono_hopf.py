@@ -10,7 +10,8 @@ from cpg_ros.dynamics.hopf import HopfPoint
 from cpg_ros.dynamics.hopf_search import hopf_at
 from cpg_ros.networks.network import Network
 from cpg_ros.networks.parameter_line import ParameterLine
-from cpg_ros.networks.quadruped import GAITS, Quadruped
+from cpg_ros.networks.quadruped import Quadruped
+from cpg_ros.networks.symmetry import GAITS
 from cpg_ros.papers.buono_blocks import UNCOUPLED, Sample
 from cpg_ros.papers.buono_gaits import AUTHORS
 from cpg_ros.papers.row import Citation, Picture, Row

@@ -10,7 +10,8 @@ from dataclasses import dataclass
 from cpg_ros.dynamics.equilibrium import equilibrium
 from cpg_ros.dynamics.isotypic import blocks
 from cpg_ros.networks.network import known
-from cpg_ros.networks.quadruped import GAITS, Quadruped
+from cpg_ros.networks.quadruped import Quadruped
+from cpg_ros.networks.symmetry import GAITS
 
 #: Gait -> sign of beta against alpha, and the signs that alpha and gamma must have; 0 is any.
 SIGNS = {'pronk': (1, 1, 1), 'pace': (1, 1, -1), 'bound': (1, -1, 1), 'trot': (1, -1, -1),

@@ -11,6 +11,7 @@ from cpg_ros.dynamics.fourier.newton import NODES, newton
 from cpg_ros.dynamics.fourier.orbit import FourierOrbit
 from cpg_ros.dynamics.hopf import first_hopf
 from cpg_ros.dynamics.periodic import NoOrbit, check_values
+from cpg_ros.dynamics.seek import sought
 from cpg_ros.networks.equations import equations_of, values_of
 from cpg_ros.networks.network import Network, Preset
 from cpg_ros.networks.symmetry import Symmetry
@@ -79,7 +80,7 @@ def _first_harmonic(network: Network, symmetry: Symmetry) -> tuple[np.ndarray, f
 def _guess(network: Network, gait: str) -> tuple[np.ndarray, float] | None:
     """Waveforms and period near onset."""
     symmetry = network.symmetry(gait)
-    if symmetry.odd and network.variables == 1:
+    if _simple(network, symmetry):
         return _first_harmonic(network, symmetry)
     point = first_hopf(network, gait)
     if point is None or (network.delay - point.value) * point.normal_form.side <= 0.0:
@@ -170,9 +171,8 @@ def solve(network: Network, gait: str, near: FourierOrbit | None = None) -> Four
     if obstacle:
         raise NoOrbit(obstacle)
     name, delay, onset = network.delay_parameter, network.delay, _onset(network, gait)
-    if onset is None:
-        raise NoOrbit(f'no delay gives a {gait}')
-    if delay <= onset:
+    simple = _simple(network, symmetry)
+    if simple and onset is not None and delay <= onset:
         raise NoOrbit(f"{name} {delay:g} is below the {gait}'s critical delay {onset:.4f}")
     if near is not None and near.symmetry == symmetry:
         try:
@@ -181,24 +181,31 @@ def solve(network: Network, gait: str, near: FourierOrbit | None = None) -> Four
             # Not near enough.
             pass
     reason = 'no orbit was found'
-    orbit = None
     try:
         guess = _guess(network, gait)
         orbit = None if guess is None else _accepted(newton(network, symmetry, *guess))
-        if orbit is None:
+        if orbit is None and onset is not None and delay > onset:
             orbit = _continued(network, gait, onset)
+        if orbit is None and not simple:
+            found = (from_path(network, symmetry, *one) for one in sought(network, gait))
+            orbit = next((one for one in found if one is not None), None)
+        if orbit is not None:
+            return orbit
     except NoOrbit as error:
         reason = str(error)
-    if orbit is None:
-        raise NoOrbit(f'no {gait} at {name} {delay:g}, far from its critical delay {onset:.4f}: '
-                      f'{reason}')
-    return orbit
+    far = '' if onset is None else f', far from its critical delay {onset:.4f}'
+    raise NoOrbit(f'no {gait} at {name} {delay:g}{far}: {reason}')
+
+
+def _simple(network: Network, symmetry: Symmetry) -> bool:
+    """Whether cells have one variable and swing about 0: then harmonic balance tells the onset."""
+    return symmetry.odd and network.variables == 1
 
 
 def _onset(network: Network, gait: str) -> float | None:
     """The gait's first critical delay."""
     symmetry = network.symmetry(gait)
-    if symmetry.odd and network.variables == 1:
+    if _simple(network, symmetry):
         a, b = _describing(network, symmetry)(1e-9)
         omegas = frequencies(a, b)
         return critical_delay(a, b, omegas[0]) if omegas else None

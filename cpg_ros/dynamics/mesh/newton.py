@@ -90,7 +90,8 @@ def summed(jacobians: np.ndarray, lengths: np.ndarray, answers: np.ndarray) -> n
     return weighted.reshape(n, d, s * d) @ answers.reshape(n, s * d, -1)
 
 
-def linearised(reduced: Reduced, now: Solution, extra: np.ndarray | None = None):
+def linearised(reduced: Reduced, now: Solution, extra: np.ndarray | None = None
+               ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Linearise: return increments at mesh points as functions of (dy0, dL, extras).
 
     The answer is (P, R, stage answer to dy, stage answer to the sources): dy_k = P_k dy_0 +

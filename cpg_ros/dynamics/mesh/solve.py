@@ -15,43 +15,14 @@ from cpg_ros.dynamics.mesh.newton import collocate as from_path
 from cpg_ros.dynamics.mesh.newton import predicted
 from cpg_ros.dynamics.mesh.orbit import MeshOrbit
 from cpg_ros.dynamics.periodic import NoOrbit, check_values, richer
-from cpg_ros.errors import InputError
+from cpg_ros.dynamics.seek import settled, sought
 from cpg_ros.integration.simulate import simulate
 from cpg_ros.networks.network import Network, Preset
 from cpg_ros.networks.symmetry import Symmetry
 
-#: Periods the network gets to find its gait, held by a lock of this gain (1/model time).
-SETTLING, HOLD = 30, 1.0
-
 
 def _accepted(orbit: MeshOrbit | None) -> MeshOrbit | None:
     return orbit if orbit is not None and not richer(orbit) else None
-
-
-def settled(network: Network, symmetry: Symmetry, start: np.ndarray, period: float,
-            hold: float = HOLD) -> tuple[Callable[[np.ndarray], np.ndarray], float] | None:
-    """Let the network run from a state and find its period: (states over cycles, period).
-
-    None where it comes to rest or repeats nothing within three of the given periods.
-    """
-    step = min(network.step, period / 400.0)
-    lock = (hold, symmetry) if hold else None
-    run = simulate(network, start, (SETTLING + 3) * period, step, lock=lock, progress=False)
-    first = int(SETTLING * period / step)
-    v, rise = run.x[first:, 0], run.slopes[first:, 0]
-    if not np.isfinite(run.x[-1]).all() or np.ptp(v) < 1e-3:
-        return None
-    peaks = first + np.flatnonzero((rise[:-1] > 0.0) & (rise[1:] <= 0.0))
-    peaks = peaks[run.x[peaks, 0] > v.max() - 0.02 * np.ptp(v)]
-    if peaks.size < 2:
-        return None
-    size = np.ptp(run.x[first:], axis=0).max()
-    gaps = np.abs(run.x[peaks[1:]] - run.x[peaks[0]]).max(axis=1) / size
-    close = np.flatnonzero(gaps < max(0.05, 1.5 * gaps.min()))
-    if gaps.min() > 0.2:
-        return None
-    begin, found = run.t[peaks[0]], float(run.t[peaks[1 + close[0]]] - run.t[peaks[0]])
-    return lambda theta: run(begin + theta * found), found
 
 
 @lru_cache(maxsize=64)
@@ -62,11 +33,12 @@ def from_preset(preset: Preset) -> MeshOrbit:
         NoOrbit: the start does not lead to an orbit of the gait.
 
     """
-    if preset.start is None:
-        raise InputError(f'the preset of {preset.gait} has no start')
-    network, start = preset.network, np.array(preset.start)
+    network = preset.network
     check_values(network, preset.gait)
     symmetry = network.symmetry(preset.gait)
+    if preset.start is None:
+        return _sought(network, preset.gait)
+    start = np.array(preset.start)
     run = simulate(network, start, 1.05 * preset.period, network.step, progress=False)
     orbit = _accepted(from_path(network, symmetry, lambda theta: run(theta * preset.period),
                                 preset.period))
@@ -75,6 +47,15 @@ def from_preset(preset: Preset) -> MeshOrbit:
     if orbit is None:
         raise NoOrbit(f'no {preset.gait} was found from the start given')
     return orbit
+
+
+def _sought(network: Network, gait: str) -> MeshOrbit:
+    symmetry = network.symmetry(gait)
+    for path, period in sought(network, gait):
+        orbit = _accepted(from_path(network, symmetry, path, period))
+        if orbit is not None:
+            return orbit
+    raise NoOrbit(f'no {gait} at these parameters was found from any wave about the equilibrium')
 
 
 def _by_itself(network: Network, symmetry: Symmetry, start: np.ndarray, period: float
@@ -135,9 +116,8 @@ def solve(network: Network, gait: str, near: MeshOrbit | None = None) -> MeshOrb
     symmetry = network.symmetry(gait)
     check_values(network, gait)
     if near is None:
-        if gait not in network.presets():
-            raise NoOrbit(f'no preset of {gait} is known to start from')
-        near = from_preset(network.presets()[gait])
+        known = network.presets().get(gait)
+        near = _sought(network, gait) if known is None else from_preset(known)
     if near.network == network and near.symmetry == symmetry:
         return near
     orbit = None

@@ -1,0 +1,199 @@
+"""A network of one's own, this file: what it states is enough for everything else.
+
+Stuart-Landau oscillators, one a leg, coupled through both variables: on the walk the radius is
+sqrt(mu - k), the period 2 pi / omega, the Hopf point at mu = k, and the multipliers are those of
+the amplitude, exp(-2 (mu - k) T), and of the wave in which both legs move together. The second
+network hears the other leg a delay ago; on the walk its pace solves omega' = omega +
+k sin(omega' tau), its radius is sqrt(mu - k cos(omega' tau)).
+"""
+
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+from scipy.integrate import solve_ivp
+from scipy.optimize import brentq
+
+from cpg_ros.networks.network import Network, Preset, Range, known
+from cpg_ros.networks.symmetry import Group, Symmetry
+
+OTHER = (1, 0)
+Z2 = Group(2, (('side', OTHER),))
+SHIFTS = {'hop': Fraction(0), 'walk': Fraction(1, 2)}
+
+
+@dataclass(frozen=True)
+class TwoLegs(Network):
+    """Two oscillators ``z' = (mu + i omega - |z|^2) z + k z_other``, z = x + i y."""
+
+    mu: float
+    omega: float
+    k: float
+
+    name = 'two_legs'
+    cells = 2
+    states = ('x', 'y')
+    readout = 'phase'
+    step = 0.01
+    ranges = {'mu': Range(-5.0, 5.0, 'square of the radius of a cell by itself'),
+              'omega': Range(0.1, 50.0, 'angular frequency'),
+              'k': Range(-5.0, 5.0, 'weight of the other cell')}
+    couplings = ('k',)
+    legs = {'ankle': {'left': (1,), 'right': (2,)}}
+    sides = {'left': 'left', 'right': 'right'}
+    usual_gait = 'walk'
+    free = ('mu', 'k')
+    line = 'mu'
+    span = (-1.0, 3.0)
+
+    @staticmethod
+    def equations(cell, p):
+        x, y = cell.now()
+        x_other, y_other = cell.now(OTHER)
+        rest = p.mu - x ** 2 - y ** 2
+        return rest * x - p.omega * y + p.k * x_other, rest * y + p.omega * x + p.k * y_other
+
+    @classmethod
+    def gaits(cls):
+        return tuple(SHIFTS)
+
+    def symmetry(self, gait):
+        return Symmetry.of(Z2, {'side': SHIFTS[known(gait, self.gaits())]})
+
+    @classmethod
+    def presets(cls):
+        return {'walk': Preset('walk', cls(1.0, 6.0, -0.5)),
+                'hop': Preset('hop', cls(1.0, 6.0, 0.5))}
+
+
+def late_network():
+    """The second network; in here, since a file holds one."""
+    @dataclass(frozen=True)
+    class LateLegs(TwoLegs):
+        """The same, the other leg heard a delay ago."""
+
+        tau: float = 0.1
+
+        name = 'late_legs'
+        delay_parameter = 'tau'
+        longest_delay = 2.0
+        ranges = {**TwoLegs.ranges, 'tau': Range(0.01, 2.0, 'delay [model time]')}
+        line = 'tau'
+
+        @staticmethod
+        def equations(cell, p):
+            x, y = cell.now()
+            x_other, y_other = cell.past(OTHER)
+            rest = p.mu - x ** 2 - y ** 2
+            return rest * x - p.omega * y + p.k * x_other, rest * y + p.omega * x + p.k * y_other
+
+        @classmethod
+        def presets(cls):
+            return {'walk': Preset('walk', cls(-0.5, 6.0, -1.0, 0.3))}
+
+    return LateLegs
+
+
+WALK = TwoLegs(1.0, 6.0, -0.5)
+HARMONIC = np.linspace(0.0, 1.0, 33)
+
+
+@pytest.mark.parametrize(('gait', 'k'), [('walk', -0.5), ('walk', 0.3), ('hop', 0.4)])
+def test_its_orbit_and_multipliers_are_the_exact_ones(gait, k):
+    from cpg_ros.dynamics.floquet import multipliers
+    from cpg_ros.dynamics.orbit import solve_orbit
+    network = replace(WALK, k=k)
+    square = network.mu + (k if gait == 'hop' else -k)
+    orbit = solve_orbit(network, gait)
+    assert orbit.period == pytest.approx(2.0 * np.pi / 6.0, rel=1e-10)
+    assert np.allclose(orbit.waveform(HARMONIC), np.sqrt(square) * np.cos(2 * np.pi * HARMONIC),
+                       atol=1e-9)
+    assert orbit.d_period[0] == pytest.approx(0.0, abs=1e-9)
+    assert orbit.d_waveform(np.zeros(1))[0, 0] == pytest.approx(0.5 / np.sqrt(square), rel=1e-8)
+    found = multipliers(orbit)
+    amplitude = np.exp(-2.0 * square * orbit.period)
+    assert np.abs(found.within - amplitude).min() < 1e-8
+
+    def rates(t, x):
+        return np.concatenate([network.rates(x[:4]), (network.jacobian(x[:4])
+                                                      @ x[4:].reshape(4, 4)).ravel()])
+
+    start = np.concatenate([orbit(np.array(0.0)), np.eye(4).ravel()])
+    whole = solve_ivp(rates, (0.0, orbit.period), start, 'DOP853', rtol=1e-12, atol=1e-13)
+    own = np.linalg.eigvals(whole.y[4:, -1].reshape(4, 4))
+    mine = np.concatenate([found.within, found.transverse, [found.trivial]])
+    assert np.allclose(np.sort_complex(own), np.sort_complex(mine), atol=1e-8)
+
+
+def test_its_hopf_point_and_branch_are_the_exact_ones():
+    from cpg_ros.dynamics.continuation import follow
+    from cpg_ros.dynamics.hopf_search import hopf_points
+    from cpg_ros.dynamics.orbit import solve_orbit
+    from cpg_ros.networks.parameter_line import ParameterLine
+    line = ParameterLine.parse('mu', TwoLegs)
+    points = {point.gait: point for point in hopf_points(WALK, line, -1.0, 3.0)}
+    assert points['walk'].value == pytest.approx(-0.5, abs=1e-10)
+    assert points['hop'].value == pytest.approx(0.5, abs=1e-10)
+    point = points['walk']
+    assert (point.omega, point.supercritical) == (pytest.approx(6.0), True)
+    assert point.normal_form.k1 == pytest.approx(1.0, abs=1e-9)
+    assert point.amplitude(-0.4) == pytest.approx(np.sqrt(0.1), rel=1e-9)
+    branch = follow(solve_orbit(WALK, 'walk'), line, -1.0, 3.0)
+    assert [end.why for end in branch.ends] == ['rest', 'bound']
+    assert branch.ends[0].value == pytest.approx(-0.5, abs=1e-5)
+    assert np.allclose(branch.amplitudes, np.sqrt(branch.values + 0.5), atol=1e-7)
+
+
+def late_pace(network):
+    """Angular frequency and squared radius of the walk, from z' = ... with z = r exp(i W t)."""
+    def gap(pace):
+        return pace - network.omega - network.k * np.sin(pace * network.tau)
+
+    pace = brentq(gap, 0.5 * network.omega, 1.5 * network.omega, xtol=1e-14)
+    return pace, network.mu - network.k * np.cos(pace * network.tau)
+
+
+def test_with_a_delay_its_orbit_is_the_exact_one():
+    from cpg_ros.dynamics.floquet import multipliers
+    from cpg_ros.dynamics.hopf import first_hopf
+    from cpg_ros.dynamics.orbit import solve_orbit
+    from cpg_ros.integration.simulate import simulate
+    network = late_network()(0.3, 6.0, -1.0, 0.1)
+    pace, square = late_pace(network)
+    point = first_hopf(replace(network, mu=-0.5), 'walk')
+    if point is not None:
+        matrix = 1j * point.omega - (-0.5 + 6.0j) - np.exp(-1j * point.omega * point.value)
+        assert abs(matrix) < 1e-9
+    run = simulate(network, lambda t: np.sqrt(square) * np.stack(
+        [np.cos(pace * t), -np.cos(pace * t), np.sin(pace * t), -np.sin(pace * t)], axis=-1),
+        10.0, 0.0025, progress=False)
+    states = run(np.array([2.0 * np.pi / pace * 8]))[0]
+    assert np.allclose(states, np.sqrt(square) * np.array([1.0, -1.0, 0.0, 0.0]), atol=1e-7)
+    orbit = solve_orbit(network, 'walk')
+    assert orbit.period == pytest.approx(2.0 * np.pi / pace, rel=1e-9)
+    assert orbit.peak == pytest.approx(np.sqrt(square), rel=1e-9)
+    assert abs(multipliers(orbit).trivial - 1.0) < 1e-8
+
+
+def robot_tree():
+    joint = {'cell': 1, 'offset': 0.1, 'weights': [0.3], 'lower': -1.0, 'upper': 1.0,
+             'velocity': 10.0}
+    return {'network': __file__, 'legs': {
+        leg: {'joints': [{**joint, 'name': f'{leg}_hip', 'cell': cell}]}
+        for leg, cell in (('left', 1), ('right', 2))}}
+
+
+def test_a_generator_runs_it_and_switches_its_gait(start, tmp_path):
+    robot = tmp_path / 'two_legs.yaml'
+    robot.write_text(yaml.safe_dump(robot_tree()))
+    _, watcher = start('-p', f'network:={Path(__file__)}', '-p', f'robot:={robot}', '-p',
+                       'frequency:=2.0', '-p', 'transition:=0.3', '-p', 'rate:=200.0')
+    watcher.wait_for_gait('walk')
+    assert watcher.set(gait='hop')[0].successful
+    watcher.wait_for_gait('hop')
+    assert watcher.set(**{'two_legs.mu': 2.0})[0].successful
+    refused = watcher.set(**{'two_legs.mu': -3.0})[0]
+    assert not refused.successful and 'hop' in refused.reason
