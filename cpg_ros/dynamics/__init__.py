@@ -4,6 +4,5 @@ Imports ``integration`` and what is below; knows nothing of ROS.
 """
 
 __all__ = ['arclength', 'characteristic', 'continuation', 'delay_crossings', 'equilibrium',
-           'expansion', 'floquet', 'fourier', 'gait_assessment', 'hopf', 'hopf_search', 'isotypic',
-           'isotypic_split', 'mesh', 'normal_form', 'orbit', 'periodic', 'sign_changes',
-           'stability']
+           'expansion', 'floquet', 'gait_assessment', 'hopf', 'hopf_search', 'isotypic',
+           'isotypic_split', 'normal_form', 'orbit', 'periodic', 'sign_changes', 'stability']

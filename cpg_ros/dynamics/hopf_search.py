@@ -121,8 +121,8 @@ def _on_grid(network: Network, line: ParameterLine, low: float, high: float) -> 
                         known.append((value, omega))
                         found.append(hopf_at(line.at(network, value), line,
                                              split(value)[which].mode, omega))
-    # Points that symmetry puts in one place differ by rounding; the fast one first.
-    return sorted(found, key=lambda point: (round(point.value, 9), -point.omega, point.mode))
+    # Points that symmetry puts in one place differ by rounding.
+    return sorted(found, key=lambda point: (round(point.value, 9), point.omega, point.mode))
 
 
 def _followed(along: list[Block]) -> int:
