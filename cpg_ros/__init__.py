@@ -4,13 +4,13 @@ What is used most is here by name, and loaded when it is first asked for; the re
 """
 
 import os
-from importlib import import_module
-from typing import TYPE_CHECKING, Any
 
 # Matrices here are small: threads of BLAS cost more than they give, and its idle ones spin on the
 # cores that the publishing thread needs. It is read when numpy loads, so before anything else.
 os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
 
+# As in typing, which would take longer to load than all of this.
+TYPE_CHECKING = False
 if TYPE_CHECKING:
     from cpg_ros.dynamics.continuation import follow
     from cpg_ros.dynamics.floquet import multipliers
@@ -42,9 +42,10 @@ _PLACES = {
     'solve_orbit': 'dynamics.orbit'}
 
 
-def __getattr__(name: str) -> Any:
+def __getattr__(name: str) -> object:
     if name not in _PLACES:
         raise AttributeError(f'module {__name__!r} has no attribute {name!r}')
+    from importlib import import_module
     value = globals()[name] = getattr(import_module(f'{__name__}.{_PLACES[name]}'), name)
     return value
 

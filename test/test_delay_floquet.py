@@ -7,11 +7,12 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from modes import MODES, class_of
+from modes import class_of
 
-from cpg_ros.dynamics.characteristic import characteristic_roots
+from cpg_ros.dynamics.equilibrium import equilibrium
 from cpg_ros.dynamics.floquet import multipliers, smallest_gain
-from cpg_ros.dynamics.hopf import hopf_point
+from cpg_ros.dynamics.hopf import first_hopf
+from cpg_ros.dynamics.isotypic import blocks
 from cpg_ros.dynamics.orbit import solve_orbit, solve_preset
 from cpg_ros.dynamics.periodic import Orbit
 from cpg_ros.dynamics.stability import stability
@@ -125,19 +126,20 @@ networks = st.builds(Delayed, st.floats(-4.0, -2.0), st.floats(-1.0, 1.5), st.fl
 @settings(max_examples=15, deadline=None)
 @given(networks, st.sampled_from(['trot', 'walk']))
 def test_near_onset_the_multipliers_are_those_of_normal_form_and_rest(network, gait):
-    point = hopf_point(network, network.symmetry(gait))
-    mu = 2e-4 * point.tau
-    here = replace(network, tau=point.tau + mu)
+    point = first_hopf(network, gait)
+    mu = 2e-4 * point.value
+    here = replace(network, tau=point.value + mu)
     orbit = solve_orbit(here, gait)
     mine = multipliers(orbit)
     assert abs(mine.trivial - 1.0) < 1e-6
-    # r' = k1 mu r + k2 r^3 in the time t/tau: r - r0 decays at -2 k1 mu.
-    decay = 2.0 * point.normal_form.k1.real * mu * orbit.period / here.tau
+    # r' = k1 mu r + k2 r^3: r - r0 decays at -2 k1 mu.
+    decay = 2.0 * point.normal_form.k1.real * mu * orbit.period
     assert -np.log(mine.within[0].real) == pytest.approx(decay, rel=2e-2)
     # Transverse ones are those of the rest state, to first order in mu.
-    own = {point.mode.j, -point.mode.j % 4}
-    roots = np.concatenate([characteristic_roots(here, mode, 5) for mode in MODES
-                            if mode.k != point.mode.k or mode.j not in own])
+    j, k = point.mode
+    own = {(j, k), (-j % 4, k)}
+    roots = np.concatenate([block.roots(5) for block in blocks(here, equilibrium(here))
+                            if block.mode not in own])
     rest = np.exp(roots.real.max() * orbit.period)
     assert np.log(mine.leading_transverse / rest) == pytest.approx(0.0, abs=2e-2)
 
@@ -149,7 +151,7 @@ def test_gaits_of_one_waveform_have_one_set_of_multipliers(network, factor, gain
     a, b, c, d, _ = network.as_dict().values()
     for family in ((('trot', c, d), ('pace', c, -d), ('pronk', -c, -d), ('bound', -c, d)),
                    (('walk', c, d), ('walk', c, -d), ('jump', -c, d), ('jump', -c, -d))):
-        tau = factor * hopf_point(network, network.symmetry(family[0][0])).tau
+        tau = factor * first_hopf(network, family[0][0]).value
         first, *others = (multipliers(solve_orbit(Delayed(a, b, c, d, tau), gait), gain)
                           for gait, c, d in family)
         for other in others:

@@ -125,9 +125,9 @@ def test_shipped_gaits_survive_noise(network, name):
     runs = simulate(orbit.network, [orbit, orbit], 500.0, orbit.network.step, every=20,
                     lock=(judged.chosen, orbit.symmetry), noise=0.01, seed=3)
     for x, slopes in zip(runs.x, runs.slopes, strict=True):
-        phases = np.empty((len(x), cells.size))
+        phases, clocks = np.empty((len(x), cells.size)), readout.clocks(0.0)
         for k, now in enumerate(zip(x, slopes, slopes, strict=True)):
-            readout.look(np.array(now), *scratch, phases[k])
+            readout.look(np.array(now), runs.t[1] / orbit.period, clocks, *scratch, phases[k])
         unwound = np.unwrap(phases[:, 0], period=1.0)
         assert unwound[-1] - unwound[0] == pytest.approx(500.0 / orbit.period, rel=0.02)
         stride = int(orbit.period / runs.t[1])

@@ -334,7 +334,7 @@ def test_what_the_generator_refuses():
 def test_verdicts_come_with_a_fit():
     recording, cells = trot(None)
     fit = invert(recording, cells, TROT, 'trot', ('c',))
-    assert fit.hopf.tau == pytest.approx(0.2852, abs=1e-4)
+    assert fit.hopf.value == pytest.approx(0.2852, abs=1e-4)
     assert not fit.verdict.stable and fit.verdict.stable_with_default_gain
     theta, errors = fit.synchronisation()
     assert theta == pytest.approx(np.arange(20) / 20) and errors.shape == (6, 20)

@@ -6,13 +6,16 @@ import numpy as np
 import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
-from modes import MODES, eigenvalue_terms
+from modes import MODES, class_of, eigenvalue_terms
 from scipy.special import lambertw
 
-from cpg_ros.dynamics.hopf import hopf_point
+from cpg_ros.dynamics.hopf import first_hopf
+from cpg_ros.dynamics.hopf_search import hopf_points
 from cpg_ros.dynamics.orbit import NoOrbit, solve_orbit
 from cpg_ros.networks.delayed import GAITS, PRESETS, Delayed
+from cpg_ros.networks.parameter_line import ParameterLine
 
+TAU = ParameterLine(('tau',), (1.0,))
 EXAMPLE = Delayed(-4.5, 1.0, 6.5, -2.0, 0.4)
 SWAP = [1, 0, 3, 2, 5, 4, 7, 6]
 OFF_NODES = np.random.default_rng(3).uniform(-3.0, 3.0, 200)
@@ -73,7 +76,7 @@ def test_phases_of_the_legs(preset, legs):
 def test_exact_derivatives(gait):
     network, width = PRESETS[gait].network, 1e-5
     orbit = solve_orbit(network, gait)
-    theta = np.arange(orbit.values.size) / orbit.values.size
+    theta = np.arange(orbit.samples) / orbit.samples
     for k, name in enumerate(Delayed.parameters()):
         value = getattr(network, name)
         low, high = (solve_orbit(replace(network, **{name: value + side * width}), gait)
@@ -81,15 +84,15 @@ def test_exact_derivatives(gait):
         period = (high.period - low.period) / (2.0 * width)
         waveform = (high.waveform(theta) - low.waveform(theta)) / (2.0 * width)
         assert orbit.d_period[k] == pytest.approx(period, rel=1e-6, abs=1e-7)
-        assert np.allclose(orbit.d_values[:, k], waveform, 1e-6, 1e-7)
+        assert np.allclose(orbit.d_waveform(theta)[:, k], waveform, 1e-6, 1e-7)
 
 
 @pytest.mark.parametrize(('network', 'gait', 'omega', 'tau', 'k1', 'k2'), ONSETS)
 def test_onset(network, gait, omega, tau, k1, k2):
-    point = hopf_point(network, network.symmetry(gait))
-    assert (point.omega, point.tau) == pytest.approx((omega, tau), abs=1e-4)
+    point = first_hopf(network, gait)
+    assert (point.omega, point.value) == pytest.approx((omega, tau), abs=1e-4)
     # Just beyond it the normal form gives the amplitude, and the period is 2 pi / omega.
-    orbit = solve_orbit(replace(network, tau=point.tau + 5e-4), gait)
+    orbit = solve_orbit(replace(network, tau=point.value + 5e-4), gait)
     theta = np.arange(256) / 256
     first = 2.0 * abs(np.mean(orbit.waveform(theta) * np.exp(-2j * np.pi * theta)))
     assert first == pytest.approx(2.0 * np.sqrt(-k1 * 5e-4 / k2), rel=1e-3)
@@ -100,20 +103,22 @@ def test_onset(network, gait, omega, tau, k1, k2):
 @given(networks, st.sampled_from(MODES), st.sampled_from([-1.0, 1.0]))
 def test_hopf_points_make_the_characteristic_matrix_singular(network, mode, sign):
     network = replace(network, c=sign * network.c)
-    point = hopf_point(network, mode)
-    assume(point is not None)
+    found = [point for point in hopf_points(network, TAU, 0.0, 20.0)
+             if point.mode == class_of(mode) and point.n == 0]
+    assume(found)
+    point = max(found, key=lambda one: one.omega)
     a, b, c, d, _ = network.as_dict().values()
     unit = np.eye(8)
     root = 1j * point.omega
     matrix = ((root - a - b) * unit - d * np.roll(unit, 2, axis=0)
-              - c * np.exp(-root * point.tau) * unit[SWAP])
+              - c * np.exp(-root * point.value) * unit[SWAP])
     assert np.linalg.svd(matrix)[1][-1] < 1e-9
 
 
 @pytest.mark.parametrize(('network', 'gait'), [row[:2] for row in ONSETS])
 def test_the_critical_delay_is_where_the_mode_turns_unstable(network, gait):
-    a, b = eigenvalue_terms(network, mode := network.symmetry(gait))
-    critical = hopf_point(network, mode).tau
+    a, b = eigenvalue_terms(network, network.symmetry(gait))
+    critical = first_hopf(network, gait).value
     for tau, sign in ((0.3 * critical, -1), (0.99 * critical, -1), (1.01 * critical, 1)):
         roots = a + lambertw(b * tau * np.exp(-a * tau), np.arange(-9, 10)) / tau
         assert np.sign(roots.real.max()) == sign
@@ -128,7 +133,7 @@ def test_symmetry_laws(network, factor, s):
             (('trot', c, d, 1), ('pace', c, -d, 1), ('pronk', -c, -d, 1), ('bound', -c, d, 1)),
             (('walk', c, d, 1), ('walk', c, -d, 1), ('jump', -c, d, 1), ('jump', -c, -d, 1)),
             (('trot', c, d, 1), ('trot', c, d, s)), (('walk', c, d, 1), ('walk', c, d, s))):
-        tau = factor * hopf_point(network, network.symmetry(families[0][0])).tau
+        tau = factor * first_hopf(network, families[0][0]).value
         first, *others = (
             solve_orbit(Delayed(a * rate, b * rate, c * rate, d * rate, tau / rate), gait)
             for gait, c, d, rate in families)

@@ -55,12 +55,13 @@ class Theory:
         return a * x + b * y + c * x**2 + d * x * y + e * x**3 + f * x**2 * y
 
 
-def looks(readout, states):
-    """Angles, rises, legs and distances at states given with their slopes."""
+def looks(readout, theta, states, stride=1e-3):
+    """Angles, rises, legs and distances at states, clocks coming from where the gait is then."""
     rows = []
-    for state in states:
-        angle, rise, legs = np.empty((3, state.shape[1] // 2))
-        distance = readout.look(np.vstack([state, state[:1] * np.nan]), angle, rise, legs)
+    for phase, state in zip(theta, states, strict=True):
+        angle, rise, legs = np.empty((3, state.size // 2))
+        now = np.vstack([state, np.full((2, state.size), np.nan)])
+        distance = readout.look(now, stride, readout.clocks(phase - stride), angle, rise, legs)
         rows.append((angle, rise, legs, distance))
     return [np.array(row) for row in zip(*rows, strict=True)]
 
@@ -73,8 +74,7 @@ def test_on_the_orbit_joints_and_legs_are_those_of_theory(network, name, harmoni
     theory = Theory(orbit, harmonics)
     readout = PhaseReadout(orbit, cells, WEIGHTS[:cells.size], cells, harmonics)
     theta = np.random.default_rng(7).uniform(0.0, 1.0, 400)
-    angle, rise, legs, distance = looks(readout, np.stack(
-        [orbit(theta * orbit.period), orbit.derivative(theta * orbit.period)], axis=1))
+    angle, rise, legs, distance = looks(readout, theta, orbit(theta * orbit.period))
     late = legs - theta[:, None] + theory.crests
     assert np.abs((late + 0.5) % 1.0 - 0.5).max() < 1e-4
     assert np.abs(angle - theory.angles(theta)).max() < 1e-3
@@ -95,24 +95,64 @@ def test_a_state_off_the_orbit_is_told(network, name):
     cells, cycle = np.arange(orbit.network.cells), np.arange(256) / 256 * orbit.period
     readout = PhaseReadout(orbit, cells, WEIGHTS[:cells.size], cells, 3)
     rest, on_it = orbit(cycle).mean(axis=0), orbit(np.array(0.0))
-    (distance,) = looks(readout, [np.stack([rest, 0.0 * rest])])[3]
-    assert distance > 0.3
     # One cell by itself a quarter of a cycle late, or twice as far out.
-    away = on_it.copy()
-    away[[cells[-1], -1]] = orbit(np.array(-0.25 * orbit.period))[[cells[-1], -1]]
-    assert looks(readout, [np.stack([away, 0.0 * away])])[3][0] > 0.3
-    away = on_it.copy()
-    away[[cells[-1], -1]] += on_it[[cells[-1], -1]] - rest[[cells[-1], -1]]
-    assert looks(readout, [np.stack([away, 0.0 * away])])[3][0] > 0.3
+    late, far = on_it.copy(), on_it.copy()
+    late[[cells[-1], -1]] = orbit(np.array(-0.25 * orbit.period))[[cells[-1], -1]]
+    far[[cells[-1], -1]] += on_it[[cells[-1], -1]] - rest[[cells[-1], -1]]
+    assert (looks(readout, [0.0] * 3, [rest, late, far])[3] > 0.3).all()
 
 
 @pytest.mark.parametrize('component', [*range(8), slice(None)])
 def test_nan_anywhere_comes_through(component):
     orbit = solve_preset(PRESETS['biped']['walk'])
     readout = PhaseReadout(orbit, cells := np.arange(4), WEIGHTS[:4], cells, 3)
-    state = np.stack([orbit(np.array(1.0)), orbit.derivative(np.array(1.0))])
-    state[0, component] = np.nan
-    assert np.isnan(looks(readout, [state])[3]).all()
+    state = orbit(np.array(0.0))
+    state[component] = np.nan
+    assert np.isnan(looks(readout, [0.0], [state])[3]).all()
+
+
+def test_a_waveform_that_repeats_within_a_cycle_is_refused():
+    orbit = solve_preset(PRESETS['quadruped']['pace'])
+
+    class Twice:
+        network, waves, phases, levels = orbit.network, orbit.waves, orbit.phases, orbit.levels
+
+        def waveform(self, theta, *arguments):
+            return orbit.waveform(2.0 * theta, *arguments)
+
+    with pytest.raises(ValueError, match='repeats within a cycle: the first harmonic'):
+        PhaseReadout(Twice(), np.arange(8), WEIGHTS, np.arange(8), 3)
+
+
+@EVERY
+def test_clocks_come_to_what_the_cells_do(network, name):
+    orbit = solve_preset(PRESETS[network][name])
+    cells, stride = np.arange(orbit.network.cells), 0.005
+    readout = PhaseReadout(orbit, cells, WEIGHTS[:cells.size], cells, 3)
+    theory, rng = Theory(orbit, 3), np.random.default_rng(8)
+    # Some cells far from where their clocks have them, each in its own way.
+    away = rng.uniform(-0.4, 0.4, cells.size)
+    clocks = readout.clocks(0.0)
+    clocks[0] += away
+    angle, rise, legs = np.empty((3, cells.size))
+
+    def run(state_at, strides):
+        rows = []
+        for k in range(round(strides / stride)):
+            theta = (k + 1) * stride
+            state = state_at(theta)
+            distance = readout.look(np.vstack([state] * 3), stride, clocks, angle, rise, legs)
+            rows.append((theta, angle.copy(), distance))
+        return [np.array(row) for row in zip(*rows, strict=True)]
+
+    theta, angles, distances = run(lambda theta: orbit(np.array(theta * orbit.period)), 9.0)
+    assert distances[0] > 0.3 and distances[-100:].max() < 0.1
+    assert np.abs(angles[-200:] - theory.angles(theta[-200:])).max() < 0.01
+    # Come to rest, even where they never would, they hardly move their joints any more.
+    rest = orbit(np.array(0.0))
+    theta, angles, distances = run(lambda theta: rest, 6.0)
+    assert (distances[200:] > 0.3).all()
+    assert (np.ptp(angles[-200:], axis=0) < 0.15 * np.ptp(theory.angles(theta), axis=0)).all()
 
 
 def drive(pattern, count, dt=1e-3):

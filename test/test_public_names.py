@@ -25,7 +25,7 @@ print(cpg_ros.solve_orbit(preset.network, 'trot').period)
 """
     found = subprocess.run([sys.executable, '-c', script], capture_output=True, text=True,
                            check=True)
-    # DESIGN 2.1: the trot at tau 0.4.
+    # The trot of Liu & Zhang's example 1, at tau 0.4.
     assert float(found.stdout) == pytest.approx(1.27827056, abs=1e-8)
 
 

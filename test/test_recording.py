@@ -149,22 +149,14 @@ def test_what_is_no_recording_is_refused_in_one_line(made, joints, message):
     assert str(error.value) == message
 
 
-def test_select_and_between():
+def test_select():
     stamps, positions = ramp()
     recording = merged([(stamps, JOINTS, positions)], 'live')
     chosen = recording.select(('rf_knee', 'lf_hip'))
     assert chosen.joints == ('rf_knee', 'lf_hip')
     assert np.array_equal(chosen.positions, positions[:, [3, 0]])
-    part = recording.between(0.0199, 0.1)
-    assert np.array_equal(part.positions, positions[10:51])
-    assert part.times[0] == 0.0
-    assert part.start + part.times[-1] == pytest.approx(recording.start + 0.1, abs=1e-6)
     with pytest.raises(RecordingError, match=r"^live: no joint 'tail'; there are 'lf_hip'"):
         recording.select(('tail',))
-    with pytest.raises(RecordingError, match=r'^live: 1 sample between 0 and 0\.001 s$'):
-        recording.between(0.0, 0.001)
-    with pytest.raises(RecordingError, match=r'^live: 0 samples between 3 and 2 s$'):
-        recording.between(3.0, 2.0)
 
 
 @pytest.mark.parametrize(('times', 'positions'), [

@@ -210,7 +210,8 @@ def from_hopf(network: Network, symmetry: Symmetry, omega: float,
     rest = np.zeros(network.components) if rest is None else rest
     if vector is None:
         if network.variables > 1:
-            raise InputError('cells of several variables need the eigenvector')
+            raise InputError(f'with {network.variables} variables a cell, a Hopf point needs the '
+                             'stand and the eigenvector')
         vector = np.exp(2j * np.pi * symmetry.phases)
     # Cell 1 peaks at phase 0.
     vector = vector / vector[0]

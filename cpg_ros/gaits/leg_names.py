@@ -7,7 +7,7 @@ right, L or R alone: left_knee, L_hip, hip_r, LHipPitch.
 """
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from cpg_ros.errors import CpgError
@@ -60,7 +60,7 @@ class Legs:
         """Names of a leg's joints."""
         return self.joints[leg]
 
-    def __iter__(self):
+    def __iter__(self) -> Iterator[str]:
         """Names of the legs."""
         return iter(self.joints)
 

@@ -140,7 +140,7 @@ def _trial(problem: Problem, begin: np.ndarray, weigh: bool) -> Trial:
         problem.begin(values)
         values[-1] = problem.first_phase(values)
     except NoOrbit as error:
-        return Trial(values, values, float('inf'), np.empty((0, 1 + values.size)), 1, 1, False,
+        return Trial(values, values, float('inf'), np.empty((0, 1 + values.size)), 1, False,
                      str(error))
     if weigh:
         problem.sizes = np.maximum(problem.joints.stated, _left(problem, values))

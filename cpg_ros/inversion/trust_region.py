@@ -26,7 +26,6 @@ class Trial:
         path: cost and values at the start and after every accepted step, shape
             (iterations + 1, 1 + values).
         evaluations: orbits that were asked for.
-        infeasible: how many of them there were not.
         converged: whether a tolerance was met.
         why: the reason where there was nothing to start from, or ''.
 
@@ -37,7 +36,6 @@ class Trial:
     cost: float
     path: np.ndarray
     evaluations: int
-    infeasible: int
     converged: bool
     why: str = ''
 
@@ -62,20 +60,20 @@ def descend(evaluate: Evaluate, start: np.ndarray, low: np.ndarray, high: np.nda
     """
     start = np.asarray(start, dtype=float)
     path: list[np.ndarray] = []
-    count = [0, 0]
+    asked = 0
     try:
         size = evaluate(start)[0].size
     except NoOrbit as error:
-        return Trial(start, start, float('inf'), np.empty((0, 1 + start.size)), 1, 1, False,
+        return Trial(start, start, float('inf'), np.empty((0, 1 + start.size)), 1, False,
                      str(error))
 
     def residual(values: np.ndarray) -> np.ndarray:
-        count[0] += 1
+        nonlocal asked
+        asked += 1
         try:
             return evaluate(values)[0]
         except NoOrbit:
             # The method answers what is not finite with a shorter step.
-            count[1] += 1
             return np.full(size, np.nan)
 
     def jacobian(values: np.ndarray) -> np.ndarray:
@@ -85,5 +83,5 @@ def descend(evaluate: Evaluate, start: np.ndarray, low: np.ndarray, high: np.nda
 
     found = least_squares(residual, start, jacobian, (low, high), 'trf', x_scale='jac',
                           ftol=tolerance, xtol=tolerance, gtol=1e-15, max_nfev=most)
-    return Trial(start, found.x, float(found.cost), np.array(path), count[0],
-                 count[1], found.status > 0)
+    return Trial(start, found.x, float(found.cost), np.array(path), asked,
+                 found.status > 0)

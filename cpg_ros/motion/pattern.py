@@ -65,7 +65,8 @@ class Pattern:
         self._jump: tuple[np.ndarray, np.ndarray] | None = None
         self._absorbed = ABSORB
         self._recovering = False
-        self._slowing = 1.0
+        self._slowing = self._slower = 1.0
+        self._frequency = newest.program.frequency
         self._last_rate: np.ndarray | None = None
         self._level, self._level_rate = 0.0, 0.0
         self._ramp_to(float(enabled), max(ramp, SUBSTEP))
@@ -130,9 +131,8 @@ class Pattern:
         """Advance by dt in s and fill position, velocity and phases."""
         if self._requests:
             self._take_requests()
-        if len(self._tracks) == 1 and not self._ramps and self._absorbed >= ABSORB:
-            self._cruise(dt)
-        else:
+        calm = len(self._tracks) == 1 and not self._ramps and self._absorbed >= ABSORB
+        if not (calm and self._cruise(dt)):
             parts = max(1, math.ceil(dt / SUBSTEP - 1e-9))
             for _ in range(parts):
                 self._step(dt / parts)
@@ -159,26 +159,33 @@ class Pattern:
         self._requests.extend(waiting)
 
     def _absorb(self) -> None:
-        """Take note that the network's output jumps here; ``_step`` smooths it."""
+        """Take note that the network's output jumps here; the next ``_step`` smooths it."""
         self._jump, self._absorbed = None, 0.0
 
-    def _cruise(self, dt: float) -> None:
-        """One gait, at the stand or in full swing: nothing to mix, nothing to allocate."""
-        self._slowing, self._last_rate = 1.0, None
+    def _cruise(self, dt: float) -> bool:
+        """One gait, at the stand or in full swing: nothing to mix, nothing to allocate.
+
+        False if the network left its orbit: the tick is to be worked out anew.
+        """
+        self._slowing, self._slower, self._last_rate = 1.0, 1.0, None
         track, drive = self._tracks[0], self.drive
         frequency = track.program.frequency
         if drive is not None:
             drive.advance(dt)
             frequency *= drive.pace
-        if not track.advance(frequency * dt):
+        strides = 0.5 * (self._frequency + frequency) * dt
+        self._frequency = frequency
+        if not track.advance(strides):
+            track.phase -= strides
             self._recover(track)
             self._step(0.0)
-            return
+            return False
         np.multiply(track.angle, self._level, out=self._wanted)
         self._wanted += self._offset
         np.multiply(track.rise, self._level * frequency, out=self._rate)
         if drive is not None:
             self._rate += self._level * drive.rate[self._leg] * track.reach
+        return True
 
     def _recover(self, track: Track) -> None:
         self.faults += 1
@@ -187,7 +194,9 @@ class Pattern:
         self._absorb()
 
     def _step(self, dt: float) -> None:
-        clock = dt * self._slowing
+        # Slowing and frequency run linearly from tick to tick, as the velocities say.
+        clock = 0.5 * dt * (self._slowing + self._slower)
+        self._slowing = self._slower
         tracks = self._tracks
         first = tracks[0]
         frequency, moving = first.program.frequency, len(tracks) > 1
@@ -201,8 +210,10 @@ class Pattern:
         if self.drive is not None:
             self.drive.advance(dt)
             frequency *= self.drive.pace
+        strides = 0.5 * (self._frequency + frequency) * clock
+        self._frequency = frequency
         for track in tracks:
-            if not track.advance(frequency * clock):
+            if not track.advance(strides):
                 self._recover(track)
 
         wanted, rate = first.angle, self._rate_of(first, frequency)
@@ -220,16 +231,15 @@ class Pattern:
             rate = self._level * rate + self._level_rate * wanted
             wanted = self._level * wanted
         if moving:
-            # The pattern slows where it would outrun the gaits, now or at the next substep.
+            # The pattern slows where it would outrun the gaits at the next substep.
             bound = np.minimum(np.max([t.program.speed + SHIFTING * np.abs(t.program.shift)
                                        for t in tracks], axis=0), self._limit)
             ahead = rate if self._last_rate is None else 2.0 * rate - self._last_rate
-            fastest = np.maximum(np.abs(rate), np.abs(ahead))
             self._last_rate = rate
-            self._slowing = 1.0 / max(1.0, float(np.max(fastest / np.maximum(bound, 1e-9))))
+            self._slower = 1.0 / max(1.0, float(np.max(np.abs(ahead) / np.maximum(bound, 1e-9))))
             rate = self._slowing * rate
         else:
-            self._slowing, self._last_rate = 1.0, None
+            self._slowing, self._slower, self._last_rate = 1.0, 1.0, None
 
         if self._absorbed < ABSORB:
             wanted, rate = self._smooth(wanted + self._offset, rate, dt)

@@ -1,13 +1,18 @@
 """From cells to joints by the cells' phase: for relaxation oscillators.
 
 A Morris-Lecar cell jumps: its potential crosses most of its range within a few per cent of a
-stride, which no joint can follow. But the cell's two variables tell its phase at any instant, and
-a joint can be a smooth function of that: x is the cell's waveform up to a few harmonics, y the
-derivative of x by phase in radians. Phase is read as the angle in the plane of the two variables
-about a centre that the orbit turns round steadily. A cell far inside its orbit, coming to rest or
-changing gait, moves its joints less: both are scaled by ``1 - (1 - q)^3``, q the square of its
-radius over the orbit's, at most 1; so joints depend smoothly on the state, and on the orbit not
-on the radius at all.
+stride, and on the way it may double back so that neither variable tells the phase. No joint can
+follow that. Instead every cell is followed as a lock-in amplifier follows a signal: a phase and an
+amplitude run with the strides and are drawn to what the cell does, by what its two variables and
+the gait's orbit at that phase differ by, along the first harmonic of that orbit and across it. On
+the orbit there is no difference and they run evenly; elsewhere the mean pull over a stride is the
+sine of the phase error, whatever the waveform.
+
+A joint is a smooth function of that phase: x is the cell's waveform up to a few harmonics, y the
+derivative of x by phase in radians, both scaled by ``1 - (1 - a^2)^3``, a the amplitude over the
+orbit's, at most 1: a cell that comes to rest moves its joints less. Phase and amplitude change at
+rates that are continuous in time, and velocities are made of those rates: they are the
+derivatives of the positions whatever the network does, and whatever is done to it.
 """
 
 import math
@@ -15,103 +20,128 @@ from functools import lru_cache
 
 import numpy as np
 from numba import njit
-from scipy.optimize import minimize
 
 from cpg_ros.dynamics.periodic import Orbit
 from cpg_ros.integration.jit import OPTIONS, sources_digest
 from cpg_ros.motion.readout import TURN, NoPhase, monomials
 
-#: Entries of the tables over the angle, and points of a cycle they are made from. On the plateaus
-#: of the quadruped's trot and walk a cell hardly turns: there the phase hangs on the last digits.
-TABLE, POINTS = 65536, 8192
-#: A phase off by a quarter of this (cycles) counts as far off as a radius off by this share.
+#: Points of a cycle in the tables of an orbit: a cell may jump within a hundredth of a cycle.
+POINTS = 4096
+#: Pull of a cell on its phase and amplitude, per stride; over how many strides it is smoothed (so
+#: much that they come back as fast as they can without overshoot); and the most it adds to the
+#: phase's speed, cycles a stride: joints never run backward.
+PULL, SMOOTHING, MOST = 1.0, 0.25, 0.5
+#: A cell further away than this many half ranges of its orbit counts as this far.
+FURTHEST = 2.0
+#: A phase off by a quarter of this (cycles) counts as far off as a half range.
 PHASE_SHARE = 4.0
+#: Least share of the first harmonic in a waveform's variance, for the phase to be followed.
+LEAST_SHARE = 0.1
 
 
 def _cached(digest):
     """Build the cached entry point; see sources_digest for why it is a closure."""
 
     @njit(cache=True, **OPTIONS)
-    def observe_phases(now, period, size, waves, phases, shape, tables, harmonics, crests, cells,
-                       weights, leg_cells, turned, angle, rise, legs):
-        """Read joints and legs off a network's state.
+    def observe_phases(now, strides, waves, phases, shape, circles, tables, harmonics, crests,
+                       cells, weights, leg_cells, clocks, angle, rise, legs):
+        """Let the cells' clocks go on and read joints and legs off them.
 
         Args:
-            now: x, x', x'' of the components, shape (3, 2 size); x'' is not used.
-            period: of the orbit, model time.
-            size: cells of the network.
+            now: x, x', x'' of the components, shape (3, 2 size); only x is used.
+            strides: since the last look; with 0 the clocks stand and are only read.
             waves: number of each cell's waveform, shape (size,).
             phases: phase of each cell in the gait, cycles, shape (size,).
-            shape: centre and half range of both variables of each wave, shape (waves, 4).
-            tables: phase minus angle (cycles), angular speed (cycles a cycle) and radius over
-                the angle, shape (waves, TABLE, 3): a row is one place in memory.
+            shape: mean and half range of both variables of each wave, shape (waves, 4).
+            circles: cosine and sine term of both variables' first harmonic over its mean
+                square, shape (waves, 4).
+            tables: both variables from their mean over their half range, and their slopes from
+                row to row, over the phase, shape (waves, POINTS, 4).
             harmonics: cosine and sine terms of x, shape (waves, 1 + H, 2).
             crests: phase at which x peaks, shape (waves,).
             cells: the cell behind each joint, shape (joints,).
             weights: readout weights of each joint in rad, shape (joints, 6).
             leg_cells: the cell that gives each leg's phase.
-            turned: scratch, phase, speed (cycles a cycle), scale of each cell and the scale's
-                rate (per cycle), shape (4, size).
+            clocks: of each cell, shape (10, size): phase (cycles), what its speed (cycles a
+                stride) is above 1 now and at the next look, amplitude, its rate (per stride)
+                now and at the next look; and x, y and their derivatives by the strides.
             angle: filled with the joints' deviation from their offset, rad.
-            rise: filled with its derivative by phase, rad per cycle.
+            rise: filled with its derivative by the strides, rad per stride.
             legs: filled with the legs' phases in cycles, [0, 1), 0 where x peaks.
 
         Returns:
-            The largest distance of a cell from where the gait has it, as a share of its radius.
+            The largest distance of a cell from where the gait has it, in half ranges; 0 if the
+            clocks stand.
 
         """
         digest  # noqa: B018
         distance, sum_ = 0.0, 0.0
-        for cell in range(size):
-            s, table = shape[waves[cell]], tables[waves[cell]]
-            count = table.shape[0]
-            x, y = (now[0, cell] - s[0]) / s[2], (now[0, size + cell] - s[1]) / s[3]
-            dx, dy = now[1, cell] / s[2], now[1, size + cell] / s[3]
-            square = x * x + y * y
-            turn = math.atan2(y, x) / TURN
-            # Linear between two rows; the comparison keeps NaN from becoming an index.
-            place = (turn - math.floor(turn)) * count
-            low = int(place) if place >= 0.0 else 0
-            rest = place - low
-            low = low if low < count else 0
-            here, there = table[low], table[low + 1 if low + 1 < count else 0]
-            turned[0, cell] = turn + here[0] + rest * (there[0] - here[0])
-            turned[1, cell] = turned[2, cell] = turned[3, cell] = 0.0
-            radius = here[2] + rest * (there[2] - here[2])
-            if square > 1e-6:
-                speed = (x * dy - y * dx) / square * period / TURN
-                turned[1, cell] = speed / (here[1] + rest * (there[1] - here[1]))
-                q = square / (radius * radius)
-                if q < 1.0:
-                    grows = (there[2] - here[2]) * count * speed
-                    rate = 2.0 * q * ((x * dx + y * dy) * period / square - grows / radius)
-                    turned[2, cell] = 1.0 - (1.0 - q)**3
-                    turned[3, cell] = 3.0 * (1.0 - q) * (1.0 - q) * rate
-                else:
-                    turned[2, cell] = 1.0
-            off = abs(math.sqrt(square) / radius - 1.0)
-            distance = max(distance, off)
-            sum_ += off
-        base = turned[0, leg_cells[0]] - phases[leg_cells[0]]
-        for cell in range(size):
-            late = turned[0, cell] - base - phases[cell]
-            distance = max(distance, PHASE_SHARE * abs(late - math.floor(late + 0.5)))
-        for joint in range(cells.shape[0]):
-            cell = cells[joint]
-            terms = harmonics[waves[cell]]
+        pull = PULL / (1.0 + 2.0 * PULL * strides)
+        share = strides / (SMOOTHING + strides)
+        for cell in range(waves.shape[0]):
+            wave = waves[cell]
+            if strides > 0.0:
+                # Both rates are linear in between, so that this is their exact integral.
+                phase = clocks[0, cell] + strides * (
+                    1.0 + 0.5 * (clocks[1, cell] + clocks[2, cell]))
+                clocks[0, cell] = phase - math.floor(phase)
+                clocks[1, cell] = clocks[2, cell]
+                clocks[3, cell] += 0.5 * strides * (clocks[4, cell] + clocks[5, cell])
+                clocks[4, cell] = clocks[5, cell]
+            phase, amount = clocks[0, cell], clocks[3, cell]
+            c1, s1 = math.cos(TURN * phase), math.sin(TURN * phase)
+            if strides > 0.0:
+                s, table, circle = shape[wave], tables[wave], circles[wave]
+                # The comparison keeps NaN from becoming an index.
+                place = phase * table.shape[0]
+                low = int(place) if place >= 0.0 else 0
+                t = place - low
+                low = low if low < table.shape[0] else 0
+                here, there = table[low], table[low + 1 if low + 1 < table.shape[0] else 0]
+                h01 = t * t * (3.0 - 2.0 * t)
+                h10, h11 = t * (1.0 - t) * (1.0 - t), t * t * (t - 1.0)
+                v = here[0] + h01 * (there[0] - here[0]) + h10 * here[2] + h11 * there[2]
+                w = here[1] + h01 * (there[1] - here[1]) + h10 * here[3] + h11 * there[3]
+                x = (now[0, cell] - s[0]) / s[2]
+                y = (now[0, waves.shape[0] + cell] - s[1]) / s[3]
+                off = max(abs(x - v), abs(y - w), abs(amount - 1.0))
+                distance = max(distance, off)
+                sum_ += x + y
+                x = min(max(x, -FURTHEST), FURTHEST) - amount * v
+                y = min(max(y, -FURTHEST), FURTHEST) - amount * w
+                along = ((circle[0] * c1 + circle[1] * s1) * x
+                         + (circle[2] * c1 + circle[3] * s1) * y)
+                across = ((circle[1] * c1 - circle[0] * s1) * x
+                          + (circle[3] * c1 - circle[2] * s1) * y)
+                across = min(max(pull * across / TURN, -MOST), MOST)
+                clocks[2, cell] += share * (across - clocks[2, cell])
+                clocks[5, cell] += share * (pull * along - clocks[5, cell])
+            terms = harmonics[wave]
             x, y, z = terms[0, 0], 0.0, 0.0
-            c1, s1 = math.cos(TURN * turned[0, cell]), math.sin(TURN * turned[0, cell])
             c, s_ = 1.0, 0.0
             for k in range(1, terms.shape[0]):
                 c, s_ = c * c1 - s_ * s1, s_ * c1 + c * s1
-                along = terms[k, 0] * c + terms[k, 1] * s_
-                across = terms[k, 1] * c - terms[k, 0] * s_
-                x += along
-                y += k * across
-                z -= k * k * along
-            speed, scale, rate = TURN * turned[1, cell], turned[2, cell], turned[3, cell]
-            dx, dy = scale * y * speed + rate * x, scale * z * speed + rate * y
-            x, y = scale * x, scale * y
+                in_phase = terms[k, 0] * c + terms[k, 1] * s_
+                quadrature = terms[k, 1] * c - terms[k, 0] * s_
+                x += in_phase
+                y += k * quadrature
+                z -= k * k * in_phase
+            speed, scale, rate = TURN * (1.0 + clocks[1, cell]), 1.0, 0.0
+            if amount < 1.0:
+                rest = (1.0 - amount * amount) if amount > 0.0 else 1.0
+                scale = 1.0 - rest * rest * rest
+                rate = 6.0 * max(amount, 0.0) * rest * rest * clocks[4, cell]
+            clocks[6, cell], clocks[7, cell] = scale * x, scale * y
+            clocks[8, cell] = scale * y * speed + rate * x
+            clocks[9, cell] = scale * z * speed + rate * y
+        base = clocks[0, leg_cells[0]] - phases[leg_cells[0]]
+        if strides > 0.0:
+            for cell in range(waves.shape[0]):
+                late = clocks[0, cell] - base - phases[cell]
+                distance = max(distance, PHASE_SHARE * abs(late - math.floor(late + 0.5)))
+        for joint in range(cells.shape[0]):
+            cell = cells[joint]
+            x, y, dx, dy = clocks[6, cell], clocks[7, cell], clocks[8, cell], clocks[9, cell]
             w = weights[joint]
             angle[joint] = (w[0] * x + w[1] * y + w[2] * x * x + w[3] * x * y
                             + (w[4] * x + w[5] * y) * x * x)
@@ -119,7 +149,7 @@ def _cached(digest):
                             + 2.0 * w[5] * x * y) * dx
                            + (w[1] + w[3] * x + w[5] * x * x) * dy)
         for leg in range(leg_cells.shape[0]):
-            phase = turned[0, leg_cells[leg]] - crests[waves[leg_cells[leg]]]
+            phase = clocks[0, leg_cells[leg]] - crests[waves[leg_cells[leg]]]
             phase -= math.floor(phase)
             legs[leg] = phase if phase < 1.0 else 0.0
         # Whatever max makes of a NaN: it comes through the sum.
@@ -160,65 +190,35 @@ def evaluate(terms: np.ndarray, theta: np.ndarray, order: int = 0) -> np.ndarray
     return (np.exp(TURN * 1j * np.multiply.outer(theta, k)) @ complex_terms).real
 
 
-def _centre(v: np.ndarray, w: np.ndarray, dv: np.ndarray, dw: np.ndarray) -> np.ndarray:
-    """Find the centre about which a closed curve turns most steadily, shape (2,).
-
-    Args:
-        v: first coordinate of the curve on even points of a cycle, shape (m,).
-        w: second one.
-        dv: derivative of the first by phase.
-        dw: derivative of the second.
-
-    Raises:
-        NoPhase: it turns back somewhere, whatever the centre.
-
-    """
-    def slowest(centre: np.ndarray) -> float:
-        x, y = v - centre[0], w - centre[1]
-        return -float(((x * dw - y * dv) / (x * x + y * y)).min())
-
-    starts = [np.array([a, b]) for a in np.linspace(-0.8, 0.8, 9)
-              for b in np.linspace(-0.8, 0.8, 9)]
-    found = minimize(slowest, min(starts, key=slowest), method='Nelder-Mead',
-                     options={'maxfev': 120, 'xatol': 1e-3})
-    turns = np.unwrap(np.arctan2(w - found.x[1], v - found.x[0]))
-    if found.fun >= 0.0 or not 0.9 * TURN < turns[-1] - turns[0] < TURN:
-        raise NoPhase("its waveform does not turn steadily about any centre in the plane of "
-                      "the cell's two variables, so that they do not tell its phase")
-    return found.x
-
-
 class PhaseMap:
-    """How an orbit's cells tell their phase, and the smooth waveform that joints follow.
+    """An orbit as its cells' clocks see it, and the smooth waveform that joints follow.
 
     Attributes:
-        shape, tables, terms, crests: as observe_phases takes them (terms: harmonics).
+        shape, circles, tables, terms, crests: as observe_phases takes them (terms: harmonics).
 
     """
 
     def __init__(self, orbit: Orbit, harmonics: int) -> None:
-        count = int(orbit.waves.max()) + 1
-        theta, grid = np.arange(POINTS) / POINTS, np.arange(TABLE) / TABLE
-        self.shape, self.tables = np.empty((count, 4)), np.empty((count, TABLE, 3))
+        count, theta = int(orbit.waves.max()) + 1, np.arange(POINTS) / POINTS
+        self.shape, self.circles = np.empty((2, count, 4))
+        self.tables = np.empty((count, POINTS, 4))
         self.terms, self.crests = np.empty((count, 1 + harmonics, 2)), np.empty(count)
-        for wave, ((v_mid, v_half), (w_mid, w_half)) in enumerate(orbit.levels):
-            v, dv = ((orbit.waveform(theta, order, wave, 0) - (v_mid if order == 0 else 0.0))
-                     / v_half for order in (0, 1))
-            w, dw = ((orbit.waveform(theta, order, wave, 1) - (w_mid if order == 0 else 0.0))
-                     / w_half for order in (0, 1))
-            few = slice(None, None, POINTS // 1024)
-            a, b = _centre(v[few], w[few], dv[few], dw[few])
-            self.shape[wave] = v_mid + a * v_half, w_mid + b * w_half, v_half, w_half
-            x, y = v - a, w - b
-            angle = np.unwrap(np.arctan2(y, x)) / TURN
-            # A cycle more on either side, so that the whole grid lies inside.
-            first = math.floor(angle[0])
-            angles = np.concatenate([angle - 1.0, angle, angle + 1.0]) - first
-            late = np.concatenate([theta - 1.0, theta, theta + 1.0]) - angles
-            speed = (x * dw - y * dv) / (x * x + y * y) / TURN
-            for row, values in enumerate((late, np.tile(speed, 3), np.tile(np.hypot(x, y), 3))):
-                self.tables[wave, :, row] = np.interp(grid, angles, values)
-            self.terms[wave] = smooth_terms(v, harmonics)
+        for wave, levels in enumerate(orbit.levels):
+            half = levels[:, 1]
+            states, slopes = (np.stack([orbit.waveform(theta, order, wave, variable)
+                                        for variable in (0, 1)], axis=1) for order in (0, 1))
+            mean = states.mean(axis=0)
+            states = (states - mean) / half
+            first = 2.0 * np.fft.rfft(states, axis=0)[1] / POINTS
+            square = 0.5 * (np.abs(first)**2).sum()
+            if square < LEAST_SHARE * (states**2).mean(axis=0).sum():
+                raise NoPhase("its waveform repeats within a cycle: the first harmonic, by "
+                                 f"which its phase is followed, has less than {LEAST_SHARE:.0%} "
+                                 "of it")
+            self.shape[wave] = *mean, *half
+            self.circles[wave] = np.stack([first.real, -first.imag], axis=1).ravel() / square
+            self.tables[wave] = np.hstack([states, slopes / half / POINTS])
+            self.terms[wave] = smooth_terms(states[:, 0], harmonics)
             self.crests[wave] = _crest(self.terms[wave])
 
 
@@ -227,7 +227,7 @@ def phase_map(orbit: Orbit, harmonics: int) -> PhaseMap:
     """Return an orbit's phase map, made once.
 
     Raises:
-        NoPhase: a waveform does not tell the phase.
+        NoPhase: a waveform has hardly any first harmonic.
 
     """
     return PhaseMap(orbit, harmonics)
@@ -247,13 +247,13 @@ class PhaseReadout:
         """Prepare for an orbit; arguments as in WaveReadout, and how many harmonics x has.
 
         Raises:
-            NoPhase: a waveform does not tell the phase.
+            NoPhase: a waveform has hardly any first harmonic.
 
         """
         known = phase_map(orbit, harmonics)
-        self._view = (orbit.period, orbit.network.cells, orbit.waves, orbit.phases, known.shape,
-                      known.tables, known.terms, known.crests, cells, weights, leg_cells,
-                      np.zeros((4, orbit.network.cells)))
+        self._phases = orbit.phases
+        self._view = (orbit.waves, orbit.phases, known.shape, known.circles, known.tables,
+                      known.terms, known.crests, cells, weights, leg_cells)
         self.start = float((orbit.phases[leg_cells[0]]
                             - known.crests[orbit.waves[leg_cells[0]]]) % 1.0)
         theta = np.arange(512) / 512
@@ -265,10 +265,19 @@ class PhaseReadout:
             self.angles[joint] = weights[joint] @ values
             self.rises[joint] = weights[joint] @ slopes
 
-    def look(self, now: np.ndarray, angle: np.ndarray, rise: np.ndarray, legs: np.ndarray
-             ) -> float:
-        """Read joints and legs off a state; see observe_phases."""
-        return observe_phases(now, *self._view, angle, rise, legs)
+    def clocks(self, phase: float) -> np.ndarray:
+        """Return the cells' clocks where the gait has them at a phase of its orbit in cycles."""
+        clocks = np.zeros((10, self._phases.size))
+        clocks[0], clocks[3] = (phase + self._phases) % 1.0, 1.0
+        return clocks
+
+    def look(self, now: np.ndarray, strides: float, clocks: np.ndarray, angle: np.ndarray,
+             rise: np.ndarray, legs: np.ndarray) -> float:
+        """Let clocks go on by some strides to a state and read joints and legs.
+
+        See observe_phases.
+        """
+        return observe_phases(now, strides, *self._view, clocks, angle, rise, legs)
 
 
 def _crest(terms: np.ndarray) -> float:

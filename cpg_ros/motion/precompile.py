@@ -28,7 +28,7 @@ def precompile(name: str) -> None:
                 joints, joints)
     else:
         simulate(network, np.zeros(network.components), network.step, network.step)
-        observe_phases(stepper.now, 1.0, 1, cells, np.zeros(1), np.ones((1, 4)),
-                       np.ones((1, 4, 3)), np.zeros((1, 2, 2)), joints, cells, weights, cells,
-                       np.zeros((4, 1)), joints, joints, joints)
+        observe_phases(stepper.now, 1.0, cells, np.zeros(1), np.ones((1, 4)), np.ones((1, 4)),
+                       np.ones((1, 4, 4)), np.zeros((1, 2, 2)), joints, cells, weights, cells,
+                       np.zeros((10, 1)), joints, joints, joints)
     confine(joints, joints, joints, joints, joints, 1.0, joints, joints)

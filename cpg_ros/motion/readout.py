@@ -187,9 +187,13 @@ class WaveReadout:
         values, slopes = monomials(x, y, z)
         self.angles, self.rises = weights @ values, weights @ slopes
 
-    def look(self, now: np.ndarray, angle: np.ndarray, rise: np.ndarray, legs: np.ndarray
-             ) -> float:
-        """Read joints and legs off a state; see observe."""
+    def clocks(self, phase: float) -> np.ndarray:
+        """Return nothing: a state tells all by itself."""
+        return np.empty((0, 0))
+
+    def look(self, now: np.ndarray, strides: float, clocks: np.ndarray, angle: np.ndarray,
+             rise: np.ndarray, legs: np.ndarray) -> float:
+        """Read joints and legs off a state, however many strides after the last; see observe."""
         return observe(now, *self._view, angle, rise, legs)
 
 

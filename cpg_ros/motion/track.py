@@ -38,6 +38,7 @@ class Track:
         self.angle, self.rise, self.reach, self._lift = np.zeros((4, self._leg.size))
         self.legs = np.zeros(len(program.robot.legs))
         self.stepper = program.seed.copy()
+        self._clocks = program.readout.clocks(0.0)
         self.settling = self._calm = self._still = 0.0
         self.follow(program)
 
@@ -46,25 +47,27 @@ class Track:
         self.program = program
         self._least = AT_REST * float(program.orbit.levels[0, 0, 1])
         self._astray = 0.0
-        self._look()
+        self._look(0.0)
         self.phase = float(self.legs[0])
 
     def align(self, phase: float) -> None:
         """Bring the first leg to this phase, from the orbit's start."""
         ahead = (phase - self.program.readout.start) % 1.0
         self.stepper.advance(ahead * self.program.orbit.period)
-        self._look()
+        self._clocks = self.program.readout.clocks(ahead)
+        self._look(0.0)
         self.phase = float(self.legs[0])
         self._astray = 0.0
 
-    def _look(self) -> float:
+    def _look(self, strides: float) -> float:
         program, now, angle, rise = self.program, self.stepper.now, self.angle, self.rise
-        distance = program.readout.look(now, angle, rise, self.legs)
+        clocks = self._clocks
+        distance = program.readout.look(now, strides, clocks, angle, rise, self.legs)
         if self.drive is not None:
             # angle = in_place + stride (angle - in_place), and so its derivatives.
             stride = self.drive.stride[self._leg]
             still, lift = self.reach, self._lift
-            program.in_place.look(now, still, lift, self.legs)
+            program.in_place.look(now, 0.0, clocks, still, lift, self.legs)
             rise += (stride - 1.0) * (rise - lift)
             np.subtract(angle, still, out=self.reach)
             angle += (stride - 1.0) * self.reach
@@ -74,7 +77,7 @@ class Track:
     def advance(self, strides: float) -> bool:
         """Advance by some strides; tell whether the network is still on its orbit."""
         self.stepper.advance(strides * self.program.orbit.period)
-        distance = self._look()
+        distance = self._look(strides)
         expected = self.phase + strides
         if not math.isfinite(distance):
             self.phase = expected % 1.0

@@ -26,13 +26,13 @@ QUIET = 10.0
 class _Unserved(CallbackGroup):
     """Keeps subscriptions from the executor: their messages wait until they are taken."""
 
-    def can_execute(self, entity) -> bool:
+    def can_execute(self, entity: object) -> bool:
         return False
 
-    def beginning_execution(self, entity) -> bool:
+    def beginning_execution(self, entity: object) -> bool:
         return False
 
-    def ending_execution(self, entity) -> None:
+    def ending_execution(self, entity: object) -> None:
         pass
 
 

@@ -97,9 +97,6 @@ class Inversion(StartedNode):
         self._warn_of_unknown()
         self.get_logger().info(f'listening to {", ".join(topics)}; call ~/fit')
 
-    def _value(self, name: str):
-        return self.get_parameter(name).value
-
     def _changed(self, parameters: list[Parameter]) -> None:
         for parameter in parameters:
             if parameter.name == 'window':

@@ -6,6 +6,7 @@ import sys
 import threading
 import traceback
 from collections.abc import Callable
+from typing import Any
 
 import rclpy
 from rclpy.exceptions import InvalidParameterTypeException, InvalidParameterValueException
@@ -39,7 +40,7 @@ class StartedNode(Node):
 
     """
 
-    def __init__(self, name: str, **options) -> None:
+    def __init__(self, name: str, **options: Any) -> None:
         super().__init__(name, start_parameter_services=False, **options)
         self._parameter_service = StrictParameterService(self)
         self._doubles: set[str] = set()
@@ -67,7 +68,7 @@ class StartedNode(Node):
         """Return what a batch of changes stands for."""
         return as_doubles(parameters, self._doubles)
 
-    def _value(self, name: str):
+    def _value(self, name: str) -> Any:
         return self.get_parameter(name).value
 
     def _one_of(self, name: str, allowed: tuple[str, ...]) -> None:

@@ -1,6 +1,10 @@
 """Parameter services that answer malformed requests instead of dying of them."""
 
+from collections.abc import Sequence
+
+from rcl_interfaces.msg import Parameter as ParameterMessage
 from rcl_interfaces.msg import SetParametersResult
+from rcl_interfaces.srv import SetParameters, SetParametersAtomically
 from rclpy.parameter import Parameter
 from rclpy.parameter_service import ParameterService
 
@@ -12,15 +16,19 @@ class StrictParameterService(ParameterService):
     node, and answers the second without the name.
     """
 
-    def _set_parameters_callback(self, request, response):
+    def _set_parameters_callback(
+            self, request: SetParameters.Request, response: SetParameters.Response
+            ) -> SetParameters.Response:
         response.results = [self._judged([parameter]) for parameter in request.parameters]
         return response
 
-    def _set_parameters_atomically_callback(self, request, response):
+    def _set_parameters_atomically_callback(
+            self, request: SetParametersAtomically.Request,
+            response: SetParametersAtomically.Response) -> SetParametersAtomically.Response:
         response.result = self._judged(request.parameters)
         return response
 
-    def _judged(self, messages) -> SetParametersResult:
+    def _judged(self, messages: Sequence[ParameterMessage]) -> SetParametersResult:
         parameters = []
         for message in messages:
             try:

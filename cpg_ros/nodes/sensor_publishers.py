@@ -1,6 +1,8 @@
 """What a simulated robot publishes: built once, filled in place and published every period."""
 
+from collections.abc import Callable
 from importlib import import_module, util
+from typing import Any
 
 import numpy as np
 from geometry_msgs.msg import TransformStamped
@@ -32,7 +34,7 @@ class Measurements:
         self._contacts.layout.dim = [MultiArrayDimension(label=','.join(feet), stride=1,
                                                          size=len(feet))]
 
-        def publisher(kind: type, topic: str):
+        def publisher(kind: type, topic: str) -> Callable[[Any], None]:
             return node.create_publisher(
                 kind, topic, QoSProfile(depth=100),
                 qos_overriding_options=QoSOverridingOptions.with_default_policies()).publish

@@ -71,22 +71,6 @@ class Recording:
         columns = [self.joints.index(name) for name in names]
         return replace(self, joints=tuple(names), positions=self.positions[:, columns])
 
-    def between(self, begin: float, end: float) -> 'Recording':
-        """Return the samples with begin <= times <= end (s), their times from 0 again.
-
-        Raises:
-            RecordingError: fewer than two samples are there.
-
-        """
-        first = int(np.searchsorted(self.times, begin))
-        last = int(np.searchsorted(self.times, end, 'right'))
-        if last - first < 2:
-            raise RecordingError(f'{self.source}: {_counted(max(0, last - first), "sample")} '
-                                 f'between {begin:.6g} and {end:.6g} s')
-        times = self.times[first:last]
-        return replace(self, times=times - times[0], positions=self.positions[first:last],
-                       start=self.start + float(times[0]))
-
 
 def require(names: Sequence[str], there: Sequence[str], source: str) -> None:
     """Refuse names of joints that are not there, or are given twice."""

@@ -6,7 +6,7 @@ centre manifold, in the full network, and with the symmetry lock.
 """
 
 import sys
-from argparse import RawDescriptionHelpFormatter
+from argparse import Namespace, RawDescriptionHelpFormatter
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -111,7 +111,7 @@ def parameters(name: str, preset: str | None, changes: list[tuple[str, float]]) 
     return network
 
 
-def _analysed(chosen) -> Analysis:
+def _analysed(chosen: Namespace) -> Analysis:
     if chosen.plot is not None and not chosen.plot.absolute().parent.is_dir():
         raise InputError(f'--plot: there is no folder {chosen.plot.parent}')
     network = parameters(chosen.network, chosen.preset, chosen.set)

@@ -5,7 +5,7 @@ gait. ``check_robot --urdf my.urdf --make my_robot.yaml`` writes a first robot f
 """
 
 import sys
-from argparse import RawDescriptionHelpFormatter
+from argparse import Namespace, RawDescriptionHelpFormatter
 from collections.abc import Sequence
 from math import isfinite
 from pathlib import Path
@@ -17,7 +17,7 @@ from cpg_ros.files.plain_text import as_json
 from cpg_ros.networks.registry import NETWORKS
 from cpg_ros.robots.robot import Robot
 from cpg_ros.robots.robot_file import find_robot, write_robot
-from cpg_ros.robots.urdf import load_urdf
+from cpg_ros.robots.urdf import UrdfJoint, load_urdf
 from cpg_ros.tools.arguments import Parser, number, say
 
 DESCRIPTION = '''\
@@ -56,7 +56,7 @@ def _parser() -> Parser:
     return parser
 
 
-def _checked(chosen) -> RobotCheck:
+def _checked(chosen: Namespace) -> RobotCheck:
     if (chosen.robot is None) == (chosen.make is None):
         raise InputError('give either a robot file or --make FILE')
     for option, value, highest in (('frequency', chosen.frequency, 10.0),
@@ -74,7 +74,7 @@ def _checked(chosen) -> RobotCheck:
                    list(dict.fromkeys(chosen.gaits)), chosen.frequency, chosen.amplitude)
 
 
-def _made(chosen, urdf) -> Robot:
+def _made(chosen: Namespace, urdf: dict[str, UrdfJoint]) -> Robot:
     if chosen.make.suffix not in ('.yaml', '.yml'):
         raise InputError(f'--make: {chosen.make} is not called .yaml')
     if chosen.make.exists():

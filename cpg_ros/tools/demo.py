@@ -21,6 +21,7 @@ from rcl_interfaces.srv import SetParametersAtomically
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.signals import SignalHandlerOptions
+from rclpy.utilities import try_shutdown
 
 from cpg_ros.errors import CpgError
 from cpg_ros.tools.arguments import Parser, say
@@ -251,7 +252,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(f'demo: {error}', file=sys.stderr)
         return 1
     finally:
-        rclpy.try_shutdown()
+        try_shutdown()
     # One that was still starting, and was ended by our signal, did not fail.
     return 1 if any(node.returncode not in (0, -signal.SIGTERM) for node in nodes) else 0
 

@@ -6,7 +6,7 @@ the generator loads. Without a recording the executable is the node ``cpg_invers
 """
 
 import sys
-from argparse import RawDescriptionHelpFormatter
+from argparse import Namespace, RawDescriptionHelpFormatter
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -92,7 +92,7 @@ def _parser() -> Parser:
     return parser
 
 
-def _recording(chosen, robot: Robot | None) -> Recording:
+def _recording(chosen: Namespace, robot: Robot | None) -> Recording:
     if chosen.csv is not None:
         return read_csv(chosen.csv, unit=chosen.unit, time=chosen.time, joints=chosen.joints)
     servo = None if chosen.kp is None else Servo(chosen.kp, chosen.kd or 0.0)
@@ -102,7 +102,7 @@ def _recording(chosen, robot: Robot | None) -> Recording:
     return read_bag(chosen.bag, chosen.topics, names, some=True, servo=servo)
 
 
-def _checked(parser: Parser, chosen) -> None:
+def _checked(parser: Parser, chosen: Namespace) -> None:
     """Refuse what can be refused before any work."""
     if chosen.csv is not None and chosen.topics:
         parser.error('argument --topics: a CSV file has none')
@@ -128,14 +128,13 @@ def _checked(parser: Parser, chosen) -> None:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Invert the recording that is named, or run the node; return the exit code."""
-    given = sys.argv[1:] if arguments is None else list(arguments)
-    if not given or given[0] == '--ros-args':
+    """Invert a recording, or run the node if the command line has none; return the exit code."""
+    if arguments is None and sys.argv[1:2] in ([], ['--ros-args']):
         # Without ROS installed, recordings can be inverted all the same.
         from cpg_ros.nodes.inversion_node import run
-        return run(None if arguments is None else given)
+        return run()
     parser = _parser()
-    chosen = parser.parse_args(given)
+    chosen = parser.parse_args(sys.argv[1:] if arguments is None else arguments)
     _checked(parser, chosen)
     try:
         robot = None if chosen.robot is None else find_robot(chosen.robot)
@@ -170,7 +169,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return 0
 
 
-def _paper(chosen, found: Inverted, starts: list[dict[str, float]]) -> list[PaperFit]:
+def _paper(chosen: Namespace, found: Inverted, starts: list[dict[str, float]]
+           ) -> list[PaperFit]:
     """Fit as the paper does, if that is wanted."""
     if not chosen.paper:
         return []
@@ -179,7 +179,7 @@ def _paper(chosen, found: Inverted, starts: list[dict[str, float]]) -> list[Pape
                       list(found.fit.parameters), starts)
 
 
-def _written(chosen, found: Inverted, robot) -> list[Path]:
+def _written(chosen: Namespace, found: Inverted, robot: Robot | None) -> list[Path]:
     written = [] if chosen.out is None else write_fitted(chosen.out, found, robot)
     if chosen.report is not None:
         # matplotlib takes half a second, and only pages need it.

@@ -75,11 +75,11 @@ def transfer(jacobians: np.ndarray, lengths: np.ndarray, sources: np.ndarray) ->
     np.multiply(-collocation.A[:, None, :, None],
                 (lengths[:, None, None, None] * jacobians).transpose(0, 2, 1, 3)[:, None],
                 out=matrix)
-    matrix = matrix.reshape(n, s * d, s * d)
-    matrix[:, np.arange(s * d), np.arange(s * d)] += 1.0
+    whole = matrix.reshape(n, s * d, s * d)
+    whole[:, np.arange(s * d), np.arange(s * d)] += 1.0
     right = np.empty((n, s, d, d + sources.shape[-1]))
     right[..., :d], right[..., d:] = np.eye(d), sources
-    return np.linalg.solve(matrix, right.reshape(n, s * d, -1)).reshape(right.shape)
+    return np.linalg.solve(whole, right.reshape(n, s * d, -1)).reshape(right.shape)
 
 
 def summed(jacobians: np.ndarray, lengths: np.ndarray, answers: np.ndarray) -> np.ndarray:
@@ -138,11 +138,11 @@ def _newton(reduced: Reduced, now: Solution, steps: int = 15) -> bool:
     scale = np.abs(now.points).max()
     d, longest = now.points.shape[1], 20.0 * now.length
     for _ in range(steps):
-        p, r, by_start, by_source = linearised(reduced, now)
-        right = np.empty(d + 1)
-        right[:d] = now.points[0, reduced.turn] - now.points[-1] - r[-1, :, 1]
-        right[d] = -reduced.rates(now.points[0])[0]
         try:
+            p, r, by_start, by_source = linearised(reduced, now)
+            right = np.empty(d + 1)
+            right[:d] = now.points[0, reduced.turn] - now.points[-1] - r[-1, :, 1]
+            right[d] = -reduced.rates(now.points[0])[0]
             found = np.linalg.solve(bordered(reduced, now, p, r), right)
         except np.linalg.LinAlgError:
             return False
