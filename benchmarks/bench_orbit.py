@@ -13,10 +13,11 @@ import numpy as np
 from common import by_turns, emit, log
 from scipy.optimize import brentq, root
 
-from cpg_ros.dynamics.hopf import hopf_point
+from cpg_ros.dynamics.hopf import first_hopf
 from cpg_ros.dynamics.orbit import Orbit, solve_orbit
 from cpg_ros.integration.simulate import simulate
-from cpg_ros.networks.delayed import PRESETS, Preset, default_symmetry_gain
+from cpg_ros.networks.delayed import PRESETS
+from cpg_ros.networks.network import Preset
 
 #: Preset -> period, to eight decimals. The legs' phases differ, the waveforms are two.
 PERIODS = {'trot': 1.27827056, 'pace': 1.27827056, 'bound': 1.27827056, 'pronk': 1.27827056,
@@ -42,7 +43,7 @@ def residual(orbit: Orbit) -> float:
 def by_simulation(preset: Preset) -> float:
     """Period, from the last two upward zero crossings of cell 1 once they agree to 1e-8."""
     network, mode = preset.network, preset.network.symmetry(preset.gait)
-    omega = hopf_point(network, mode).omega
+    omega = first_hopf(network, preset.gait).omega
 
     def history(times: np.ndarray) -> np.ndarray:
         return 0.9 * np.cos(omega * times[:, None] + 2.0 * np.pi * mode.phases)
@@ -50,7 +51,7 @@ def by_simulation(preset: Preset) -> float:
     end = 16.0
     while True:
         run = simulate(network, history, end, 0.0025, progress=False,
-                       lock=(default_symmetry_gain(network), mode))
+                       lock=(network.sufficient_gain(0.5), mode))
         up = np.flatnonzero((run.x[:-1, 0] < 0.0) & (run.x[1:, 0] >= 0.0))[-3:]
         first, second = np.diff([
             brentq(lambda t, run=run: run(t)[0, 0], run.t[i], run.t[i + 1], xtol=1e-13)
@@ -64,19 +65,20 @@ def by_root_finder(preset: Preset) -> float:
     """Period, by MINPACK's hybrid method with differences for derivatives."""
     network, mode = preset.network, preset.network.symmetry(preset.gait)
     a, b, c, d, tau = network.as_dict().values()
+    shifts = {name: float(shift) for name, shift in mode.shifts}
     waves = 2j * np.pi * np.arange(NODES // 2 + 1)
 
     def equations(unknowns: np.ndarray) -> np.ndarray:
         u, period = unknowns[:-1], unknowns[-1]
         spectrum = np.fft.rfft(u)
-        turns = (waves, np.exp(-waves * mode.j / 4),
-                 np.exp(waves * (mode.k / 2 - tau / period)))
+        turns = (waves, np.exp(-waves * shifts['omega']),
+                 np.exp(waves * (shifts['kappa'] - tau / period)))
         slope, ring, past = (np.fft.irfft(spectrum * turn, NODES) for turn in turns)
         rest = (slope / period - a * u - b * np.tanh(u) - d * np.tanh(ring) - c * np.tanh(past))
         return np.append(rest, slope[0])
 
     wave = 0.9 * np.cos(2.0 * np.pi * np.arange(NODES) / NODES)
-    start = np.append(wave, 2.0 * np.pi / hopf_point(network, mode).omega)
+    start = np.append(wave, 2.0 * np.pi / first_hopf(network, preset.gait).omega)
     found = root(equations, start, tol=1e-12)
     return float(found.x[-1])
 

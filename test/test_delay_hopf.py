@@ -15,6 +15,7 @@ from cpg_ros.dynamics.hopf import first_hopf
 from cpg_ros.dynamics.hopf_search import hopf_points
 from cpg_ros.dynamics.isotypic import blocks
 from cpg_ros.dynamics.orbit import solve_orbit
+from cpg_ros.errors import InputError
 from cpg_ros.networks.network import Network, Range
 from cpg_ros.networks.parameter_line import ParameterLine
 from cpg_ros.networks.symmetry import Group, Symmetry
@@ -192,3 +193,8 @@ def test_the_normal_form_predicts_the_exact_orbits():
         assert turns[1] / turns[0] == pytest.approx(0.25, abs=0.05)
         judged += 1
     assert judged
+
+
+def test_a_negative_delay_is_refused():
+    with pytest.raises(InputError, match='lag from -1 to 2 makes lag negative'):
+        hopf_points(RING, LAG, -1.0, 2.0)

@@ -43,13 +43,15 @@ def hopf_points(network: Network, line: ParameterLine, low: float, high: float
 
     Raises:
         NoEquilibrium: it exists nowhere on the way.
-        InputError: low is not below high, a parameter is not finite, or the weights have not
-            the symmetry of the network.
+        InputError: low is not below high, a parameter is not finite, the delay would be
+            negative, or the weights have not the symmetry of the network.
 
     """
     if not (np.isfinite(low) and np.isfinite(high) and low < high):
         raise InputError(f'low {low} must be less than high {high}')
     delay = network.delay_parameter
+    if min(line.at(network, value).delay for value in (low, high)) < 0.0:
+        raise InputError(f'{line} from {low:g} to {high:g} makes {delay} negative')
     if line.names == (delay,) and delay not in equations_of(type(network)).rows:
         return _by_delay(network, line, low, high)
     return _on_grid(network, line, low, high)
@@ -121,8 +123,8 @@ def _on_grid(network: Network, line: ParameterLine, low: float, high: float) -> 
                         known.append((value, omega))
                         found.append(hopf_at(line.at(network, value), line,
                                              split(value)[which].mode, omega))
-    # Points that symmetry puts in one place differ by rounding; the fast one first.
-    return sorted(found, key=lambda point: (round(point.value, 9), -point.omega, point.mode))
+    # Points that symmetry puts in one place differ by rounding.
+    return sorted(found, key=lambda point: (round(point.value, 9), point.omega, point.mode))
 
 
 def _followed(along: list[Block]) -> int:

@@ -3,4 +3,4 @@
 Imports ``networks`` and what is below; knows nothing of ROS.
 """
 
-__all__ = ['jit', 'kernel', 'simulate', 'stepper']
+__all__ = ['field_code', 'jit', 'kernel', 'loops', 'simulate', 'stepper']

@@ -3,5 +3,6 @@
 Imports ``files``; knows nothing of ROS.
 """
 
-__all__ = ['biped', 'delayed', 'hk_theorem', 'morris_lecar', 'network', 'parameter_line',
-           'preset_files', 'quadruped', 'registry', 'symmetry']
+__all__ = ['biped', 'delayed', 'derivation', 'equations', 'field', 'generated', 'hk_theorem',
+           'morris_lecar', 'network', 'network_check', 'parameter_line', 'preset_files',
+           'quadruped', 'registry', 'symmetry', 'terms']

@@ -1,6 +1,7 @@
 """Buono & Golubitsky (2001), sections 4 to 6: Table 12, the stand, Theorems 4.1 to 4.3."""
 
 from collections.abc import Iterator
+from typing import cast
 
 import numpy as np
 from scipy.optimize import brentq
@@ -40,8 +41,7 @@ FAILING = ('walk', 0.05)
 
 
 def _sample(network: Network) -> Sample:
-    assert isinstance(network, Quadruped)
-    return Sample(network, equilibrium(network))
+    return Sample(cast(Quadruped, network), equilibrium(network))
 
 
 def hopf(network: Quadruped, line: str, gait: str, low: float, high: float) -> HopfPoint:
