@@ -202,5 +202,5 @@ class Watcher:
 
 
 def _messages(values: dict) -> list[ParameterMessage]:
-    return [Parameter(re.sub('^(delayed|quadruped|biped)_', r'\1.', name), value=value)
+    return [Parameter(re.sub('^(delayed|quadruped|biped|two_legs)_', r'\1.', name), value=value)
             .to_parameter_msg() for name, value in values.items()]

@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import yaml
+from graph import until
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
@@ -191,9 +192,9 @@ def test_a_generator_runs_it_and_switches_its_gait(start, tmp_path):
     robot.write_text(yaml.safe_dump(robot_tree()))
     _, watcher = start('-p', f'network:={Path(__file__)}', '-p', f'robot:={robot}', '-p',
                        'frequency:=2.0', '-p', 'transition:=0.3', '-p', 'rate:=200.0')
-    watcher.wait_for_gait('walk')
+    until(lambda: watcher.gaits[-1:] == ['walk'], 'the walk')
     assert watcher.set(gait='hop')[0].successful
-    watcher.wait_for_gait('hop')
-    assert watcher.set(**{'two_legs.mu': 2.0})[0].successful
-    refused = watcher.set(**{'two_legs.mu': -3.0})[0]
+    until(lambda: watcher.gaits[-1:] == ['hop'], 'the hop')
+    assert watcher.set(two_legs_mu=2.0)[0].successful
+    refused = watcher.set(two_legs_mu=-3.0)[0]
     assert not refused.successful and 'hop' in refused.reason

@@ -111,7 +111,7 @@ def test_presets_stand_beside_the_file(tmp_path):
     ('sides = {}', "sides = {'p': 'top'}", "sides: 'top' is not one of left, right"),
     ('sides = {}', 'ranges = {}', "ranges: the parameter 'a' has none"),
     ('sides = {}', "free = ('k',)", "free: 'k' is not one of a, b, c, d, tau"),
-    ('sides = {}', "line = 'k'", "ValueError: 'k' is not one of a, b, c, d, tau"),
+    ('sides = {}', "line = 'k'", "InputError: 'k' is not one of a, b, c, d, tau"),
     ('sides = {}', "sides = {}\n    usual_gait = 'canter'", "usual_gait: 'canter' is not one of "),
     ('sides = {}', "readout = 'phase'", 'readout: the phase is told by cells with two variables'),
     ('sides = {}', "searched = {'a': (0, 1)}", "searched: the parameter 'b' has no bounds"),

@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import TypeVar
 from zlib import crc32
 
+from cpg_ros.errors import CpgError
 from cpg_ros.networks import biped, delayed, quadruped
 from cpg_ros.networks.network import Network, Preset
 from cpg_ros.networks.network_check import flaw
@@ -27,7 +28,7 @@ SHIPPED: dict[str, type[Network]] = {
 Entry = TypeVar('Entry')
 
 
-class NetworkError(ValueError):
+class NetworkError(CpgError):
     """There is no such network, or it cannot be used; one line."""
 
 
