@@ -3,7 +3,7 @@
 A gait switch cross-fades two networks whose legs share one phase; a ramp scales the whole
 pattern between the stand (every joint at its offset) and the gait; a watchdog compares the
 network with its orbit. All three run on the pattern's own clock, which is slowed while they
-move whenever a joint would exceed the speed that the gaits themselves reach.
+move whenever a joint would exceed the speed that the gaits themselves reach, and after a stall.
 """
 
 import math
@@ -13,6 +13,7 @@ import numpy as np
 
 from cpg_ros.motion.plan import Program
 from cpg_ros.motion.readout import confine
+from cpg_ros.motion.resumption import Resumption
 from cpg_ros.motion.smoothstep import smoothstep
 from cpg_ros.motion.steering import Drive
 from cpg_ros.motion.track import Track
@@ -67,6 +68,7 @@ class Pattern:
         self._recovering = False
         self._slowing = 1.0
         self._last_rate: np.ndarray | None = None
+        self._resumption = Resumption()
         self._level, self._level_rate = 0.0, 0.0
         self._ramp_to(float(enabled), max(ramp, SUBSTEP))
         self.enabled = enabled
@@ -130,14 +132,24 @@ class Pattern:
         """Advance by dt in s and fill position, velocity and phases."""
         if self._requests:
             self._take_requests()
+        slow = self._resumption
+        clock, share = slow.advance(dt) if slow.active else (dt, 1.0)
         if len(self._tracks) == 1 and not self._ramps and self._absorbed >= ABSORB:
-            self._cruise(dt)
+            self._cruise(clock)
         else:
-            parts = max(1, math.ceil(dt / SUBSTEP - 1e-9))
+            parts = max(1, math.ceil(clock / SUBSTEP - 1e-9))
             for _ in range(parts):
-                self._step(dt / parts)
-        self.held += confine(self._wanted, self._rate, self._lower, self._upper, self._limit,
+                self._step(clock / parts)
+        rate = self._rate if share == 1.0 else share * self._rate
+        self.held += confine(self._wanted, rate, self._lower, self._upper, self._limit,
                              dt, self.position, self.velocity) > 0
+
+    def resume(self, stall: float) -> None:
+        """Go on after a stall in s from where the pattern stood, slowed in.
+
+        Belongs to the thread of advance.
+        """
+        self._resumption.begin(stall)
 
     def _take_requests(self) -> None:
         waiting = []

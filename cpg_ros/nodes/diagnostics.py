@@ -40,7 +40,7 @@ class Diagnostics:
             level, text = DiagnosticStatus.ERROR, 'the network left its orbit and was re-seeded'
             if program.gain == 0.0:
                 text += ' (symmetry_gain is 0: no gait is stable)'
-        elif new['dropped ticks']:
+        elif 100 * new['dropped ticks'] > new['ticks']:
             level, text = DiagnosticStatus.WARN, f'{new["dropped ticks"]} ticks dropped'
         elif new['ticks held by limits']:
             level, text = DiagnosticStatus.WARN, 'a joint limit held the pattern back'

@@ -84,7 +84,8 @@ class Generator(StartedNode):
             QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL),
             qos_overriding_options=QoSOverridingOptions.with_default_policies())
         self.create_service(SetBool, '~/enable', self._enable)
-        self.ticker = Ticker(self, self._value('rate'), self._tick, self._restart, self._fail)
+        self.ticker = Ticker(self, self._value('rate'), self._tick, self._restart, self._fail,
+                             self.pattern.resume)
         self._diagnostics = Diagnostics(self, self.pattern, self.ticker, self._cmd_vel)
         self.add_on_set_parameters_callback(self._judge)
         self.add_post_set_parameters_callback(self._apply)
