@@ -3,7 +3,7 @@
 from cpg_ros.motion.smoothstep import smoothstep
 
 #: A joint whose command stood still for this time (s) has come to rest.
-HOLD = 0.05
+HOLD = 0.1
 #: The clock is slowed in for as long as the stall was, but no longer than this (s).
 LONGEST = 0.5
 

@@ -136,8 +136,7 @@ class Generator(StartedNode):
             program = self._planner.plan(self._values())
             self.pattern.apply(program, self._value('transition'))
             if self._cmd_vel:
-                self._cmd_vel.program = program
-                self._cmd_vel.act()
+                self._cmd_vel.follow(program)
             self._announce()
 
     def _announce(self) -> None:
@@ -159,8 +158,7 @@ class Generator(StartedNode):
         response.success = True
         response.message = f'ramping {"up" if request.data else "down"} over {ramp:g} s'
         if self._cmd_vel:
-            self._cmd_vel.enabled = request.data
-            self._cmd_vel.act()
+            self._cmd_vel.enable(request.data)
             if request.data and not self._cmd_vel.walking:
                 response.message = 'enabled: standing until cmd_vel asks for motion'
         else:

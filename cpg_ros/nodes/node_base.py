@@ -35,12 +35,13 @@ class StartedNode(Node):
         stop: set when the node is to end.
         failure: what ended the thread, if anything did.
         thread: one that may be at work when the node ends, and need not come to its end.
+        parameter_service: which has a thread of its own, too.
 
     """
 
     def __init__(self, name: str, **options) -> None:
         super().__init__(name, start_parameter_services=False, **options)
-        self._parameter_service = StrictParameterService(self)
+        self.parameter_service = StrictParameterService(self)
         self._doubles: set[str] = set()
         self.add_pre_set_parameters_callback(self._complete)
         self.failure: BaseException | None = None
@@ -129,9 +130,10 @@ def run(make: Callable[[], StartedNode], name: str, args: list[str] | None) -> i
     gc.freeze()
     node.begin()
     serving.start()
-    # A bare wait() can miss a signal that another thread received.
-    while not node.stop.wait(0.2):
+    # A bare wait() can miss a signal that another thread received, and a stop must not wait.
+    while not node.stop.wait(0.02):
         pass
+    node.parameter_service.end()
     node.finish()
     for number in (signal.SIGINT, signal.SIGTERM):
         # It ends already: a second one, while the interpreter winds up, would kill it.
@@ -139,4 +141,4 @@ def run(make: Callable[[], StartedNode], name: str, args: list[str] | None) -> i
     executor.shutdown(timeout_sec=0.1)
     rclpy.shutdown()
     code = 0 if node.failure is None else 1
-    return ended(ended(code, node.thread), serving)
+    return ended(code, node.thread, node.parameter_service.thread, serving)
