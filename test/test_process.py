@@ -9,7 +9,6 @@ import yaml
 from ament_index_python.packages import get_package_share_directory
 from diagnostic_msgs.msg import DiagnosticStatus
 from graph import Watcher, off_grid, until
-from std_srvs.srv import SetBool
 
 CONFIG = Path(get_package_share_directory('cpg_ros')) / 'config'
 
@@ -107,12 +106,3 @@ def test_a_bad_parameter_is_refused_at_start(start, argument, reason):
     assert process.wait() == 1
     assert 'FATAL' in process.lines[-1] and reason in process.lines[-1]
     assert 'Traceback' not in process.log
-
-
-def test_without_autostart_it_stands_until_enabled(start):
-    _, watcher = start('-p', 'autostart:=false')
-    _, positions, velocities = watcher.record(0.5)
-    assert np.ptp(positions, axis=0).max() == 0.0 and not velocities.any()
-    watcher.call(SetBool, '/cpg_generator/enable', SetBool.Request(data=True))
-    _, positions, _ = watcher.record(2.5)
-    assert np.ptp(positions, axis=0).max() > 0.4
