@@ -241,7 +241,9 @@ class Pattern:
 
         if self._ramps:
             moving = True
-            self._advance_ramp(clock)
+            # First to the stand: the gait swings about it, not about where the joints were.
+            if not self._leading:
+                self._advance_ramp(clock)
         if self._level != 1.0 or self._level_rate:
             rate = self._level * rate + self._level_rate * wanted
             wanted = self._level * wanted

@@ -26,7 +26,7 @@ from cpg_ros.nodes.diagnostics import Diagnostics
 from cpg_ros.nodes.generator_parameters import COMMANDS, NETWORK, Planner, exclusive, specs
 from cpg_ros.nodes.joint_publishers import Outputs
 from cpg_ros.nodes.measured_pose import MeasuredPose
-from cpg_ros.nodes.node_base import StartedNode, StartError, run
+from cpg_ros.nodes.node_base import StartedNode, StartError, asked_for_help, run
 from cpg_ros.nodes.parameter_spec import as_doubles
 from cpg_ros.nodes.rivals import Rivals
 from cpg_ros.robots.robot import Robot
@@ -262,7 +262,10 @@ def compile_kernels(network: str) -> None:
 
 def main(args: list[str] | None = None) -> int:
     """Run the node until SIGINT or SIGTERM; return the exit code."""
-    return run(Generator, NAME, args)
+    known = {'network': NETWORK, **specs(NETWORK.default)}
+    code = asked_for_help('generator', 'Publishes the joint states of a gait; the parameters of '
+                          'the networks are listed by ros2 param describe.', known, args)
+    return run(Generator, NAME, args) if code is None else code
 
 
 if __name__ == '__main__':

@@ -5,7 +5,7 @@ import signal
 import sys
 import threading
 import traceback
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 import rclpy
 from rclpy.exceptions import InvalidParameterTypeException, InvalidParameterValueException
@@ -14,6 +14,7 @@ from rclpy.logging import get_logger
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.signals import SignalHandlerOptions
+from rclpy.utilities import remove_ros_args
 
 from cpg_ros.nodes.parameter_services import StrictParameterService
 from cpg_ros.nodes.parameter_spec import Spec, as_doubles
@@ -105,6 +106,42 @@ def _spin(executor: SingleThreadedExecutor, node: StartedNode) -> None:
             node.get_logger().error('a request failed:\n' + traceback.format_exc())
 
 
+def asked_for_help(executable: str, text: str, known: Mapping[str, Spec],
+                   args: list[str] | None) -> int | None:
+    """Look at the words that are not for ROS; return the exit code if the node is not to start.
+
+    Args:
+        executable: its name.
+        text: what it does, a sentence.
+        known: the parameters, to be listed.
+        args: from the command line, without the program's name; None for those of the process.
+
+    """
+    given = sys.argv[1:] if args is None else args
+    try:
+        words = remove_ros_args(given)
+    except RuntimeError as error:
+        print(f'{executable}: ROS arguments: {_first(error)}', file=sys.stderr)
+        return 2
+    wrong = [word for word in words if word not in ('-h', '--help')]
+    if wrong:
+        print(f'{executable}: not understood: {" ".join(wrong)} (parameters: --ros-args -p '
+              'NAME:=VALUE; see --help)', file=sys.stderr)
+        return 2
+    if not words:
+        return None
+    parameters = (f'  {name}  {spec.text} (default: {spec.default!r})'
+                  for name, spec in known.items())
+    print(f'usage: {executable} [--help] [--ros-args -p NAME:=VALUE ... -r FROM:=TO ... '
+          f'--params-file FILE]\n\n{text}\n\nparameters:', *parameters, sep='\n')
+    return 0
+
+
+def _first(error: RuntimeError) -> str:
+    """Return the reason that rclpy gives; what follows is about its own sources."""
+    return str(error).partition('. Error')[0].partition(', at /')[0]
+
+
 def run(make: Callable[[], StartedNode], name: str, args: list[str] | None) -> int:
     """Run a node until SIGINT or SIGTERM, or until it stops itself; return the exit code."""
     def leave(*_: object) -> None:
@@ -114,7 +151,11 @@ def run(make: Callable[[], StartedNode], name: str, args: list[str] | None) -> i
         signal.signal(number, leave)
     # The publishing thread must not wait long for one that computes in Python.
     sys.setswitchinterval(2e-4)
-    rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
+    try:
+        rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
+    except RuntimeError as error:
+        print(f'{name}: ROS arguments: {_first(error)}', file=sys.stderr)
+        return 2
     try:
         node = make()
     except StartError as error:

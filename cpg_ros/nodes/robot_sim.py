@@ -21,7 +21,7 @@ from std_srvs.srv import Trigger
 from cpg_ros.nodes.command_topics import KINDS, Commands
 from cpg_ros.nodes.deadline_thread import Ticker
 from cpg_ros.nodes.lockstep import Lockstep
-from cpg_ros.nodes.node_base import StartedNode, StartError, run
+from cpg_ros.nodes.node_base import StartedNode, StartError, asked_for_help, run
 from cpg_ros.nodes.parameter_spec import Spec
 from cpg_ros.nodes.sensor_publishers import Measurements
 from cpg_ros.robots.robot_file import RobotError, find_robot
@@ -271,7 +271,8 @@ class RobotSim(StartedNode):
 
 def main(args: list[str] | None = None) -> int:
     """Run the node until SIGINT or SIGTERM, or its duration is over; return the exit code."""
-    return run(RobotSim, NAME, args)
+    code = asked_for_help(NAME, 'Simulates a robot that a generator moves.', SPECS, args)
+    return run(RobotSim, NAME, args) if code is None else code
 
 
 if __name__ == '__main__':
