@@ -10,7 +10,7 @@ from pathlib import Path
 from launch.actions import OpaqueFunction, Shutdown
 from launch.substitutions import LaunchConfiguration
 
-from cpg_ros.nodes.launch_arguments import declared, number, started
+from cpg_ros.nodes.launch_arguments import declared, started, value
 from launch import LaunchDescription
 
 BOTH = {
@@ -40,19 +40,25 @@ COMMANDS = {'joint_states': 'none'}
 def nodes(context):
     """Return generator and simulation, which speak the same command and follow one clock."""
     command = LaunchConfiguration('command').perform(context)
-    unwanted = {}
+    unwanted, folders = {}, []
     for picture in ('film', 'footfalls'):
         path = Path(LaunchConfiguration(picture).perform(context)).expanduser()
         if str(path) == 'none':
             unwanted[picture] = ''
         else:
-            path.parent.mkdir(parents=True, exist_ok=True)
-    simulated = number(context, 'real_time_factor') != 1.0
-    return [started(context, 'generator', 'cpg_generator', {**BOTH, **GENERATOR}, {
+            folders.append(path.parent)
+    simulated = value(context, 'real_time_factor', float) != 1.0
+    both = [started(context, 'generator', 'cpg_generator', {**BOTH, **GENERATOR}, {
                 'rate': 500.0, 'combined_topic': '', 'command': COMMANDS.get(command, command),
                 'use_sim_time': simulated}, on_exit=Shutdown()),
             started(context, 'robot_sim', 'robot_sim', {**BOTH, **SIMULATION}, {
                 'clock': simulated, **unwanted}, on_exit=Shutdown(), sigterm_timeout=DRAWING)]
+    for folder in folders:
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise RuntimeError(f'{folder}: {error.strerror}') from error
+    return both
 
 
 def generate_launch_description():
