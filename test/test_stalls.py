@@ -54,10 +54,12 @@ def test_what_was_missed_is_not_run_through(start, rate, seconds):
     for rows in map(np.array, (commands, states)):
         times, angles = rows[:, 0], rows[:, 1:]
         after = np.flatnonzero(times >= again)[0]
-        # At most two at once; a reader that was slow itself hears more together.
-        assert np.sum(times[after:] < times[after] + 0.5 / rate) <= 2
+        # Two at once at most; over 8 periods, as a reader is late at times, too.
+        assert np.sum(times[after:] < times[after] + 8.0 / rate) <= 10
+        # Two ticks together are no more than a period's motion; what a reader loses takes time.
         steps = np.abs(np.diff(angles, axis=0))
-        assert steps[after - 1:].max() <= LIMIT / rate
+        allowed = LIMIT * (np.diff(times) + 1.0 / rate)
+        assert (steps[after - 1:] <= allowed[after - 1:, None]).all()
         # On from where it stood, at rest at first: seen over 8 periods, within the limit.
         assert steps[after - 1:after + 1].max() < 1e-3 * LIMIT
         gone = np.abs(angles[after:] - angles[after - 1])[:8].max(axis=1)
