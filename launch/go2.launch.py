@@ -1,8 +1,8 @@
 """A simulated Unitree Go2 walks: ros2 launch cpg_ros go2.launch.py gait:=walk film:=walk.gif.
 
-The generator and the physics run side by side, as fast as the clock on the wall or, with
-real_time_factor:=0, as fast as they can. Needs MuJoCo: pip install cpg-ros[sim]. Another robot:
-robot:=$PWD/my_robot.yaml model:=$PWD/my.urdf.
+The generator and the physics take turns, as fast as the clock on the wall or, on a slow machine
+and with real_time_factor:=0, as fast as they can; time begins when both are there. Needs MuJoCo:
+pip install cpg-ros[sim]. Another robot: robot:=$PWD/my_robot.yaml model:=$PWD/my.urdf.
 """
 
 from pathlib import Path
@@ -10,7 +10,7 @@ from pathlib import Path
 from launch.actions import OpaqueFunction, Shutdown
 from launch.substitutions import LaunchConfiguration
 
-from cpg_ros.nodes.launch_arguments import declared, number, started
+from cpg_ros.nodes.launch_arguments import declared, started
 from launch import LaunchDescription
 
 BOTH = {
@@ -40,19 +40,24 @@ COMMANDS = {'joint_states': 'none'}
 def nodes(context):
     """Return generator and simulation, which speak the same command and follow one clock."""
     command = LaunchConfiguration('command').perform(context)
-    unwanted = {}
+    unwanted, folders = {}, []
     for picture in ('film', 'footfalls'):
         path = Path(LaunchConfiguration(picture).perform(context)).expanduser()
         if str(path) == 'none':
             unwanted[picture] = ''
         else:
-            path.parent.mkdir(parents=True, exist_ok=True)
-    simulated = number(context, 'real_time_factor') != 1.0
-    return [started(context, 'generator', 'cpg_generator', {**BOTH, **GENERATOR}, {
+            folders.append(path.parent)
+    both = [started(context, 'generator', 'cpg_generator', {**BOTH, **GENERATOR}, {
                 'rate': 500.0, 'combined_topic': '', 'command': COMMANDS.get(command, command),
-                'use_sim_time': simulated}, on_exit=Shutdown()),
+                'use_sim_time': True}, on_exit=Shutdown()),
             started(context, 'robot_sim', 'robot_sim', {**BOTH, **SIMULATION}, {
-                'clock': simulated, **unwanted}, on_exit=Shutdown(), sigterm_timeout=DRAWING)]
+                'lockstep': True, **unwanted}, on_exit=Shutdown(), sigterm_timeout=DRAWING)]
+    for folder in folders:
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise RuntimeError(f'{folder}: {error.strerror}') from error
+    return both
 
 
 def generate_launch_description():

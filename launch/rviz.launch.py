@@ -7,12 +7,20 @@ its robot file and its URDF: robot:=$PWD/my_robot.yaml urdf:=$PWD/my.urdf.
 from pathlib import Path
 
 from ament_index_python.packages import PackageNotFoundError, get_package_prefix
-from launch.actions import DeclareLaunchArgument, IncludeLaunchDescription, OpaqueFunction
+from launch.actions import (
+    DeclareLaunchArgument,
+    IncludeLaunchDescription,
+    OpaqueFunction,
+    RegisterEventHandler,
+    Shutdown,
+)
+from launch.event_handlers import OnProcessExit
 from launch.launch_description_sources import PythonLaunchDescriptionSource
 from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
 from launch_ros.parameter_descriptions import ParameterValue
 
+from cpg_ros.nodes.launch_arguments import value
 from cpg_ros.robots.urdf import load_urdf, root
 from launch import LaunchDescription
 
@@ -33,19 +41,28 @@ def needed(package):
                            f'ros-$ROS_DISTRO-{package.replace("_", "-")}') from error
 
 
+def check(context):
+    """Raise an error before anything starts, if not all of it can."""
+    needed('robot_state_publisher')
+    if value(context, 'rviz', bool):
+        needed('rviz2')
+        config = Path(LaunchConfiguration('rviz_config').perform(context)).expanduser()
+        if not config.is_file():
+            raise RuntimeError(f'rviz_config:={config}: there is no such file')
+    viewers(context)
+
+
 def viewers(context):
     """Return robot_state_publisher with the URDF's text, and rviz2."""
     namespace, sim_time = LaunchConfiguration('namespace'), LaunchConfiguration('use_sim_time')
     clock = {'use_sim_time': ParameterValue(sim_time, value_type=bool)}
     urdf = Path(LaunchConfiguration('urdf').perform(context)).expanduser()
     frame = root(load_urdf(urdf))
-    needed('robot_state_publisher')
     nodes = [Node(package='robot_state_publisher', executable='robot_state_publisher',
                   namespace=namespace, output='screen', parameters=[{
                       'robot_description': ParameterValue(urdf.read_text(), value_type=str),
                       'publish_frequency': 50.0, **clock}])]
-    if LaunchConfiguration('rviz').perform(context).lower() in ('true', '1'):
-        needed('rviz2')
+    if value(context, 'rviz', bool):
         # The configuration has the frame of the generic quadruped, and no namespace.
         nodes.append(Node(package='rviz2', executable='rviz2', namespace=namespace,
                           output='screen', parameters=[clock],
@@ -57,7 +74,10 @@ def viewers(context):
 def generate_launch_description():
     """Generator, robot_state_publisher and rviz2, optionally in a namespace."""
     generator = PythonLaunchDescriptionSource(str(SHARE / 'launch' / 'generator.launch.py'))
+    # None of them is of use without the others.
+    whole = RegisterEventHandler(OnProcessExit(on_exit=[Shutdown()]))
     return LaunchDescription([
         *(DeclareLaunchArgument(name, default_value=default, description=text)
           for name, (default, text) in ARGUMENTS.items()),
+        OpaqueFunction(function=check), whole,
         IncludeLaunchDescription(generator), OpaqueFunction(function=viewers)])

@@ -107,6 +107,15 @@ def until(condition, what: str):
     raise AssertionError(f'waited {PATIENCE} s in vain for {what}')
 
 
+def off_grid(times, period: float) -> float:
+    """Largest distance of the gaps between times from whole periods, in s.
+
+    A stalled generator leaves periods out, which a loaded machine may make it do.
+    """
+    gaps = np.diff(times)
+    return float(np.abs(gaps - period * np.maximum(np.round(gaps / period), 1.0)).max())
+
+
 class Watcher:
     """A node that records joint states and calls the generator's parameter services."""
 

@@ -57,8 +57,8 @@ def test_no_node_outlives_it(tmp_path, number):
 
 
 def test_no_node_outlives_it_when_it_walks(tmp_path):
-    with demo(tmp_path) as process:
-        until(lambda: b'the robot walks' in process.stdout.readline(), 'a robot that walks')
+    with demo(tmp_path, '--every', '0.5') as process:
+        until(lambda: b'  walk ' in process.stdout.readline(), 'a robot that walks')
         nodes = nodes_of(process)
         process.terminate()
         process.communicate(timeout=60)

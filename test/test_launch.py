@@ -57,10 +57,12 @@ def described(monkeypatch):
     """Run a launch file with stand-ins for launch and launch_ros, which are not on PyPI."""
     kinds = {name: type(name, (Stub,), {}) for name in (
         'LaunchDescription', 'LaunchContext', 'DeclareLaunchArgument', 'OpaqueFunction',
-        'IncludeLaunchDescription', 'Shutdown', 'LaunchConfiguration', 'Node', 'ParameterValue',
+        'IncludeLaunchDescription', 'Shutdown', 'RegisterEventHandler', 'OnProcessExit',
+        'LaunchConfiguration', 'Node', 'ParameterValue',
         'PythonLaunchDescriptionSource')}
     for name in ('launch', 'launch.actions', 'launch.substitutions', 'launch.launch_context',
-                 'launch.launch_description_sources', 'launch_ros', 'launch_ros.actions',
+                 'launch.launch_description_sources', 'launch.event_handlers', 'launch_ros',
+                 'launch_ros.actions',
                  'launch_ros.parameter_descriptions'):
         module = ModuleType(name)
         vars(module).update(kinds)
@@ -72,7 +74,8 @@ def described(monkeypatch):
         exec(compile(Path(space['__file__']).read_text(), space['__file__'], 'exec'), space)
         if name == 'rviz':
             space['get_package_prefix'] = lambda package: f'/opt/{package}'
-        described = SimpleNamespace(arguments={}, nodes=[], includes=[], space=space)
+        described = SimpleNamespace(arguments={}, nodes=[], includes=[], space=space,
+                                    whole=False)
         functions = []
         for entity in space['generate_launch_description']().arguments[0]:
             if isinstance(entity, kinds['DeclareLaunchArgument']):
@@ -80,11 +83,13 @@ def described(monkeypatch):
                 assert entity.options['description']
             elif isinstance(entity, kinds['OpaqueFunction']):
                 functions.append(entity.options['function'])
+            elif isinstance(entity, kinds['RegisterEventHandler']):
+                described.whole = True
             else:
                 described.includes.append(entity.arguments[0].arguments[0])
         assert not set(given) - set(described.arguments) or name == 'rviz'
         context = {'namespace': '', 'use_sim_time': 'false', **described.arguments, **given}
-        described.nodes = [node for function in functions for node in function(context)]
+        described.nodes = [node for function in functions for node in function(context) or ()]
         described.context = context
         return described
     yield run
@@ -157,8 +162,13 @@ def test_what_is_empty_is_left_to_the_generator(described):
 @pytest.mark.parametrize(('name', 'given', 'words'), [
     ('generator', {'frequency': 'fast'}, 'frequency:=fast is not a number'),
     ('inversion', {'order': '2.5'}, 'order:=2.5 is not a whole number'),
-    ('go2', {'real_time_factor': 'half'}, 'real_time_factor:=half is not a number')])
-def test_an_argument_that_is_no_number_is_named(described, name, given, words):
+    ('go2', {'real_time_factor': 'half'}, 'real_time_factor:=half is not a number'),
+    ('go2', {'duration': 'long'}, 'duration:=long is not a number'),
+    ('go2', {'cmd_vel': 'perhaps'}, 'cmd_vel:=perhaps is not true or false'),
+    ('inversion', {'topics': 'a'}, 'topics:=a is not a list as'),
+    ('rviz', {'rviz': 'maybe'}, 'rviz:=maybe is not true or false'),
+    ('rviz', {'rviz_config': '/nix'}, 'rviz_config:=/nix: there is no such file')])
+def test_an_argument_of_another_kind_is_named(described, name, given, words):
     with pytest.raises(RuntimeError, match=words):
         described(name, **given)
 
@@ -192,12 +202,11 @@ def test_the_inversion_gets_parameters_that_it_declares(described):
                                                         described('inversion').nodes[0]))
 
 
-@pytest.mark.parametrize(('given', 'command', 'sim_time'), [
-    ({}, 'none', False), ({'command': 'joint_trajectory'}, 'joint_trajectory', False),
-    ({'command': 'forward_position', 'real_time_factor': '0.0'}, 'forward_position', True),
-    ({'real_time_factor': '0'}, 'none', True), ({'real_time_factor': '0.5'}, 'none', True)])
-def test_go2_speaks_one_command_and_follows_one_clock(described, given, command, sim_time,
-                                                      monkeypatch, tmp_path):
+@pytest.mark.parametrize(('given', 'command'), [
+    ({}, 'none'), ({'command': 'joint_trajectory'}, 'joint_trajectory'),
+    ({'command': 'forward_position', 'real_time_factor': '0.0'}, 'forward_position'),
+    ({'real_time_factor': '0.5'}, 'none')])
+def test_go2_speaks_one_command_and_takes_turns(described, given, command, monkeypatch, tmp_path):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv('HOME', str(tmp_path / 'home'))
     found = described('go2', film='~/films/a.gif', gait='walk', cmd_vel='true', **given)
@@ -207,10 +216,10 @@ def test_go2_speaks_one_command_and_follows_one_clock(described, given, command,
     assert set(to_generator) - {'network', 'use_sim_time'} <= set(known)
     assert to_generator == {'network': 'delayed', 'gait': 'walk', 'robot': 'unitree_go2',
                             'rate': 500.0, 'combined_topic': '', 'cmd_vel': True,
-                            'command': command, 'use_sim_time': sim_time}
+                            'command': command, 'use_sim_time': True}
     to_simulation = parameters(found, simulation)
     assert to_simulation == {
-        'clock': sim_time, 'robot': 'unitree_go2', 'model': 'go2', 'film': '~/films/a.gif',
+        'lockstep': True, 'robot': 'unitree_go2', 'model': 'go2', 'film': '~/films/a.gif',
         'footfalls': 'out/footfalls.png', 'duration': 0.0,
         'command': given.get('command', 'joint_states'),
         'real_time_factor': float(given.get('real_time_factor', 1.0))}
@@ -239,6 +248,8 @@ def test_rviz_shows_the_urdf_of_the_robot(described, tmp_path):
     urdf.write_text(text)
     found = described('rviz', urdf=str(urdf), use_sim_time='true', namespace='dog')
     assert found.includes == [str(SOURCE / 'launch' / 'generator.launch.py')]
+    # The end of one is the end of all.
+    assert found.whole
     publisher, viewer = found.nodes
     assert parameters(found, publisher) == {
         'robot_description': text, 'publish_frequency': 50.0, 'use_sim_time': True}

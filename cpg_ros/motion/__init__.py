@@ -4,4 +4,4 @@ Imports ``dynamics``, ``robots`` and what is below; knows nothing of ROS.
 """
 
 __all__ = ['joint_readout', 'pattern', 'phase_readout', 'plan', 'precompile', 'readout',
-           'runnable', 'smoothstep', 'steering', 'track']
+           'resumption', 'runnable', 'smoothstep', 'steering', 'track']

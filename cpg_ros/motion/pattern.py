@@ -3,7 +3,7 @@
 A gait switch cross-fades two networks whose legs share one phase; a ramp scales the whole
 pattern between the stand (every joint at its offset) and the gait; a watchdog compares the
 network with its orbit. All three run on the pattern's own clock, which is slowed while they
-move whenever a joint would exceed the speed that the gaits themselves reach.
+move whenever a joint would exceed the speed that the gaits themselves reach, and after a stall.
 """
 
 import math
@@ -13,6 +13,7 @@ import numpy as np
 
 from cpg_ros.motion.plan import Program
 from cpg_ros.motion.readout import confine
+from cpg_ros.motion.resumption import Resumption
 from cpg_ros.motion.smoothstep import smoothstep
 from cpg_ros.motion.steering import Drive
 from cpg_ros.motion.track import Track
@@ -68,9 +69,23 @@ class Pattern:
         self._slowing = self._slower = 1.0
         self._frequency = newest.program.frequency
         self._last_rate: np.ndarray | None = None
+        self._resumption = Resumption()
+        # Where the joints were found, from the stand, and how they are led from there.
+        self._found = np.zeros_like(self._offset)
+        self._leading = self._led = 0.0
         self._level, self._level_rate = 0.0, 0.0
         self._ramp_to(float(enabled), max(ramp, SUBSTEP))
         self.enabled = enabled
+
+    def start_from(self, angles: np.ndarray, time: float) -> None:
+        """Begin at these angles, rad, (joints,), and lead the joints to the stand in s or more.
+
+        To be called before the first advance. No joint takes more than half of its speed limit.
+        """
+        self._found = angles - self._offset
+        self.position[:] = np.clip(angles, self._lower, self._upper)
+        fastest = 1.5 * np.abs(self._found) / np.maximum(0.5 * self._limit, 1e-9)
+        self._leading, self._led = max(time, SUBSTEP, float(fastest.max())), 0.0
 
     # -- asked from other threads ---------------------------------------------------------
 
@@ -113,7 +128,7 @@ class Pattern:
     @property
     def standing(self) -> bool:
         """Tell whether it is disabled and the ramp has ended."""
-        return not self.enabled and self._level == 0.0 and not self._requests
+        return not (self.enabled or self._level or self._requests or self._leading)
 
     @property
     def in_transition(self) -> bool:
@@ -131,13 +146,24 @@ class Pattern:
         """Advance by dt in s and fill position, velocity and phases."""
         if self._requests:
             self._take_requests()
-        calm = len(self._tracks) == 1 and not self._ramps and self._absorbed >= ABSORB
-        if not (calm and self._cruise(dt)):
-            parts = max(1, math.ceil(dt / SUBSTEP - 1e-9))
+        slow = self._resumption
+        clock, share = slow.advance(dt) if slow.active else (dt, 1.0)
+        calm = (len(self._tracks) == 1 and not (self._ramps or self._leading)
+                and self._absorbed >= ABSORB)
+        if not (calm and self._cruise(clock)):
+            parts = max(1, math.ceil(clock / SUBSTEP - 1e-9))
             for _ in range(parts):
-                self._step(dt / parts)
-        self.held += confine(self._wanted, self._rate, self._lower, self._upper, self._limit,
+                self._step(clock / parts)
+        rate = self._rate if share == 1.0 else share * self._rate
+        self.held += confine(self._wanted, rate, self._lower, self._upper, self._limit,
                              dt, self.position, self.velocity) > 0
+
+    def resume(self, stall: float) -> None:
+        """Go on after a stall in s from where the pattern stood, slowed in.
+
+        Belongs to the thread of advance.
+        """
+        self._resumption.begin(stall)
 
     def _take_requests(self) -> None:
         waiting = []
@@ -226,14 +252,21 @@ class Pattern:
 
         if self._ramps:
             moving = True
-            self._advance_ramp(clock)
+            # First to the stand: the gait swings about it, not about where the joints were.
+            if not self._leading:
+                self._advance_ramp(clock)
         if self._level != 1.0 or self._level_rate:
             rate = self._level * rate + self._level_rate * wanted
             wanted = self._level * wanted
+        found = np.zeros_like(wanted)
+        if self._leading:
+            moving, found = True, self._found
+            left, left_rate = self._lead(clock)
+            wanted, rate = wanted + left * found, rate + left_rate * found
         if moving:
             # The pattern slows where it would outrun the gaits at the next substep.
-            bound = np.minimum(np.max([t.program.speed + SHIFTING * np.abs(t.program.shift)
-                                       for t in tracks], axis=0), self._limit)
+            bound = np.minimum(np.max([t.program.speed + SHIFTING * (
+                np.abs(t.program.shift) + np.abs(found)) for t in tracks], axis=0), self._limit)
             ahead = rate if self._last_rate is None else 2.0 * rate - self._last_rate
             self._last_rate = rate
             self._slower = 1.0 / max(1.0, float(np.max(np.abs(ahead) / np.maximum(bound, 1e-9))))
@@ -286,6 +319,16 @@ class Pattern:
         self._level = start + share * (end - start) + s * (1.0 - s)**2 * time * start_rate
         self._level_rate = (share_rate * (end - start) / time
                             + (1.0 - s) * (1.0 - 3.0 * s) * start_rate)
+
+    def _lead(self, clock: float) -> tuple[float, float]:
+        """Return the share of the way from where the joints were found that is left, its rate."""
+        self._led += clock
+        s = self._led / self._leading
+        if s >= 1.0:
+            self._leading = 0.0
+            return 0.0, 0.0
+        share, share_rate = smoothstep(s)
+        return 1.0 - share, -share_rate / self._leading
 
     def _smooth(self, wanted: np.ndarray, rate: np.ndarray, dt: float
                 ) -> tuple[np.ndarray, np.ndarray]:

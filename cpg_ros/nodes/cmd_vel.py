@@ -1,6 +1,7 @@
 """Walking as the topic cmd_vel asks: fast or slow, turning, and standing where nobody asks."""
 
 import math
+import threading
 from collections.abc import Callable
 from typing import Any
 
@@ -15,23 +16,18 @@ from cpg_ros.motion.pattern import Pattern
 from cpg_ros.motion.plan import Program
 
 #: How often it is seen whether the last command is too old, s.
-LOOK = 0.05
+LOOK = 0.02
 #: Time between two warnings of a kind, s.
 QUIET = 5.0
 
 
 class CmdVel:
-    """Steers a pattern by the newest command.
-
-    Attributes:
-        program: the gait to steer.
-        enabled: whether the robot may walk at all.
-
-    """
+    """Steers a pattern by the newest command; other threads may change the gait meanwhile."""
 
     def __init__(self, node: Node, pattern: Pattern, program: Program, enabled: bool,
                  timeout: Callable[[], float], ramp: Callable[[], float]) -> None:
-        self.program, self.enabled = program, enabled
+        self._program, self._enabled = program, enabled
+        self._deciding = threading.Lock()
         self._node, self._pattern, self._timeout, self._ramp = node, pattern, timeout, ramp
         self._asked, self._when, self._stale = (0.0, 0.0), -math.inf, True
         self._up = False
@@ -47,7 +43,7 @@ class CmdVel:
     @property
     def walking(self) -> bool:
         """Tell whether a fresh command asks for motion."""
-        return self.enabled and not self._stale and self._asked != (0.0, 0.0)
+        return self._enabled and not self._stale and self._asked != (0.0, 0.0)
 
     @property
     def state(self) -> str:
@@ -71,8 +67,9 @@ class CmdVel:
             self._log.warning(f'cmd_vel asks for {aside:g} m/s to the left: this robot walks '
                               'forward, backward and in curves only',
                               throttle_duration_sec=QUIET)
-        self._asked, self._when, self._stale = (speed, turn), self._now(), False
-        self.act()
+        with self._deciding:
+            self._asked, self._when, self._stale = (speed, turn), self._now(), False
+            self._act()
 
     def _look(self) -> None:
         age = self._now() - self._when
@@ -81,24 +78,37 @@ class CmdVel:
             return
         if stale and self.walking:
             self._log.warning(f'no cmd_vel for {age:.2g} s: stopping')
-        self._stale = stale
-        self.act()
+        with self._deciding:
+            self._stale = stale
+            self._act()
 
-    def act(self) -> None:
-        """Make the pattern do what is asked."""
+    def follow(self, program: Program) -> None:
+        """Steer this gait from now on."""
+        with self._deciding:
+            self._program = program
+            self._act()
+
+    def enable(self, enabled: bool) -> None:
+        """Say whether the robot may walk at all."""
+        with self._deciding:
+            self._enabled = enabled
+            self._act()
+
+    def _act(self) -> None:
         walking = self.walking
         if walking:
             speed, turn = self._asked
-            slowest, fastest = self.program.speeds
+            slowest, fastest = self._program.speeds
             if not slowest <= speed <= fastest:
-                self._log.warning(f"cmd_vel asks for {speed:g} m/s: the {self.program.name}'s "
+                self._log.warning(f"cmd_vel asks for {speed:g} m/s: the {self._program.name}'s "
                                   f'range is {slowest:g} to {fastest:g} m/s',
                                   throttle_duration_sec=QUIET)
-            self._pattern.steer(*self.program.steer(speed, turn))
+            self._pattern.steer(*self._program.steer(speed, turn))
         if walking != self._up:
             self._up = walking
             self._pattern.enable(walking, self._ramp())
 
     def end(self) -> None:
         """Leave the pattern alone from now on, as it is ramped down for the last time."""
-        self.enabled = self._up = False
+        with self._deciding:
+            self._enabled = self._up = False

@@ -5,35 +5,21 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from rclpy.callback_groups import CallbackGroup
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
-from rclpy.qos_overriding_options import QoSOverridingOptions
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 from cpg_ros.errors import CpgError
 from cpg_ros.nodes.joint_publishers import COMMAND_TOPICS
+from cpg_ros.nodes.unserved import subscribe, taken
 from cpg_ros.robots.robot import Robot
 from cpg_ros.robots.robot_file import LARGEST
 
 KINDS = ('joint_states', *COMMAND_TOPICS)
 #: Least time between two warnings about commands, s.
 QUIET = 10.0
-
-
-class _Unserved(CallbackGroup):
-    """Keeps subscriptions from the executor: their messages wait until they are taken."""
-
-    def can_execute(self, entity: object) -> bool:
-        return False
-
-    def beginning_execution(self, entity: object) -> bool:
-        return False
-
-    def ending_execution(self, entity: object) -> None:
-        pass
 
 
 class _Bad(CpgError):
@@ -67,7 +53,6 @@ class Commands:
         self._node, self._robot, self._period = node, robot, period
         self.angles = np.array(angles, dtype=float)
         self._index = {name: k for k, name in enumerate(robot.order)}
-        self._group = _Unserved()
         # One for each topic: the subscription, what reads a message, and names -> places.
         self._sources: list[tuple[Any, Any]] = []
         self._known: dict[str, tuple[list[str], np.ndarray]] = {}
@@ -87,10 +72,7 @@ class Commands:
         self.topics = [subscription.topic_name for subscription, _ in self._sources]
 
     def _listen(self, kind: type, topic: str, read: Any) -> None:
-        subscription = self._node.create_subscription(
-            kind, topic, lambda _: None, QoSProfile(depth=10), callback_group=self._group,
-            qos_overriding_options=QoSOverridingOptions.with_default_policies())
-        self._sources.append((subscription, read))
+        self._sources.append((subscribe(self._node, kind, topic, QoSProfile(depth=10)), read))
         self._fresh.append(False)
 
     @property
@@ -107,10 +89,8 @@ class Commands:
         """Take what has arrived; return whether all topics have brought what is expected."""
         for k, (subscription, read) in enumerate(self._sources):
             last = None
-            with subscription.handle:
-                while (taken := subscription.handle.take_message(
-                        subscription.msg_type, False)) is not None:
-                    last = taken[0]
+            for message, _ in taken(subscription):
+                last = message
             if last is not None:
                 try:
                     self._fresh[k] |= read(last)

@@ -9,8 +9,12 @@ from rclpy.clock import JumpThreshold
 from rclpy.duration import Duration
 from rclpy.node import Node
 
-#: Behind by more than this (s), as after a suspended process, ticks are dropped, not caught up:
-#: a robot must not be driven through a second of motion in a burst.
+#: Behind by this many periods, as after a suspended process, those are left out: a robot must not
+#: be driven through what it missed, and never gets more than two ticks at once.
+STALL = 2
+#: Steps of simulated time that are no stall, s: /clock may be that coarse, or lose a message.
+COARSE = 0.05
+#: What makes up for lost time, as a simulation may, does so when behind by no more than this, s.
 MOST_BEHIND = 1.0
 
 
@@ -34,27 +38,42 @@ def system_offset() -> int:
 class Ticker(threading.Thread):
     """Calls ``tick(dt, stamp)`` once a period, dt in s and the stamp in ns of ROS time.
 
-    A late tick is made up for at once and the deadlines stay where they were, so the rate has
-    no drift and no period is left out. The stamp is that of the deadline. With simulated time
-    the deadlines are instants of ``/clock``: it pauses with the clock, and a jump back calls
-    ``restart``.
+    The deadlines stay on their grid, so the rate has no drift. A tick that is late by less than
+    a period is made up for at once; after a stall the periods that have passed are left out,
+    ``resume`` is told how long it was in s, and the next tick is at the next deadline. The stamp
+    is that of the deadline. With simulated time the deadlines are instants of ``/clock``: it
+    pauses with the clock, and a jump back calls ``restart``.
 
     Attributes:
         ticks: ticks so far.
         late: those that began more than a period after their deadline.
-        dropped: periods left out after being behind by more than MOST_BEHIND.
+        dropped: periods left out in stalls.
         worst: longest delay behind a deadline since it was last read, s.
 
     """
 
     def __init__(self, node: Node, rate: float, tick: Callable[[float, int], None],
-                 restart: Callable[[], None], failed: Callable[[BaseException], None]) -> None:
+                 restart: Callable[[], None], failed: Callable[[BaseException], None],
+                 resume: Callable[[float], None] | None = None) -> None:
+        """Be ready to tick.
+
+        Args:
+            node: whose clock says whether time is simulated.
+            rate: of the ticks, Hz.
+            tick: called with dt and stamp.
+            restart: called where simulated time jumps back.
+            failed: called with what ended the thread.
+            resume: called after a stall; None: up to MOST_BEHIND is made up for instead.
+
+        """
         super().__init__(name='ticker', daemon=True)
         self.rate = rate
         self.ticks = self.late = self.dropped = 0
         self._worst = 0.0
         self._clock: Any = node.get_clock()
         self._tick, self._restart, self._failed = tick, restart, failed
+        self._resume = resume
+        self._resuming = False
         self._ending = threading.Event()
         self._moved = threading.Event()
         threshold = JumpThreshold(min_forward=Duration(nanoseconds=1),
@@ -97,11 +116,37 @@ class Ticker(threading.Thread):
             if behind < 0:
                 time.sleep(-behind * 1e-9)
                 behind = time.monotonic_ns() - deadline
-            deadline += self._note(behind, period)
+            self._worst = max(self._worst, behind * 1e-9)
+            leap, skip = self._stalled(behind, period)
+            deadline += leap
+            if skip:
+                continue
+            self.ticks += 1
+            if behind > period:
+                self.late += 1
             self._tick(period * 1e-9, deadline + system_offset())
 
+    def _stalled(self, behind: int, period: int) -> tuple[int, bool]:
+        """Return how far the deadline must leap, ns, and whether its tick is left out, too.
+
+        So that no two ticks come together then; but where every sleep is longer than a stall,
+        some must come.
+        """
+        resume = self._resume
+        if resume is None:
+            missed, skip = behind // period if behind > MOST_BEHIND * 1e9 else 0, False
+        elif behind < STALL * period:
+            self._resuming = False
+            return 0, False
+        else:
+            missed, skip = behind // period, not self._resuming
+            self._resuming = skip
+            resume(behind * 1e-9)
+        self.dropped += missed + skip
+        return missed * period, skip
+
     def _run_simulated(self) -> None:
-        deadline = last = 0
+        deadline = last = step = 0
         while not self._ending.is_set() and self._clock.ros_time_is_active:
             self._moved.wait()
             self._moved.clear()
@@ -111,25 +156,17 @@ class Ticker(threading.Thread):
             if deadline == 0 or now < last:
                 if deadline:
                     self._restart()
-                deadline = now
+                deadline = last = now
+            # A clock may be coarser than a period; a stall is a step unlike the one before.
+            usual, step = step, now - last
             last = now
+            period = self._period()
+            behind = now - deadline - period
+            if behind >= STALL * period and step > max(2 * usual, round(COARSE * 1e9)):
+                leap, skip = self._stalled(behind, period)
+                deadline += leap + skip * period
             while not self._ending.is_set() and deadline + self._period() <= now:
                 period = self._period()
                 deadline += period
-                if now - deadline > MOST_BEHIND * 1e9:
-                    self.dropped += (now - deadline) // period
-                    deadline += (now - deadline) // period * period
                 self.ticks += 1
                 self._tick(period * 1e-9, deadline)
-
-    def _note(self, behind: int, period: int) -> int:
-        """Count a tick and its lateness, ns; return how far the deadline must leap."""
-        self.ticks += 1
-        self._worst = max(self._worst, behind * 1e-9)
-        if behind > period:
-            self.late += 1
-        if behind <= MOST_BEHIND * 1e9:
-            return 0
-        leap = behind // period * period
-        self.dropped += leap // period
-        return leap

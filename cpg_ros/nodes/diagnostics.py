@@ -1,5 +1,7 @@
 """The generator's health, once a second on /diagnostics."""
 
+from typing import Any
+
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.clock import Clock
 from rclpy.clock_type import ClockType
@@ -8,18 +10,22 @@ from rclpy.node import Node
 from cpg_ros.motion.pattern import Pattern
 from cpg_ros.nodes.cmd_vel import CmdVel
 from cpg_ros.nodes.deadline_thread import Ticker
+from cpg_ros.nodes.rivals import Rivals
 
 
 class Diagnostics:
-    """Reports ERROR from a fault until the pattern is back, at least once; WARN on lateness."""
+    """Reports ERROR on a fault until the pattern is back, and on other publishers; else WARN.
 
-    def __init__(self, node: Node, pattern: Pattern, ticker: Ticker, cmd_vel: CmdVel | None
-                 ) -> None:
+    A warning is for lateness, and for silence: what is not published is not OK.
+    """
+
+    def __init__(self, node: Node, pattern: Pattern, ticker: Ticker, rivals: Rivals,
+                 cmd_vel: CmdVel | None) -> None:
         self._node, self._pattern, self._ticker = node, pattern, ticker
-        self._cmd_vel = cmd_vel
+        self._rivals, self._cmd_vel = rivals, cmd_vel
         self._publisher = node.create_publisher(DiagnosticArray, '/diagnostics', 10)
         self._before = self._counts()
-        self._seconds = 0
+        self._silent = 0
         # On the steady clock: health is wanted when simulated time stands still, too.
         self._clock = Clock(clock_type=ClockType.STEADY_TIME)
         self._timer = node.create_timer(1.0, self.publish, clock=self._clock)
@@ -36,11 +42,16 @@ class Diagnostics:
         self._before = counts
         new = {key: counts[key] - before[key] for key in counts}
         program = pattern.program
+        self._silent = 0 if new['ticks'] else self._silent + 1
         if new['watchdog re-seeds'] or pattern.recovering:
             level, text = DiagnosticStatus.ERROR, 'the network left its orbit and was re-seeded'
             if program.gain == 0.0:
                 text += ' (symmetry_gain is 0: no gait is stable)'
-        elif new['dropped ticks']:
+        elif self._rivals.text:
+            level, text = DiagnosticStatus.ERROR, self._rivals.text
+        elif self._silent > 1.0 / self._ticker.rate:
+            level, text = DiagnosticStatus.WARN, f'nothing is published: {self._why_silent()}'
+        elif 100 * new['dropped ticks'] > new['ticks']:
             level, text = DiagnosticStatus.WARN, f'{new["dropped ticks"]} ticks dropped'
         elif new['ticks held by limits']:
             level, text = DiagnosticStatus.WARN, 'a joint limit held the pattern back'
@@ -68,8 +79,19 @@ class Diagnostics:
         message.header.stamp = self._node.get_clock().now().to_msg()
         self._publisher.publish(message)
 
+    def _why_silent(self) -> str:
+        clock: Any = self._node.get_clock()
+        now = clock.now().nanoseconds
+        if not self._ticker.is_alive():
+            return 'waiting for ~/enable'
+        if not clock.ros_time_is_active:
+            return f'no tick for {self._silent} s'
+        return f'simulated time is still {1e-9 * now:.3f} s' if now else 'no /clock yet'
+
     def _state(self) -> str:
         pattern = self._pattern
+        if not self._ticker.is_alive():
+            return 'waiting for ~/enable'
         if pattern.standing:
             return 'standing'
         if pattern.level < 1.0:

@@ -23,15 +23,20 @@ from cpg_ros.networks.registry import NetworkError, find_network
 from cpg_ros.nodes.cmd_vel import CmdVel
 from cpg_ros.nodes.deadline_thread import Ticker
 from cpg_ros.nodes.diagnostics import Diagnostics
-from cpg_ros.nodes.generator_parameters import COMMANDS, NETWORK, Planner, specs
+from cpg_ros.nodes.generator_parameters import COMMANDS, NETWORK, Planner, exclusive, specs
 from cpg_ros.nodes.joint_publishers import Outputs
-from cpg_ros.nodes.node_base import StartedNode, StartError, run
+from cpg_ros.nodes.measured_pose import MeasuredPose
+from cpg_ros.nodes.node_base import StartedNode, StartError, asked_for_help, run
 from cpg_ros.nodes.parameter_spec import as_doubles
+from cpg_ros.nodes.rivals import Rivals
+from cpg_ros.robots.robot import Robot
 from cpg_ros.robots.robot_file import RobotError, find_robot
 
 NAME = 'cpg_generator'
 #: On SIGINT or SIGTERM the ramp takes this long, and the node ends by the later time, s.
 LAST_RAMP, LAST_DEADLINE = 0.5, 0.8
+#: Two that start at once know of one another after this time, s.
+DISCOVERY = 0.5
 
 
 class Generator(StartedNode):
@@ -53,6 +58,7 @@ class Generator(StartedNode):
         compile_kernels(self._value('network'))
         for name, spec in specs(network).items():
             self._declare(name, spec)
+        self._declare('exclusive', exclusive(self._value('command')))
         presets = network.presets() | self._further_presets(network)
         self._one_of('gait', tuple(presets))
         self._one_of('command', COMMANDS)
@@ -79,18 +85,30 @@ class Generator(StartedNode):
         self._cmd_vel = CmdVel(self, self.pattern, program, autostart,
                                lambda: self._value('cmd_vel_timeout'),
                                lambda: self._value('ramp')) if steered else None
-        self._outputs = Outputs(self, robot, self._value('combined_topic'),
-                                self._value('command'))
+        try:
+            self._outputs = Outputs(self, robot, self._value('combined_topic'),
+                                    self._value('command'))
+        except ValueError as error:
+            raise StartError(str(error)) from error
+        self._measured = self._measured_pose(robot)
         self._gait = self.create_publisher(
             String, '~/gait',
             QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL),
             qos_overriding_options=QoSOverridingOptions.with_default_policies())
         self.create_service(SetBool, '~/enable', self._enable)
-        self.ticker = Ticker(self, self._value('rate'), self._tick, self._restart, self._fail)
-        self._diagnostics = Diagnostics(self, self.pattern, self.ticker, self._cmd_vel)
+        self.ticker = Ticker(self, self._value('rate'), self._tick, self._restart, self._fail,
+                             self.pattern.resume)
+        self._rivals = Rivals(self, self._outputs.topics)
+        self._diagnostics = Diagnostics(self, self.pattern, self.ticker, self._rivals,
+                                        self._cmd_vel)
         self.add_on_set_parameters_callback(self._judge)
         self.add_post_set_parameters_callback(self._apply)
         self._warn_of_unknown()
+        if self._value('exclusive'):
+            time.sleep(DISCOVERY)
+            if self._rivals.look():
+                raise StartError(f'{self._rivals.text}: end what publishes there, give the topic '
+                                 'another name, or set exclusive to false')
 
     # -- parameters -----------------------------------------------------------------------
 
@@ -137,8 +155,7 @@ class Generator(StartedNode):
             program = self._planner.plan(self._values())
             self.pattern.apply(program, self._value('transition'))
             if self._cmd_vel:
-                self._cmd_vel.program = program
-                self._cmd_vel.act()
+                self._cmd_vel.follow(program)
             self._announce()
 
     def _announce(self) -> None:
@@ -155,13 +172,39 @@ class Generator(StartedNode):
 
     # -- the robot ------------------------------------------------------------------------
 
+    def _measured_pose(self, robot: Robot) -> MeasuredPose | None:
+        topic = self._value('measured_topic')
+        if not topic or self.resolve_topic_name(topic) in self._outputs.topics:
+            return None
+        return MeasuredPose(self, robot, topic)
+
+    def _lead_to_the_stand(self) -> str:
+        """Begin where the joints are, if that is known; return where that is."""
+        try:
+            pose = self._measured.take() if self._measured else None
+        except ValueError as error:
+            self.get_logger().warning(f'the pose is not known, starting at the stand: {error}')
+            pose = None
+        if pose is None:
+            return 'the stand'
+        self.pattern.start_from(pose, self._value('ramp'))
+        return 'the measured pose'
+
     def _enable(self, request: SetBool.Request, response: SetBool.Response) -> SetBool.Response:
         ramp = self._value('ramp')
         response.success = True
         response.message = f'ramping {"up" if request.data else "down"} over {ramp:g} s'
+        if not self.ticker.is_alive():
+            if not request.data:
+                response.message = 'nothing is published yet'
+                return response
+            if self._value('exclusive') and self._rivals.look():
+                response.success, response.message = False, self._rivals.text
+                return response
+            response.message += f' from {self._lead_to_the_stand()}'
+            self.ticker.start()
         if self._cmd_vel:
-            self._cmd_vel.enabled = request.data
-            self._cmd_vel.act()
+            self._cmd_vel.enable(request.data)
             if request.data and not self._cmd_vel.walking:
                 response.message = 'enabled: standing until cmd_vel asks for motion'
         else:
@@ -179,12 +222,15 @@ class Generator(StartedNode):
         self.pattern.restart(self._value('ramp'), self.pattern.enabled)
 
     def begin(self) -> None:
-        """Start publishing."""
+        """Start publishing, or wait for being enabled."""
         self._announce()
         names = len(self.pattern.robot.joints)
-        self.get_logger().info(f"publishing {names} joints of '{self.pattern.robot.name}' at "
-                               f'{self.ticker.rate:g} Hz')
-        self.ticker.start()
+        at = f"{names} joints of '{self.pattern.robot.name}' at {self.ticker.rate:g} Hz"
+        if self._value('autostart'):
+            self.get_logger().info(f'publishing {at}')
+            self.ticker.start()
+        else:
+            self.get_logger().info(f'publishing nothing until ~/enable, then {at}')
 
     def finish(self) -> None:
         """Ramp down to the stand, then stop publishing, within LAST_DEADLINE."""
@@ -198,7 +244,8 @@ class Generator(StartedNode):
                 time.sleep(0.005)
             time.sleep(min(0.05, 1.0 / self.ticker.rate))
         self.ticker.end()
-        self.ticker.join(timeout=0.2)
+        if self.ticker.is_alive():
+            self.ticker.join(timeout=0.2)
 
 
 def compile_kernels(network: str) -> None:
@@ -217,7 +264,10 @@ def compile_kernels(network: str) -> None:
 
 def main(args: list[str] | None = None) -> int:
     """Run the node until SIGINT or SIGTERM; return the exit code."""
-    return run(Generator, NAME, args)
+    known = {'network': NETWORK, **specs(NETWORK.default)}
+    code = asked_for_help('generator', 'Publishes the joint states of a gait; the parameters of '
+                          'the networks are listed by ros2 param describe.', known, args)
+    return run(Generator, NAME, args) if code is None else code
 
 
 if __name__ == '__main__':

@@ -41,11 +41,20 @@ def specs(network: type[Network]) -> dict[str, Spec]:
                                'none', read_only=True),
         'command': Spec('none', 'command topic for ros2_control', read_only=True,
                         constraints='one of: ' + ', '.join(COMMANDS)),
-        'autostart': Spec(True, 'ramp into the gait at start; false waits for ~/enable',
-                          read_only=True),
+        'measured_topic': Spec('joint_states', "the robot's own joint states, from which it is "
+                               "led to the stand if autostart is false; empty for none",
+                               read_only=True),
+        'autostart': Spec(True, 'ramp into the gait at start; false publishes nothing until '
+                          '~/enable', read_only=True),
         'cmd_vel': Spec(False, 'walk as the topic cmd_vel asks; the robot file must say how',
                         read_only=True),
         'cmd_vel_timeout': Spec(0.5, 'a cmd_vel older than this stops the robot [s]', 0.05, 60.0)}
+
+
+def exclusive(command: str) -> Spec:
+    """Return the parameter whose default depends on whether a robot is commanded."""
+    return Spec(command != 'none', 'do not start where another node publishes on the command or '
+                'joint topics', read_only=True)
 
 
 @dataclass(frozen=True)

@@ -29,9 +29,20 @@ def view_of(message: object, field: str, n: int) -> np.ndarray:
 
 
 class Outputs:
-    """Per-leg and combined joint states, leg phases, and commands for ros2_control."""
+    """Per-leg and combined joint states, leg phases, and commands for ros2_control.
+
+    Attributes:
+        topics: those that move joints, resolved.
+
+    """
 
     def __init__(self, node: Node, robot: Robot, combined_topic: str, command: str) -> None:
+        """Prepare all messages.
+
+        Raises:
+            ValueError: the combined topic is one of the others.
+
+        """
         joints = [joint.name for joint in robot.joints]
         self._order = robot.places
         self._stamps: list = []
@@ -40,6 +51,14 @@ class Outputs:
         self._positions: list[tuple[np.ndarray, slice | np.ndarray]] = []
         self._velocities: list[tuple[np.ndarray, slice | np.ndarray]] = []
         self._node = node
+        own = [*(f'{leg}/joint_states' for leg in robot.legs), *COMMAND_TOPICS.values()]
+        if combined_topic:
+            name = node.resolve_topic_name(combined_topic)
+            for topic in (*own, '~/phase'):
+                if name == node.resolve_topic_name(topic):
+                    raise ValueError(f"combined_topic '{combined_topic}' is the generator's own "
+                                     f'{topic}: it would be published twice on one topic')
+        self.topics: list[str] = []
 
         start = 0
         for leg, members in robot.legs.items():
@@ -54,6 +73,7 @@ class Outputs:
         phases.layout.dim = [MultiArrayDimension(label=','.join(robot.legs), stride=1,
                                                  size=len(robot.legs))]
         self._add(Float64MultiArray, '~/phase', phases)
+        self.topics.remove(node.resolve_topic_name('~/phase'))
         self._point: JointTrajectoryPoint | None = None
         if command == 'joint_trajectory':
             self._trajectory(robot.order)
@@ -67,6 +87,7 @@ class Outputs:
             kind, topic, QoSProfile(depth=100),
             qos_overriding_options=QoSOverridingOptions.with_default_policies())
         self._publish.append((publisher.publish, message))
+        self.topics.append(publisher.topic_name)
 
     def _joint_state(self, topic: str, names: list[str], part: slice | np.ndarray) -> None:
         message = JointState(name=names)

@@ -1,14 +1,17 @@
 """What the launch files share: launch arguments that become the parameters of a node."""
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, get_origin
 
+import yaml
 from launch.actions import DeclareLaunchArgument
 from launch.launch_context import LaunchContext
 from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
 from launch_ros.parameter_descriptions import ParameterValue
 
+#: What a value of a type is called.
+WHAT = {int: 'a whole number', float: 'a number', bool: 'true or false', list: 'a list as [a, b]'}
 #: Argument -> (default, type, what it is); each sets the parameter of the same name, but an
 #: empty one is left to the node.
 Arguments = Mapping[str, tuple[str, type, str]]
@@ -21,19 +24,23 @@ def declared(arguments: Arguments) -> list[DeclareLaunchArgument]:
             for name, (default, _, text) in known.items()]
 
 
-def number(context: LaunchContext, name: str, kind: type = float) -> float:
-    """Return a number that an argument was given.
+def value(context: LaunchContext, name: str, kind: type) -> Any:
+    """Return what an argument was given.
 
     Raises:
-        RuntimeError: it is none; one line for the user.
+        RuntimeError: it is not of this kind; one line for the user.
 
     """
     text = LaunchConfiguration(name).perform(context)
     try:
-        return kind(text)
-    except ValueError:
-        what = 'a whole number' if kind is int else 'a number'
-        raise RuntimeError(f"{name}:={text} is not {what}") from None
+        # As launch itself will read it.
+        found = kind(text) if kind in (int, float, str) else yaml.safe_load(text)
+    except (ValueError, yaml.YAMLError):
+        found = None
+    origin = get_origin(kind) or kind
+    if not isinstance(found, origin):
+        raise RuntimeError(f'{name}:={text} is not {WHAT[origin]}')
+    return found
 
 
 def started(context: LaunchContext, executable: str, name: str, arguments: Arguments,
@@ -49,14 +56,13 @@ def started(context: LaunchContext, executable: str, name: str, arguments: Argum
         options: further ones of the action Node.
 
     Raises:
-        RuntimeError: an argument is not the number that it should be.
+        RuntimeError: an argument is not of the kind that it should be.
 
     """
     given = {key: kind for key, (_, kind, _) in arguments.items()
              if LaunchConfiguration(key).perform(context)}
     for key, kind in given.items():
-        if kind in (int, float):
-            number(context, key, kind)
+        value(context, key, kind)
     parameters = {key: ParameterValue(LaunchConfiguration(key), value_type=kind)
                   for key, kind in given.items()}
     return Node(package='cpg_ros', executable=executable, name=name, output='screen',

@@ -1,4 +1,4 @@
-"""A thread that lets a simulation and what commands it take turns, each as fast as it can."""
+"""A thread that lets a simulation and what commands it take turns, no faster than they should."""
 
 import threading
 import time
@@ -12,6 +12,8 @@ from cpg_ros.nodes.command_topics import Commands
 PATIENCE, IMPATIENCE = 1.0, 0.02
 #: Between two looks at whether an answer is there, s.
 LOOK = 5e-5
+#: Behind the clock on the wall by no more than this is made up for, s; more makes a slow robot.
+MOST_BEHIND = 0.05
 
 
 class Lockstep(threading.Thread):
@@ -21,25 +23,36 @@ class Lockstep(threading.Thread):
     the first ``tick`` is at the first command, so that a run can be repeated exactly. Where
     commands come only every few periods, as from a generator of a lower rate, that is learnt.
 
+    With a pace, simulated time goes that many times as fast as the clock on the wall, or slower
+    where the machine is.
+
     Attributes:
         ticks: so far.
         late: those that did not get the command they waited for.
         dropped: none ever.
         rate: of the ticks in simulated time, Hz.
+        worst: longest delay behind the pace since it was last read, s.
 
     """
 
     def __init__(self, node: Node, rate: float, commands: Commands,
                  tell: Callable[[int], None], ready: Callable[[], bool],
-                 tick: Callable[[float, int], None], failed: Callable[[BaseException], None]
-                 ) -> None:
+                 tick: Callable[[float, int], None], failed: Callable[[BaseException], None],
+                 pace: float = 0.0) -> None:
         super().__init__(name='lockstep', daemon=True)
         self.rate = rate
         self.ticks = self.late = self.dropped = 0
-        self.worst = 0.0
+        self._worst, self._due = 0.0, 0.0
+        self._spacing = 1.0 / (rate * pace) if pace else 0.0
         self._node, self._commands = node, commands
         self._tell, self._ready, self._tick, self._failed = tell, ready, tick, failed
         self._ending = threading.Event()
+
+    @property
+    def worst(self) -> float:
+        """Longest delay behind the pace since this was last read, s."""
+        worst, self._worst = self._worst, 0.0
+        return worst
 
     def end(self) -> None:
         """Stop after the tick under way."""
@@ -84,8 +97,20 @@ class Lockstep(threading.Thread):
                                f'{PATIENCE:g} s: going on without; the rate of what commands '
                                f'should be {self.rate:g} Hz', throttle_duration_sec=10.0)
             if started:
+                self._keep_pace()
                 self.ticks += 1
                 self._tick(1.0 / self.rate, now)
+
+    def _keep_pace(self) -> None:
+        """Wait until the clock on the wall is where simulated time is."""
+        if not self._spacing:
+            return
+        now = time.monotonic()
+        due = max(self._due + self._spacing, now - MOST_BEHIND) if self._due else now
+        self._worst = max(self._worst, now - due)
+        self._due = due
+        if due > now:
+            self._ending.wait(due - now)
 
     def _answered(self, patience: float) -> bool:
         """Wait for the commands; return whether they came."""

@@ -5,7 +5,7 @@ import signal
 import sys
 import threading
 import traceback
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import rclpy
@@ -15,6 +15,7 @@ from rclpy.logging import get_logger
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.signals import SignalHandlerOptions
+from rclpy.utilities import remove_ros_args
 
 from cpg_ros.errors import CpgError
 from cpg_ros.nodes.parameter_services import StrictParameterService
@@ -37,12 +38,13 @@ class StartedNode(Node):
         stop: set when the node is to end.
         failure: what ended the thread, if anything did.
         thread: one that may be at work when the node ends, and need not come to its end.
+        parameter_service: which has a thread of its own, too.
 
     """
 
     def __init__(self, name: str, **options: Any) -> None:
         super().__init__(name, start_parameter_services=False, **options)
-        self._parameter_service = StrictParameterService(self)
+        self.parameter_service = StrictParameterService(self)
         self._doubles: set[str] = set()
         self.add_pre_set_parameters_callback(self._complete)
         self.failure: BaseException | None = None
@@ -106,6 +108,42 @@ def _spin(executor: SingleThreadedExecutor, node: StartedNode) -> None:
             node.get_logger().error('a request failed:\n' + traceback.format_exc())
 
 
+def asked_for_help(executable: str, text: str, known: Mapping[str, Spec],
+                   args: list[str] | None) -> int | None:
+    """Look at the words that are not for ROS; return the exit code if the node is not to start.
+
+    Args:
+        executable: its name.
+        text: what it does, a sentence.
+        known: the parameters, to be listed.
+        args: from the command line, without the program's name; None for those of the process.
+
+    """
+    given = sys.argv[1:] if args is None else args
+    try:
+        words = remove_ros_args(given)
+    except RuntimeError as error:
+        print(f'{executable}: ROS arguments: {_first(error)}', file=sys.stderr)
+        return 2
+    wrong = [word for word in words if word not in ('-h', '--help')]
+    if wrong:
+        print(f'{executable}: not understood: {" ".join(wrong)} (parameters: --ros-args -p '
+              'NAME:=VALUE; see --help)', file=sys.stderr)
+        return 2
+    if not words:
+        return None
+    parameters = (f'  {name}  {spec.text} (default: {spec.default!r})'
+                  for name, spec in known.items())
+    print(f'usage: {executable} [--help] [--ros-args -p NAME:=VALUE ... -r FROM:=TO ... '
+          f'--params-file FILE]\n\n{text}\n\nparameters:', *parameters, sep='\n')
+    return 0
+
+
+def _first(error: RuntimeError) -> str:
+    """Return the reason that rclpy gives; what follows is about its own sources."""
+    return str(error).partition('. Error')[0].partition(', at /')[0]
+
+
 def run(make: Callable[[], StartedNode], name: str, args: list[str] | None) -> int:
     """Run a node until SIGINT or SIGTERM, or until it stops itself; return the exit code."""
     def leave(*_: object) -> None:
@@ -115,7 +153,11 @@ def run(make: Callable[[], StartedNode], name: str, args: list[str] | None) -> i
         signal.signal(number, leave)
     # The publishing thread must not wait long for one that computes in Python.
     sys.setswitchinterval(2e-4)
-    rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
+    try:
+        rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
+    except RuntimeError as error:
+        print(f'{name}: ROS arguments: {_first(error)}', file=sys.stderr)
+        return 2
     try:
         node = make()
     except StartError as error:
@@ -131,9 +173,10 @@ def run(make: Callable[[], StartedNode], name: str, args: list[str] | None) -> i
     gc.freeze()
     node.begin()
     serving.start()
-    # A bare wait() can miss a signal that another thread received.
-    while not node.stop.wait(0.2):
+    # A bare wait() can miss a signal that another thread received, and a stop must not wait.
+    while not node.stop.wait(0.02):
         pass
+    node.parameter_service.end()
     node.finish()
     for number in (signal.SIGINT, signal.SIGTERM):
         # It ends already: a second one, while the interpreter winds up, would kill it.
@@ -141,4 +184,4 @@ def run(make: Callable[[], StartedNode], name: str, args: list[str] | None) -> i
     executor.shutdown(timeout_sec=0.1)
     rclpy.shutdown()
     code = 0 if node.failure is None else 1
-    return ended(ended(code, node.thread), serving)
+    return ended(code, node.thread, node.parameter_service.thread, serving)

@@ -21,7 +21,7 @@ from std_srvs.srv import Trigger
 from cpg_ros.nodes.command_topics import KINDS, Commands
 from cpg_ros.nodes.deadline_thread import Ticker
 from cpg_ros.nodes.lockstep import Lockstep
-from cpg_ros.nodes.node_base import StartedNode, StartError, run
+from cpg_ros.nodes.node_base import StartedNode, StartError, asked_for_help, run
 from cpg_ros.nodes.parameter_spec import Spec
 from cpg_ros.nodes.sensor_publishers import Measurements
 from cpg_ros.robots.robot_file import RobotError, find_robot
@@ -56,8 +56,9 @@ SPECS = {
     'real_time_factor': Spec(1.0, 'simulated time by real time, from 0.001; 0 runs as fast as it '
                              'can, in lockstep with a generator that uses simulated time',
                              0.0, 100.0),
-    'clock': Spec(False, 'publish /clock, and stamp by it; so it is, too, where '
-                  'real_time_factor is 0'),
+    'lockstep': Spec(False, 'take turns with a generator that uses simulated time, so that a slow '
+                     'machine makes a slow robot; so it is, too, where real_time_factor is 0'),
+    'clock': Spec(False, 'publish /clock, and stamp by it; so it is, too, in lockstep'),
     'film': Spec('', 'film to leave (.gif or .mp4) of the last minute; empty for none'),
     'footfalls': Spec('', 'footfall diagram to leave (.png, .svg or .pdf) of the last minute; '
                       'empty for none'),
@@ -113,14 +114,15 @@ class RobotSim(StartedNode):
         self._time = 0.0
         self._clock_message = Clock()
         self._tell_time: Publisher | None = None
-        if self._value('clock') or not factor:
+        lockstep = self._value('lockstep') or not factor
+        if self._value('clock') or lockstep:
             self._tell_time = self.create_publisher(Clock, '/clock', 10)
         self.ticker: Ticker | Lockstep
-        if factor:
+        if not lockstep:
             self.ticker = Ticker(self, self._rate * factor, self._tick, lambda: None, self._fail)
         else:
             self.ticker = Lockstep(self, self._rate, self._commands, self._tell, self._heard,
-                                   self._move, self._fail)
+                                   self._move, self._fail, factor)
         self.create_subscription(Wrench, '~/push', self._push, 10)
         self.create_service(Trigger, '~/reset', self._reset)
         self.create_subscription(
@@ -244,7 +246,8 @@ class RobotSim(StartedNode):
         """Start the physics."""
         mass = float(self._body.model.body_mass.sum())
         factor = self._value('real_time_factor')
-        pace = f'{factor:g} times real time' if factor else 'lockstep'
+        pace = ' in '.join([f'{factor:g} times real time'] * bool(factor)
+                           + ['lockstep'] * isinstance(self.ticker, Lockstep))
         self.get_logger().info(
             f"simulating '{self._value('model')}' ({mass:.1f} kg) at {self._rate:g} Hz, "
             f'{self._steps} steps a period, {pace}; commands from '
@@ -271,7 +274,8 @@ class RobotSim(StartedNode):
 
 def main(args: list[str] | None = None) -> int:
     """Run the node until SIGINT or SIGTERM, or its duration is over; return the exit code."""
-    return run(RobotSim, NAME, args)
+    code = asked_for_help(NAME, 'Simulates a robot that a generator moves.', SPECS, args)
+    return run(RobotSim, NAME, args) if code is None else code
 
 
 if __name__ == '__main__':

@@ -8,13 +8,13 @@ import threading
 PATIENCE = 0.2
 
 
-def ended(code: int, thread: threading.Thread | None) -> int:
-    """Return the exit code once the thread has ended; if it does not, end the process with it.
+def ended(code: int, *threads: threading.Thread | None) -> int:
+    """Return the exit code once the threads have ended; if one does not, end the process with it.
 
     An interpreter that winds up under a thread which then returns from compiled C++ code is
     aborted by the C++ runtime.
     """
-    if thread is not None:
+    for thread in filter(None, threads):
         thread.join(PATIENCE)
         if thread.is_alive():
             sys.stdout.flush()

@@ -1,0 +1,41 @@
+"""Where a robot's joints are, as its own driver publishes them."""
+
+import math
+import time
+
+import numpy as np
+from rclpy.node import Node
+from rclpy.qos import QoSProfile, ReliabilityPolicy
+from sensor_msgs.msg import JointState
+
+from cpg_ros.nodes.unserved import subscribe, taken
+from cpg_ros.robots.robot import Robot
+
+#: Joint states older than this tell nothing of where the joints are now, s.
+FRESH = 1.0
+
+
+class MeasuredPose:
+    """The newest joint states of a topic, read when they are asked for."""
+
+    def __init__(self, node: Node, robot: Robot, topic: str) -> None:
+        self._names = [joint.name for joint in robot.joints]
+        # Best effort goes with every publisher; several may share the topic.
+        self._subscription = subscribe(node, JointState, topic, QoSProfile(
+            depth=50, reliability=ReliabilityPolicy.BEST_EFFORT))
+
+    def take(self) -> np.ndarray | None:
+        """Return the angle of each joint, rad, leg by leg; None where nothing is published.
+
+        Raises:
+            ValueError: what is published does not have all joints.
+
+        """
+        found: dict[str, float] = {}
+        for message, arrived in taken(self._subscription):
+            if time.time_ns() - arrived < FRESH * 1e9:
+                found.update(zip(message.name, message.position, strict=False))
+        missing = [name for name in self._names if not math.isfinite(found.get(name, math.nan))]
+        if found and missing:
+            raise ValueError(f'{self._subscription.topic_name} has no angle of {missing[0]}')
+        return np.array([found[name] for name in self._names]) if found else None

@@ -1,0 +1,38 @@
+"""Subscriptions whose messages wait until they are taken."""
+
+from collections.abc import Iterator
+from typing import Any
+
+from rclpy.callback_groups import CallbackGroup
+from rclpy.node import Node
+from rclpy.qos import QoSProfile
+from rclpy.qos_overriding_options import QoSOverridingOptions
+from rclpy.subscription import Subscription
+
+
+class _Unserved(CallbackGroup):
+    """Keeps subscriptions from the executor."""
+
+    def can_execute(self, entity: object) -> bool:
+        return False
+
+    def beginning_execution(self, entity: object) -> bool:
+        return False
+
+    def ending_execution(self, entity: object) -> None:
+        pass
+
+
+def subscribe(node: Node, kind: type, topic: str, quality: QoSProfile) -> Subscription:
+    """Subscribe to a topic whose messages are only taken."""
+    return node.create_subscription(
+        kind, topic, lambda _: None, quality, callback_group=_Unserved(),
+        qos_overriding_options=QoSOverridingOptions.with_default_policies())
+
+
+def taken(subscription: Subscription) -> Iterator[tuple[Any, int]]:
+    """Take what has arrived: each message, and when it did, ns of system time."""
+    handle, kind = subscription.handle, subscription.msg_type
+    with handle:
+        while (found := handle.take_message(kind, False)) is not None:
+            yield found[0], found[1]['received_timestamp']
