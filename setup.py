@@ -33,6 +33,7 @@ setup(
         'generator = cpg_ros.nodes.generator:main',
         'robot_sim = cpg_ros.nodes.robot_sim:main',
         'inversion = cpg_ros.tools.inversion:main',
+        'cpg = cpg_ros.tools.cpg:main',
         'demo = cpg_ros.tools.demo:main',
         'analyze = cpg_ros.tools.analyze:main',
         'check_robot = cpg_ros.tools.check_robot:main',

@@ -35,5 +35,6 @@ def asked_for() -> dict[str, bool]:
 
 def _plain(parts: list[str]) -> list[str]:
     """Return a place in a file with a capital word for every name."""
-    return [NAMED[before] if before in NAMED and '[' not in part else re.sub(r'\[\d+\]', '[]', part)
+    return [NAMED[before] if before in NAMED and '[' not in part else
+            re.sub(r'\[\d+\]', '[]', part)
             for before, part in zip(['', *parts], parts, strict=False)]
