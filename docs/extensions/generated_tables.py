@@ -184,9 +184,8 @@ def arguments(name: str) -> str:
 
 def door(_: str) -> str:
     """Return what `import cpg_ros` gives."""
-    kinds = {name: 'autodata' if isinstance(thing := getattr(cpg_ros, name), dict) else
-             'autoclass' if isinstance(thing, type) else 'autofunction'
-             for name in cpg_ros.__all__}
+    kinds = {name: 'autoclass' if isinstance(thing := getattr(cpg_ros, name), type) else
+             'autofunction' if callable(thing) else 'autodata' for name in cpg_ros.__all__}
     return rst(f'.. {kind}:: cpg_ros.{name}\n' + ('   :no-value:\n' if kind == 'autodata' else
                                                  '   :members:\n' * (kind == 'autoclass'))
                for name, kind in kinds.items())
