@@ -4,4 +4,5 @@ Imports every room; nothing imports it.
 """
 
 __all__ = ['analysis_plot', 'analysis_report', 'analyze', 'arguments', 'check_robot', 'demo',
-           'gait_diagram', 'inversion', 'optimize', 'reproduce', 'reproduction_report', 'tune']
+           'executables', 'gait_diagram', 'inversion', 'optimize', 'reproduce',
+           'reproduction_report', 'tune']
