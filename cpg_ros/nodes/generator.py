@@ -264,7 +264,7 @@ def compile_kernels(network: str) -> None:
 
 def main(args: list[str] | None = None) -> int:
     """Run the node until SIGINT or SIGTERM; return the exit code."""
-    known = {'network': NETWORK, **specs(NETWORK.default)}
+    known = {'network': NETWORK, **specs(find_network(NETWORK.default))}
     code = asked_for_help('generator', 'Publishes the joint states of a gait; the parameters of '
                           'the networks are listed by ros2 param describe.', known, args)
     return run(Generator, NAME, args) if code is None else code
