@@ -78,7 +78,7 @@ class Feedback:
         if gains.placement:
             self._stepped = placement.advance(
                 self._stepped, swinging, placement.step(velocity, turning, gains),
-                velocity[:, 1], gains, dt)
+                velocity, gains, dt)
             way[..., :2] += self._stepped
         if gains.reflexes:
             way[..., 2] += self._reflexes.advance(estimate.contact, swinging, progress,
@@ -86,7 +86,7 @@ class Feedback:
         if gains.slope:
             way[..., :2] += slope.shift(self._ground, gains)[:, None]
         self.way += (1.0 - math.exp(-dt / gains.smooth)) * (share * way - self.way)
-        self.hurry = 1.0 + share * (pace.hurry(velocity[:, 1], gains) - 1.0) * gains.pace
+        self.hurry = 1.0 + share * (pace.hurry(velocity, gains) - 1.0) * gains.pace
         self._steer(-velocity[:, 0], wanted, course, dt, share)
         return displace(self.geometry, planned, feet, self.way)
 

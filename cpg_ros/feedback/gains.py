@@ -57,7 +57,9 @@ class Gains:
     step_most: float = 0.136
     step_decay: float = 3.1
     give: float = 0.55
+    give_ahead: float = 0.0
 
+    pace_ahead: float = 0.0
     pace_from: float = 0.25
     pace_gain: float = 2.4
     pace_most: float = 0.6

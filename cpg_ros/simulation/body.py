@@ -159,6 +159,11 @@ class Body:
         return self._pose[3:]
 
     @property
+    def rates(self) -> np.ndarray:
+        """Velocity in the world's frame, m/s, then angular velocity in the base's, rad/s."""
+        return self._rates
+
+    @property
     def twist(self) -> np.ndarray:
         """Velocity in m/s (x y z), then angular velocity in rad/s, both in the base's frame."""
         matrix = self._matrix()

@@ -23,8 +23,9 @@ from cpg_ros.simulation.batch import PUSH
 from cpg_ros.simulation.body import FALLEN, Body
 from cpg_ros.simulation.leg_geometry import read_geometry
 from cpg_ros.simulation.model_indices import Anatomy
+from cpg_ros.simulation.proprioception import felt
 from cpg_ros.simulation.robot_model import engine
-from cpg_ros.simulation.run_metrics import BEGINNING, GRAVITY
+from cpg_ros.simulation.run_metrics import BEGINNING
 from cpg_ros.simulation.terrain import Terrain, add_ground, lay
 
 #: From the stand into the gait, s.
@@ -188,21 +189,10 @@ class ClosedLoop:
         model, parts = self.body.model, self.parts
         moving = state[:, 1 + model.nq:1 + model.nq + model.nv]
         free = int(model.jnt_dofadr[model.body_jntadr[parts.base]])
-        w, x, y, z = state[:, 1 + parts.pose[3:]].T
-        lean = np.stack([np.arctan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y)),
-                         np.arcsin(np.clip(2.0 * (w * y - z * x), -1.0, 1.0)),
-                         np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))], axis=1)
-        axes = np.stack([1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y),
-                         2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x),
-                         2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-                        axis=1).reshape(-1, 3, 3)
-        faster = (moving[:, free:free + 3] - before[:, free:free + 3]) / self.timestep
-        faster[:, 2] += GRAVITY
-        push, velocity = (np.einsum('rij,ri->rj', axes, one)
-                          for one in (faster, moving[:, free:free + 3]))
-        return Senses(state[:, 1 + parts.angles[order]], moving[:, parts.speeds[order]],
-                      -sensors[:, :3 * legs].reshape(-1, legs, 3)[:, :, 2], lean,
-                      moving[:, free + 3:free + 6], push), velocity
+        return felt(state[:, 1 + parts.angles[order]], moving[:, parts.speeds[order]],
+                    -sensors[:, :3 * legs].reshape(-1, legs, 3)[:, :, 2],
+                    state[:, 1 + parts.pose[3:]], moving[:, free:free + 6],
+                    before[:, free:free + 6], self.timestep)
 
     def _work(self, control: np.ndarray, senses: Senses, order: np.ndarray) -> np.ndarray:
         """Power of the motors, none regained, W, shape (runs, 1)."""

@@ -39,8 +39,8 @@ def read_geometry(body: Body, parts: Anatomy) -> Geometry:
         upper, lower = np.diff(np.stack([*anchors[1:], data.geom_xpos[foot] - base]), axis=0)
         links = [complex(link[2], link[0]) for link in (upper, lower)]
         bend = turns[2] * chain[-1].offset + np.angle(links[1] / links[0])
-        columns = [names.index(joint.name) for joint in chain]
-        rows.append((columns if len(columns) == 3 else [columns[0], *columns], turns, anchors[0],
+        own = [names.index(joint.name) for joint in chain]
+        rows.append((own if len(own) == 3 else [own[0], *own], turns, anchors[0],
                      # What the links themselves are off sideways belongs to the leg's plane.
                      anchors[1] - anchors[0] + [0.0, upper[1] + lower[1], 0.0], *links,
                      1.0 if np.sin(bend) >= 0.0 else -1.0))
