@@ -15,6 +15,9 @@ from cpg_ros.feedback.timetable import Timetable
 from cpg_ros.motion.pattern import Pattern
 from cpg_ros.motion.plan import Program
 
+#: Joints are where they are told to be a little later: corrections come ahead by this, cycles.
+LEAD = 0.04
+
 
 class Feedback:
     """The feedback of one gait, of as many robots as there are runs.
@@ -62,7 +65,7 @@ class Feedback:
         """
         gains, estimate = self.gains, self.estimate
         estimate.update(senses, dt)
-        swinging, progress = self.timetable(phase)
+        swinging, progress = self.timetable(phase + LEAD)
         feet = forward(self.geometry, planned)
         own = self.expected(phase, wanted)
         velocity = estimate.velocity[:, :2] - own[:, :2]
@@ -78,7 +81,7 @@ class Feedback:
         if gains.placement:
             self._stepped = placement.advance(
                 self._stepped, swinging, placement.step(velocity, turning, gains),
-                velocity, gains, dt)
+                velocity[:, 1], gains, dt)
             way[..., :2] += self._stepped
         if gains.reflexes:
             way[..., 2] += self._reflexes.advance(estimate.contact, swinging, progress,

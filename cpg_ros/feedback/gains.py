@@ -18,7 +18,7 @@ class Gains:
         step_most: most that a foot is placed elsewhere, m.
         step_decay: rate at which that is given up in stance, 1/s.
         give: share of the sideways velocity that feet in stance yield to.
-        pace_from: sideways velocity error at which strides get faster, m/s.
+        pace_from: velocity error at which strides get faster, m/s.
         pace_gain: share of the frequency per m/s above that.
         pace_most: largest share.
         lift: of a foot that meets something while it swings forward, m.
@@ -50,16 +50,14 @@ class Gains:
     pitch_rate: float = 0.062
     posture_most: float = 0.08
 
-    step: float = 0.141
+    step: float = 0.16
     step_pitch_rate: float = 0.045
     step_roll_rate: float = 0.01
     step_filter: float = 0.032
-    step_most: float = 0.136
+    step_most: float = 0.17
     step_decay: float = 3.1
     give: float = 0.55
-    give_ahead: float = 0.0
 
-    pace_ahead: float = 0.0
     pace_from: float = 0.25
     pace_gain: float = 2.4
     pace_most: float = 0.6

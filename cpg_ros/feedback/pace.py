@@ -1,4 +1,4 @@
-"""Pace: a body that is pushed sideways steps faster."""
+"""Pace: a body that is pushed steps faster."""
 
 import numpy as np
 
@@ -13,6 +13,6 @@ def hurry(velocity: np.ndarray, gains: Gains) -> np.ndarray:
         gains: of the law.
 
     """
-    pushed = np.hypot(gains.pace_ahead * velocity[:, 0], velocity[:, 1])
+    pushed = np.hypot(velocity[:, 0], velocity[:, 1])
     return 1.0 + np.clip(gains.pace_gain * (pushed - gains.pace_from),
                          0.0, gains.pace_most)

@@ -22,7 +22,7 @@ def step(velocity: np.ndarray, turning: np.ndarray, gains: Gains) -> np.ndarray:
     return np.clip(far, -gains.step_most, gains.step_most)
 
 
-def advance(way: np.ndarray, swinging: np.ndarray, wanted: np.ndarray, velocity: np.ndarray,
+def advance(way: np.ndarray, swinging: np.ndarray, wanted: np.ndarray, sideways: np.ndarray,
             gains: Gains, dt: float) -> np.ndarray:
     """Move feet in the air to their steps, and let those on the ground go back, yielding.
 
@@ -30,12 +30,12 @@ def advance(way: np.ndarray, swinging: np.ndarray, wanted: np.ndarray, velocity:
         way: by which feet are displaced, m, shape (runs, legs, 2).
         swinging: shape (runs, legs).
         wanted: as of step, shape (runs, 2).
-        velocity: as of step, m/s, shape (runs, 2).
+        sideways: velocity to the left beyond what is expected, m/s, shape (runs,).
         gains: of the law.
         dt: s.
 
     """
     swung = way + (1.0 - math.exp(-dt / gains.step_filter)) * (wanted[:, None] - way)
     stood = way * math.exp(-gains.step_decay * dt)
-    stood -= dt * (np.array([gains.give_ahead, gains.give]) * velocity)[:, None]
+    stood[..., 1] -= gains.give * dt * sideways[:, None]
     return np.clip(np.where(swinging[..., None], swung, stood), -gains.step_most, gains.step_most)
