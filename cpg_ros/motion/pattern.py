@@ -8,6 +8,7 @@ move whenever a joint would exceed the speed that the gaits themselves reach, an
 
 import math
 from collections import deque
+from collections.abc import Callable
 
 import numpy as np
 
@@ -37,6 +38,8 @@ class Pattern:
         position, velocity: of each joint, rad and rad/s, leg by leg; overwritten by advance.
         faults: times the watchdog had to put the network back on its orbit.
         held: ticks in which a limit held a joint back.
+        correct: takes and returns angles before limits hold them; None for the gait as it is.
+        hurry: factor of the pattern's clock.
 
     """
 
@@ -48,6 +51,8 @@ class Pattern:
         self._leg = robot.leg_of_joint
         self.faults = 0
         self.held = 0
+        self.correct: Callable[[np.ndarray], np.ndarray] | None = None
+        self.hurry = 1.0
         self._offset, self._lower = robot.column('offset'), robot.column('lower')
         self._upper, self._limit = robot.column('upper'), robot.column('velocity')
         self._requests: deque = deque()
@@ -63,6 +68,7 @@ class Pattern:
         self._tracks = [newest]
         self.position, self.velocity = self._offset.copy(), np.zeros_like(self._offset)
         self._wanted, self._rate = self.position.copy(), self.velocity.copy()
+        self._corrected = np.zeros_like(self._offset)
         self._jump: tuple[np.ndarray, np.ndarray] | None = None
         self._absorbed = ABSORB
         self._recovering = False
@@ -148,14 +154,21 @@ class Pattern:
             self._take_requests()
         slow = self._resumption
         clock, share = slow.advance(dt) if slow.active else (dt, 1.0)
+        clock, share = self.hurry * clock, self.hurry * share
         calm = (len(self._tracks) == 1 and not (self._ramps or self._leading)
                 and self._absorbed >= ABSORB)
         if not (calm and self._cruise(clock)):
             parts = max(1, math.ceil(clock / SUBSTEP - 1e-9))
             for _ in range(parts):
                 self._step(clock / parts)
-        rate = self._rate if share == 1.0 else share * self._rate
-        self.held += confine(self._wanted, rate, self._lower, self._upper, self._limit,
+        wanted, rate = self._wanted, self._rate if share == 1.0 else share * self._rate
+        if self.correct is not None:
+            wanted = self.correct(wanted)
+            correction = wanted - self._wanted
+            if dt > 0.0:
+                rate = rate + (correction - self._corrected) / dt
+            self._corrected = correction
+        self.held += confine(wanted, rate, self._lower, self._upper, self._limit,
                              dt, self.position, self.velocity) > 0
 
     def resume(self, stall: float) -> None:
