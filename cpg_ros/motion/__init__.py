@@ -7,5 +7,5 @@ from cpg_ros.errors import needed
 
 needed('numba')
 
-__all__ = ['joint_readout', 'pattern', 'phase_readout', 'plan', 'precompile', 'readout',
+__all__ = ['joint_readout', 'pattern', 'phase_readout', 'plan', 'precompile', 'ramp', 'readout',
            'resumption', 'runnable', 'smoothstep', 'steering', 'track']

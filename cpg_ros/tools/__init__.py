@@ -4,5 +4,5 @@ Imports every room; nothing imports it.
 """
 
 __all__ = ['analysis_plot', 'analysis_report', 'analyze', 'arguments', 'check_robot', 'cpg',
-           'demo', 'gait_diagram', 'inversion', 'optimize', 'reproduce', 'reproduction_report',
-           'tune']
+           'demo', 'executables', 'gait_diagram', 'inversion', 'optimize', 'reproduce',
+           'reproduction_report', 'tune']
