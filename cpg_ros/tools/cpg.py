@@ -183,8 +183,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(f'cpg: {error}', file=sys.stderr)
         return 1
     except (NameValidationException, RuntimeError) as error:
-        # The name of a node or topic, or the domain in the environment.
-        print(f'cpg: {str(error).splitlines()[0]}', file=sys.stderr)
+        # The name of a node or topic, or the domain in the environment; what follows is about
+        # the sources of rclpy.
+        print(f"cpg: {str(error).splitlines()[0].partition(', at /')[0]}", file=sys.stderr)
         return 2
     except KeyboardInterrupt:
         return 130
