@@ -1,10 +1,23 @@
 """Kernels on disk: compiled for one network in one process, loaded with others in the next."""
 
 import os
+import shutil
 import subprocess
 import sys
+from pathlib import Path
+
+import pytest
+
+import cpg_ros
+from cpg_ros.files.shared_resources import share
 
 WARM = 'from cpg_ros.motion.precompile import precompile; precompile({network!r})'
+STEP = '''
+import numpy as np
+from cpg_ros.integration.stepper import Stepper
+from cpg_ros.networks.biped import Biped
+Stepper(Biped.symmetric(0.229, 0.254, 0.39, -0.681, 0.489), np.zeros(8)).advance(0.1)
+'''
 CHECK = '''
 import numpy as np
 from cpg_ros.integration.stepper import Stepper
@@ -32,3 +45,65 @@ def test_networks_compiled_apart_keep_their_own_code(tmp_path):
                            stdout=subprocess.PIPE, text=True)
     assert found.stdout == 'agree\n'
     assert sorted(tmp_path.rglob('*.nbc')) == before, 'the cache was not used'
+
+
+@pytest.mark.parametrize('source', ['integration/jit.py', 'motion/readout.py',
+                                    'networks/derivation.py'])
+def test_a_changed_source_is_compiled_again(tmp_path, source):
+    # numba watches only the file that a kernel stands in, and the rooms have several.
+    package = tmp_path / 'package'
+    shutil.copytree(Path(cpg_ros.__file__).parent, package / 'cpg_ros',
+                    ignore=shutil.ignore_patterns('__pycache__'))
+    shutil.copytree(share() / 'config', package / 'config')
+    cache = tmp_path / 'cache'
+    environment = dict(os.environ, NUMBA_CACHE_DIR=str(cache), PYTHONPATH=os.pathsep.join(
+        [str(package), os.environ.get('PYTHONPATH', '')]))
+
+    def kernels_after_a_start():
+        subprocess.run([sys.executable, '-c', STEP], env=environment, check=True, cwd=package)
+        return sorted(cache.rglob('*.nbc'))
+
+    first = kernels_after_a_start()
+    assert first and kernels_after_a_start() == first
+    changed = package / 'cpg_ros' / source
+    changed.write_text(changed.read_text() + '\n# Changed.\n')
+    assert set(kernels_after_a_start()) > set(first)
+
+
+RUN = """
+import sys, tempfile
+if {nowhere}:
+    tempfile.tempdir = '/dev/null'
+import cpg_ros
+from cpg_ros.motion.precompile import precompile
+assert cpg_ros.__file__.startswith(sys.argv[1])
+precompile('delayed')
+"""
+
+
+@pytest.mark.parametrize('nowhere', [False, True], ids=['temporary', 'nowhere'])
+def test_it_starts_where_neither_the_package_nor_the_home_can_be_written(tmp_path, nowhere):
+    package, scratch = tmp_path / 'read_only', tmp_path / 'scratch'
+    scratch.mkdir()
+    shutil.copytree(Path(cpg_ros.__file__).parent, package / 'cpg_ros',
+                    ignore=shutil.ignore_patterns('__pycache__'))
+    shutil.copytree(Path(cpg_ros.__file__).resolve().parents[1] / 'config', package / 'config')
+    for room in [folder for folder in package.rglob('*') if folder.is_dir()]:
+        # Whoever runs this, root too, can make no folder where a file is.
+        (room / '__pycache__').touch()
+    environment = {key: value for key, value in os.environ.items()
+                   if key not in ('NUMBA_CACHE_DIR', 'XDG_CACHE_HOME')}
+    environment |= {'HOME': '/dev/null', 'TMPDIR': str(scratch), 'PYTHONPATH': str(package)}
+    seen = []
+    for _ in range(1 if nowhere else 2):
+        run = subprocess.run([sys.executable, '-c', RUN.format(nowhere=nowhere), str(package)],
+                             env=environment, cwd=package, capture_output=True,
+                             text=True)
+        assert run.returncode == 0, run.stderr
+        seen.append(sorted(scratch.rglob('*.nbc')))
+        (line,) = run.stderr.splitlines()
+        assert line.startswith(f'compiled code cannot be kept in {package}/cpg_ros/')
+        assert line.endswith('nor in a temporary folder: it is compiled at every start' if nowhere
+                             else f': kept in {scratch / f"cpg_ros-{os.getuid()}"}')
+    assert bool(seen[0]) is not nowhere
+    assert seen[0] == seen[-1], 'the cache was not used'

@@ -47,7 +47,9 @@ def test_another_name_is_not():
 @pytest.mark.parametrize('room', ROOMS, ids=lambda room: room.name)
 def test_every_room_lists_its_modules(room):
     listed = importlib.import_module(f'cpg_ros.{room.name}').__all__
-    assert listed == sorted(file.stem for file in room.glob('*.py') if file.stem != '__init__')
+    folders = [one.parent for one in room.glob('*/__init__.py')]
+    assert listed == sorted(file.stem for file in (*room.glob('*.py'), *folders)
+                            if file.stem != '__init__')
 
 
 def test_the_package_says_that_it_is_typed():

@@ -104,8 +104,8 @@ class HopfPoint:
         double = characteristic_matrix(2.0 * axis, *expansion.linear(twice), delay)[0]
         ahead = expansion.heard(q, chi, axis)
         back, second = ahead.conj(), expansion.second
-        flat = expansion.heard(np.linalg.solve(still, second(ahead, back)), one)
-        fast = expansion.heard(np.linalg.solve(double, second(ahead, ahead)), twice, 2.0 * axis)
+        flat = expansion.heard(_moved(still, second(ahead, back)), one)
+        fast = expansion.heard(_moved(double, second(ahead, ahead)), twice, 2.0 * axis)
         k2 = 0.5 * (p @ (expansion.third(ahead, ahead, back) + 2.0 * second(ahead, flat)
                          + second(back, fast)))
 
@@ -121,7 +121,7 @@ class HopfPoint:
         axis, chi, (q, p) = 1j * self.omega, self.block.vector, self._eigenvectors
         one, late = np.ones_like(chi), np.exp(-axis * delay)
         still = characteristic_matrix(0.0, *expansion.linear(one), delay)[0]
-        moves = expansion.heard(np.linalg.solve(still, expansion.along(line)), one)
+        moves = expansion.heard(_moved(still, expansion.along(line)), one)
         now, past = expansion.linear_along(line, chi)
         change = (now + past * late) @ q + expansion.second(moves, expansion.heard(q, chi, axis))
         if self.network.delay_parameter in line.names:
@@ -145,7 +145,7 @@ class HopfPoint:
 
         The critical root stays on the axis: what one parameter moves it by, the line takes back.
         """
-        back = -self.normal_form.k1.real
+        back = -self._speed(self.line).real
         return {name: self._speed(ParameterLine((name,), (1.0,))).real / back
                 for name in self.network.parameters() if name not in self.line.names}
 
@@ -254,6 +254,11 @@ class HopfPoint:
         swing = self.normal_form.radius(value - self.value) * np.concatenate(
             [entry * turning for entry in self.vector], axis=1)
         return everywhere(network, equilibrium(network)) + 2.0 * swing.real
+
+
+def _moved(matrix: np.ndarray, push: np.ndarray) -> np.ndarray:
+    """Solve for what a push moves; where there is none, a singular matrix does not matter."""
+    return np.linalg.solve(matrix, push) if push.any() else np.zeros_like(push)
 
 
 def first_hopf(network: Network, gait: str) -> HopfPoint | None:

@@ -10,9 +10,9 @@ from typing import Any
 
 import sympy
 
-from cpg_ros.integration.loops import Program, Writer
+from cpg_ros.integration.loops import LoopProgram, Writer
 from cpg_ros.networks.derivation import expressions
-from cpg_ros.networks.equations import Equations
+from cpg_ros.networks.equations import Equations, Source
 
 
 def _share_exponentials(parts: list[Any]) -> tuple[list[Any], dict[Any, Any]]:
@@ -86,11 +86,12 @@ def kernel_source(equations: Equations) -> str:
     driven, rest = _split(rates, delayed, now)
     variables = len(rates)
     texts, most, extra = [], 0, 0
+    sources: dict[Source, int] = {}
     for name, results, state in (('drive', driven, 'past'), ('field', rest, 'z')):
         if not results:
             continue
         results, powers = _share_exponentials(results)
-        program = Program([(symbol, one) for symbol, one in arguments
+        program = LoopProgram([(symbol, one) for symbol, one in arguments
                             if one.delayed == (name == 'drive')], powers)
         lowered = [program.lowered(part) for part in results]
         used = {str(symbol) for part in (*lowered, *(call for _, call in program.functions),
@@ -104,7 +105,7 @@ def kernel_source(equations: Equations) -> str:
         slices += [f'p_{row} = p[{r}]' for r, row in enumerate(equations.rows)
                    if f'p_{row}' in used]
         slices += [f'o{k} = out[{k} * m:{k + 1} * m]' for k in range(len(results))]
-        writer = Writer(program)
+        writer = Writer(program, sources)
         most, extra = max(most, writer.arrays), max(extra, writer.extra)
         writer.loops([(f'o{k}', part) for k, part in enumerate(lowered)])
         head = ('n, past, p, lanes, work, out' if name == 'drive'
@@ -118,5 +119,7 @@ def kernel_source(equations: Equations) -> str:
     head = ''.join(line + '\n' for line in (
         f'from math import {", ".join(others)}' if others else '',
         f'from cpg_ros.integration.jit import {", ".join(known)}' if known else '') if line)
-    return (f'{head}\nDRIVEN, WORK, EXTRA = {len(driven)}, {most}, {extra}\n\n\n'
+    head += 'from numpy import array\n' if sources else ''
+    places = ''.join(f'SOURCE_{k} = array({source!r})\n' for source, k in sources.items())
+    return (f'{head}\n{places}DRIVEN, WORK, EXTRA = {len(driven)}, {most}, {extra}\n\n\n'
             f'def compiled(decorate):\n{code}\n    return {"drive" if driven else None}, field\n')

@@ -7,13 +7,21 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numba import njit
+from numba import config, njit
+
+from cpg_ros.networks import generated
+
+#: Whether machine code can be kept; numba reads where, if not beside its source.
+KEPT = generated.folder() is not None
+config.reload_config()
 
 #: No division checks (they keep loops from being vectorised), fused multiply-add allowed,
 #: and the interpreter lock released: the publishing thread must not wait for parameters.
 OPTIONS: dict[str, Any] = {'error_model': 'numpy', 'fastmath': {'contract'}, 'nogil': True}
 
 jit = njit(**OPTIONS)
+#: For entry points, whose machine code is kept on disk.
+entry = njit(cache=KEPT, **OPTIONS)
 #: For what is built into its caller, where a loop of known length can be unrolled.
 part = njit(inline='always', **OPTIONS)
 

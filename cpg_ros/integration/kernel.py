@@ -23,7 +23,7 @@ from typing import Any
 import numpy as np
 from numba import njit, prange
 
-from cpg_ros.integration.jit import OPTIONS, jit, part, renamed, sources_digest
+from cpg_ros.integration.jit import KEPT, OPTIONS, jit, part, renamed, sources_digest
 from cpg_ros.networks import generated
 from cpg_ros.networks.equations import equations_of
 from cpg_ros.networks.network import Network
@@ -283,7 +283,7 @@ def _cached(digest, network, components, **functions):
 
     def ready(function, parallel=False):
         mine = renamed(_with(function, functions), network)
-        return njit(cache=True, parallel=parallel, **OPTIONS)(mine)
+        return njit(cache=KEPT, parallel=parallel, **OPTIONS)(mine)
 
     return Kernels(ready(set_slope), ready(advance), ready(integrate_one), ready(integrate),
                    ready(integrate_many, parallel=True))

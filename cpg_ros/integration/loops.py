@@ -6,7 +6,6 @@ compilers turn into vector instructions.
 """
 
 from collections.abc import Sequence
-from itertools import groupby
 from typing import Any
 
 import sympy
@@ -16,16 +15,16 @@ from cpg_ros.networks.derivation import print_float
 from cpg_ros.networks.equations import Argument, Source
 
 
-class _Printer(PythonCodePrinter):  # type: ignore[misc]
+class _KernelPrinter(PythonCodePrinter):  # type: ignore[misc]
     """Python, numbers to the last digit."""
 
     _print_Float = print_float
 
 
-_PRINTER = _Printer({'fully_qualified_modules': False})
+_PRINTER = _KernelPrinter({'fully_qualified_modules': False})
 
 
-class Program:
+class LoopProgram:
     """Loops that work out expressions of arguments that are all heard at one time."""
 
     def __init__(self, arguments: Sequence[tuple[Any, Argument]], powers: dict[Any, Any]
@@ -88,8 +87,8 @@ class Program:
 class Writer:
     """Writes the loops of a program as the body of a function."""
 
-    def __init__(self, program: Program) -> None:
-        self._program = program
+    def __init__(self, program: LoopProgram, sources: dict[Source, int]) -> None:
+        self._program, self.sources = program, sources
         self.lines: list[str] = []
         #: Fetched array -> by how many cells it is behind the array that it is fetched from.
         self.rings: dict[str, int] = {}
@@ -156,41 +155,5 @@ class Writer:
             self.lines += [f'to, of = {target}[:{turn} * lanes], {array}[m - {turn} * lanes:m]',
                            f'for i in range({turn} * lanes):', '    to[i] = of[i]']
             return
-        for block in _blocks(source):
-            indent, here, there, length = self._places(block)
-            self.lines += [f'{indent}a, b = {here}, {there}',
-                           f'{indent}to, of = {target}[a:a + {length} * lanes], '
-                           f'{array}[b:b + {length} * lanes]',
-                           f'{indent}for i in range({length} * lanes):',
-                           f'{indent}    to[i] = of[i]']
-
-    def _places(self, block: tuple[int, int, int, int, int, int]) -> tuple[str, str, str, int]:
-        """Open a loop over a block; return the indentation, its two places, and its length."""
-        begin, there, length, count, stride, step = block
-        if count == 1:
-            return '', f'{begin} * lanes', f'{there} * lanes', length
-        self.lines.append(f'for k in range({count}):')
-        return ('    ', f'({begin} + {stride} * k) * lanes', f'({there} + {step} * k) * lanes',
-                length)
-
-
-def _blocks(source: Source) -> list[tuple[int, int, int, int, int, int]]:
-    """Part the cells into blocks (begin, source, length, how many, their stride, its step)."""
-    runs = []
-    for _, group in groupby(enumerate(source), lambda at: at[1] - at[0]):
-        run = list(group)
-        runs.append((run[0][0], run[0][1], len(run)))
-    found = []
-    while runs:
-        begin, there, length = runs[0]
-        best = [runs[0]]
-        for other in runs[1:]:
-            stride, step = other[0] - begin, other[1] - there
-            chain = [(begin + k * stride, there + k * step, length) for k in range(len(runs))]
-            missing = (k for k, one in enumerate(chain) if one not in runs)
-            best = max(best, chain[:next(missing, len(chain))], key=len)
-        stride = best[1][0] - begin if len(best) > 1 else 0
-        step = best[1][1] - there if len(best) > 1 else 0
-        found.append((begin, there, length, len(best), stride, step))
-        runs = [run for run in runs if run not in best]
-    return found
+        place = self.sources.setdefault(source, len(self.sources))
+        self.lines.append(f'fetch(lanes, SOURCE_{place}, {array}, {target})')

@@ -19,10 +19,9 @@ import math
 from functools import lru_cache
 
 import numpy as np
-from numba import njit
 
 from cpg_ros.dynamics.periodic import Orbit
-from cpg_ros.integration.jit import OPTIONS, sources_digest
+from cpg_ros.integration.jit import entry, sources_digest
 from cpg_ros.motion.readout import TURN, NoPhase, monomials
 
 #: Points of a cycle in the tables of an orbit: a cell may jump within a hundredth of a cycle.
@@ -42,7 +41,7 @@ LEAST_SHARE = 0.1
 def _cached(digest):
     """Build the cached entry point; see sources_digest for why it is a closure."""
 
-    @njit(cache=True, **OPTIONS)
+    @entry
     def observe_phases(now, strides, waves, phases, shape, circles, tables, harmonics, crests,
                        cells, weights, leg_cells, clocks, angle, rise, legs):
         """Let the cells' clocks go on and read joints and legs off them.

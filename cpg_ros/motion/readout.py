@@ -7,11 +7,10 @@ the gait's peak, y its derivative by phase. See phase_readout for those whose ph
 import math
 
 import numpy as np
-from numba import njit
 
 from cpg_ros.dynamics.periodic import Orbit
 from cpg_ros.errors import CpgError
-from cpg_ros.integration.jit import OPTIONS, jit, sources_digest
+from cpg_ros.integration.jit import entry, jit, sources_digest
 
 #: Entries of the tables over one cycle.
 TABLE = 512
@@ -38,7 +37,7 @@ def lookup(table, cycles):
 def _cached(digest):
     """Build the cached entry points; see sources_digest for why they are closures."""
 
-    @njit(cache=True, **OPTIONS)
+    @entry
     def observe(now, peak, period, cells, weights, phases, leg_cells, wave, lead, angle, rise,
                 leg_phases):
         """Read joints and legs off a network's state.
@@ -88,7 +87,7 @@ def _cached(digest):
         # Whatever max makes of a NaN: it comes through the sum.
         return distance + 0.0 * sum_
 
-    @njit(cache=True, **OPTIONS)
+    @entry
     def confine(wanted, wanted_rate, lower, upper, speed, dt, position, velocity):
         """Move position to the wanted one within the joints' limits; count those held back.
 

@@ -1,7 +1,10 @@
 """Code that is generated from a network's equations, kept on disk between processes."""
 
+import contextlib
 import importlib.util
+import logging
 import os
+import stat
 import sys
 import tempfile
 from collections.abc import Callable
@@ -11,25 +14,51 @@ from types import ModuleType
 
 from cpg_ros.files.atomic_write import write_atomically
 
+_LOGGER = logging.getLogger(__name__)
+
 
 @cache
-def folder() -> Path:
-    """Return where generated code is kept, created if need be.
+def folder() -> Path | None:
+    """Return where generated code and numba's machine code are kept, created if need be.
 
-    As numba's own cache: ``NUMBA_CACHE_DIR`` if it is set, else beside the package where that can
-    be written to, else among the user's caches, else a temporary folder of this process.
+    ``NUMBA_CACHE_DIR`` if it is set, else beside the package, else among the user's caches, else
+    one temporary folder a user, to which ``NUMBA_CACHE_DIR`` is set. None if nothing can be
+    written; either is said.
     """
     own = Path(__file__).resolve().parent / '__pycache__'
-    wanted = [Path(os.environ['NUMBA_CACHE_DIR'])] if os.environ.get('NUMBA_CACHE_DIR') else [
-        own, Path(os.environ.get('XDG_CACHE_HOME') or Path.home() / '.cache') / 'cpg_ros']
+    wanted = [own, Path(os.environ.get('XDG_CACHE_HOME') or '~/.cache').expanduser() / 'cpg_ros']
+    if os.environ.get('NUMBA_CACHE_DIR'):
+        wanted.insert(0, Path(os.environ['NUMBA_CACHE_DIR']))
     for place in wanted:
-        try:
+        with contextlib.suppress(OSError):
             place.mkdir(parents=True, exist_ok=True)
-        except OSError:
-            continue
-        if os.access(place, os.W_OK):
-            return place
-    return Path(tempfile.mkdtemp(prefix='cpg_ros_'))
+            if os.access(place, os.W_OK):
+                return place
+    tried = f'compiled code cannot be kept in {" or ".join(map(str, wanted))}'
+    with contextlib.suppress(OSError):
+        place = _temporary()
+        os.environ['NUMBA_CACHE_DIR'] = str(place)
+        _LOGGER.warning('%s: kept in %s', tried, place)
+        return place
+    _LOGGER.warning('%s, nor in a temporary folder: it is compiled at every start', tried)
+    return None
+
+
+def _temporary() -> Path:
+    """Return a temporary folder that is the user's alone: what is in it will be run.
+
+    Raises:
+        OSError: there is none.
+
+    """
+    user = os.getuid() if hasattr(os, 'getuid') else 0
+    place = Path(tempfile.gettempdir()) / f'cpg_ros-{user}'
+    with contextlib.suppress(FileExistsError):
+        place.mkdir(mode=0o700)
+    found = place.lstat()
+    if found.st_uid != user or found.st_mode != stat.S_IFDIR | 0o700:
+        return Path(tempfile.mkdtemp(prefix='cpg_ros-'))
+    return place
 
 
 def load(name: str, write: Callable[[], str]) -> ModuleType:
@@ -40,9 +69,14 @@ def load(name: str, write: Callable[[], str]) -> ModuleType:
         write: makes the text.
 
     """
-    path, known = folder() / f'{name}.py', f'cpg_ros_generated_{name}'
+    place, known = folder(), f'cpg_ros_generated_{name}'
     if known in sys.modules:
         return sys.modules[known]
+    if place is None:
+        module = sys.modules[known] = ModuleType(known)
+        exec(compile(write(), known, 'exec'), vars(module))
+        return module
+    path = place / f'{name}.py'
     if not path.exists():
         write_atomically(path, write())
     spec = importlib.util.spec_from_file_location(known, path)

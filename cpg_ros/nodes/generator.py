@@ -1,7 +1,6 @@
 """The generator node: a central pattern generator that publishes joint states in real time."""
 
 import sys
-import threading
 import time
 from pathlib import Path
 
@@ -249,22 +248,24 @@ class Generator(StartedNode):
 
 
 def compile_kernels(network: str) -> None:
-    """Compile or load the numerical kernels, saying so where it takes long."""
-    logger = get_logger(NAME)
-    began = time.monotonic()
-    notice = threading.Timer(1.0, logger.info, ['compiling the numerical kernels; only the very '
-                                                'first start needs this (10 to 20 s)'])
-    notice.daemon = True
-    notice.start()
-    precompile(network)
-    notice.cancel()
-    if time.monotonic() - began > 1.0:
+    """Compile or load the numerical kernels, saying so if they are compiled."""
+    logger, began = get_logger(NAME), time.monotonic()
+    said: list[str] = []
+
+    def compiling() -> None:
+        if not said:
+            said.append('compiling the numerical kernels; only the very first start needs this '
+                        '(10 to 20 s)')
+            logger.info(said[0])
+
+    precompile(network, compiling)
+    if said:
         logger.info(f'compiled in {time.monotonic() - began:.1f} s')
 
 
 def main(args: list[str] | None = None) -> int:
     """Run the node until SIGINT or SIGTERM; return the exit code."""
-    known = {'network': NETWORK, **specs(NETWORK.default)}
+    known = {'network': NETWORK, **specs(find_network(NETWORK.default))}
     code = asked_for_help('generator', 'Publishes the joint states of a gait; the parameters of '
                           'the networks are listed by ros2 param describe.', known, args)
     return run(Generator, NAME, args) if code is None else code

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import lru_cache
 
 import numpy as np
 from scipy.optimize import brentq
@@ -28,6 +29,7 @@ def _delayed(network: Network, delay: float) -> Network:
 Describing = Callable[[float], tuple[complex, complex]]
 
 
+@lru_cache(maxsize=8)
 def _describing(network: Network, symmetry: Symmetry) -> Describing:
     """Return A and B of ``lambda = A + B exp(-lambda tau)`` as functions of an amplitude.
 
