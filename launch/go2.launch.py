@@ -40,23 +40,23 @@ COMMANDS = {'joint_states': 'none'}
 def nodes(context):
     """Return generator and simulation, which speak the same command and follow one clock."""
     command = LaunchConfiguration('command').perform(context)
-    unwanted, folders = {}, []
+    unwanted, folders = {}, {}
     for picture in ('film', 'footfalls'):
         path = Path(LaunchConfiguration(picture).perform(context)).expanduser()
         if str(path) == 'none':
             unwanted[picture] = ''
         else:
-            folders.append(path.parent)
+            folders[picture] = path.parent
     both = [started(context, 'generator', 'cpg_generator', {**BOTH, **GENERATOR}, {
                 'rate': 500.0, 'combined_topic': '', 'command': COMMANDS.get(command, command),
                 'use_sim_time': True}, on_exit=Shutdown()),
             started(context, 'robot_sim', 'robot_sim', {**BOTH, **SIMULATION}, {
                 'lockstep': True, **unwanted}, on_exit=Shutdown(), sigterm_timeout=DRAWING)]
-    for folder in folders:
+    for picture, folder in folders.items():
         try:
             folder.mkdir(parents=True, exist_ok=True)
         except OSError as error:
-            raise RuntimeError(f'{folder}: {error.strerror}') from error
+            raise RuntimeError(f'{picture}:= in {folder}: {error.strerror}') from error
     return both
 
 

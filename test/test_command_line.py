@@ -1,7 +1,11 @@
 """Every executable: help, and words that are not for it."""
 
 import os
+import resource
+import signal
 import subprocess
+from functools import partial
+from pathlib import Path
 
 import pytest
 from graph import EXECUTABLE, free_domain
@@ -41,3 +45,73 @@ def test_words_that_are_not_for_it(executable, words, said):
     assert found.returncode == 2 and not found.stdout
     assert len(found.stderr.splitlines()) == 1, found.stderr
     assert said in found.stderr
+
+
+@pytest.mark.parametrize(('words', 'code', 'said'), [
+    (['-p', 'combined_topic:=bad topic'], 1, "topic 'bad topic': failed to resolve name: "),
+    (['-p', 'autostart:=false', '-p', 'measured_topic:=9a'], 1, "topic '9a': failed to"),
+    (['-r', 'joint_states:=9 bad'], 2, "Couldn't parse remap rule: '-r joint_states:=9 bad'"),
+    (['--params-file', '/nix.yaml'], 2, "'--params-file /nix.yaml': Error opening YAML file"),
+    (['--params-file', 'nested.yaml'], 2, 'nested.yaml\': Sequences cannot be key at line 3'),
+    (['-p', 'qos_overrides./joint_states.publisher.reliability:=bogus'], 1,
+     "topic 'joint_states': Unexpected QoS override for policy `reliability`: `bogus`"),
+    (['-p', 'qos_overrides./joint_states.publisher.depth:=many'], 1, "topic 'joint_states': ")],
+    ids=['topic', 'listening', 'remap', 'missing file', 'nested', 'qos', 'depth'])
+def test_what_cannot_be_used_is_one_line(words, code, said, tmp_path):
+    nested = tmp_path / 'nested.yaml'
+    nested.write_text('/**:\n  ros__parameters:\n    gait: {a: {b: [[1, 2], [3]]}}\n')
+    found = run('generator', '--ros-args', *(str(nested) if word == nested.name else word
+                                             for word in words))
+    lines = [line for line in found.stderr.splitlines() + found.stdout.splitlines()
+             if 'the numerical kernels' not in line and 'compiled in' not in line]
+    assert found.returncode == code and len(lines) == 1, found.stderr
+    assert said in lines[0]
+
+
+@pytest.mark.parametrize(('domain', 'said'), [
+    ('999', 'ROS_DOMAIN_ID 999 is not from 0 to 232'),
+    ('abc', 'ROS_DOMAIN_ID is not an integral number')])
+def test_a_bad_domain_is_one_line(domain, said):
+    found = subprocess.run([EXECUTABLE], env=dict(os.environ, ROS_DOMAIN_ID=domain), text=True,
+                           capture_output=True, timeout=60, check=False)
+    assert found.returncode == 2
+    (line,) = found.stderr.splitlines()
+    assert said in line
+
+
+def test_a_full_disk_is_said_with_the_name_of_the_file(tmp_path):
+    urdf, made = Path(__file__).parent.parent / 'urdf' / 'quadruped.urdf', tmp_path / 'made.yaml'
+    # No file may grow: as on a full disk, the error of the system has no name in it.
+    none = partial(resource.setrlimit, resource.RLIMIT_FSIZE, (0, 0))
+
+    def make(where, **options):
+        return subprocess.run([EXECUTABLE.with_name('check_robot'), '--urdf', urdf, '--make',
+                               where], text=True, capture_output=True, timeout=60, **options)
+
+    for other in (tmp_path / 'one.yaml', tmp_path / 'two.yaml'):
+        # From now on all that it compiles is on disk.
+        assert make(other).returncode == 0
+        other.unlink()
+    found = make(made, preexec_fn=none)
+    assert found.returncode == 2
+    assert found.stderr == f'check_robot: {made}: File too large\n'
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize('executable', ['generator', 'analyze'])
+def test_an_interrupt_while_it_loads_is_one_line(executable, tmp_path):
+    # numpy loads slowly here.
+    (tmp_path / 'numpy.py').write_text('import time; print(flush=True); time.sleep(60.0)\n')
+    path = os.pathsep.join([str(tmp_path), os.environ.get('PYTHONPATH', '')])
+    process = subprocess.Popen([EXECUTABLE.with_name(executable)], text=True,
+                               env=dict(os.environ, PYTHONPATH=path), stdout=subprocess.PIPE,
+                               stderr=subprocess.PIPE)
+    process.stdout.readline()
+    process.send_signal(signal.SIGINT)
+    assert process.communicate(timeout=60)[1] == f'{executable}: stopped\n'
+    assert process.returncode == 130
+
+
+def test_a_second_start_compiles_nothing(start):
+    start(watch=False).wait_for('publishing')
+    assert 'compil' not in start(watch=False).wait_for('publishing').log

@@ -90,6 +90,8 @@ def test_a_bag_in_a_gait_out(bag, tmp_path, capsys):
     assert tree['delayed'] == said['params']
     robot = load_robot(tree['robot'])
     assert robot.order == tuple(name for name in walked()[0])
+    # By itself, too, the robot file knows how fast.
+    assert robot.motion('trot', 'trot').frequency == said['frequency']
     network = type(PRESETS['delayed']['trot'].network)(**tree['delayed'])
     orbit = solve_orbit(network, 'trot')
     theta = np.arange(100) / 100

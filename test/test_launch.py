@@ -13,7 +13,7 @@ from graph import free_domain
 from setuptools import find_packages
 
 from cpg_ros.networks.registry import NETWORKS, PRESETS
-from cpg_ros.nodes.generator_parameters import USUAL, Planner, specs
+from cpg_ros.nodes.generator_parameters import Planner, specs
 from cpg_ros.nodes.inversion_node import Inversion
 from cpg_ros.robots.robot_file import find_robot
 
@@ -33,9 +33,9 @@ def executables():
 
 def of_generator(network):
     """Parameters of the generator: name -> spec."""
-    robot, gait = USUAL[network]
-    planner = Planner(NETWORKS[network], PRESETS[network], find_robot(robot))
-    return specs(network) | planner.specs(gait)
+    kind = NETWORKS[network]
+    planner = Planner(kind, PRESETS[network], find_robot(kind.usual_robot))
+    return specs(kind) | planner.specs(kind.usual_gait)
 
 
 class Stub:
@@ -88,7 +88,8 @@ def described(monkeypatch):
             else:
                 described.includes.append(entity.arguments[0].arguments[0])
         assert not set(given) - set(described.arguments) or name == 'rviz'
-        context = {'namespace': '', 'use_sim_time': 'false', **described.arguments, **given}
+        context = {'namespace': '', 'params_file': '', 'use_sim_time': 'false',
+                   **described.arguments, **given}
         described.nodes = [node for function in functions for node in function(context) or ()]
         described.context = context
         return described
@@ -171,6 +172,24 @@ def test_what_is_empty_is_left_to_the_generator(described):
 def test_an_argument_of_another_kind_is_named(described, name, given, words):
     with pytest.raises(RuntimeError, match=words):
         described(name, **given)
+
+
+@pytest.mark.parametrize('name', ['generator', 'inversion', 'go2'])
+def test_a_parameter_file_comes_between_defaults_and_what_is_asked(described, name, tmp_path,
+                                                                   monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    file = tmp_path / 'fitted.yaml'
+    file.write_text('/**: {ros__parameters: {robot: a.yaml, frequency: 2.1}}')
+    found = described(name, params_file=str(file), robot='goat')
+    for node in found.nodes:
+        defaults, given, asked = node.options['parameters']
+        assert given == str(file) and 'params_file' not in {**defaults, **asked}
+        # Neither a default of the launch file nor anything but what was asked hides the file.
+        assert 'robot' in asked and not {'rate', 'gait', 'model', 'order', 'window'} & {
+            key for key, value in asked.items() if isinstance(value, Stub)}
+        assert set(defaults) - set(asked) or name == 'inversion'
+    with pytest.raises(RuntimeError, match='params_file:=/nix: there is no such file'):
+        described(name, params_file='/nix')
 
 
 def test_the_inversion_gets_parameters_that_it_declares(described):

@@ -79,9 +79,13 @@ def test_velocity_is_the_derivative_of_position(running):
 
 def test_frequency_is_in_strides_a_second(running):
     _, watcher = running
-    _, positions, _ = watcher.record(10.0)
+    times, positions, _ = watcher.record(10.0)
+    # The longest stretch without a stall of the machine, which the clock is slowed in after.
+    edges = np.concatenate([[0], np.nonzero(np.diff(times) > 0.0075)[0] + 1, [times.size]])
+    longest = int(np.diff(edges).argmax())
+    whole = slice(edges[longest] + 120, edges[longest + 1])
     thigh = watcher.names.index('lh_thigh_joint')
-    x = positions[:, thigh] - 0.8
+    x = positions[whole, thigh] - 0.8
     k = np.nonzero((x[:-1] < 0) & (x[1:] >= 0))[0]
     crossings = 0.005 * (k + x[k] / (x[k] - x[k + 1]))
     strides = (crossings.size - 1) / (crossings[-1] - crossings[0])

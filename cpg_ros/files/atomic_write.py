@@ -8,7 +8,7 @@ def write_atomically(path: str | Path, content: str | bytes) -> None:
     """Write a file, which until then stays what it was.
 
     Raises:
-        OSError: it cannot be written.
+        OSError: it cannot be written; the error has the file's name, also where a disk is full.
 
     """
     path = Path(path)
@@ -16,5 +16,7 @@ def write_atomically(path: str | Path, content: str | bytes) -> None:
     try:
         beside.write_bytes(content.encode() if isinstance(content, str) else content)
         beside.replace(path)
+    except OSError as error:
+        raise OSError(error.errno, error.strerror, str(path)) from error
     finally:
         beside.unlink(missing_ok=True)

@@ -12,7 +12,7 @@ from cpg_ros.files.atomic_write import write_atomically
 from cpg_ros.inversion.recording_fit import Inverted
 from cpg_ros.motion.plan import Refused, plan
 from cpg_ros.networks.registry import find_network, reference
-from cpg_ros.robots.robot import Joint, Robot
+from cpg_ros.robots.robot import Joint, Motion, Robot
 from cpg_ros.robots.robot_file import load_robot, write_robot
 
 #: Limits of joints that no robot file gives: the share of the recorded range that is left on
@@ -39,11 +39,13 @@ def fitted_robot(found: Inverted, robot: Robot | None) -> Robot:
 
     """
     fit = found.fit
+    # Without its frequency the gait would run at the generator's usual one.
+    motions = {fit.gait: Motion(float(found.stride.frequency))}
     if robot is not None:
         legs = {leg: tuple(_moved(joint, found) for joint in joints)
                 for leg, joints in robot.legs.items()}
         return Robot(robot.name, (fit.network.name,), robot.assignment, fit.harmonics, legs,
-                      robot.order, sides=robot.sides, girdles=robot.girdles)
+                     robot.order, motions, robot.sides, robot.girdles)
     network = type(fit.network)
     assignment = next(iter(network.legs))
     for leg in network.legs[assignment]:
@@ -54,7 +56,8 @@ def fitted_robot(found: Inverted, robot: Robot | None) -> Robot:
     legs = {leg: tuple(_guessed(name, leg, found) for name in names)
             for leg, names in found.legs.items()}
     order = tuple(name for name in found.recording.joints if name in fit.readouts)
-    return Robot('fitted', (network.name,), assignment, fit.harmonics, legs, order)
+    return Robot('fitted', (network.name,), assignment, fit.harmonics, legs, order,
+                 motions)
 
 
 def _moved(joint: Joint, found: Inverted) -> Joint:

@@ -1,6 +1,9 @@
 """Make every kernel of the real-time path ready, compiling those not yet on disk."""
 
+from collections.abc import Callable
+
 import numpy as np
+from numba.core import event
 
 from cpg_ros.integration.simulate import simulate
 from cpg_ros.integration.stepper import Stepper
@@ -9,13 +12,32 @@ from cpg_ros.motion.readout import confine, observe
 from cpg_ros.networks.registry import find_network
 
 
-def precompile(name: str) -> None:
+class _Notice(event.Listener):
+    """Calls a function when something is compiled; what is loaded from disk is not."""
+
+    def __init__(self, compiling: Callable[[], None]) -> None:
+        self._compiling = compiling
+
+    def on_start(self, event: event.Event) -> None:
+        self._compiling()
+
+    def on_end(self, event: event.Event) -> None:
+        """Whatever follows has been announced."""
+
+
+def precompile(name: str, compiling: Callable[[], None] = lambda: None) -> None:
     """Run each kernel that a network needs once, on the types the generator uses.
 
     Args:
         name: as find_network takes it, and errors as of that.
+        compiling: called for each function that is not on disk yet, before it is compiled.
 
     """
+    with event.install_listener('numba:compile', _Notice(compiling)):
+        _run_all(name)
+
+
+def _run_all(name: str) -> None:
     preset = next(iter(find_network(name).presets().values()))
     network = preset.network
     stepper = Stepper(network, np.zeros(network.components), gain=1.0,

@@ -1,7 +1,6 @@
 """The generator node: a central pattern generator that publishes joint states in real time."""
 
 import sys
-import threading
 import time
 from pathlib import Path
 
@@ -249,16 +248,18 @@ class Generator(StartedNode):
 
 
 def compile_kernels(network: str) -> None:
-    """Compile or load the numerical kernels, saying so where it takes long."""
-    logger = get_logger(NAME)
-    began = time.monotonic()
-    notice = threading.Timer(1.0, logger.info, ['compiling the numerical kernels; only the very '
-                                                'first start needs this (10 to 20 s)'])
-    notice.daemon = True
-    notice.start()
-    precompile(network)
-    notice.cancel()
-    if time.monotonic() - began > 1.0:
+    """Compile or load the numerical kernels, saying so if they are compiled."""
+    logger, began = get_logger(NAME), time.monotonic()
+    said: list[str] = []
+
+    def compiling() -> None:
+        if not said:
+            said.append('compiling the numerical kernels; only the very first start needs this '
+                        '(10 to 20 s)')
+            logger.info(said[0])
+
+    precompile(network, compiling)
+    if said:
         logger.info(f'compiled in {time.monotonic() - began:.1f} s')
 
 

@@ -1,6 +1,7 @@
 """What the launch files share: launch arguments that become the parameters of a node."""
 
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any, get_origin
 
 import yaml
@@ -18,8 +19,10 @@ Arguments = Mapping[str, tuple[str, type, str]]
 
 
 def declared(arguments: Arguments) -> list[DeclareLaunchArgument]:
-    """Return the arguments, and that of the namespace."""
-    known = {**arguments, 'namespace': ('', str, 'namespace of all its topics')}
+    """Return the arguments, and those that every launch file has."""
+    known = {**arguments, 'namespace': ('', str, 'namespace of all its topics'),
+             'params_file': ('', str, 'file with parameters, as inversion writes; arguments '
+                             'that are not at their defaults come before it; empty for none')}
     return [DeclareLaunchArgument(name, default_value=default, description=text)
             for name, (default, _, text) in known.items()]
 
@@ -56,7 +59,8 @@ def started(context: LaunchContext, executable: str, name: str, arguments: Argum
         options: further ones of the action Node.
 
     Raises:
-        RuntimeError: an argument is not of the kind that it should be.
+        RuntimeError: an argument is not of the kind that it should be, or there is no such
+            params_file.
 
     """
     given = {key: kind for key, (_, kind, _) in arguments.items()
@@ -65,6 +69,15 @@ def started(context: LaunchContext, executable: str, name: str, arguments: Argum
         value(context, key, kind)
     parameters = {key: ParameterValue(LaunchConfiguration(key), value_type=kind)
                   for key, kind in given.items()}
+    layers: list[Any] = [{**parameters, **(fixed or {})}]
+    if name_of_file := LaunchConfiguration('params_file').perform(context):
+        file = Path(name_of_file).expanduser()
+        if not file.is_file():
+            raise RuntimeError(f'params_file:={name_of_file}: there is no such file')
+        # Later ones win: what is only a default gives way to the file.
+        asked = {key: one for key, one in parameters.items()
+                 if LaunchConfiguration(key).perform(context) != arguments[key][0]}
+        layers = [parameters, str(file), {**asked, **(fixed or {})}]
     return Node(package='cpg_ros', executable=executable, name=name, output='screen',
                 namespace=LaunchConfiguration('namespace'),
-                parameters=[{**parameters, **(fixed or {})}], **options)
+                parameters=layers, **options)

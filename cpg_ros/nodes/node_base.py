@@ -1,15 +1,22 @@
 """How nodes declare parameters, start, serve and end."""
 
+import contextlib
 import gc
+import os
 import signal
 import sys
 import threading
 import traceback
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
 import rclpy
-from rclpy.exceptions import InvalidParameterTypeException, InvalidParameterValueException
+from rclpy.exceptions import (
+    InvalidParameterTypeException,
+    InvalidParameterValueException,
+    NameValidationException,
+    ParameterException,
+)
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.logging import get_logger
 from rclpy.node import Node
@@ -22,6 +29,8 @@ from cpg_ros.nodes.parameter_services import StrictParameterService
 from cpg_ros.nodes.parameter_spec import Spec, as_doubles
 from cpg_ros.nodes.shutdown import ended
 
+#: The ports of the domains after it are too high for UDP.
+LAST_DOMAIN = 232
 #: What a parameter of a type is called.
 KINDS = {bool: 'a bool', int: 'an integer', float: 'a double', str: 'a string',
          list: 'a list of strings'}
@@ -70,6 +79,28 @@ class StartedNode(Node):
         """Return what a batch of changes stands for."""
         return as_doubles(parameters, self._doubles)
 
+    def resolve_topic_name(self, topic: str, **options: Any) -> str:
+        """Do as the base class does; errors as of create_publisher."""
+        with _topic(topic):
+            return super().resolve_topic_name(topic, **options)
+
+    def create_publisher(self, kind: Any, topic: str, *rest: Any,  # type: ignore[override]
+                         **options: Any) -> Any:
+        """Do as the base class does.
+
+        Raises:
+            StartError: the topic's name or a QoS override of it cannot be used.
+
+        """
+        with _topic(topic):
+            return super().create_publisher(kind, topic, *rest, **options)
+
+    def create_subscription(self, kind: Any, topic: str, *rest: Any,  # type: ignore[override]
+                            **options: Any) -> Any:
+        """Do as the base class does; errors as of create_publisher."""
+        with _topic(topic):
+            return super().create_subscription(kind, topic, *rest, **options)
+
     def _value(self, name: str) -> Any:
         return self.get_parameter(name).value
 
@@ -94,6 +125,15 @@ class StartedNode(Node):
 
     def finish(self) -> None:
         """End the thread."""
+
+
+@contextlib.contextmanager
+def _topic(name: str) -> Iterator[None]:
+    """Say of which topic a name or an override of its QoS is wrong."""
+    try:
+        yield
+    except (NameValidationException, ParameterException, RuntimeError) as error:
+        raise StartError(f"topic '{name}': {_first(error)}") from error
 
 
 def _spin(executor: SingleThreadedExecutor, node: StartedNode) -> None:
@@ -139,9 +179,17 @@ def asked_for_help(executable: str, text: str, known: Mapping[str, Spec],
     return 0
 
 
-def _first(error: RuntimeError) -> str:
-    """Return the reason that rclpy gives; what follows is about its own sources."""
-    return str(error).partition('. Error')[0].partition(', at /')[0]
+def _first(error: Exception) -> str:
+    """Return the reason that rclpy gives, on a line; what follows is about its own sources."""
+    reason = str(error).replace('. Error: error not set', '').partition(', at /')[0]
+    return ' '.join(reason.replace('. Error: ', ': ').split())
+
+
+def _domain() -> str:
+    """Return what is wrong with the domain, or ''; Fast DDS would end the process."""
+    domain = os.environ.get('ROS_DOMAIN_ID', '')
+    return (f'ROS_DOMAIN_ID {domain} is not from 0 to {LAST_DOMAIN}'
+            if domain.isdecimal() and int(domain) > LAST_DOMAIN else '')
 
 
 def run(make: Callable[[], StartedNode], name: str, args: list[str] | None) -> int:
@@ -153,6 +201,9 @@ def run(make: Callable[[], StartedNode], name: str, args: list[str] | None) -> i
         signal.signal(number, leave)
     # The publishing thread must not wait long for one that computes in Python.
     sys.setswitchinterval(2e-4)
+    if wrong := _domain():
+        print(f'{name}: {wrong}', file=sys.stderr)
+        return 2
     try:
         rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
     except RuntimeError as error:

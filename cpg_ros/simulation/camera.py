@@ -235,6 +235,8 @@ def film(path: Path, fps: float) -> Iterator[Film]:
             yield roll
             roll.close()
         beside.replace(path)
+    except OSError as error:
+        raise OSError(error.errno, error.strerror, str(path)) from error
     finally:
         beside.unlink(missing_ok=True)
 
