@@ -3,7 +3,7 @@
 Quadrupeds: a code of two letters (LF or FL, RF or FR; hind LH, HL, RL, BL, LR and RH, HR, RR,
 BR), or the words left or right with front or fore, hind, rear or back, anywhere in the name and
 in any case: FL_hip_joint, lf_haa, JointPosRR_calf, front_left_knee, hip_hind_right. Bipeds: left,
-right, L or R alone: left_knee, L_hip, hip_r, LHipPitch.
+right, lt, rt, L or R alone: left_knee, L_hip, hip_r, LHipPitch.
 """
 
 import re
