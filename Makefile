@@ -1,4 +1,4 @@
-# make run | make demo | make test | make build | make bench; everything is set up in .venv and install/.
+# make run | demo | shell | test | docs | bench | build | clean; all is set up in .venv and install/.
 PYTHON ?= python3
 SHELL := /bin/bash
 
@@ -11,7 +11,7 @@ export ROS_AUTOMATIC_DISCOVERY_RANGE ?= LOCALHOST
 ENTER := set -e; source install/setup.bash; \
 	export AMENT_PREFIX_PATH=$(CURDIR)/install/cpg_ros:$(CURDIR)/$(VENV)
 
-.PHONY: build run demo test bench clean
+.PHONY: build run demo shell test docs bench clean
 
 build: install/.built
 
@@ -21,7 +21,16 @@ run: install/.built
 demo: install/.built
 	@$(ENTER); exec install/cpg_ros/lib/cpg_ros/demo $(ARGS)
 
-test: install/.built
+shell: install/.built
+	@$(ENTER); export PATH=$(CURDIR)/install/cpg_ros/lib/cpg_ros:$(CURDIR)/$(VENV)/bin:$$PATH; \
+		echo 'generator, cpg, analyze, inversion ... are on the path (--help); exit leaves this shell'; \
+		exec $${SHELL:-/bin/bash} -i || true
+
+docs: install/.built
+	@$(ENTER); $(VENV)/bin/sphinx-build -W --keep-going -q -b html docs docs/_build
+	@echo 'built: docs/_build/index.html'
+
+test: install/.built docs
 	@$(VENV)/bin/ruff check .
 	@$(VENV)/bin/mypy
 	@$(VENV)/bin/lint-imports --no-logo
@@ -31,11 +40,12 @@ test: install/.built
 bench: install/.built
 	@$(ENTER); for file in benchmarks/bench_*.py; do $(VENV)/bin/python $$file; done
 
-$(VENV)/.installed: requirements.txt requirements-models.txt
+$(VENV)/.installed: requirements.txt requirements-docs.txt requirements-models.txt
 	@test -x $(VENV)/bin/pip || $(PYTHON) -m venv --clear $(VENV) || \
 		{ echo '$(PYTHON) could not make a virtual environment (on Debian and Ubuntu: apt install python3-venv)' >&2; exit 1; }
 	@echo 'installing the dependencies into $(VENV) (the first time takes a few minutes)'
-	@$(VENV)/bin/python -m pip install --quiet --disable-pip-version-check -r requirements.txt
+	@$(VENV)/bin/python -m pip install --quiet --disable-pip-version-check -r requirements.txt \
+		-r requirements-docs.txt
 	@$(VENV)/bin/python -m pip install --quiet --disable-pip-version-check --no-deps \
 		-r requirements-models.txt
 	@touch $@
@@ -46,4 +56,4 @@ install/.built: $(VENV)/.installed $(SOURCES)
 	@touch $@
 
 clean:
-	rm -rf build install log out $(VENV)
+	rm -rf build install log out docs/_build $(VENV)

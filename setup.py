@@ -33,6 +33,7 @@ setup(
         'generator = cpg_ros.tools.executables:generator',
         'robot_sim = cpg_ros.tools.executables:robot_sim',
         'inversion = cpg_ros.tools.executables:inversion',
+        'cpg = cpg_ros.tools.executables:cpg',
         'demo = cpg_ros.tools.executables:demo',
         'analyze = cpg_ros.tools.executables:analyze',
         'check_robot = cpg_ros.tools.executables:check_robot',

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[1]
-PAGES = [ROOT / 'README.md', *sorted((ROOT / 'docs').glob('*.md'))]
+PAGES = [*sorted(ROOT.glob('*.md')), *sorted((ROOT / 'docs').rglob('*.md'))]
 SOURCES = [path for folder in ('cpg_ros', 'test', 'benchmarks')
            for path in sorted((ROOT / folder).rglob('*.py')) if path != Path(__file__)]
 CITATION = re.compile(r'docs/(\w+\.md), section (.{60})')
@@ -31,7 +31,7 @@ def test_sections_that_code_cites():
                 if not one[2].startswith(tuple(headings(ROOT / 'docs' / one[1])))]
 
 
-@pytest.mark.parametrize('page', PAGES, ids=lambda page: page.name)
+@pytest.mark.parametrize('page', PAGES, ids=lambda page: str(page.relative_to(ROOT)))
 def test_what_a_page_names(page):
     text = page.read_text()
     for link, anchor in re.findall(r'\]\((?!https?:)([^)#]*)#?([^)]*)\)', text):
@@ -48,5 +48,17 @@ def test_what_a_page_names(page):
 
 
 def test_the_example_of_the_readme_runs():
-    (example,) = re.findall(r'```python\n(.*?)```', PAGES[0].read_text(), re.DOTALL)
+    (example,) = re.findall(r'```python\n(.*?)```', (ROOT / 'README.md').read_text(), re.DOTALL)
     exec(example, {})
+
+
+def test_the_readme_is_short():
+    assert len((ROOT / 'README.md').read_text().splitlines()) <= 150
+
+
+@pytest.mark.parametrize(('file', 'pattern'), [
+    ('setup.py', r"version='([\d.]+)'"), ('package.xml', r'<version>([\d.]+)<'),
+    ('CITATION.cff', r'\nversion: ([\d.]+)\n')])
+def test_the_version_is_the_same_everywhere(file, pattern):
+    found = re.findall(pattern, (ROOT / file).read_text())
+    assert found == [importlib.import_module('cpg_ros').__version__]

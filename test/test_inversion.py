@@ -16,7 +16,7 @@ from cpg_ros.inversion.free_parameters import free_numbers, within_hopf_set
 from cpg_ros.inversion.identifiability import correlation_length
 from cpg_ros.inversion.invert import invert
 from cpg_ros.inversion.least_squares import Period, Problem
-from cpg_ros.motion.runnable import refusal
+from cpg_ros.motion.plan import refusal
 from cpg_ros.networks.delayed import Delayed
 from cpg_ros.networks.quadruped import Quadruped
 from cpg_ros.networks.registry import PRESETS
@@ -313,22 +313,22 @@ def test_a_number_at_its_bound_beside_another_is_said():
 
 def test_what_the_generator_runs_is_preferred(monkeypatch):
     recording, cells = trot(None, network=replace(TROT, tau=0.5))
-    monkeypatch.setattr(inversion, 'refusal', lambda orbit, harmonics: (
+    monkeypatch.setattr(inversion, 'refusal', lambda orbit, gait, harmonics: (
         'it is too late' if orbit.network.tau > 0.45 else ''))
     fit = invert(recording, cells, TROT, 'trot', ('tau',))
     assert 0.44 < fit.parameters['tau'].value <= 0.45
     assert 'the generator would refuse the trot that fits best: it is too late' in fit.warnings[-1]
-    monkeypatch.setattr(inversion, 'refusal', lambda orbit, harmonics: 'never')
+    monkeypatch.setattr(inversion, 'refusal', lambda orbit, gait, harmonics: 'never')
     fit = invert(recording, cells, TROT, 'trot', ('tau',))
     assert fit.parameters['tau'].value == pytest.approx(0.5, abs=1e-4)
     assert fit.warnings[-1].endswith('never')
 
 
 def test_what_the_generator_refuses():
-    assert refusal(solve_orbit(TROT, 'trot'), HARMONICS) == ''
-    assert refusal(solve_preset(PRESETS['biped']['walk']), HARMONICS) == ''
+    assert refusal(solve_orbit(TROT, 'trot'), 'trot', HARMONICS) == ''
+    assert refusal(solve_preset(PRESETS['biped']['walk']), 'walk', HARMONICS) == ''
     fast = Delayed(-450.0, 100.0, 650.0, -200.0, 0.004)
-    assert 'its period' in refusal(solve_orbit(fast, 'trot'), HARMONICS)
+    assert 'its period' in refusal(solve_orbit(fast, 'trot'), 'trot', HARMONICS)
 
 
 def test_verdicts_come_with_a_fit():

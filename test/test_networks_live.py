@@ -149,7 +149,7 @@ def test_a_network_in_a_file_has_parameters_of_its_own(tmp_path, start):
     assert watcher.get('network', 'gait', 'twin.c', 'twin.tau') == [str(path), 'trot', 6.0, 0.4]
     assert watcher.set(gait='walk', **{'twin.c': 6.2})[0].successful
     refused = watcher.set_together(gait='trot', **{'twin.tau': 0.2})
-    # DESIGN 2.1: the trot's critical delay.
+    # docs/numbers_and_errata.md, section Hopf points of the delayed network.
     assert not refused.successful and '0.2852' in refused.reason
     path.write_text(TWIN.replace("'twin'", "'biped'"))
     process = start('-p', f'network:={path}', watch=False)

@@ -141,7 +141,7 @@ def test_many_lines_are_read_in_parts(write):
     ('time,knee\n\n\n', ': no samples'),
     ('time,knee\n0,0.1\n1,fast\n', ", line 3, column 'knee': 'fast' is not a number"),
     ('time,knee\n0,0.1\nlater,0.1\n', ", line 3, column 'time': 'later' is not a number"),
-    ('time;knee\n0,1;0,5\n', ", line 2, column 'time': '0,1' is not a number"),
+    ('time;knee\n0,1;0.5\n', ", line 2, column 'time': '0,1' is not a number"),
     ('time,knee\n0,0.1\n\n1,0.1,7\n', ', line 4: 3 columns, where the header has 2'),
     ('time,hip,knee\n0,0.1,0.2\n1,0.1\n', ', line 3: 2 columns, where the header has 3'),
     ('time,hip,knee\n0,0.1\n1,0.1\n', ', line 2: 2 columns, where the header has 3'),

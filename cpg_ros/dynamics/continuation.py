@@ -11,7 +11,7 @@ import numpy as np
 
 from cpg_ros.dynamics import arclength
 from cpg_ros.dynamics.arclength import Place
-from cpg_ros.dynamics.orbit import curve_from_rest
+from cpg_ros.dynamics.orbit import curve_from_rest, curve_through
 from cpg_ros.dynamics.periodic import NoOrbit, Orbit, richer
 from cpg_ros.errors import InputError
 from cpg_ros.networks.network import Network
@@ -149,7 +149,7 @@ def follow(orbit: Orbit, along: ParameterLine, low: float, high: float, *,
     """
     _check(orbit.network, orbit.symmetry, along, low, high)
     value, scales = along.value(orbit.network), (orbit.period, high - low)
-    curve, z = orbit.curve(along, scales)
+    curve, z = curve_through(orbit, along, scales)
     # At a fold the value cannot be held, but the period can.
     start = (arclength.resolved(curve, z, arclength.held(z.size, -1))
              or arclength.resolved(curve, z, arclength.held(z.size, -2)))

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import brentq
 
-from cpg_ros.dynamics.periodic import Orbit
+from cpg_ros.dynamics.orbit import Orbit, way
 
 #: A multiplier from here on up is 1 as far as can be told.
 ATTRACTS = 1.0 - 1e-7
@@ -69,14 +69,14 @@ def multipliers(orbit: Orbit, gain: float = 0.0) -> Multipliers:
         gain: of a symmetry lock, 1/model time.
 
     """
-    rest, trivial = _parted(orbit.multipliers_within)
-    outside = orbit.multipliers_transverse(gain)
+    rest, trivial = _parted(way(orbit.network).floquet.within(orbit))
+    outside = way(orbit.network).floquet.transverse(orbit, gain)
     return Multipliers(orbit.period, gain, _sorted(rest), _sorted(outside), trivial)
 
 
 def leading_within(orbit: Orbit) -> float:
     """Return the modulus of the leading multiplier within the class but the trivial one."""
-    return float(np.abs(_parted(orbit.multipliers_within)[0]).max(initial=0.0))
+    return float(np.abs(_parted(way(orbit.network).floquet.within(orbit))[0]).max(initial=0.0))
 
 
 def _sorted(values: np.ndarray) -> np.ndarray:
@@ -93,7 +93,7 @@ def smallest_gain(orbit: Orbit) -> float:
     """Return the symmetry gain above which every transverse disturbance decays, 1/model time."""
     def growth(gain: float) -> float:
         """Logarithm of the leading transverse multiplier."""
-        largest = np.abs(orbit.multipliers_transverse(gain)).max(initial=0.0)
+        largest = np.abs(way(orbit.network).floquet.transverse(orbit, gain)).max(initial=0.0)
         return float(np.log(largest)) if largest > 0.0 else -np.inf
 
     if not orbit.network.delay:
@@ -119,7 +119,8 @@ def sufficient_gain(orbit: Orbit, rate: float) -> float:
         return bound
     gain = 0.0
     for _ in range(MOST_GAINS):
-        largest = float(np.abs(orbit.multipliers_transverse(gain)).max(initial=0.0))
+        outside = way(orbit.network).floquet.transverse(orbit, gain)
+        largest = float(np.abs(outside).max(initial=0.0))
         growth = np.log(largest) / orbit.period + rate if largest > 0.0 else -np.inf
         if growth <= 1e-9:
             break

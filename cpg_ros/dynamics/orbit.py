@@ -7,28 +7,40 @@ with the same functions; what they solve for are orbits and curves that know wha
 
 from collections.abc import Callable
 from types import ModuleType
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from cpg_ros.dynamics.fourier import curve as fourier_curve
+from cpg_ros.dynamics.fourier import floquet as fourier_floquet
 from cpg_ros.dynamics.fourier import solve as fourier_solve
 from cpg_ros.dynamics.mesh import curve as mesh_curve
+from cpg_ros.dynamics.mesh import floquet as mesh_floquet
 from cpg_ros.dynamics.mesh import solve as mesh_solve
 from cpg_ros.dynamics.periodic import NoOrbit, Orbit
 from cpg_ros.networks.network import Network, Preset
 from cpg_ros.networks.parameter_line import ParameterLine
 from cpg_ros.networks.symmetry import Symmetry
 
-__all__ = ['NoOrbit', 'Orbit', 'curve_from_rest', 'solve_beside', 'solve_from_path', 'solve_orbit',
-           'solve_preset']
+__all__ = ['NoOrbit', 'Orbit', 'curve_from_rest', 'curve_through', 'solve_beside',
+           'solve_from_path', 'solve_orbit', 'solve_preset', 'way']
 
 
-def _way(network: Network) -> tuple[ModuleType, ModuleType]:
-    """How a network's orbits are found, and followed."""
-    if network.delay_parameter:
-        return fourier_solve, fourier_curve
-    return mesh_solve, mesh_curve
+class Way(NamedTuple):
+    """Modules with the same functions, which find, follow and judge orbits."""
+
+    solve: ModuleType
+    curve: ModuleType
+    floquet: ModuleType
+
+
+FOURIER = Way(fourier_solve, fourier_curve, fourier_floquet)
+MESH = Way(mesh_solve, mesh_curve, mesh_floquet)
+
+
+def way(network: Network) -> Way:
+    """Return how a network's orbits are found, followed and judged."""
+    return FOURIER if network.delay_parameter else MESH
 
 
 def solve_orbit(network: Network, gait: str, near: Orbit | None = None) -> Orbit:
@@ -46,7 +58,7 @@ def solve_orbit(network: Network, gait: str, near: Orbit | None = None) -> Orbit
             the parameters are.
 
     """
-    found: Orbit = _way(network)[0].solve(network, gait, near)
+    found: Orbit = way(network).solve.solve(network, gait, near)
     return found
 
 
@@ -61,13 +73,13 @@ def solve_beside(network: Network, near: Orbit) -> Orbit:
         NoOrbit: the method leads elsewhere; a shorter way may do.
 
     """
-    found: Orbit = _way(network)[0].beside(network, near)
+    found: Orbit = way(network).solve.beside(network, near)
     return found
 
 
 def solve_preset(preset: Preset) -> Orbit:
     """Solve for a preset's orbit; errors as in solve_orbit."""
-    found: Orbit = _way(preset.network)[0].from_preset(preset)
+    found: Orbit = way(preset.network).solve.from_preset(preset)
     return found
 
 
@@ -83,8 +95,22 @@ def solve_from_path(network: Network, symmetry: Symmetry,
         period: in model time.
 
     """
-    found: Orbit | None = _way(network)[0].from_path(network, symmetry, path, period)
+    found: Orbit | None = way(network).solve.from_path(network, symmetry, path, period)
     return found
+
+
+def curve_through(orbit: Orbit, line: ParameterLine, scales: tuple[float, float]
+                  ) -> tuple[Any, np.ndarray]:
+    """Return the curve of a gait's orbits along a line of parameters, and the orbit's place on it.
+
+    Args:
+        orbit: of a network on the line.
+        line: of parameters.
+        scales: against which periods and values on the line are measured.
+
+    """
+    curve, place = way(orbit.network).curve.through(orbit, line, scales)
+    return curve, place
 
 
 def curve_from_rest(network: Network, symmetry: Symmetry, line: ParameterLine,
@@ -103,6 +129,6 @@ def curve_from_rest(network: Network, symmetry: Symmetry, line: ParameterLine,
         period: of the critical oscillation, model time.
 
     """
-    curve, point, border = _way(network)[1].from_rest(network, symmetry, line, scales, rest,
+    curve, point, border = way(network).curve.from_rest(network, symmetry, line, scales, rest,
                                                       vector, period)
     return curve, point, border

@@ -6,10 +6,9 @@ from functools import cached_property
 
 import numpy as np
 
-from cpg_ros.dynamics.arclength import Curve, NoOrbit
+from cpg_ros.dynamics.arclength import NoOrbit
 from cpg_ros.errors import InputError
 from cpg_ros.networks.network import Network
-from cpg_ros.networks.parameter_line import ParameterLine
 from cpg_ros.networks.symmetry import Symmetry
 
 __all__ = ['NoOrbit', 'Orbit', 'check_values', 'richer']
@@ -56,30 +55,6 @@ class Orbit(ABC):
     @abstractmethod
     def samples(self) -> int:
         """Even points of a cycle that tell all there is to a waveform."""
-
-    @abstractmethod
-    def curve(self, line: ParameterLine, scales: tuple[float, float]) -> tuple[Curve, np.ndarray]:
-        """The gait's orbits along a line of parameters, and the place of this one among them.
-
-        Args:
-            line: through the orbit's network.
-            scales: against which periods and values on the line are measured.
-
-        """
-
-    @property
-    @abstractmethod
-    def multipliers_within(self) -> np.ndarray:
-        """Floquet multipliers within the gait's class, 1 among them."""
-
-    @abstractmethod
-    def multipliers_transverse(self, gain: float = 0.0) -> np.ndarray:
-        """Floquet multipliers transverse to the gait's class.
-
-        Args:
-            gain: of the symmetry lock, 1/model time.
-
-        """
 
     @property
     def phases(self) -> np.ndarray:

@@ -108,9 +108,11 @@ def legs_of(joints: Sequence[str], whole: bool = False) -> Legs:
         whole: these are all that the robot has, so that one with FL and FR alone is a biped.
 
     Raises:
-        LegsError: no leg, not all of two or four legs, or more than four can be told.
+        LegsError: no leg, not all of two or four legs, or more than four can be told, or they
+            are of two robots.
 
     """
+    _refuse_two(joints)
     words = {name: words_of(name) for name in joints}
     read = {name: _read(words[name]) for name in joints}
     if any(MIDDLE & set(listed) for listed in words.values()):
@@ -135,6 +137,26 @@ def legs_of(joints: Sequence[str], whole: bool = False) -> Legs:
         raise LegsError(f'no legs can be told from the joint names {_listed(list(joints))}; usual '
                         'ones have LF, RF, LH, RH, front_left ... or left, right in them')
     return Legs(found, _says(found, read, joints), _rest(found, joints))
+
+
+def _refuse_two(joints: Sequence[str]) -> None:
+    """Refuse names that differ by what is before the leg's, and are the same otherwise."""
+    robots: dict[tuple[str, ...], dict[tuple[str, ...], str]] = {}
+    for name in joints:
+        words = words_of(name)
+        told = _read(words)[2]
+        place = next((k for k, word in enumerate(words) if word in told), 0)
+        if place and not set(words[:place]) & set(JOINTS):
+            robots.setdefault(tuple(words[:place]), {})[tuple(words[place:])] = name
+    for first, own in robots.items():
+        # Of a single joint a leg the word before may tell which joint it is.
+        roles = {tuple(word for word in rest if word not in _read(rest)[2]) for rest in own}
+        other = next((one for key, one in robots.items() if key != first
+                      and set(one) == set(own)), None)
+        if other is not None and len(roles) > 1:
+            raise LegsError('joints of two robots are there, such as '
+                            f"'{next(iter(own.values()))}' and '{next(iter(other.values()))}'; "
+                            'name those of one (--joints)')
 
 
 def _rest(found: Mapping[str, tuple[str, ...]], joints: Sequence[str]) -> tuple[str, ...]:

@@ -140,7 +140,8 @@ def followed(times: np.ndarray, positions: np.ndarray, rough: Rough) -> Warp:
     """
     slope, level = (np.polyfit(rough.times - rough.begin, rough.phases, 1)
                     if rough.times.size > 1 else (1.0, 0.0))
-    span = rough.end - rough.begin
+    # Plain numbers: what is fitted is written to files that know no others.
+    span = float(rough.end - rough.begin)
     within = (times >= rough.begin - 1.0 / slope) & (times <= rough.end + 1.0 / slope)
     grid, y = even(times[within], positions[within], BLOCKS * POINTS * slope)
     inside = (grid >= rough.begin) & (grid <= rough.end)

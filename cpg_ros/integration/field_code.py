@@ -10,7 +10,7 @@ from typing import Any
 
 import sympy
 
-from cpg_ros.integration.loops import Program, Writer
+from cpg_ros.integration.loops import LoopProgram, Writer
 from cpg_ros.networks.derivation import expressions
 from cpg_ros.networks.equations import Equations, Source
 
@@ -91,7 +91,7 @@ def kernel_source(equations: Equations) -> str:
         if not results:
             continue
         results, powers = _share_exponentials(results)
-        program = Program([(symbol, one) for symbol, one in arguments
+        program = LoopProgram([(symbol, one) for symbol, one in arguments
                             if one.delayed == (name == 'drive')], powers)
         lowered = [program.lowered(part) for part in results]
         used = {str(symbol) for part in (*lowered, *(call for _, call in program.functions),

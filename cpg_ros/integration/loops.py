@@ -15,16 +15,16 @@ from cpg_ros.networks.derivation import print_float
 from cpg_ros.networks.equations import Argument, Source
 
 
-class _Printer(PythonCodePrinter):  # type: ignore[misc]
+class _KernelPrinter(PythonCodePrinter):  # type: ignore[misc]
     """Python, numbers to the last digit."""
 
     _print_Float = print_float
 
 
-_PRINTER = _Printer({'fully_qualified_modules': False})
+_PRINTER = _KernelPrinter({'fully_qualified_modules': False})
 
 
-class Program:
+class LoopProgram:
     """Loops that work out expressions of arguments that are all heard at one time."""
 
     def __init__(self, arguments: Sequence[tuple[Any, Argument]], powers: dict[Any, Any]
@@ -87,7 +87,7 @@ class Program:
 class Writer:
     """Writes the loops of a program as the body of a function."""
 
-    def __init__(self, program: Program, sources: dict[Source, int]) -> None:
+    def __init__(self, program: LoopProgram, sources: dict[Source, int]) -> None:
         self._program, self.sources = program, sources
         self.lines: list[str] = []
         #: Fetched array -> by how many cells it is behind the array that it is fetched from.

@@ -21,7 +21,7 @@ from cpg_ros.inversion.identifiability import Optimum, correlation_length, sprea
 from cpg_ros.inversion.least_squares import Period, Problem
 from cpg_ros.inversion.trust_region import Trial
 from cpg_ros.inversion.variable_projection import WEIGHTS
-from cpg_ros.motion.runnable import refusal
+from cpg_ros.motion.plan import refusal
 from cpg_ros.networks.network import Network
 from cpg_ros.robots.robot import HARMONICS
 
@@ -91,14 +91,16 @@ def invert(cycle: MeanCycle, cells: Mapping[str, int], network: Network, gait: s
         best = min(trials, key=lambda trial: trial.cost)
         if best.why:
             raise NoOrbit(trials[0].why)
-        return problem, trials, _weighed(problem, best.values)
+        values = _weighed(problem, best.values)
+        problem.hold(values)
+        return problem, trials, values
 
     problem, trials, values = attempt(lambda orbit: '')
-    flaw, warnings = refusal(problem.placed(values).orbit, harmonics), []
+    flaw, warnings = refusal(problem.placed(values).orbit, gait, harmonics), []
     if flaw:
         said = f'the generator would refuse the {gait} that fits best: {flaw}'
         try:
-            problem, trials, values = attempt(lambda orbit: refusal(orbit, harmonics))
+            problem, trials, values = attempt(lambda orbit: refusal(orbit, gait, harmonics))
             said += '; this is the best one that it runs'
         except NoOrbit:
             pass
@@ -107,8 +109,9 @@ def invert(cycle: MeanCycle, cells: Mapping[str, int], network: Network, gait: s
     better = min(others, key=lambda trial: trial.cost, default=None)
     left = problem(values)[0]
     if (better is not None and better.cost < 0.5 * float(left @ left)
-            and (flaw or not refusal(problem.placed(better.values).orbit, harmonics))):
+            and (flaw or not refusal(problem.placed(better.values).orbit, gait, harmonics))):
         values = _weighed(problem, better.values)
+        problem.hold(values)
     return _judged(problem, trials, [trial.values for trial in others], values, profiles,
                    warnings, done)
 
@@ -177,6 +180,7 @@ def _along_the_valley(problem: Problem, values: np.ndarray) -> list[Trial]:
         with suppress(NoOrbit):
             problem.begin(begin)
             found.append(problem.coordinates.descend(problem, problem.rephased(begin), TOLERANCE))
+            problem.hold(found[-1].values)
     return found
 
 

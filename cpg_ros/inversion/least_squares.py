@@ -73,6 +73,7 @@ class Problem:
         self._places = {key: [j for j, other in enumerate(keys) if other == key]
                         for key in dict.fromkeys(keys)}
         self._solved: dict[bytes, tuple[Orbit, Signals]] = {}
+        self._held: dict[bytes, tuple[Orbit, Signals]] = {}
         self._placed: tuple[bytes, Placed] | None = None
 
     @property
@@ -105,6 +106,10 @@ class Problem:
         self._solved[numbers.tobytes()] = orbit, signals(orbit, self.harmonics)
         return self._solved[numbers.tobytes()]
 
+    def hold(self, values: np.ndarray) -> None:
+        """Keep the orbit at values, whatever is solved for next: not every way leads back."""
+        self._held[values[:len(self.free)].tobytes()] = self._solve(values)
+
     def _solve(self, values: np.ndarray) -> tuple[Orbit, Signals]:
         """Solve for an orbit, and what joints see of it, from the nearest one solved for.
 
@@ -113,6 +118,8 @@ class Problem:
 
         """
         key = values[:len(self.free)].tobytes()
+        if key in self._held:
+            return self._held[key]
         if key not in self._solved:
             network = self._network(values)
             near = self._nearest(values)

@@ -1,6 +1,7 @@
 """A fit as files that the generator loads as they are: its parameters, and a robot file."""
 
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
@@ -10,9 +11,9 @@ from cpg_ros.errors import InputError
 from cpg_ros.files.atomic_write import write_atomically
 from cpg_ros.inversion.recording_fit import Inverted
 from cpg_ros.motion.plan import Refused, plan
-from cpg_ros.networks.registry import reference
+from cpg_ros.networks.registry import find_network, reference
 from cpg_ros.robots.robot import Joint, Motion, Robot
-from cpg_ros.robots.robot_file import write_robot
+from cpg_ros.robots.robot_file import load_robot, write_robot
 
 #: Limits of joints that no robot file gives: the share of the recorded range that is left on
 #: either side, and the multiple of the fastest fitted speed.
@@ -35,7 +36,6 @@ def fitted_robot(found: Inverted, robot: Robot | None) -> Robot:
     Raises:
         InputError: a leg of the network has no recorded joint, or a joint would swing about an
             angle outside its limits.
-        Refused: the robot's limits do not let a joint move so.
 
     """
     fit = found.fit
@@ -44,15 +44,8 @@ def fitted_robot(found: Inverted, robot: Robot | None) -> Robot:
     if robot is not None:
         legs = {leg: tuple(_moved(joint, found) for joint in joints)
                 for leg, joints in robot.legs.items()}
-        moved = Robot(robot.name, (fit.network.name,), robot.assignment, fit.harmonics, legs,
-                      robot.order, motions, robot.sides, robot.girdles)
-        preset = fit.network.presets()[fit.gait]
-        try:
-            plan(moved, fit.gait, preset, fit.network, found.stride.frequency)
-        except Refused as error:
-            raise Refused(f'{found.recording.source}: robot {robot.name} cannot do this: '
-                          f'{error}') from error
-        return moved
+        return Robot(robot.name, (fit.network.name,), robot.assignment, fit.harmonics, legs,
+                     robot.order, motions, robot.sides, robot.girdles)
     network = type(fit.network)
     assignment = next(iter(network.legs))
     for leg in network.legs[assignment]:
@@ -101,13 +94,25 @@ def parameter_tree(found: Inverted, robot: Path) -> dict[str, Any]:
                            for name, value in fit.network.as_dict().items()}}}}
 
 
+def _planned(parameters: Path, robot: Path) -> None:
+    """Have the generator's own plan made from files as they were written; Refused as in plan."""
+    tree = yaml.safe_load(parameters.read_text())['/**']['ros__parameters']
+    kind = find_network(tree['network'])
+    network = kind(**tree[kind.name])
+    plan(load_robot(robot), tree['gait'], kind.presets()[tree['gait']], network,
+         tree['frequency'], tree['amplitude'])
+
+
 def write_fitted(path: Path, found: Inverted, robot: Robot | None = None) -> list[Path]:
     """Write the parameter file, and beside it the robot file that it names.
+
+    Nothing gets their names that the generator would refuse.
 
     Returns:
         The files written.
 
     Raises:
+        Refused: the robot's limits do not let a joint move so.
         CpgError: as in fitted_robot.
         OSError: a file cannot be written.
 
@@ -118,7 +123,15 @@ def write_fitted(path: Path, found: Inverted, robot: Robot | None = None) -> lis
             f'the joints\' range, readout of order {found.fit.order}')
     moved, tree = fitted_robot(found, robot), parameter_tree(found, beside.resolve())
     comment = ''.join(f'# {line}\n' for line in said.splitlines())
-    parameters = comment + yaml.safe_dump(tree, sort_keys=False)
-    write_robot(beside, moved, said)
-    write_atomically(path, parameters)
+    with TemporaryDirectory(prefix='.', dir=path.absolute().parent) as folder:
+        parameters, joints = Path(folder, path.name), Path(folder, beside.name)
+        write_robot(joints, moved, said)
+        write_atomically(parameters, comment + yaml.safe_dump(tree, sort_keys=False))
+        try:
+            _planned(parameters, joints)
+        except Refused as error:
+            raise Refused(f'{found.recording.source}: robot {moved.name} cannot do this: '
+                          f'{error}') from error
+        joints.replace(beside)
+        parameters.replace(path)
     return [path, beside]

@@ -9,7 +9,7 @@ from cpg_ros.gaits.leg_names import legs_of
 from cpg_ros.gaits.stride import Stride, find_stride
 from cpg_ros.inversion.fit_data import cells_of
 from cpg_ros.inversion.gait_fit import Fit
-from cpg_ros.inversion.invert import invert
+from cpg_ros.inversion.given_up import fit_at_all
 from cpg_ros.networks.preset_files import Preset
 from cpg_ros.networks.registry import SHIPPED, NetworkError, find_network
 from cpg_ros.recordings.recording import Recording
@@ -158,7 +158,7 @@ def inverted(recording: Recording, robot: Robot | None = None, network: str = ''
         warnings.append(f'the recorded phases are those of {stride.gait or "none of the gaits"}, '
                         f'not of {gait}')
     parameters = preset_of(network, preset or gait).network
-    fit = invert(stride, cells, parameters, gait, free, order, starts, done=done)
+    fit, given_up = fit_at_all(stride, cells, parameters, gait, free, order, starts, done)
     return Inverted(recording, read, legs, stride, fit,
                     {order: fit.share_at(order) for order in ORDERS},
-                    (*warnings, *fit.warnings))
+                    (*warnings, *given_up, *fit.warnings))

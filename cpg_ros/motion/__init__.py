@@ -3,5 +3,5 @@
 Imports ``dynamics``, ``robots`` and what is below; knows nothing of ROS.
 """
 
-__all__ = ['joint_readout', 'pattern', 'phase_readout', 'plan', 'precompile', 'readout',
+__all__ = ['joint_readout', 'pattern', 'phase_readout', 'plan', 'precompile', 'ramp', 'readout',
            'resumption', 'runnable', 'smoothstep', 'steering', 'track']

@@ -8,10 +8,12 @@ move whenever a joint would exceed the speed that the gaits themselves reach, an
 
 import math
 from collections import deque
+from collections.abc import Callable
 
 import numpy as np
 
 from cpg_ros.motion.plan import Program
+from cpg_ros.motion.ramp import Ramp
 from cpg_ros.motion.readout import confine
 from cpg_ros.motion.resumption import Resumption
 from cpg_ros.motion.smoothstep import smoothstep
@@ -37,6 +39,8 @@ class Pattern:
         position, velocity: of each joint, rad and rad/s, leg by leg; overwritten by advance.
         faults: times the watchdog had to put the network back on its orbit.
         held: ticks in which a limit held a joint back.
+        correct: takes and returns angles before limits hold them; None for the gait as it is.
+        hurry: factor of the pattern's clock.
 
     """
 
@@ -48,11 +52,12 @@ class Pattern:
         self._leg = robot.leg_of_joint
         self.faults = 0
         self.held = 0
+        self.correct: Callable[[np.ndarray], np.ndarray] | None = None
+        self.hurry = 1.0
         self._offset, self._lower = robot.column('offset'), robot.column('lower')
         self._upper, self._limit = robot.column('upper'), robot.column('velocity')
         self._requests: deque = deque()
         self._tracks = [Track(program, 0.0, drive)]
-        self._ramps: deque[tuple[float, float, float, float]] = deque()
         self.restart(ramp, enabled)
 
     def restart(self, ramp: float, enabled: bool = True) -> None:
@@ -63,6 +68,7 @@ class Pattern:
         self._tracks = [newest]
         self.position, self.velocity = self._offset.copy(), np.zeros_like(self._offset)
         self._wanted, self._rate = self.position.copy(), self.velocity.copy()
+        self._corrected = np.zeros_like(self._offset)
         self._jump: tuple[np.ndarray, np.ndarray] | None = None
         self._absorbed = ABSORB
         self._recovering = False
@@ -73,8 +79,8 @@ class Pattern:
         # Where the joints were found, from the stand, and how they are led from there.
         self._found = np.zeros_like(self._offset)
         self._leading = self._led = 0.0
-        self._level, self._level_rate = 0.0, 0.0
-        self._ramp_to(float(enabled), max(ramp, SUBSTEP))
+        self._ramp = Ramp()
+        self._ramp.go(float(enabled), max(ramp, SUBSTEP))
         self.enabled = enabled
 
     def start_from(self, angles: np.ndarray, time: float) -> None:
@@ -108,7 +114,7 @@ class Pattern:
         """
         if self.drive is None:
             raise ValueError('this pattern has no drive')
-        self.drive.ask(stride, pace, at_once=self._level == 0.0)
+        self.drive.ask(stride, pace, at_once=self._ramp.level == 0.0)
 
     @property
     def program(self) -> Program:
@@ -123,12 +129,12 @@ class Pattern:
     @property
     def level(self) -> float:
         """0 at the stand, 1 in the full gait."""
-        return self._level
+        return self._ramp.level
 
     @property
     def standing(self) -> bool:
         """Tell whether it is disabled and the ramp has ended."""
-        return not (self.enabled or self._level or self._requests or self._leading)
+        return not (self.enabled or self._ramp.level or self._requests or self._leading)
 
     @property
     def in_transition(self) -> bool:
@@ -148,14 +154,21 @@ class Pattern:
             self._take_requests()
         slow = self._resumption
         clock, share = slow.advance(dt) if slow.active else (dt, 1.0)
-        calm = (len(self._tracks) == 1 and not (self._ramps or self._leading)
+        clock, share = self.hurry * clock, self.hurry * share
+        calm = (len(self._tracks) == 1 and not (self._ramp.active or self._leading)
                 and self._absorbed >= ABSORB)
         if not (calm and self._cruise(clock)):
             parts = max(1, math.ceil(clock / SUBSTEP - 1e-9))
             for _ in range(parts):
                 self._step(clock / parts)
-        rate = self._rate if share == 1.0 else share * self._rate
-        self.held += confine(self._wanted, rate, self._lower, self._upper, self._limit,
+        wanted, rate = self._wanted, self._rate if share == 1.0 else share * self._rate
+        if self.correct is not None:
+            wanted = self.correct(wanted)
+            correction = wanted - self._wanted
+            if dt > 0.0:
+                rate = rate + (correction - self._corrected) / dt
+            self._corrected = correction
+        self.held += confine(wanted, rate, self._lower, self._upper, self._limit,
                              dt, self.position, self.velocity) > 0
 
     def resume(self, stall: float) -> None:
@@ -171,7 +184,7 @@ class Pattern:
             what, how = self._requests.popleft()
             if isinstance(what, bool):
                 self.enabled = what
-                self._ramp_to(float(what), how)
+                self._ramp.go(float(what), how)
             elif how is None:
                 del self._tracks[:-1]
                 self._tracks[0].drift_to(what)
@@ -206,11 +219,11 @@ class Pattern:
             self._recover(track)
             self._step(0.0)
             return False
-        np.multiply(track.angle, self._level, out=self._wanted)
+        np.multiply(track.angle, self._ramp.level, out=self._wanted)
         self._wanted += self._offset
-        np.multiply(track.rise, self._level * frequency, out=self._rate)
+        np.multiply(track.rise, self._ramp.level * frequency, out=self._rate)
         if drive is not None:
-            self._rate += self._level * drive.rate[self._leg] * track.reach
+            self._rate += self._ramp.level * drive.rate[self._leg] * track.reach
         return True
 
     def _recover(self, track: Track) -> None:
@@ -250,14 +263,14 @@ class Pattern:
         while len(tracks) > 1 and tracks[1].progress >= 1.0:
             del tracks[0]
 
-        if self._ramps:
+        if self._ramp.active:
             moving = True
             # First to the stand: the gait swings about it, not about where the joints were.
             if not self._leading:
-                self._advance_ramp(clock)
-        if self._level != 1.0 or self._level_rate:
-            rate = self._level * rate + self._level_rate * wanted
-            wanted = self._level * wanted
+                self._ramp.advance(clock)
+        if self._ramp.level != 1.0 or self._ramp.rate:
+            rate = self._ramp.level * rate + self._ramp.rate * wanted
+            wanted = self._ramp.level * wanted
         found = np.zeros_like(wanted)
         if self._leading:
             moving, found = True, self._found
@@ -287,38 +300,6 @@ class Pattern:
         if self.drive is not None:
             rate += self.drive.rate[self._leg] * track.reach
         return rate
-
-    def _ramp_to(self, end: float, time: float) -> None:
-        """Plan the level's way to its end, from its present value and rate, without overshoot.
-
-        Cubics that end at rest, each (start, rate, end, time). One that starts towards its end
-        stays in between if it takes no longer than 3 |end - start| / |rate|.
-        """
-        level, rate = self._level, self._level_rate
-        self._ramps.clear()
-        self._ramped = 0.0
-        if rate * (end - level) < 0.0:
-            # Turned round half way: brake first, within half of the room that is left.
-            turn = level + 0.5 * ((1.0 if rate > 0.0 else 0.0) - level)
-            self._ramps.append((level, rate, turn, 2.0 * (turn - level) / rate))
-            level, rate = turn, 0.0
-        if rate:
-            time = min(time, 3.0 * (end - level) / rate)
-        self._ramps.append((level, rate, end, time))
-
-    def _advance_ramp(self, clock: float) -> None:
-        start, start_rate, end, time = self._ramps[0]
-        self._ramped += clock
-        s = self._ramped / time if time > 0.0 else 1.0
-        if s >= 1.0:
-            self._ramps.popleft()
-            self._ramped = 0.0
-            self._level, self._level_rate = end, 0.0
-            return
-        share, share_rate = smoothstep(s)
-        self._level = start + share * (end - start) + s * (1.0 - s)**2 * time * start_rate
-        self._level_rate = (share_rate * (end - start) / time
-                            + (1.0 - s) * (1.0 - 3.0 * s) * start_rate)
 
     def _lead(self, clock: float) -> tuple[float, float]:
         """Return the share of the way from where the joints were found that is left, its rate."""

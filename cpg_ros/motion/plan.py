@@ -19,6 +19,8 @@ from cpg_ros.robots.robot import Motion, Robot, Steering
 
 #: Strides per second below which a robot would seem to stand (Hz).
 SLOWEST = 0.01
+#: Periods of one orbit, solved for twice, agree to this share.
+SAME = 1e-6
 
 
 class Refused(CpgError):
@@ -122,6 +124,28 @@ def gait_of(preset: Preset, network: Network) -> tuple[Orbit, Stability]:
     if known is None or network != preset.network:
         known = solve_orbit(network, preset.gait, known)
     return known, stability(known)
+
+
+def refusal(orbit: Orbit, gait: str, harmonics: int) -> str:
+    """Say why the generator would refuse a gait, whatever the robot, or ''.
+
+    It knows the parameters only, and comes to the gait from the shipped preset.
+
+    Args:
+        orbit: the gait's.
+        gait: its name.
+        harmonics: of a Morris-Lecar cell's waveform that joints follow.
+
+    """
+    try:
+        reached, judged = gait_of(orbit.network.presets()[gait], orbit.network)
+    except CpgError as error:
+        return f'from its preset it is not found: {error}'
+    if abs(reached.period / orbit.period - 1.0) > SAME:
+        return (f'from its preset another one is found, of a period of {reached.period:.6g} '
+                f'instead of {orbit.period:.6g}')
+    found = obstacle(reached, judged, harmonics)
+    return '' if found is None else found.aside
 
 
 def plan(robot: Robot, name: str, preset: Preset, network: Network, frequency: float = 0.0,

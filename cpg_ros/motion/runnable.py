@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from cpg_ros.dynamics.periodic import Orbit
-from cpg_ros.dynamics.stability import Stability, stability
+from cpg_ros.dynamics.stability import Stability
 from cpg_ros.motion.joint_readout import joint_readout
 from cpg_ros.motion.readout import NoPhase
 
@@ -50,9 +50,3 @@ def obstacle(orbit: Orbit, judged: Stability, harmonics: int) -> Obstacle | None
         return Obstacle(f'at these parameters cannot drive joints: {error}',
                         f'it cannot drive joints: {error}')
     return None
-
-
-def refusal(orbit: Orbit, harmonics: int) -> str:
-    """Say why the generator would refuse a gait, or ''; arguments as in obstacle."""
-    found = obstacle(orbit, stability(orbit), harmonics)
-    return '' if found is None else found.aside

@@ -4,4 +4,4 @@ Imports ``files``; knows nothing of ROS.
 """
 
 __all__ = ['bag_reader', 'bag_storage', 'cdr', 'csv_reader', 'joint_streams', 'live_buffer',
-           'recording', 'servo', 'unfinished_mcap']
+           'recording', 'servo', 'stray_samples', 'table_text', 'unfinished_mcap']

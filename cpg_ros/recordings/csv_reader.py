@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
-from itertools import islice
+from itertools import chain, islice
 from pathlib import Path
 
 import numpy as np
@@ -21,6 +21,7 @@ from cpg_ros.recordings.recording import (
     merged,
     require,
 )
+from cpg_ros.recordings.table_text import decimal_commas, opened, preamble, units_of
 
 #: What a header may call its unit -> that in rad, or in s.
 ANGLES = {'rad': 1.0, 'radian': 1.0, 'radians': 1.0,
@@ -36,6 +37,8 @@ TIME = re.compile(r'^[_%#/\s]*(t|time|times|stamp|timestamp|time_?stamp)(?:[_ ](
 POSITION = re.compile(r'^joint_?pos(?:ition)?s?[_./ ]*(.+)$|^/.*/position/([^/]+)$'
                       r'|^/.*/([^/]+)/position$', re.I)
 DELIMITERS = ',;\t'
+#: A time that is so far ahead of both neighbours (s) is a stamp gone wrong.
+ASTRAY = 3600.0
 #: Lines that are parsed together.
 LINES = 8192
 
@@ -76,21 +79,17 @@ def read_csv(path: str | Path, unit: str | None = None, time: str | None = None,
     for value, units in ((unit, ANGLES), (time, TIMES)):
         if value is not None and value not in units:
             raise RecordingError(f'{path}: unit {value!r} is none of {few(list(units), 20)}')
-    try:
+    with opened(path) as file:
         size = path.stat().st_size
-        with path.open(encoding='utf-8-sig', newline='') as file:
-            table = _Table(path, file, unit, time, joints)
-            with progress_bar(f'reading {path.name}', max(1, size), enabled=progress) as bar:
-                chunks = []
-                for chunk in table.chunks():
-                    chunks.append(chunk)
-                    bar(min(size, table.read))
-    except OSError as error:
-        raise RecordingError(f'{path}: {error.strerror}') from error
-    except UnicodeDecodeError as error:
-        raise RecordingError(f'{path}: not a text file ({error.reason})') from error
+        table = _Table(path, file, unit, time, joints)
+        with progress_bar(f'reading {path.name}', max(1, size), enabled=progress) as bar:
+            chunks = []
+            for chunk in table.chunks():
+                chunks.append(chunk)
+                bar(min(size, table.read))
     recording = merged(chunks, str(path), [column.joint for column in table.columns])
-    return replace(recording, notes=(*table.notes, *recording.notes))
+    notes = [*table.notes, *(['lines that end in a delimiter'] if table.ended else [])]
+    return replace(recording, notes=(*notes, *recording.notes))
 
 
 class _Table:
@@ -98,7 +97,7 @@ class _Table:
 
     def __init__(self, path: Path, file: io.TextIOBase, unit: str | None, time: str | None,
                  joints: Sequence[str]) -> None:
-        self.path, self.file = path, file
+        self.path = path
         self.line, self.read = 1, 0
         self.notes: list[str] = []
         line = file.readline()
@@ -107,15 +106,31 @@ class _Table:
         if not line:
             raise RecordingError(f'{path}: the file is empty')
         self._printable(line, self.line)
+        if not any(map(line.count, DELIMITERS)) and (found := preamble(line, file)) is not None:
+            line, self.line, said = found[0], self.line + found[1], found[2]
+            if unit and said and unit != said:
+                raise RecordingError(f'{path}: its preamble says {said}, not {unit}')
+            unit = unit or said
         self.delimiter = max(DELIMITERS, key=line.count)
         headers = [header.strip() for header in self._cells(line.lstrip('#'), self.line)]
+        while len(headers) > 2 and not headers[-1]:
+            headers.pop()
         if len(headers) < 2:
             raise RecordingError(f'{path}, line {self.line}: one column only, {headers[0]!r}; '
                                  'a table has a time column and one per joint')
         if all(_number(header) is not None for header in headers if header):
             raise RecordingError(f'{path}, line {self.line}: no header; the first line has to '
                                  'name the columns')
-        self.width = len(headers)
+        self.width, self.ended = len(headers), False
+        first = file.readline()
+        if (named := self._units(headers, first)) != headers:
+            headers, first = named, file.readline()
+            self.line += 1
+            self.notes.append(f'line {self.line} is taken for the units of the columns')
+        self.commas = decimal_commas(first, self.delimiter)
+        if self.commas:
+            self.notes.append('commas are taken for decimal points')
+        self.lines = chain([first] if first else [], file)
         self.time = self._time(headers, time)
         self.columns = self._joints(headers, unit, joints)
         self.last = -np.inf
@@ -125,6 +140,17 @@ class _Table:
             return next(csv.reader([line], delimiter=self.delimiter, strict=True))
         except csv.Error as error:
             raise RecordingError(f'{self.path}, line {number}: {error}') from error
+
+    def _units(self, headers: list[str], line: str) -> list[str]:
+        """Return the headers with the units that the next line has, if it is one of units."""
+        if '\0' in line or not line.strip() or any(_split(header)[1] for header in headers):
+            return headers
+        cells = self._cells(line, self.line + 1)
+        units = units_of(cells[:self.width])
+        if units is None or len(units) < self.width or any(map(str.strip, cells[self.width:])):
+            return headers
+        return [f'{header} [{unit}]' if unit else header
+                for header, unit in zip(headers, units, strict=True)]
 
     def _printable(self, line: str, number: int) -> None:
         if '\0' in line:
@@ -199,8 +225,10 @@ class _Table:
         names = [column.joint for column in self.columns]
         places = [column.index for column in self.columns]
         scales = np.array([column.scale for column in self.columns])
-        while lines := list(islice(self.file, LINES)):
+        while lines := list(islice(self.lines, LINES)):
             self.read += sum(map(len, lines))
+            if self.commas:
+                lines = [line.replace(',', '.') for line in lines]
             numbers = self._numbers(lines)
             seconds = numbers[:, self.time.index] * self.time.scale
             self._check(seconds, lines)
@@ -224,6 +252,9 @@ class _Table:
                 continue
             self._printable(line, number)
             cells = self._cells(line, number)
+            while len(cells) > self.width and not cells[-1].strip():
+                cells.pop()
+                self.ended = True
             if len(cells) != self.width:
                 raise RecordingError(f'{self.path}, line {number}: {len(cells)} columns, where '
                                      f'the header has {self.width}')
@@ -241,6 +272,9 @@ class _Table:
         """Refuse times that are none, or go back."""
         before = np.append(self.last, seconds[:-1])[:len(seconds)]
         wrong = ~(np.abs(seconds) < LATEST) | (seconds < before)
+        # A single stamp far ahead of the next one is the one that is wrong: merged leaves it out.
+        first, ahead, after = seconds[:-2], seconds[1:-1], seconds[2:]
+        wrong[2:] &= ~((first <= after) & (ahead > after + ASTRAY))
         if wrong.any():
             row = int(np.argmax(wrong))
             number = [k for k, line in enumerate(lines, self.line + 1) if line.strip()][row]

@@ -188,6 +188,11 @@ def recorded(streams: Sequence[Stream], joints: Sequence[str], source: str,
     if not headers:
         unset = [stream.topic for stream in read if not stream.stamped]
         notes.append(f'no header stamps on {few(unset)}: the times are those of receipt')
+    elif len({stream.dated for stream in read}) > 1:
+        headers = False
+        other = [stream.topic for stream in read if not stream.dated]
+        notes.append(f'{few(other)}: stamps of another clock than on the other topics, such as a '
+                     "simulation's: the times are those of receipt")
     for stream in read:
         if stream.servo:
             _refuse_lacking(f'{source}{stream.topic}', 'effort but 0',

@@ -9,6 +9,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from cpg_ros.errors import CpgError
+from cpg_ros.recordings.stray_samples import (
+    FARTHEST,
+    Part,
+    counted,
+    without_astray,
+    without_far,
+)
 
 #: Stamps, shape (n,), int64, ns; the joints' names; positions, shape (n, names), rad.
 Chunk = tuple[np.ndarray, Sequence[str], np.ndarray]
@@ -55,7 +62,7 @@ class Recording:
                 f'{self.source}: positions of shape {self.positions.shape} for '
                 f'{len(self.times)} times and {len(self.joints)} joints')
         if len(self.times) < 2:
-            raise RecordingError(f'{self.source}: {_counted(len(self.times), "sample")}; '
+            raise RecordingError(f'{self.source}: {counted(len(self.times), "sample")}; '
                                  'a movement takes two at least')
         if self.times[0] != 0.0 or not (np.diff(self.times) > 0.0).all():
             raise RecordingError(f'{self.source}: times do not rise strictly from 0')
@@ -123,6 +130,8 @@ def merged(chunks: Iterable[Chunk], source: str, joints: Sequence[str] = ()) -> 
         if columns:
             stamps, positions = _joined(groups.pop(group), columns, len(group))
             found.append((stamps, [wanted.index(group[k]) for k in columns], positions))
+    found, astray = without_astray(found)
+    notes += astray
     origin = min(int(stamps.min()) for stamps, _, _ in found)
     ordered = []
     late = again = received = 0
@@ -142,26 +151,30 @@ def merged(chunks: Iterable[Chunk], source: str, joints: Sequence[str] = ()) -> 
             times, positions = times[fresh], positions[fresh]
         ordered.append((times, columns, positions))
     del found
+    far = without_far(ordered, len(wanted))
     times, positions, odd, twice = _one_table(ordered, len(wanted))
     del ordered
     if late:
-        notes.append(f'{_counted(late, "sample")} out of order, sorted by stamp')
+        notes.append(f'{counted(late, "sample")} out of order, sorted by stamp')
     if again + twice:
-        notes.append(f'{_counted(again + twice, "duplicate")} of a stamp, the first is kept')
-    notes += [f'joint {wanted[k]!r}: {_counted(int(odd[k]), "position")} not a finite number'
+        notes.append(f'{counted(again + twice, "duplicate")} of a stamp, the first is kept')
+    odd -= far
+    notes += [f'joint {wanted[k]!r}: {counted(int(odd[k]), "position")} not a finite number'
               for k in np.flatnonzero(odd)]
+    notes += [f'joint {wanted[k]!r}: {counted(int(far[k]), "position")} beyond {FARTHEST:g} rad, '
+              'left out' for k in np.flatnonzero(far)]
     there = ~np.isnan(positions)
     silent = [name for name, any_there in zip(wanted, there.any(axis=0), strict=True)
               if not any_there]
     if silent:
         raise RecordingError(f'{source}: no finite position of {named(silent)} in '
-                             f'{_counted(received, "sample")}; name the joints to take to do '
+                             f'{counted(received, "sample")}; name the joints to take to do '
                              'without')
     heard = there.any(axis=1)
     if not heard.all():
         times, positions, there = times[heard], positions[heard], there[heard]
     if len(times) < 2:
-        raise RecordingError(f'{source}: {_counted(received, "sample")}, all at stamp '
+        raise RecordingError(f'{source}: {counted(received, "sample")}, all at stamp '
                              f'{origin / 1e9:.9f} s: no time passes')
     notes += _missing(wanted, there)
     notes += _intervals(wanted, times, there)
@@ -200,7 +213,7 @@ def _joined(parts: list[tuple[np.ndarray, np.ndarray]], columns: list[int], widt
     return stamps, np.concatenate([positions for _, positions in parts])
 
 
-def _one_table(parts: list[tuple[np.ndarray, list[int], np.ndarray]], width: int
+def _one_table(parts: list[Part], width: int
                ) -> tuple[np.ndarray, np.ndarray, np.ndarray, int]:
     """Return times, positions, the number of odd values by joint, and of what came twice."""
     odd, twice = np.zeros(width, int), 0
@@ -228,7 +241,7 @@ def _missing(joints: tuple[str, ...], there: np.ndarray) -> list[str]:
     counts = there.sum(axis=0)
     most = counts.max()
     return [f'{named([joints[k] for k in np.flatnonzero(counts == count)])}: '
-            f'{_counted(int(count), "sample")} where others have {most}'
+            f'{counted(int(count), "sample")} where others have {most}'
             for count in np.unique(counts[counts < most])]
 
 
@@ -252,15 +265,11 @@ def _intervals(joints: tuple[str, ...], times: np.ndarray, there: np.ndarray) ->
         if long.any():
             lost = int((np.rint(steps[long] / usual) - 1).sum())
             worst = int(np.argmax(steps))
-            notes.append(f'{who}{_counted(int(long.sum()), "dropout")}, about '
-                         f'{_counted(lost, "sample")} of {len(own) + lost}, the longest '
+            notes.append(f'{who}{counted(int(long.sum()), "dropout")}, about '
+                         f'{counted(lost, "sample")} of {len(own) + lost}, the longest '
                          f'{steps[worst]:.4g} s at {own[worst]:.4g} s')
         off = int((np.abs(steps - usual)[~long] > JITTER * usual).sum())
         if off:
             notes.append(f'{who}{off} of {len(steps)} intervals jitter by more than '
                          f'{JITTER:.0%} of the usual {usual:.4g} s')
     return notes
-
-
-def _counted(count: int, what: str) -> str:
-    return f'{count} {what}{"" if count == 1 else "s"}'

@@ -1,6 +1,7 @@
 """A robot's body in MuJoCo: angles wanted go in, what the body does comes out."""
 
 import math
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -32,7 +33,7 @@ class Body:
     """
 
     def __init__(self, name: str, robot: Robot, kp: float = 60.0, kd: float = 2.0,
-                 timestep: float = 0.002) -> None:
+                 timestep: float = 0.002, add: Callable[[Any], None] | None = None) -> None:
         """Load a model and stand it up; arguments as of ``model.load``.
 
         Raises:
@@ -41,7 +42,7 @@ class Body:
         """
         mujoco = engine()
         self.robot = robot
-        self.model: Any = load(name, robot, kp, kd, timestep)
+        self.model: Any = load(name, robot, kp, kd, timestep, add=add)
         self.data: Any = mujoco.MjData(self.model)
         self._step = mujoco.mj_step
         self.stand = robot.column('offset')[robot.places]
@@ -156,6 +157,11 @@ class Body:
     def quaternion(self) -> np.ndarray:
         """Orientation of the base, w x y z."""
         return self._pose[3:]
+
+    @property
+    def rates(self) -> np.ndarray:
+        """Velocity in the world's frame, m/s, then angular velocity in the base's, rad/s."""
+        return self._rates
 
     @property
     def twist(self) -> np.ndarray:

@@ -6,6 +6,7 @@ in which order, the robot file says.
 
 import difflib
 import importlib.util
+from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -80,7 +81,7 @@ def legs(robot: Robot) -> tuple[str, ...]:
 
 
 def load(name: str, robot: Robot, kp: float = 60.0, kd: float = 2.0, timestep: float = 0.002,
-         visual: bool = False) -> Any:
+         visual: bool = False, add: Callable[[Any], None] | None = None) -> Any:
     """Build the model of a robot on a floor; return a ``mujoco.MjModel``.
 
     Actuators are the joints in ``robot.order``: torque = kp (control - angle) - kd speed, within
@@ -96,6 +97,7 @@ def load(name: str, robot: Robot, kp: float = 60.0, kd: float = 2.0, timestep: f
         timestep: of the integration, s.
         visual: keep what is there for pictures only, meshes coarsened to GRAIN; they take a
             second to load.
+        add: adds to the ``mujoco.MjSpec`` before it is compiled.
 
     Raises:
         SimulationError: the file cannot be read, or does not go with the robot file.
@@ -112,6 +114,8 @@ def load(name: str, robot: Robot, kp: float = 60.0, kd: float = 2.0, timestep: f
         _drive(spec, robot, kp, kd)
         _sense(spec, robot, joints, base)
         _surround(spec, base)
+        if add is not None:
+            add(spec)
         spec.option.timestep = timestep
         spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
         spec.compiler.discardvisual = not visual

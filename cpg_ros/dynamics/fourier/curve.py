@@ -101,6 +101,13 @@ class FourierCurve:
                         *equations(network, self.symmetry, u, period))
 
 
+def through(orbit: FourierOrbit, line: ParameterLine, scales: tuple[float, float]
+            ) -> tuple[FourierCurve, np.ndarray]:
+    """The curve of the orbits along a line, and the place of one of them on it."""
+    return (FourierCurve(orbit.network, orbit.symmetry, line, scales),
+            np.array([*orbit.values.ravel(), orbit.period, line.value(orbit.network)]))
+
+
 def from_rest(network: Network, symmetry: Symmetry, line: ParameterLine,
               scales: tuple[float, float], rest: np.ndarray, vector: np.ndarray, period: float
               ) -> tuple[FourierCurve, np.ndarray, np.ndarray]:

@@ -7,6 +7,8 @@ so that a delayed value always lies at a point; the monodromy matrix takes the v
 history to those a period later (Breda, Maset & Vermiglio 2012).
 """
 
+from functools import lru_cache
+
 import numpy as np
 
 from cpg_ros.dynamics.fourier.orbit import FourierOrbit
@@ -101,6 +103,17 @@ class Variation:
                                               for columns in self.outside)])
 
 
+def within(orbit: FourierOrbit) -> np.ndarray:
+    """Return the multipliers within the gait's class, 1 among them."""
+    return variation(orbit)[1]
+
+
+def transverse(orbit: FourierOrbit, gain: float = 0.0) -> np.ndarray:
+    """Return the multipliers transverse to the gait's class, with a symmetry lock."""
+    return variation(orbit)[0].transverse(gain)
+
+
+@lru_cache(maxsize=4)
 def variation(orbit: FourierOrbit) -> tuple[Variation, np.ndarray]:
     """Return the variational equation, fine enough, and the multipliers within the class."""
     n = max(1, int(np.ceil(orbit.network.delay / (SPAN * orbit.period))))

@@ -1,15 +1,11 @@
 """Orbits as trigonometric polynomials: the gaits of networks with a delay."""
 
 from dataclasses import dataclass, field
-from functools import cached_property
-from typing import Any
 
 import numpy as np
 
-from cpg_ros.dynamics.arclength import Curve
 from cpg_ros.dynamics.fourier import collocation
 from cpg_ros.dynamics.periodic import Orbit
-from cpg_ros.networks.parameter_line import ParameterLine
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,25 +56,3 @@ class FourierOrbit(Orbit):
         if self.values.shape[:2] == (1, 1):
             return collocation.evaluate(self.values[0, 0], theta, order, self.phases)
         return super()._states(times, order)
-
-    def curve(self, line: ParameterLine, scales: tuple[float, float]) -> tuple[Curve, np.ndarray]:
-        """The gait's orbits along a line of parameters, and the place of this one among them."""
-        from cpg_ros.dynamics.fourier.curve import FourierCurve
-        value = line.value(self.network)
-        return (FourierCurve(self.network, self.symmetry, line, scales),
-                np.array([*self.values.ravel(), self.period, value]))
-
-    @cached_property
-    def _variation(self) -> tuple[Any, np.ndarray]:
-        from cpg_ros.dynamics.fourier.floquet import variation
-        return variation(self)
-
-    @property
-    def multipliers_within(self) -> np.ndarray:
-        """Floquet multipliers within the gait's class, 1 among them."""
-        return self._variation[1]
-
-    def multipliers_transverse(self, gain: float = 0.0) -> np.ndarray:
-        """Floquet multipliers transverse to the gait's class, with a symmetry lock."""
-        found: np.ndarray = self._variation[0].transverse(gain)
-        return found

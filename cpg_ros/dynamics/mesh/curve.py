@@ -162,6 +162,16 @@ class MeshCurve:
         return completed(*self._solution(z))
 
 
+def through(orbit: MeshOrbit, line: ParameterLine, scales: tuple[float, float]
+            ) -> tuple[MeshCurve, np.ndarray]:
+    """The curve of the orbits along a line, and the place of one of them on it."""
+    curve = MeshCurve(orbit.network, orbit.symmetry, line, scales, orbit.mesh)
+    ends = np.vstack([orbit.coefficients[0], orbit.coefficients[:, -1].sum(axis=0)])
+    length = orbit.period / orbit.symmetry.order
+    return curve, curve.pack(Solution(orbit.mesh, ends, orbit.stages, length), length,
+                             line.value(orbit.network))
+
+
 def from_rest(network: Network, symmetry: Symmetry, line: ParameterLine,
               scales: tuple[float, float], rest: np.ndarray, vector: np.ndarray, period: float
               ) -> tuple[MeshCurve, np.ndarray, np.ndarray]:

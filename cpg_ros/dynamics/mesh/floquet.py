@@ -6,6 +6,8 @@ those transverse to it. The symmetry lock -g (I - P) x adds -g on the complement
 it multiplies the transverse multipliers by exp(-g T) exactly.
 """
 
+from functools import lru_cache
+
 import numpy as np
 
 from cpg_ros.dynamics.isotypic_split import split
@@ -13,7 +15,19 @@ from cpg_ros.dynamics.mesh.newton import Reduced, summed, transfer
 from cpg_ros.dynamics.mesh.orbit import MeshOrbit
 
 
-def mesh_multipliers(orbit: MeshOrbit) -> tuple[np.ndarray, np.ndarray]:
+def within(orbit: MeshOrbit) -> np.ndarray:
+    """Return the multipliers within the gait's class, 1 among them."""
+    return multipliers(orbit)[0]
+
+
+def transverse(orbit: MeshOrbit, gain: float = 0.0) -> np.ndarray:
+    """Return the multipliers transverse to the gait's class, with a symmetry lock."""
+    found: np.ndarray = multipliers(orbit)[1] * np.exp(-gain * orbit.period)
+    return found
+
+
+@lru_cache(maxsize=4)
+def multipliers(orbit: MeshOrbit) -> tuple[np.ndarray, np.ndarray]:
     """Return the multipliers within the class and transverse to it, without a lock.
 
     They come from the variational equation, by the orbit's own collocation.

@@ -268,23 +268,30 @@ def _refined(reduced: Reduced, now: Solution) -> MeshOrbit | None:
             return None
         try:
             mesh = remeshed(reduced, now, fewest)
+            if mesh is None:
+                return completed(reduced, now)
         except NoOrbit:
             return None
-        if mesh is None:
-            return completed(reduced, now)
         now = sampled(path_of(reduced, now), mesh, now.length)
         # Finer every time: equal shares of the error alone may stay short of the goal for ever.
         fewest = finer(mesh)
 
 
 def completed(reduced: Reduced, now: Solution) -> MeshOrbit:
-    """Complete a solution by its derivatives and its residual."""
+    """Complete a solution by its derivatives and its residual.
+
+    Raises:
+        NoOrbit: its equations are singular.
+
+    """
     coefficients = _coefficients(reduced, now)
     extra = reduced.by_parameter(now.stages)
-    p, r, by_start, by_source = linearised(reduced, now, extra)
-    right = -r[-1, :, 2:]
-    right = np.vstack([right, -reduced.by_parameter(now.points[0])[0]])
-    found = np.linalg.solve(bordered(reduced, now, p, r), right)
+    try:
+        p, r, by_start, by_source = linearised(reduced, now, extra)
+        right = np.vstack([-r[-1, :, 2:], -reduced.by_parameter(now.points[0])[0]])
+        found = np.linalg.solve(bordered(reduced, now, p, r), right)
+    except np.linalg.LinAlgError as error:
+        raise NoOrbit('the orbit is not isolated: it has no derivatives') from error
     start, d_length = found[:-1], found[-1]
     moved = p @ start + r[..., :1] * d_length + r[..., 2:]
     inner = (by_start @ moved[:-1, None] + by_source[..., :1] * d_length + by_source[..., 2:])

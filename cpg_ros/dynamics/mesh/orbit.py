@@ -5,13 +5,10 @@ A gait with m = order of H/K is known from the cells of one class each, over one
 """
 
 from dataclasses import dataclass, field
-from functools import cached_property
 
 import numpy as np
 
-from cpg_ros.dynamics.arclength import Curve
 from cpg_ros.dynamics.periodic import Orbit
-from cpg_ros.networks.parameter_line import ParameterLine
 
 #: Even points of a cycle that resolve a relaxation oscillation.
 SAMPLES = 8192
@@ -80,27 +77,3 @@ class MeshOrbit(Orbit):
     def samples(self) -> int:
         """Even points of a cycle that tell all there is to a waveform."""
         return SAMPLES
-
-    def curve(self, line: ParameterLine, scales: tuple[float, float]) -> tuple[Curve, np.ndarray]:
-        """The gait's orbits along a line of parameters, and the place of this one among them."""
-        from cpg_ros.dynamics.mesh.curve import MeshCurve
-        from cpg_ros.dynamics.mesh.newton import Solution
-        curve = MeshCurve(self.network, self.symmetry, line, scales, self.mesh)
-        ends = np.vstack([self.coefficients[0], self.coefficients[:, -1].sum(axis=0)])
-        length = self.period / self.symmetry.order
-        return curve, curve.pack(Solution(self.mesh, ends, self.stages, length), length,
-                                 line.value(self.network))
-
-    @cached_property
-    def _multipliers(self) -> tuple[np.ndarray, np.ndarray]:
-        from cpg_ros.dynamics.mesh.floquet import mesh_multipliers
-        return mesh_multipliers(self)
-
-    @property
-    def multipliers_within(self) -> np.ndarray:
-        """Floquet multipliers within the gait's class, 1 among them."""
-        return self._multipliers[0]
-
-    def multipliers_transverse(self, gain: float = 0.0) -> np.ndarray:
-        """Floquet multipliers transverse to the gait's class, with a symmetry lock."""
-        return self._multipliers[1] * np.exp(-gain * self.period)

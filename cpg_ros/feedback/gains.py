@@ -1,0 +1,82 @@
+"""The numbers of all feedback laws, each law on or off by itself."""
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Gains:
+    """Which laws are on, and their gains; SI units, found on a simulated Go2.
+
+    Attributes:
+        posture, placement, pace, reflexes, slope, heading, speed: whether the law is on.
+        roll, roll_rate: metres a foot is drawn in per metre to the left and rad, or rad/s.
+        pitch, pitch_rate: the same of pitch, by metres to the front.
+        posture_most: most that posture moves a foot in stance, m.
+        step: s, by which a velocity error is turned into a longer step.
+        step_pitch_rate, step_roll_rate: m per rad/s, forward and sideways.
+        step_filter: time constant, s.
+        step_most: most that a foot is placed elsewhere, m.
+        step_decay: rate at which that is given up in stance, 1/s.
+        give: share of the sideways velocity that feet in stance yield to.
+        pace_from: velocity error at which strides get faster, m/s.
+        pace_gain: share of the frequency per m/s above that.
+        pace_most: largest share.
+        lift: of a foot that meets something while it swings forward, m.
+        reach_rate, reach_most: of a foot that finds no ground in stance, m/s and m.
+        reflex_rate: at which both, and an early landing, are given up, 1/s.
+        slope_share: of the way by which gravity's line through the body misses its feet.
+        slope_height: of the body above its feet, m.
+        slope_filter: time constant of the angles of the ground, s.
+        slope_most: most that feet are moved for it, m.
+        turn: yaw rate wanted per heading error, 1/s.
+        turn_most: largest one, rad/s.
+        speed_share, speed_rate: stride per m/s of missing speed, and per m of missing way.
+        speed_most: most that strides are changed for it.
+        smooth: time constant of every displacement, s.
+
+    """
+
+    posture: bool = True
+    placement: bool = True
+    pace: bool = True
+    reflexes: bool = True
+    slope: bool = True
+    heading: bool = True
+    speed: bool = True
+
+    roll: float = 1.29
+    roll_rate: float = 0.109
+    pitch: float = 1.10
+    pitch_rate: float = 0.062
+    posture_most: float = 0.08
+
+    step: float = 0.16
+    step_pitch_rate: float = 0.045
+    step_roll_rate: float = 0.01
+    step_filter: float = 0.032
+    step_most: float = 0.17
+    step_decay: float = 3.1
+    give: float = 0.55
+
+    pace_from: float = 0.25
+    pace_gain: float = 2.4
+    pace_most: float = 0.6
+
+    lift: float = 0.06
+    reach_rate: float = 0.3
+    reach_most: float = 0.05
+    reflex_rate: float = 8.0
+
+    slope_share: float = 0.7
+    slope_height: float = 0.3
+    slope_filter: float = 0.5
+    slope_most: float = 0.1
+
+    turn: float = 3.0
+    turn_most: float = 0.6
+
+    speed_share: float = 0.5
+    speed_rate: float = 0.3
+    speed_most: float = 0.3
+
+    smooth: float = 0.008

@@ -1,0 +1,53 @@
+"""When each leg of a gait swings, and how far it has got, by the stride phase of the first leg."""
+
+import numpy as np
+
+from cpg_ros.feedback.kinematics import Geometry, forward
+from cpg_ros.motion.plan import Program
+
+#: Points of a stride.
+POINTS = 512
+
+
+class Timetable:
+    """A gait's angles and the times of its steps, over the stride.
+
+    Attributes:
+        angles: from the stand at full strides, rad, shape (POINTS, joints).
+        in_place: the same at strides of length 0.
+        swinging: whether each leg is meant to, shape (POINTS, legs).
+        progress: share of that swing, or else of its stance, that is over, shape (POINTS, legs).
+
+    """
+
+    def __init__(self, program: Program, geometry: Geometry) -> None:
+        """Look at a gait: a leg swings while its foot goes forward, seen from the body."""
+        robot, theta = program.robot, np.arange(POINTS) / POINTS
+        phases = theta[:, None] - program.readout.start + program.orbit.phases[robot.cells]
+        self.angles, self.in_place = (
+            program.shift + np.stack([_periodic(row, phase) for row, phase
+                                      in zip(readout.angles, phases.T, strict=True)], axis=1)
+            for readout in (program.readout, program.in_place))
+        feet = forward(geometry, robot.column('offset') + self.angles)
+        columns = [_swing(x) for x in feet[:, :, 0].T]
+        self.swinging = np.stack([one for one, _ in columns], axis=1)
+        self.progress = np.stack([one for _, one in columns], axis=1)
+
+    def __call__(self, phase: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return swinging and progress at phases in cycles, shape (runs,) -> (runs, legs)."""
+        row = (phase * POINTS).astype(int) % POINTS
+        return self.swinging[row], self.progress[row]
+
+
+def _periodic(values: np.ndarray, phase: np.ndarray) -> np.ndarray:
+    grid = np.arange(values.size + 1) / values.size
+    return np.interp(phase % 1.0, grid, np.append(values, values[0]))
+
+
+def _swing(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Find the swing from the foot furthest back to the foot furthest ahead."""
+    lift, land = int(x.argmin()), int(x.argmax())
+    swing = (land - lift) % x.size
+    since = (np.arange(x.size) - lift) % x.size
+    swinging = since < swing
+    return swinging, np.where(swinging, since / swing, (since - swing) / (x.size - swing))

@@ -1,0 +1,50 @@
+"""Samples that cannot be what they say: stamps far from all others, angles no joint can have."""
+
+import numpy as np
+
+#: A position beyond this is of no joint (rad).
+FARTHEST = 1e9
+#: A gap of so many times what all samples take, and of this much (ns), has recordings on either
+#: side that do not belong together, or stamps that went wrong.
+ASTRAY, GAP = 10.0, 60_000_000_000
+#: Stamps, the columns that they are of, and positions, shape (n, columns).
+Part = tuple[np.ndarray, list[int], np.ndarray]
+
+
+def counted(count: int, what: str) -> str:
+    """Return a number of things in words."""
+    return f'{count} {what}{"" if count == 1 else "s"}'
+
+
+def without_astray(parts: list[Part]) -> tuple[list[Part], list[str]]:
+    """Keep the most samples without a gap that dwarfs them, and say what is left out."""
+    stamps = np.sort(np.concatenate([stamps for stamps, _, _ in parts]))
+    steps = np.diff(stamps)
+    usual = np.median(steps[steps > 0]) if (steps > 0).any() else 0.0
+    gaps = np.flatnonzero(steps > max(ASTRAY * usual * stamps.size, GAP)) + 1
+    ends = np.concatenate([[0], gaps, [stamps.size]])
+    most = int(np.argmax(np.diff(ends)))
+    lost = stamps.size - int(ends[most + 1] - ends[most])
+    if not lost:
+        return parts, []
+    first, last = stamps[ends[most]], stamps[ends[most + 1] - 1]
+    kept = []
+    for own, columns, positions in parts:
+        there = (own >= first) & (own <= last)
+        if there.any():
+            kept.append((own[there], columns, positions[there]))
+    stray = stamps[0] if ends[most] else stamps[-1]
+    return kept, [f'{counted(lost, "sample")} stamped far from the others, left out, such as at '
+                  f'{stray / 1e9:.10g} s: the others are from {first / 1e9:.10g} s to '
+                  f'{last / 1e9:.10g} s']
+
+
+def without_far(parts: list[Part], width: int) -> np.ndarray:
+    """Take away positions that no joint can have; return how many, shape (width,)."""
+    count = np.zeros(width, int)
+    for _, columns, positions in parts:
+        far = np.isfinite(positions) & (np.abs(positions) > FARTHEST)
+        if far.any():
+            count[columns] += far.sum(axis=0)
+            positions[far] = np.nan
+    return count

@@ -1,0 +1,78 @@
+"""The text of tables as programs write it: packed, with a preamble, with a row of units."""
+
+import gzip
+import io
+import re
+import zlib
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+
+from cpg_ros.recordings.recording import RecordingError
+
+#: What a file packed by gzip begins with.
+GZIP = b'\x1f\x8b'
+#: The preamble of OpenSim's .mot and .sto files ends so, after this many lines at most.
+END, PREAMBLE = 'endheader', 100
+#: What a row of units has in its cells, beside numbers that would make it one of samples.
+UNIT = re.compile(r'[(\[]?\s*([a-zA-Z°%][a-zA-Z°%/^*.0-9]{0,11}|-|)\s*[)\]]?')
+#: A number with a decimal comma.
+COMMA = re.compile(r'\s*[-+]?\d*,\d+([eE][-+]?\d+)?\s*')
+
+
+@contextmanager
+def opened(path: Path) -> Iterator[io.TextIOBase]:
+    """Open a text, packed by gzip or not.
+
+    Raises:
+        RecordingError: it is cut or damaged, or no text; from within, too.
+
+    """
+    try:
+        with path.open('rb') as file:
+            packed = file.read(2) == GZIP
+        with (gzip.open(path, 'rt', encoding='utf-8-sig', newline='') if packed
+              else path.open(encoding='utf-8-sig', newline='')) as text:
+            yield text
+    except (gzip.BadGzipFile, zlib.error, EOFError) as error:
+        raise RecordingError(f'{path}: packed by gzip, and damaged: {error}') from error
+    except OSError as error:
+        raise RecordingError(f'{path}: {error.strerror}') from error
+    except UnicodeDecodeError as error:
+        raise RecordingError(f'{path}: not a text file ({error.reason})') from error
+
+
+def preamble(first: str, text: io.TextIOBase) -> tuple[str, int, str | None] | None:
+    """Pass over the preamble of OpenSim's files.
+
+    Args:
+        first: its first line, read already.
+        text: the rest.
+
+    Returns:
+        The line of the header, how many lines come before that, and the unit of angles if it
+        is said; None if it is no such file.
+
+    """
+    lines = [first]
+    while lines[-1].strip().lower() != END:
+        lines.append(text.readline())
+        if not lines[-1] or len(lines) > PREAMBLE:
+            return None
+    said = {name.strip().lower(): value.strip().lower()
+            for name, mark, value in (line.partition('=') for line in lines) if mark}
+    units = {'yes': 'deg', 'no': 'rad'}
+    return text.readline(), len(lines), units.get(said.get('indegrees', ''))
+
+
+def units_of(cells: Sequence[str]) -> list[str] | None:
+    """Return the units that a row has, '' where a column has none; None if it is no such row."""
+    found = [UNIT.fullmatch(cell.strip()) for cell in cells]
+    units = ['' if match is None or match[1] == '-' else match[1] for match in found]
+    return units if all(found) and any(units) and 'nan' not in map(str.lower, units) else None
+
+
+def decimal_commas(line: str, delimiter: str) -> bool:
+    """Tell whether the numbers of a line have decimal commas, and nothing else tells otherwise."""
+    return (delimiter != ',' and '.' not in line
+            and any(COMMA.fullmatch(cell) for cell in line.strip().split(delimiter)))

@@ -1,0 +1,226 @@
+"""Directives whose tables come from the code: parameters, topics, options, robot files, presets.
+
+What only a person can say (what a topic is for) stands in the page, one line `name: text` each.
+The page and the code must name the same things, or the build fails.
+"""
+
+import importlib
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+import graph_names
+import launch_files
+import robot_keys
+from docutils import nodes
+from sphinx.application import Sphinx
+from sphinx.errors import ExtensionError
+from sphinx.util.docutils import SphinxDirective
+
+import cpg_ros
+from cpg_ros.dynamics.orbit import solve_preset
+from cpg_ros.networks.registry import SHIPPED
+from cpg_ros.nodes import generator_parameters, inversion_node, robot_sim
+from cpg_ros.nodes.parameter_spec import Spec
+from cpg_ros.robots.robot_file import find_robot
+
+
+def cell(text: object) -> str:
+    """Return text for a cell of a table in Markdown."""
+    return str(text).replace('|', r'\|').replace('~/', r'\~/').replace('*', r'\*')
+
+
+def table(head: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
+    """Return a table in Markdown."""
+    lines = [head, ['---'] * len(head), *([cell(one) for one in row] for row in rows)]
+    return '\n'.join('| ' + ' | '.join(line) + ' |' for line in lines)
+
+
+def code(text: object) -> str:
+    """Return text as code, nothing for nothing."""
+    return f'`{text}`' if str(text) else ''
+
+
+def parameter_rows(specs: dict[str, Spec], defaults: bool = True) -> list[list[str]]:
+    """Return a row for each parameter."""
+    rows = []
+    for name, spec in specs.items():
+        span = '' if spec.low is None else f'{spec.low:g} to {spec.high:g}'
+        kind = {'str': 'string', 'float': 'double', 'list': 'string[]'}.get(
+            type(spec.default).__name__, type(spec.default).__name__)
+        default = str(spec.default).lower() if isinstance(spec.default, bool) else spec.default
+        text = spec.text + (f' ({spec.constraints})' if spec.constraints else '')
+        rows.append([code(name), kind + (', read-only' if spec.read_only else ''),
+                     code(default) if defaults else "the preset's", span, text])
+    return rows
+
+
+HEAD = ('parameter', 'type', 'default', 'range', 'what')
+
+
+def parameters(what: str) -> str:
+    """Return the parameters of a node, or those of a network in the generator."""
+    if what == 'robot_sim':
+        fixed = {name: Spec(one.default, one.text, one.low, one.high, True, one.constraints)
+                 for name, one in robot_sim.SPECS.items()}
+        return table(HEAD, parameter_rows(fixed))
+    if what == 'inversion':
+        free = [code('free'), 'string[]', 'not set', '',
+                "parameters to fit; not set: the network's usual ones"]
+        return table(HEAD, [*parameter_rows(inversion_node.SPECS), free])
+    usual = SHIPPED['delayed' if what == 'generator' else what]
+    planner = generator_parameters.Planner(usual, usual.presets(), find_robot(usual.usual_robot))
+    own = planner.specs(usual.usual_gait)
+    frequency = {'frequency': own.pop('frequency')}
+    if what != 'generator':
+        return table(HEAD, parameter_rows(own, defaults=False))
+    rows = parameter_rows({'network': generator_parameters.NETWORK,
+                           **generator_parameters.specs(usual), **frequency})
+    exclusive = parameter_rows({'exclusive': generator_parameters.exclusive('none')})[0]
+    exclusive[2] = '`true` with `command`, else `false`'
+    return table(HEAD, [*rows, exclusive])
+
+
+def presets(name: str) -> str:
+    """Return the gaits and presets of a network with their parameters and exact periods."""
+    rows = []
+    for preset_name, preset in SHIPPED[name].presets().items():
+        symmetry = preset.network.symmetry(preset.gait)
+        phases = ', '.join(str(phase) for phase in symmetry.phases)
+        values = ', '.join(f'{key} {value:g}' for key, value in preset.network.as_dict().items()
+                           if value)
+        rows.append([code(preset_name), code(preset.gait), phases,
+                     f'{solve_preset(preset).period:.4f}', values])
+    return table(('preset', 'gait', 'phases of the cells', 'period, model time', 'parameters'),
+                 rows)
+
+
+def options(name: str) -> str:
+    """Return what a tool does, its options and exit codes, from its own argument parser."""
+    module = importlib.import_module(f'cpg_ros.tools.{name}')
+    parser = (getattr(module, '_parser', None) or module.parser)()
+    rows = []
+    for action in parser._actions:
+        if action.dest == 'help':
+            continue
+        names = ', '.join(action.option_strings) or str(action.metavar or action.dest)
+        value = action.metavar or '|'.join(map(str, action.choices or ()))
+        if action.nargs == 0 or not action.option_strings:
+            value = ''
+        more = ' ...' if action.nargs in ('+', '*') else ''
+        text = parser._get_formatter()._expand_help(action) if action.help else ''
+        rows.append([code(f'{names} {value}{more}'.strip()),
+                     'yes' if action.required else '', text])
+    told = [parser.description or '', '', table(('option', 'required', 'what'), rows)]
+    if parser.epilog:
+        told += ['', '```text', parser.epilog, '```']
+    return '\n'.join(told)
+
+
+def described(name: str, found: dict[str, Any], lines: Sequence[str], where: str
+              ) -> dict[str, str]:
+    """Return what the page says of each thing found in the code.
+
+    Raises:
+        ExtensionError: the page says nothing of one, or speaks of one that is not there.
+
+    """
+    texts = dict(line.split(': ', 1) for line in lines if line.strip())
+    if missing := set(found) - set(texts):
+        raise ExtensionError(f'{where}: {name} without a word: {", ".join(sorted(missing))}')
+    if extra := set(texts) - set(found):
+        raise ExtensionError(f'{where}: {name} that the code has not: {", ".join(sorted(extra))}')
+    return texts
+
+
+class Generated(SphinxDirective):
+    """A table made by a function of the argument."""
+
+    required_arguments = 1
+    has_content = True
+    make: Any = None
+
+    def run(self) -> list[nodes.Node]:
+        """Return the table's nodes."""
+        text = type(self).make(self)
+        return self.parse_text_to_nodes(text, allow_section_headings=True)
+
+
+class Topics(Generated):
+    """Topics and services of a node, as it makes them; what they are for is in the page."""
+
+    def make(self) -> str:
+        """Return the table."""
+        found = graph_names.of(self.arguments[0])
+        texts = described('topics', found, self.content, self.env.docname)
+        return table(('name', 'type', 'direction', 'what'),
+                     [[code(name), code(found[name][1]), found[name][0], text]
+                      for name, text in texts.items()])
+
+
+class RobotFile(Generated):
+    """Keys that the reader of robot files asks for; what they mean is in the page."""
+
+    def make(self) -> str:
+        """Return the table."""
+        found = robot_keys.asked_for()
+        texts = described('keys', found, self.content, self.env.docname)
+        return table(('key', 'required', 'what'),
+                     [[code(key), 'yes' if found[key] else '', text]
+                      for key, text in texts.items()])
+
+
+def made_by(function: Any) -> type[Generated]:
+    """Return a directive that calls a function with its argument."""
+    return type(function.__name__.title(), (Generated,),
+                {'make': lambda self: function(self.arguments[0]), 'has_content': False})
+
+
+def arguments(name: str) -> str:
+    """Return the arguments of a launch file."""
+    return table(('argument', 'default', 'what'),
+                 [[code(key), code(default), text]
+                  for key, (default, text) in launch_files.arguments(name).items()])
+
+
+def door(_: str) -> str:
+    """Return what `import cpg_ros` gives."""
+    kinds = {name: 'autoclass' if isinstance(thing := getattr(cpg_ros, name), type) else
+             'autofunction' if callable(thing) else 'autodata' for name in cpg_ros.__all__}
+    return rst(f'.. {kind}:: cpg_ros.{name}\n' + ('   :no-value:\n' if kind == 'autodata' else
+                                                 '   :members:\n' * (kind == 'autoclass'))
+               for name, kind in kinds.items())
+
+
+def room(name: str) -> str:
+    """Return the modules of a room."""
+    place = importlib.import_module(f'cpg_ros.{name}')
+    listed = [one for one in place.__all__ if name != 'nodes' or one != 'launch_arguments']
+    return (place.__doc__ or '') + '\n\n' + '\n\n'.join(
+        f'## `{name}.{one}`\n\n' + rst([f'.. automodule:: cpg_ros.{name}.{one}\n   :members:\n'])
+        for one in listed)
+
+
+def rst(blocks: Iterable[str]) -> str:
+    """Return reStructuredText within Markdown."""
+    return '```{eval-rst}\n' + '\n'.join(blocks) + '```\n'
+
+
+def escaped(app: Sphinx, what: str, name: str, thing: Any, options: Any, lines: list[str]
+            ) -> None:
+    """Make of a docstring, which is plain text, what reStructuredText reads as such."""
+    for k, line in enumerate(lines):
+        parts = line.split('``')
+        parts[::2] = [part.replace('|', r'\|').replace('*', r'\*').replace('`', r'\`')
+                      for part in parts[::2]]
+        lines[k] = '``'.join(parts)
+
+
+def setup(app: Sphinx) -> dict[str, bool]:
+    """Name the directives."""
+    for name, directive in {'parameters': made_by(parameters), 'presets': made_by(presets),
+                            'options': made_by(options), 'launch': made_by(arguments),
+                            'door': made_by(door), 'room': made_by(room), 'topics': Topics,
+                            'robotfile': RobotFile}.items():
+        app.add_directive(name, directive)
+    app.connect('autodoc-process-docstring', escaped, priority=400)
+    return {'parallel_read_safe': False}

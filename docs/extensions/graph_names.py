@@ -1,0 +1,60 @@
+"""Topics and services of the nodes, asked of the nodes themselves."""
+
+import os
+from collections.abc import Callable
+from typing import Any
+
+import rclpy
+
+from cpg_ros.nodes.generator import NAME, Generator
+from cpg_ros.nodes.inversion_node import Inversion
+from cpg_ros.nodes.node_base import StartedNode
+from cpg_ros.nodes.robot_sim import RobotSim
+
+#: Node -> what makes one, and the parameters under which it has all of its topics.
+KINDS: dict[str, tuple[Callable[[], StartedNode], tuple[dict[str, str], ...]]] = {
+    'generator': (Generator, (
+        {'command': 'joint_trajectory', 'exclusive': 'false', 'robot': 'unitree_go2',
+         'cmd_vel': 'true'},
+        {'command': 'forward_position', 'exclusive': 'false', 'combined_topic': '""'})),
+    'robot_sim': (RobotSim, ({'clock': 'true'}, {'command': 'joint_trajectory'},
+                             {'command': 'forward_position'})),
+    'inversion': (Inversion, ({},))}
+#: Every node of ROS has these.
+COMMON = ('/rosout', '/parameter_events', 'parameters', 'parameter_types',
+          'parameters_atomically', 'get_type_description')
+
+
+def of(kind: str) -> dict[str, tuple[str, str]]:
+    """Return name -> (direction, type) of a node's topics and services."""
+    make, runs = KINDS[kind]
+    found: dict[str, tuple[str, str]] = {}
+    for given in runs:
+        words = [word for name, value in given.items() for word in ('-p', f'{name}:={value}')]
+        # The graph is of no concern here: nobody else is on this domain of this machine.
+        os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
+        rclpy.init(args=['--ros-args', *words, '--log-level', 'ERROR'], domain_id=231)
+        try:
+            found |= _names(make())
+        finally:
+            rclpy.shutdown()
+    return found
+
+
+def _names(node: Any) -> dict[str, tuple[str, str]]:
+    own, space = node.get_name(), node.get_namespace()
+    asked = {'published': node.get_publisher_names_and_types_by_node,
+             'subscribed': node.get_subscriber_names_and_types_by_node,
+             'service': node.get_service_names_and_types_by_node}
+    found = {}
+    for direction, ask in asked.items():
+        for name, kinds in ask(own, space):
+            if name.endswith(COMMON):
+                continue
+            plain = name.replace(f'/{own}/', '~/') if name.startswith(f'/{own}/') else (
+                name if name in ('/diagnostics', '/clock', '/tf') else name.lstrip('/'))
+            found[plain] = direction, kinds[0]
+    return found
+
+
+__all__ = ['NAME', 'of']

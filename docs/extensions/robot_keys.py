@@ -1,0 +1,40 @@
+"""Keys of robot files: those that the reader asks for when it reads a file that has them all."""
+
+import re
+from typing import Any
+from unittest.mock import patch
+
+from cpg_ros.files.yaml_reader import Reader
+from cpg_ros.networks.registry import SHIPPED
+from cpg_ros.robots.robot_file import find_robot
+
+#: Keys that are names of the user's own, or of the network's.
+NAMED = {'legs': 'LEG', 'gaits': 'GAIT', 'joints': 'JOINT'}
+
+
+def asked_for() -> dict[str, bool]:
+    """Return key -> whether it is required."""
+    found: dict[str, bool] = {}
+    legs = {leg for kind in SHIPPED.values() for part in kind.legs.values() for leg in part}
+    gaits = {name for kind in SHIPPED.values() for name in kind.presets()}
+    ask = Reader.keys
+
+    def noted(self: Any, tree: Any, where: str, required: set[str],
+              optional: set[str] = frozenset()) -> Any:  # type: ignore[assignment]
+        if not (required | optional) & (legs | gaits | names):
+            place = '.'.join(_plain(where.partition(' (')[0].split('.')))
+            for key in required | optional:
+                found[f'{place}.{key}'.removeprefix('file.')] = key in required
+        return ask(self, tree, where, required, optional)
+
+    names = {joint.name for joint in find_robot('unitree_go2').joints}
+    with patch.object(Reader, 'keys', noted):
+        find_robot('unitree_go2')
+    return found
+
+
+def _plain(parts: list[str]) -> list[str]:
+    """Return a place in a file with a capital word for every name."""
+    return [NAMED[before] if before in NAMED and '[' not in part else
+            re.sub(r'\[\d+\]', '[]', part)
+            for before, part in zip(['', *parts], parts, strict=False)]

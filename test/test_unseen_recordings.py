@@ -1,0 +1,187 @@
+"""Recordings as nobody here made them: read, fitted and written, or refused with the reason."""
+
+import gzip
+import json
+
+import numpy as np
+import pytest
+import yaml
+from bags import START, joint_state, write_bag
+from test_inversion_tool import bag_of, table_of, walked
+
+from cpg_ros.inversion import given_up, parameter_files
+from cpg_ros.motion.plan import Refused
+from cpg_ros.networks.registry import PRESETS
+from cpg_ros.robots.robot_file import load_robot
+from cpg_ros.tools.inversion import main
+
+#: What is fitted fast.
+FAST = ['--free', 'c', '--order', '2', '--json']
+
+
+def said_of(capsys, *arguments):
+    """What the executable says of a recording that it fits."""
+    assert main([*map(str, arguments), *FAST]) == 0, capsys.readouterr().err
+    said = capsys.readouterr()
+    assert 'Warning' not in said.err
+    return json.loads(said.out)
+
+
+def trot_found(said, frequency=2.0):
+    return said['gait'] == 'trot' and said['frequency'] == pytest.approx(frequency, rel=2e-3)
+
+
+def test_three_cycles_are_written(tmp_path, capsys):
+    path = table_of(tmp_path / 'walk.csv', *walked(seconds=1.5, noise=0.01))
+    assert trot_found(said_of(capsys, '--csv', path, '--out', tmp_path / 'fitted.yaml'))
+    tree = yaml.safe_load((tmp_path / 'fitted.yaml').read_text())['/**']['ros__parameters']
+    assert len(load_robot(tree['robot']).joints) == 8
+
+
+def test_what_the_generator_would_refuse_is_not_written(tmp_path, capsys, monkeypatch):
+    path = table_of(tmp_path / 'walk.csv', *walked())
+    asked = []
+
+    def refused(robot, *rest):
+        # From the file as it was written: of six digits or sixteen, and in the robot's own order.
+        asked.append(robot.order)
+        raise Refused('the trot does not attract')
+
+    monkeypatch.setattr(parameter_files, 'plan', refused)
+    assert main(['--csv', str(path), '--out', str(tmp_path / 'fitted.yaml'), *FAST]) == 2
+    assert 'the trot does not attract' in capsys.readouterr().err
+    assert asked == [tuple(walked()[0])] and list(tmp_path.iterdir()) == [path]
+
+
+def test_a_start_without_an_orbit_gives_way(tmp_path, capsys):
+    path = table_of(tmp_path / 'walk.csv', *walked())
+    said = said_of(capsys, '--csv', path, '--start', 'c=5', '--preset', 'goat_trot')
+    assert trot_found(said) and said['rms_share'] < 0.05
+    assert "not fitted as asked for: tau 0.25 is below the trot's critical delay" in ' '.join(
+        said['warnings'])
+    assert 'fitted from the start of the preset instead' in ' '.join(said['warnings'])
+
+
+def test_what_is_never_run_leaves_the_presets_parameters(tmp_path, capsys, monkeypatch):
+    path = table_of(tmp_path / 'walk.csv', *walked())
+    network = PRESETS['delayed']['trot'].network
+    monkeypatch.setattr(given_up, 'refusal', lambda orbit, gait, harmonics: (
+        '' if orbit.network.c == network.c else 'it is too far'))
+    said = said_of(capsys, '--csv', path, '--start', 'c=6', '--report', tmp_path / 'report.html')
+    assert trot_found(said) and said['parameters'] == {}
+    assert 'it is too far' in said['warnings'][0]
+    assert 'the parameters stay those of the preset' in said['warnings'][0]
+
+
+def test_a_leg_stamped_in_simulated_time(tmp_path, capsys):
+    names, t, angles = walked(noise=0.01)
+    messages = []
+    for time, row in zip(t, angles, strict=True):
+        now = START + round(1e9 * time)
+        messages += [('/most/joint_states', now, joint_state(now, names[:6], row[:6])),
+                     ('/rf/joint_states', now, joint_state(1 + round(1e9 * time), names[6:],
+                                                           row[6:]))]
+    said = said_of(capsys, '--bag', write_bag(tmp_path / 'bag', messages))
+    assert trot_found(said) and any('another clock' in note for note in said['notes'])
+
+
+@pytest.mark.parametrize('place', [0, 700, -1])
+def test_a_stamp_far_from_all_others(tmp_path, capsys, place):
+    names, t, angles = walked(noise=0.01)
+    wrong = t + 1.7e9
+    wrong[place] = 0.01 if place == 0 else wrong[place] + 365 * 86400.0
+    found = [said_of(capsys, '--csv', table_of(tmp_path / 'walk.csv', names, wrong, angles))]
+    messages = [('/joint_states', START + k, joint_state(round(1e9 * time), names, row))
+                for k, (time, row) in enumerate(zip(wrong, angles, strict=True))]
+    found.append(said_of(capsys, '--bag', write_bag(tmp_path / 'bag', messages)))
+    for said in found:
+        assert trot_found(said) and said['end'] < 13.0
+        assert sum('1 sample stamped far from the others' in note for note in said['notes']) == 1
+
+
+def test_a_pause_that_dwarfs_the_recording_divides_it(tmp_path, capsys):
+    names, t, angles = walked(noise=0.01)
+    path = table_of(tmp_path / 'walk.csv', names, np.where(t > 8.0, t + 5e4, t), angles)
+    said = said_of(capsys, '--csv', path)
+    assert trot_found(said) and 7.5 < said['end'] <= 8.0
+    assert any(note.startswith('799 samples stamped far from') for note in said['notes'])
+
+
+def test_a_position_beyond_all_joints(tmp_path, capsys):
+    names, t, angles = walked(noise=0.01)
+    angles[500:520, 3] = 1e300
+    said = said_of(capsys, '--csv', table_of(tmp_path / 'walk.csv', names, t, angles))
+    assert trot_found(said)
+    assert "joint 'rh_knee': 20 positions beyond 1e+09 rad, left out" in said['notes']
+
+
+def test_two_robots_in_one_topic(tmp_path, capsys):
+    names, t, angles = walked(noise=0.01)
+    both = [f'{robot}_{name}' for robot in ('one', 'two') for name in names]
+    bag = bag_of(tmp_path / 'bag', both, t, np.hstack([angles, angles[::-1]]))
+    assert main(['--bag', str(bag), *FAST]) == 2
+    said = capsys.readouterr().err
+    assert 'two robots' in said and '--joints' in said and said.count('\n') == 1
+    assert trot_found(said_of(capsys, '--bag', bag, '--joints', *both[:8]))
+
+
+def rewritten(path, change):
+    """A table whose lines are changed, but for the header."""
+    head, *rows = path.read_text().splitlines()
+    path.write_text('\n'.join([head, *map(change, rows)]) + '\n')
+
+
+@pytest.mark.parametrize(('kind', 'words'), [
+    ('commas', 'commas are taken for decimal points'), ('units', 'line 2 is taken for the units'),
+    ('units and commas', 'line 2 is taken for the units'), ('gzip', ''),
+    ('delimiters', 'lines that end in a delimiter'), ('sides', '')])
+def test_tables_of_other_programs(tmp_path, capsys, kind, words):
+    names, t, angles = walked(noise=0.01)
+    if 'units' in kind:
+        angles = np.degrees(angles)
+    if kind == 'sides':
+        names = [f'{joint}_{end}_{side}' for end in ('rear', 'front') for side in ('LT', 'RT')
+                 for joint in ('hip', 'knee')]
+    path = table_of(tmp_path / 'walk.csv', names, t, angles)
+    if 'commas' in kind:
+        path.write_text(path.read_text().replace(',', ';').replace('.', ','))
+    if 'units' in kind:
+        head, rest = path.read_text().split('\n', 1)
+        mark = ';' if 'commas' in kind else ','
+        path.write_text(f'{head}\ns{(mark + "deg") * len(names)}\n{rest}')
+    elif kind == 'delimiters':
+        rewritten(path, lambda row: row + ',')
+    elif kind == 'gzip':
+        path = tmp_path / 'walk.csv.gz'
+        path.write_bytes(gzip.compress((tmp_path / 'walk.csv').read_bytes()))
+    said = said_of(capsys, '--csv', path)
+    assert trot_found(said)
+    assert words in ' '.join(said['notes'])
+    assert said['joints'][names[0]]['rms'] < 0.05
+
+
+@pytest.mark.parametrize('degrees', ['yes', 'no'])
+def test_opensims_files(tmp_path, capsys, degrees):
+    names, t, angles = walked(noise=0.01)
+    scaled = np.degrees(angles) if degrees == 'yes' else angles
+    head = ['Coordinates', 'version=1', f'nRows={t.size}', f'nColumns={len(names) + 1}',
+            f'inDegrees={degrees}', '', 'Units are S.I. units (second, meters, Newtons, ...)',
+            'endheader', '\t'.join(['time', *names])]
+    path = tmp_path / 'walk.mot'
+    path.write_text('\n'.join([*head, *(
+        '\t'.join(f'{value:16.8f}' for value in (time, *row))
+        for time, row in zip(t, scaled, strict=True))]) + '\n')
+    said = said_of(capsys, '--csv', path)
+    assert trot_found(said) and max(one['rms'] for one in said['joints'].values()) < 0.02
+    if degrees == 'yes':
+        assert main(['--csv', str(path), '--unit', 'rad', *FAST]) == 2
+        assert 'its preamble says deg, not rad' in capsys.readouterr().err
+
+
+def test_a_cut_packed_table_ends_in_one_line(tmp_path, capsys):
+    path = table_of(tmp_path / 'walk.csv', *walked())
+    packed = tmp_path / 'walk.csv.gz'
+    packed.write_bytes(gzip.compress(path.read_bytes())[:20000])
+    assert main(['--csv', str(packed), *FAST]) == 2
+    said = capsys.readouterr().err
+    assert 'packed by gzip, and damaged' in said and said.count('\n') == 1
