@@ -3,8 +3,4 @@
 Imports ``networks`` and what is below; knows nothing of ROS.
 """
 
-from cpg_ros.errors import needed
-
-needed('numba')
-
 __all__ = ['field_code', 'jit', 'kernel', 'loops', 'simulate', 'stepper']

@@ -3,9 +3,5 @@
 Imports ``dynamics``, ``robots`` and what is below; knows nothing of ROS.
 """
 
-from cpg_ros.errors import needed
-
-needed('numba')
-
 __all__ = ['joint_readout', 'pattern', 'phase_readout', 'plan', 'precompile', 'ramp', 'readout',
            'resumption', 'runnable', 'smoothstep', 'steering', 'track']
