@@ -3,5 +3,10 @@
 Imports ``dynamics``, ``robots`` and what is below; knows nothing of ROS.
 """
 
+from cpg_ros.errors import needed
+
+# Before any of its modules: one line where numba is missing, not a traceback.
+needed('numba')
+
 __all__ = ['joint_readout', 'pattern', 'phase_readout', 'plan', 'precompile', 'ramp', 'readout',
            'resumption', 'runnable', 'smoothstep', 'steering', 'track']
