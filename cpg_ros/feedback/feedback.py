@@ -65,7 +65,7 @@ class Feedback:
         """
         gains, estimate = self.gains, self.estimate
         estimate.update(senses, dt)
-        swinging, progress = self.timetable(phase + LEAD)
+        swinging, _ = self.timetable(phase + LEAD)
         feet = forward(self.geometry, planned)
         own = self.expected(phase, wanted)
         velocity = estimate.velocity[:, :2] - own[:, :2]
@@ -84,7 +84,7 @@ class Feedback:
                 velocity[:, 1], gains, dt)
             way[..., :2] += self._stepped
         if gains.reflexes:
-            way[..., 2] += self._reflexes.advance(estimate.contact, swinging, progress,
+            way[..., 2] += self._reflexes.advance(estimate.contact, *self.timetable(phase),
                                                   feet[..., 2], gains, dt)
         if gains.slope:
             way[..., :2] += slope.shift(self._ground, gains)[:, None]

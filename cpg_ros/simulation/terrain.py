@@ -1,5 +1,6 @@
-"""Ground that is not flat, as heights on a grid that begins flat at the origin."""
+"""Ground that is not flat, flat at the origin: heights on a grid, or slabs."""
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -9,10 +10,12 @@ from cpg_ros.simulation.robot_model import engine
 
 #: Extent of the ground in front of the robot, behind it and to either side, and grid, m.
 AHEAD, BEHIND, ASIDE, GRID = 8.0, 1.5, 3.0, 0.05
-#: The robot starts on a flat place of this half size, m; the ground rises over as much again.
+#: The robot starts on a flat place of this half size, m.
 PLACE = 0.5
-#: Deepest ground below the origin, m.
-DEPTH = 3.0
+#: Highest ground of a height field, m; much more makes prisms so slender that feet catch in them.
+HIGHEST = 0.2
+#: Half sizes of the slabs of a ramp, m, and where that is which is not in use.
+SLAB, AWAY = (6.0, 6.0, 0.5), -50.0
 
 
 @dataclass(frozen=True)
@@ -21,7 +24,7 @@ class Terrain:
 
     Attributes:
         kind: 'height_field', 'boxes' or 'ramp'.
-        size: largest height, m; of a ramp its angle up, degrees.
+        size: largest height, m, at most HIGHEST; of a ramp its angle up, degrees.
         seed: of what is random.
         across: of a ramp: whether it rises to the left instead of ahead.
 
@@ -43,15 +46,12 @@ def heights(terrain: Terrain) -> np.ndarray:
     """Work out the ground, m, shape (rows, columns) of the grid.
 
     Raises:
-        KeyError: there is no such kind.
+        KeyError: the kind has no heights.
 
     """
     y, x = grid()
     rng = np.random.default_rng(terrain.seed)
-    found = {'height_field': _rough, 'boxes': _boxes, 'ramp': _ramp}[terrain.kind](
-        terrain, x, y, rng)
-    if terrain.kind == 'ramp':
-        return found
+    found = {'height_field': _rough, 'boxes': _boxes}[terrain.kind](terrain, x, y, rng)
     # None of it where the robot stands at the start.
     away = np.maximum(np.abs(x)[None, :], np.abs(y)[:, None])
     return found * np.clip((away - PLACE) / (0.2 * PLACE), 0.0, 1.0)
@@ -75,29 +75,39 @@ def _boxes(terrain: Terrain, x: np.ndarray, y: np.ndarray, rng: np.random.Genera
     return tops[np.ix_(*cells)]
 
 
-def _ramp(terrain: Terrain, x: np.ndarray, y: np.ndarray, rng: np.random.Generator
-          ) -> np.ndarray:
-    """A plane from the edge of the flat place on; across, it is reached through a twist."""
-    rise = np.tan(np.radians(terrain.size))
-    if terrain.across:
-        return rise * np.clip((x[None, :] - PLACE) / 1.0, 0.0, 1.0) * y[:, None]
-    return np.tile(rise * np.maximum(x - PLACE, 0.0), (y.size, 1))
-
-
 def add_ground(spec: Any) -> None:
-    """Add an empty height field named 'ground' to a model that is being built."""
+    """Add a height field 'ground' and slabs 'start' and 'ramp' to a model, out of the way."""
+    kinds, far = engine().mjtGeom, {'friction': [1.0, 0.02, 0.01], 'contype': 1,
+                                    'conaffinity': 0x7FFFFFFF}
     rows, columns = (side.size for side in grid())
     spec.add_hfield(name='ground', nrow=rows, ncol=columns, userdata=np.zeros(rows * columns),
-                    size=[0.5 * (AHEAD + BEHIND), ASIDE, 2.0 * DEPTH, 1.0])
-    spec.worldbody.add_geom(name='ground', type=engine().mjtGeom.mjGEOM_HFIELD,
-                            hfieldname='ground', pos=[0.5 * (AHEAD - BEHIND), 0.0, -50.0],
-                            friction=[1.0, 0.02, 0.01], contype=1, conaffinity=0x7FFFFFFF)
+                    size=[0.5 * (AHEAD + BEHIND), ASIDE, HIGHEST, 0.05])
+    spec.worldbody.add_geom(name='ground', type=kinds.mjGEOM_HFIELD, hfieldname='ground',
+                            pos=[0.5 * (AHEAD - BEHIND), 0.0, AWAY], **far)
+    for name in ('start', 'ramp'):
+        spec.worldbody.add_geom(name=name, type=kinds.mjGEOM_BOX, size=SLAB,
+                                pos=[0.0, 0.0, AWAY], **far)
 
 
 def lay(model: Any, terrain: Terrain) -> None:
-    """Put ground in place of the floor of a model with a height field."""
+    """Put ground in place of the floor of a model that has had it added."""
     mujoco = engine()
-    model.hfield_data[:] = (heights(terrain).ravel() + DEPTH) / (2.0 * DEPTH)
-    model.geom_pos[model.geom('ground').id, 2] = -DEPTH
-    floor = model.geom_type == mujoco.mjtGeom.mjGEOM_PLANE
-    model.geom_pos[floor, 2] = -50.0
+    # The compiler's tree of bounding boxes, and its mark of what is not turned, no longer hold.
+    model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_MIDPHASE
+    model.geom_sameframe[model.geom('ramp').id] = mujoco.mjtSameFrame.mjSAMEFRAME_NONE
+    place, floor = model.geom_pos, model.geom_type == mujoco.mjtGeom.mjGEOM_PLANE
+    place[floor, 2] = AWAY
+    if terrain.kind == 'ramp':
+        half = 0.5 * math.radians(terrain.size)
+        ramp = model.geom('ramp').id
+        axis = np.array([1.0, 0.0] if terrain.across else [0.0, -1.0])
+        model.geom_quat[ramp] = math.cos(half), *(math.sin(half) * axis), 0.0
+        # The upper edge of the slab ends the flat place.
+        edge = np.zeros(3)
+        corner = np.array([-SLAB[0], 0.0, SLAB[2]])
+        mujoco.mju_rotVecQuat(edge, corner, model.geom_quat[ramp])
+        place[ramp] = np.array([PLACE, 0.0, 0.0]) - edge
+        place[model.geom('start').id] = PLACE - SLAB[0], 0.0, -SLAB[2]
+        return
+    model.hfield_data[:] = heights(terrain).ravel() / HIGHEST
+    place[model.geom('ground').id, 2] = 0.0
