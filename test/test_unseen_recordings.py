@@ -331,3 +331,15 @@ def test_the_frequency_of_few_strides_is_as_sure_as_its_error_says(cycles):
         off.append((found.frequency - (end - begin) / (found.end - found.begin))
                    / found.frequency_error)
     assert len(off) > 16 and 0.4 < np.sqrt(np.mean(np.square(off))) < 1.7
+
+
+def test_two_legs_that_walk_may_run(tmp_path, capsys):
+    t = np.arange(2400) / 200.0
+    turns = 2.0 * np.pi * (t[:, None] + np.array([0.0, 0.0, 0.5, 0.5]))
+    angles = np.array([0.1, 0.6, 0.1, 0.6]) + 0.4 * np.cos(turns + np.array([0, 1, 0, 1]))
+    names = ['left_hip', 'left_knee', 'right_hip', 'right_knee']
+    path = table_of(tmp_path / 'walk.csv', names, t, angles)
+    assert main(['--csv', str(path), '--free', 'phi', '--order', '1', '--json']) == 0
+    said = json.loads(capsys.readouterr().out)
+    assert said['gait'] == 'walk' and said['confidence'] <= 0.5
+    assert 'it may as well be a run: name the gait it is (--gait)' in said['warnings']

@@ -200,6 +200,10 @@ def find_stride(recording: Recorded, legs: Legs | Mapping[str, Sequence[str]],
         by_cells = _cell_signals(c, cells, gains, kind)
         if by_cells is not None:
             gait = named_by_cells(by_cells, kind)
+    if len(gait.alike) > 1:
+        rivals = ' or '.join(other for other in gait.alike if other != gait.nearest)
+        # The odds of the gait have this already.
+        doubts.append(Doubt(f'it may as well be a {rivals}: name the gait it is (--gait)', 1.0))
     return Stride(float(warp.knots[0]), float(warp.knots[-1]), warp.frequency,
                   warp.frequency_error, int(warp.cycles + 1e-6), tuple(names), theta,
                   found.mean(theta), found.spread, found.error, found.counts, ahead, gait.gait,
