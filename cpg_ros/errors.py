@@ -4,6 +4,10 @@ Whatever else is raised, a ValueError of numpy or one for arrays of a wrong shap
 the program that calls: nothing here catches it, so that it is never reported as a user's.
 """
 
+import sys
+from importlib.util import find_spec
+from types import TracebackType
+
 
 class CpgError(ValueError):
     """What was asked for cannot be done; the message says what and why, in one line.
@@ -14,3 +18,32 @@ class CpgError(ValueError):
 
 class InputError(CpgError):
     """A name, a number or data that cannot be used; the message says which, and what can be."""
+
+
+class MissingLibraryError(CpgError, ImportError):
+    """A library that no apt package of Ubuntu 24.04 brings is not there; says how to get it."""
+
+
+def needed(library: str) -> None:
+    """See that a library can be imported.
+
+    Raises:
+        MissingLibraryError: it is not there. Where nobody catches it, it is one line.
+
+    """
+    if find_spec(library) is not None:
+        return
+    usual = sys.excepthook
+
+    def told(kind: type[BaseException], error: BaseException, trace: TracebackType | None
+             ) -> None:
+        if isinstance(error, MissingLibraryError):
+            print(error, file=sys.stderr)
+        else:
+            usual(kind, error, trace)
+
+    sys.excepthook = told
+    raise MissingLibraryError(
+        f'cpg_ros needs {library}, which is not installed: python3 -m venv '
+        f'--system-site-packages .venv && .venv/bin/pip install {library}, and run colcon from '
+        'that environment')

@@ -16,6 +16,8 @@ version = release = cpg_ros.__version__
 extensions = ['myst_parser', 'sphinx_design', 'sphinx.ext.autodoc', 'sphinx.ext.napoleon',
               'sphinx.ext.mathjax', 'generated_tables']
 html_theme = 'furo'
+html_static_path = ['static']
+html_css_files = ['site.css']
 html_title = f'cpg_ros {release}'
 exclude_patterns = ['_build']
 

@@ -340,3 +340,38 @@ def test_as_a_process(tmp_path):
     wrong = subprocess.run([*command, 'quadruped', '--urdf', tmp_path], capture_output=True,
                            text=True, timeout=120)
     assert wrong.returncode == 2 and wrong.stderr.count('\n') == 1
+
+
+def biped_of(left, right, *more):
+    """A URDF of two legs, with hip, knee and ankle each; more joints hang on the base."""
+    joints = []
+    for side in (left, right):
+        for name, parent in (('HIP_P', ''), ('KNEE', 'HIP_P'), ('ANKLE_P', 'KNEE')):
+            joints.append(joint_of(f'{side}_{name}', limit='lower="-2" upper="2" velocity="20"',
+                                   parent=f'{side}_{parent}_l' if parent else 'base'))
+    return robot_of(*joints, *(joint_of(name, axis='1 0 0') for name in more))
+
+
+@pytest.mark.parametrize(('left', 'right', 'more'), [
+    ('LLEG', 'RLEG', ('LLEG_HIP_R', 'RLEG_HIP_R')), ('FL', 'FR', ())])
+def test_bipeds_with_unusual_names_are_made(tmp_path, capsys, left, right, more):
+    path, out = tmp_path / 'my.urdf', tmp_path / 'made.yaml'
+    path.write_text(biped_of(left, right, *more))
+    assert main(['--urdf', str(path), '--make', str(out)]) == 0
+    robot = load_robot(out)
+    assert {leg: {joint.name for joint in joints} for leg, joints in robot.legs.items()} == {
+        leg: {f'{side}_{name}' for name in ('HIP_P', 'KNEE', 'ANKLE_P', *(['HIP_R'] if more
+                                                                          else []))}
+        for leg, side in (('left', left), ('right', right))}
+    assert robot.networks == ('biped',)
+
+
+def test_lopsided_legs_are_a_finding(tmp_path, capsys):
+    path, out = tmp_path / 'my.urdf', tmp_path / 'made.yaml'
+    path.write_text(biped_of('L', 'R', 'L_TOE_X'))
+    assert main(['--urdf', str(path), '--make', str(out), '--json']) == 1
+    said = json.loads(capsys.readouterr().out)
+    assert not said['matches']
+    assert said['lopsided'] == ['right: has 3 joints and left 4, none there like L_TOE_X']
+    assert main([str(out), '--urdf', str(path)]) == 1
+    assert '- right: has 3 joints and left 4' in capsys.readouterr().out

@@ -17,6 +17,7 @@ from cpg_ros.dynamics.continuation import follow, from_hopf
 from cpg_ros.dynamics.floquet import multipliers
 from cpg_ros.dynamics.mesh.newton import collocate
 from cpg_ros.dynamics.orbit import NoOrbit, solve_orbit, solve_preset
+from cpg_ros.errors import InputError
 from cpg_ros.integration.simulate import simulate
 from cpg_ros.networks.biped import Biped
 from cpg_ros.networks.delayed import GAITS, Delayed
@@ -344,6 +345,37 @@ def test_a_waveform_too_steep_ends_the_branch():
     (network, mode, _, _), (omega, tau, _, _) = SUBCRITICAL['pace'], hopf(*SUBCRITICAL['pace'])
     branch = from_hopf(replace(network, tau=tau), mode, omega, TAU, 0.5, 5.0)
     assert branch.ends[1].why == 'steep' and branch.points[-1].orbit.values.size == 255
+
+
+def test_a_fold_at_a_point_of_the_branch_is_no_obstacle():
+    # One point came out at the fold itself, where the rate has either sign.
+    branch = follow(solve_preset(PRESETS['biped']['walk']),
+                    ParameterLine.parse('current', Biped), 0.0, 1.0, most=100)
+    assert branch.ends[0].why == 'steps' and branch.ends[1].why == 'rest'
+    assert len(branch.points) > 100
+    assert branch.folds
+    for fold in branch.folds:
+        assert abs(fold.place.rate) < 1e-6
+
+
+def test_random_lines_end_in_branches_or_are_refused():
+    draw = np.random.default_rng(20261122)
+    ended = 0
+    for _ in range(100):
+        name = draw.choice(list(PRESETS))
+        preset = PRESETS[name][draw.choice(list(PRESETS[name]))]
+        kind = NETWORKS[name]
+        line = ParameterLine.parse(str(draw.choice([*kind.groups, *kind.parameters()])), kind)
+        value = line.value(preset.network)
+        try:
+            branch = follow(solve_preset(preset), line, value - draw.uniform(0.01, 2.0),
+                            value + draw.uniform(0.01, 2.0), most=4)
+        except (NoOrbit, InputError):
+            continue
+        assert {end.why for end in branch.ends} <= {
+            'rest', 'symmetry', 'period', 'bound', 'steps', 'steep', 'lost'}
+        ended += 1
+    assert ended > 40
 
 
 @pytest.mark.parametrize(('name', 'text', 'low', 'high', 'words'), [

@@ -34,7 +34,9 @@ def test_the_usual_names_of_four_legs(names, form):
 @pytest.mark.parametrize(('left', 'right'), [
     ('L_hip', 'R_hip'), ('left_hip', 'right_hip'), ('hip_left', 'hip_right'), ('hip_l', 'hip_r'),
     ('LHipPitch', 'RHipPitch'), ('lknee', 'rknee'), ('leg_left_1_joint', 'leg_right_1_joint'),
-    ('hip_flexion_l', 'hip_flexion_r'), ('left_ankle_joint', 'right_ankle_joint')])
+    ('hip_flexion_l', 'hip_flexion_r'), ('hip_lt', 'hip_rt'), ('LT_KNEE', 'RT_KNEE'),
+    ('LLEG_HIP_R', 'RLEG_HIP_R'), ('LeftHipR', 'RightHipR'),
+    ('left_ankle_joint', 'right_ankle_joint')])
 def test_the_usual_names_of_two_legs(left, right):
     legs = legs_of([right, left])
     assert dict(legs.joints) == {'left': (left,), 'right': (right,)}
@@ -47,6 +49,18 @@ def test_the_usual_names_of_two_legs(left, right):
 def test_names_of_particular_robots(name, leg):
     others = [f'{code}_hip' for code in ('LF', 'RF', 'LH', 'RH') if code.lower() != leg]
     assert legs_of([name, *others])[leg] == (name,)
+
+
+@pytest.mark.parametrize(('names', 'legs'), [
+    (('hip_front_lt', 'hip_front_rt', 'hip_hind_lt', 'hip_hind_rt'), ('lf', 'rf', 'lh', 'rh')),
+    (('FL_hip', 'FR_hip'), ('left', 'right')), (('RR_hip', 'RL_hip'), ('right', 'left'))])
+def test_the_legs_of_a_whole_robot(names, legs):
+    assert dict(legs_of(names, True).joints) == {
+        leg: (name,) for leg, name in zip(legs, names, strict=True)}
+    if len(legs) == 2:
+        # Of a recording, half of a quadruped.
+        with pytest.raises(LegsError, match='but none of'):
+            legs_of(names)
 
 
 def test_order_is_kept_and_what_is_of_no_leg_is_said():

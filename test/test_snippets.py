@@ -21,8 +21,8 @@ def script(page):
         if block.file:
             lines.append(f"cat > {block.file} <<'END_OF_FILE'\n{block.text}END_OF_FILE")
         elif block.language == 'python':
-            lines.append(f"'{sys.executable}' - <<'END_OF_FILE' || exit 9\n"
-                         f'{block.text}END_OF_FILE')
+            lines.append(f"'{sys.executable}' - <<'END_OF_FILE' || exit 9\n{block.text}"
+                         'END_OF_FILE')
         elif block.language == 'console':
             lines += [command(line) for line in block.commands]
     return '\n'.join(lines)

@@ -38,7 +38,7 @@ def robot_from(urdf: Mapping[str, UrdfJoint], name: str) -> tuple[Robot, str]:
             has no room to move.
 
     """
-    legs = legs_of([joint.name for joint in urdf.values() if not joint.flaw])
+    legs = legs_of([joint.name for joint in urdf.values() if not joint.flaw], True)
     usual = {name: next(iter(kind.legs.items())) for name, kind in SHIPPED.items()}
     assignment, cells = next(one for one in usual.values() if set(one[1]) == set(legs))
     networks = tuple(name for name, one in usual.items() if one == (assignment, cells))

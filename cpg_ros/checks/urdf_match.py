@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from difflib import get_close_matches
+from itertools import combinations
 from math import inf, nan
 from typing import Any
 
@@ -76,20 +77,22 @@ class RobotCheck:
     urdf: str
     joints: tuple[JointCheck, ...]
     gaits: tuple[GaitCheck, ...]
+    lopsided: tuple[str, ...]
     notes: tuple[str, ...]
 
     @property
     def faults(self) -> list[str]:
         """What does not match, one line each."""
         return [f'{joint.joint.name}: {fault}' for joint in self.joints for fault in joint.faults
-                ] + [f'{gait.network} {gait.name}: {fault}' for gait in self.gaits
-                     for fault in gait.faults]
+                ] + [*self.lopsided] + [f'{gait.network} {gait.name}: {fault}'
+                                        for gait in self.gaits for fault in gait.faults]
 
     def as_dict(self) -> dict[str, Any]:
         """Return it as plain types."""
         return {'robot': self.robot, 'urdf': self.urdf, 'matches': not self.faults,
                 'joints': [joint.as_dict() for joint in self.joints],
-                'gaits': [gait.as_dict() for gait in self.gaits], 'notes': list(self.notes)}
+                'gaits': [gait.as_dict() for gait in self.gaits],
+                'lopsided': list(self.lopsided), 'notes': list(self.notes)}
 
     def text(self) -> str:
         """Return it as tables, then what does not match, then notes."""
@@ -140,7 +143,21 @@ def checked(robot: Robot, urdf: Mapping[str, UrdfJoint], names: tuple[str, str],
               (gaits or NETWORKS[network].gaits()) if name in NETWORKS[network].presets()]
     return RobotCheck(*names, joints, tuple(
         _gait(robot, urdf, network, name, frequency, amplitude) for network, name in chosen),
-        tuple(_notes(robot, urdf)))
+        tuple(_lopsided(robot)), tuple(_notes(robot, urdf)))
+
+
+def _lopsided(robot: Robot) -> Iterator[str]:
+    """Say which legs have joints that those of the other side do not have."""
+    for left, right in combinations(robot.legs, 2):
+        sides = [robot.sides.get(leg) for leg in (left, right)]
+        if (len(robot.legs[left]) == len(robot.legs[right]) or None in sides
+                or sides[0] == sides[1] or robot.girdles.get(left) != robot.girdles.get(right)):
+            continue
+        fewer, more = sorted((left, right), key=lambda leg: len(robot.legs[leg]))
+        known = {role_of(joint.name) for joint in robot.legs[fewer]}
+        alone = [joint.name for joint in robot.legs[more] if role_of(joint.name) not in known]
+        yield (f'{fewer}: has {len(robot.legs[fewer])} joints and {more} '
+               f'{len(robot.legs[more])}, none there like {", ".join(alone) or "the rest"}')
 
 
 def _faults(joint: Joint, urdf: UrdfJoint | None, near: str) -> Iterator[str]:
@@ -211,7 +228,7 @@ def _nearest(robot: Robot, urdf: Mapping[str, UrdfJoint]) -> dict[str, str]:
     able = [name for name, joint in urdf.items() if not joint.flaw]
     free = [name for name in able if name not in there]
     try:
-        legs: Mapping[str, Sequence[str]] = legs_of(able).joints
+        legs: Mapping[str, Sequence[str]] = legs_of(able, True).joints
     except LegsError:
         legs = {}
     near = {}

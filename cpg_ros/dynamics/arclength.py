@@ -184,7 +184,9 @@ def crossing(here: Place, way: float, value: float) -> Place | None:
     try:
         while sign * gap(reach) > 0.0:
             reach *= 2.0
-        near = along(here, way * brentq(gap, 0.0, reach, xtol=1e-2 * reach))
+        # Newton's method may put the point itself beyond a value that is next to it.
+        near = along(here, way * brentq(gap, 0.0, reach, xtol=1e-2 * reach)
+                     if sign * gap(0.0) > 0.0 else 0.0)
     except np.linalg.LinAlgError:
         return None
     return pinned(near, value) if near is not None and near.rate else None
@@ -199,9 +201,13 @@ def fold(after: Place, step: float) -> Place | None:
         return found.rate
 
     try:
+        # Where the fold is the point itself, to rounding, it may also be found after it.
+        last = 0.0 if rate(0.0) * after.rate > 0.0 else 0.1 * step
+        if rate(last) * after.rate <= 0.0:
+            return None
         for reach in (1.1, 1.4, 2.0):
             if rate(-reach * step) * after.rate < 0.0:
-                found = along(after, brentq(rate, -reach * step, 0.0, xtol=1e-9 * step,
+                found = along(after, brentq(rate, -reach * step, last, xtol=1e-9 * step,
                                             rtol=1e-12))
                 return None if found is None else resolved(found.curve, found.z, found.tangent)
     except (np.linalg.LinAlgError, NoOrbit):

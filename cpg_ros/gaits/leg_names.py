@@ -3,7 +3,8 @@
 Quadrupeds: a code of two letters (LF or FL, RF or FR; hind LH, HL, RL, BL, LR and RH, HR, RR,
 BR), or the words left or right with front or fore, hind, rear or back, anywhere in the name and
 in any case: FL_hip_joint, lf_haa, JointPosRR_calf, front_left_knee, hip_hind_right. Bipeds: left,
-right, L or R alone: left_knee, L_hip, hip_r, LHipPitch.
+right, LT, RT, L or R alone: left_knee, L_hip, hip_rt, LHipPitch. An R after the side is for roll:
+LLEG_HIP_R.
 """
 
 import re
@@ -71,7 +72,9 @@ class Legs:
 
 def words_of(name: str) -> list[str]:
     """Split a name into lower-case words: at signs, digits and capitals, and after a code."""
-    return [word.lower() for word in _WORD.findall(_STUCK.sub(r'\1_', name))]
+    words = [word.lower() for word in _WORD.findall(_STUCK.sub(r'\1_', name))]
+    side = next((k for k, word in enumerate(words) if word in SIDES), len(words))
+    return [word if k <= side or word != 'r' else 'roll' for k, word in enumerate(words)]
 
 
 def _read(words: Sequence[str]) -> tuple[str, str, frozenset[str]]:
@@ -97,11 +100,12 @@ def role_of(name: str) -> str:
     return ' '.join(word for word in words if word not in told)
 
 
-def legs_of(joints: Sequence[str]) -> Legs:
+def legs_of(joints: Sequence[str], whole: bool = False) -> Legs:
     """Guess the legs of joints from their names.
 
     Args:
         joints: names.
+        whole: these are all that the robot has, so that one with FL and FR alone is a biped.
 
     Raises:
         LegsError: no leg, not all of two or four legs, or more than four can be told, or they
@@ -120,6 +124,9 @@ def legs_of(joints: Sequence[str]) -> Legs:
                             and not others & set(words[name])) for leg in known}
         there = [leg for leg in known if found[leg]]
         if len(there) == len(known):
+            break
+        if whole and column == 0 and [leg[0] for leg in sorted(there)] == ['l', 'r']:
+            found = dict(zip(BIPED, (found[leg] for leg in sorted(there)), strict=True))
             break
         # Two codes may be left and right of a biped by chance, three are a quadruped's.
         if column == 0 and len(there) >= 2:

@@ -27,6 +27,10 @@ GRID = 1024
 SIGNED = 1.0
 #: Correlations that differ by more tell the sense of a joint.
 CLEARER = 0.2
+#: A joint that moves by less than this share of the variance of another tells no leg's phase.
+TELLING = 0.05
+#: By how much legs in a gait are off its phases, RMS, cycles: what the odds of gaits rest on.
+SCATTER = 0.06
 #: Largest violation of a symmetry, over the cells' RMS, and samples a cycle for it.
 BY_CELLS, SAMPLES = 0.2, 128
 
@@ -41,6 +45,7 @@ class Named:
         distance: of that, in cycles: RMS over the legs after the best common shift.
         margin: how much further the next gait is that is told apart, cycles.
         alike: gaits that the nearest cannot be told from, itself among them.
+        sure: probability that it is the nearest and no other, by the scatter of legs' phases.
         notes: one line each.
 
     """
@@ -50,6 +55,7 @@ class Named:
     distance: float
     margin: float
     alike: tuple[str, ...]
+    sure: float
     notes: tuple[str, ...]
 
 
@@ -99,7 +105,7 @@ def _pairs(first: Sequence[str], other: Sequence[str]) -> list[tuple[str, str]]:
 
 
 def leg_phases(legs: Mapping[str, Sequence[str]], c: Mapping[str, np.ndarray]
-               ) -> tuple[dict[str, float], tuple[str, ...]]:
+               ) -> tuple[dict[str, float], tuple[str, ...], tuple[str, ...]]:
     """Find by how much each leg is ahead of the first one.
 
     Args:
@@ -107,11 +113,14 @@ def leg_phases(legs: Mapping[str, Sequence[str]], c: Mapping[str, np.ndarray]
         c: joint -> Fourier coefficients of its mean cycle, complex, shape (n + 1,).
 
     Returns:
-        Leg -> phase in cycles, [0, 1): x_leg(t) = x_first(t + phase T); and notes.
+        Leg -> phase in cycles, [0, 1): x_leg(t) = x_first(t + phase T); notes; and
+        legs whose phase may be half a cycle off, as nothing tells the sense of their angles.
 
     """
     phases: dict[str, float] = {}
-    notes, opposite = [], []
+    notes: list[str] = []
+    opposite: list[str] = []
+    vague: list[str] = []
     for leg, joints in legs.items():
         if not phases:
             phases[leg] = 0.0
@@ -120,8 +129,9 @@ def leg_phases(legs: Mapping[str, Sequence[str]], c: Mapping[str, np.ndarray]
         base, pairs = next(((known, found) for known in phases
                             if (found := _pairs(legs[known], joints))), ('', []))
         if pairs:
-            ahead, mirrored = _shift(pairs, c)
+            ahead, mirrored, told = _shift(pairs, c)
             opposite += mirrored
+            vague += [] if told else [leg]
         else:
             base = next(iter(phases))
             most = [max(names, key=lambda name: np.abs(c[name][1]))
@@ -129,23 +139,33 @@ def leg_phases(legs: Mapping[str, Sequence[str]], c: Mapping[str, np.ndarray]
             ahead = float(np.angle(c[most[1]][1] / c[most[0]][1])) / (2.0 * np.pi)
             notes.append(f'{leg} has no joint named like one of {base}: its phase is that of '
                          f'{most[1]} against {most[0]}, half a cycle off if their senses differ')
+            vague.append(leg)
         # What is hardly below a whole cycle is none.
         phases[leg] = round((phases[base] + ahead) % 1.0, 9) % 1.0
     if opposite:
         notes.append(f'taken to count angles in the opposite sense of {next(iter(legs))}: '
                      f'{", ".join(opposite)}')
-    return phases, tuple(notes)
+    return phases, tuple(notes), tuple(vague)
 
 
 def _shift(pairs: list[tuple[str, str]], c: Mapping[str, np.ndarray]
-           ) -> tuple[float, list[str]]:
-    """Return by how much the second of each pair is ahead of the first, all together."""
-    pairs = sorted(pairs, key=lambda pair: -_power(c[pair[0]]) * _power(c[pair[1]]))
+           ) -> tuple[float, list[str], bool]:
+    """Return by how much the second of each pair is ahead of the first, all together.
+
+    And the joints that count angles in the opposite sense, and whether any joint's sense is told.
+    """
+    power = {pair: _power(c[pair[0]]) * _power(c[pair[1]]) for pair in pairs}
+    least = TELLING**2 * max(power.values())
+    senses = {pair: _sense(c[pair[0]], c[pair[1]]) for pair in pairs}
+    # Those whose sense is told come first: the others have to agree with them.
+    pairs = sorted(pairs, key=lambda pair: (not (senses[pair] and power[pair] >= least),
+                                            -power[pair]))
+    told = bool(senses[pairs[0]])
     total: np.ndarray | None = None
     mirrored = []
     for first, other in pairs:
         terms = _cross(c[other], c[first])
-        sense = _sense(c[first], c[other])
+        sense = senses[first, other]
         if total is None:
             sense = sense or 1.0
             total = np.zeros_like(terms)
@@ -157,7 +177,7 @@ def _shift(pairs: list[tuple[str, str]], c: Mapping[str, np.ndarray]
             mirrored.append(other)
         total = total + sense * terms
     assert total is not None
-    return _peak(total)[0], mirrored
+    return _peak(total)[0], mirrored, told
 
 
 def _symmetry(network: type[Network], gait: str) -> Any:
@@ -169,6 +189,11 @@ def _apart(phases: np.ndarray, wanted: np.ndarray, waves: np.ndarray) -> float:
     squares = [nearest_gait(phases[waves == wave], {'': wanted[waves == wave]})[1]**2
                * np.count_nonzero(waves == wave) for wave in np.unique(waves)]
     return float(np.sqrt(sum(squares) / phases.size))
+
+
+def _odds(nearest: float, other: float, legs: int) -> float:
+    """Odds of a gait against the nearest one, from the distances of both."""
+    return float(np.exp(-0.5 * legs * (other**2 - nearest**2) / SCATTER**2))
 
 
 def named(phases: Mapping[str, float], network: type[Network]) -> Named:
@@ -197,6 +222,8 @@ def named(phases: Mapping[str, float], network: type[Network]) -> Named:
             and abs(apart[gait] - apart[nearest]) < 1e-9]
     margin = min((apart[gait] for gait in apart if gait not in same
                   and size[gait] >= size[nearest]), default=np.inf) - apart[nearest]
+    rivals = [gait for gait in apart if gait != nearest and size[gait] >= size[nearest]]
+    odds = [_odds(apart[nearest], apart[gait], own.size) for gait in rivals]
     notes = []
     if len(same) > 1:
         notes.append(f"the legs move alike in {', '.join(same)}: only which of a leg's cells "
@@ -208,7 +235,7 @@ def named(phases: Mapping[str, float], network: type[Network]) -> Named:
         kind = 'lateral' if beside == (network.girdles[order[0]] == 'hind') else 'diagonal'
         notes.append(f'{kind} sequence: {", ".join(order).upper()}')
     return Named(nearest if apart[nearest] <= TOLERANCE else None, nearest, apart[nearest],
-                 margin, tuple(same), tuple(notes))
+                 margin, tuple(same), 1.0 / (1.0 + sum(odds)), tuple(notes))
 
 
 def named_by_cells(c: np.ndarray, network: type[Network]) -> Named:
@@ -228,4 +255,5 @@ def named_by_cells(c: np.ndarray, network: type[Network]) -> Named:
     # What a wave is off from itself that is early by the distance.
     distance, second = (float(np.arcsin(min(0.5 * size, 1.0)) / np.pi)
                         for size in (found.distance, found.distance + found.margin))
-    return Named(found.name, found.nearest, distance, second - distance, (found.nearest,), ())
+    return Named(found.name, found.nearest, distance, second - distance, (found.nearest,),
+                 1.0 / (1.0 + _odds(distance, second, network.cells)), ())

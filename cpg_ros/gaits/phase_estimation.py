@@ -233,7 +233,14 @@ def _straight(grid: np.ndarray, x: np.ndarray, phases: np.ndarray, span: float
     block = (np.interp(grid, [0.0, span], phases - phases[0]) * BLOCKS).astype(int)
     sums = np.bincount(block, scores)
     free = max(1.0 - (2 * HARMONICS + 1) / grid.size, 0.1)
-    return phases, float(np.sqrt(np.sum(sums**2)) / max(power, 1e-300) / free)
+    own = float(np.sqrt(np.sum(sums**2)) / max(power, 1e-300) / free)
+    # Strides wander besides, slowly: what blocks and their neighbours are early or late together
+    # is that, and counts once a cycle. The mean cycle takes one cycle's share of it.
+    early = (np.bincount(block, np.einsum('jn,jn->n', slope, left))
+             / np.maximum(np.bincount(block, np.einsum('jn,jn->n', slope, slope)), 1e-300))
+    cycles = float(phases[1] - phases[0])
+    wander = max(float(np.mean(early[1:] * early[:-1])), 0.0) / max(1.0 - 1.0 / cycles, 0.1)**2
+    return phases, float(np.hypot(own, np.sqrt(12.0 * wander / cycles) / span))
 
 
 def _steady(grid: np.ndarray, x: np.ndarray, knots: np.ndarray, phases: np.ndarray

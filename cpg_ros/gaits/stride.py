@@ -11,6 +11,14 @@ from typing import Protocol
 import numpy as np
 
 from cpg_ros.errors import CpgError, InputError
+from cpg_ros.gaits.doubts import (
+    Doubt,
+    doubts_of_angles,
+    doubts_of_change,
+    doubts_of_legs,
+    doubts_of_rhythm,
+    limping,
+)
 from cpg_ros.gaits.leg_names import Legs
 from cpg_ros.gaits.leg_phases import leg_phases, named, named_by_cells
 from cpg_ros.gaits.phase_average import Warped, warped
@@ -34,6 +42,8 @@ SEEDS, OTHERS = 4, 3.0
 #: A sample is no motion if it is off both neighbours by this many standard deviations and times
 #: as much as they differ.
 SPIKE = 3.0
+#: What fewer cycles leave of the confidence.
+FEW_CYCLES = 0.9
 #: A change of frequency over the stretch that is worth a note.
 DRIFT = 0.04
 
@@ -87,6 +97,9 @@ class Stride:
         nearest: the nearest gait.
         distance: of the leg phases from the nearest, RMS over legs, cycles.
         margin: how much further the next gait is, cycles.
+        confidence: probability that gait and frequency are those named, as far as the recording
+            tells.
+        doubts: what speaks against them, one line each.
         notes: one line each.
         warp: stride phase of the recording's times within the stretch.
 
@@ -108,6 +121,8 @@ class Stride:
     nearest: str
     distance: float
     margin: float
+    confidence: float
+    doubts: tuple[str, ...]
     notes: tuple[str, ...]
     warp: Warp
 
@@ -174,8 +189,13 @@ def find_stride(recording: Recorded, legs: Legs | Mapping[str, Sequence[str]],
     leading = {leg: tuple(name for name in listed
                           if cells is None or cells.get(name) == own[leg][0]) or listed
                for leg, listed in chosen.items()}
-    ahead, by_legs = leg_phases(leading, c)
+    ahead, by_legs, vague = leg_phases(leading, c)
     gait = named(ahead, kind)
+    doubts = [*doubts_of_rhythm(warp.frequency, float(found.counts.max()) / warp.cycles),
+              *doubts_of_angles(names, found.mean(theta)), *doubts_of_legs(vague),
+              *doubts_of_change(phases, x, leading, names)]
+    if warp.cycles < SURE:
+        doubts.append(Doubt('', FEW_CYCLES))
     if cells is not None and gains is not None and len(gait.alike) > 1:
         by_cells = _cell_signals(c, cells, gains, kind)
         if by_cells is not None:
@@ -184,7 +204,9 @@ def find_stride(recording: Recorded, legs: Legs | Mapping[str, Sequence[str]],
                   warp.frequency_error, int(warp.cycles + 1e-6), tuple(names), theta,
                   found.mean(theta), found.spread, found.error, found.counts, ahead, gait.gait,
                   gait.nearest, gait.distance, gait.margin,
-                  tuple(notes) + by_legs + gait.notes,
+                  gait.sure * float(np.prod([one.left for one in doubts])),
+                  tuple(one.said for one in doubts if one.said),
+                  (*notes, *by_legs, *limping(chosen, c), *gait.notes),
                   replace(warp, phases=warp.phases - found.zero))
 
 

@@ -16,6 +16,8 @@ from cpg_ros.networks.network import Network
 
 #: Phases between recording and orbit that are tried.
 SHIFTS = 120
+#: A joint whose mean cycle has a smaller range stands (rad).
+STANDS = 0.01
 
 
 @dataclass(frozen=True)
@@ -85,15 +87,16 @@ class Fit:
 
     @property
     def rms_share(self) -> dict[str, float]:
-        """That over the joint's range; 0 for a joint that stands still."""
+        """That over the joint's range; 0 for a joint that stands."""
         spans = np.ptp(self.recorded, axis=1)
-        return {name: rms / span if span > 0.0 else 0.0
+        return {name: rms / span if span > STANDS else 0.0
                 for (name, rms), span in zip(self.rms.items(), spans.tolist(), strict=True)}
 
     @property
     def mean_rms_share(self) -> float:
-        """Mean over the joints."""
-        return float(np.mean(list(self.rms_share.values())))
+        """Mean over the joints that move; 0 if none does."""
+        moving = np.ptp(self.recorded, axis=1) > STANDS
+        return float(np.sum(list(self.rms_share.values())) / max(np.count_nonzero(moving), 1))
 
     def share_at(self, order: int) -> float:
         """Mean RMS error over range with readouts of another order, the parameters kept."""
@@ -109,8 +112,9 @@ class Fit:
             columns = psi.transpose(1, 0, 2)
             weights = np.linalg.pinv(columns) @ self.recorded[j][:, None]
             left = (columns @ weights)[..., 0] - self.recorded[j]
-            shares[j] = np.sqrt(np.mean(left**2, axis=1)) / (spans[j] or np.inf)
-        return float(shares.mean(axis=0).min())
+            shares[j] = np.sqrt(np.mean(left**2, axis=1)) / max(spans[j], 1e-300)
+        moving = spans > STANDS
+        return float(shares[moving].mean(axis=0).min()) if moving.any() else 0.0
 
     def synchronisation(self, points: int = 20) -> tuple[np.ndarray, np.ndarray]:
         """Errors at even instants, as in Liu & Zhang's Figures 5, 6, 8 and 9.

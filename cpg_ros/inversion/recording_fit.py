@@ -1,7 +1,7 @@
 """A recording inverted: its steady stride, the gait fitted to it, and how well that does."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from cpg_ros.errors import InputError
@@ -15,6 +15,9 @@ from cpg_ros.networks.registry import SHIPPED, NetworkError, find_network
 from cpg_ros.recordings.recording import Recording
 from cpg_ros.robots.robot import Robot
 
+#: Mean RMS error over range above which a fit is poor, by the order of the readout: real trots
+#: and walks leave 0.14 to 0.19, 0.05 to 0.09 and 0.03 to 0.04; and what it leaves of confidence.
+POOR, LEFT = {1: 0.25, 2: 0.15, 3: 0.1}, 0.5
 #: Orders of the readout that are compared.
 ORDERS = (1, 2, 3)
 
@@ -42,6 +45,16 @@ class Inverted:
     shares: dict[int, float]
     warnings: tuple[str, ...]
 
+    @property
+    def confidence(self) -> float:
+        """Probability that gait and frequency are those named; less where the fit is poor."""
+        return self.stride.confidence * (LEFT if self.poor else 1.0)
+
+    @property
+    def poor(self) -> bool:
+        """Whether the readouts leave more than those of their order do of a gait."""
+        return self.fit.mean_rms_share > POOR[self.fit.order]
+
     def as_dict(self) -> dict[str, Any]:
         """Everything in plain types, for JSON."""
         fit, stride = self.fit, self.stride
@@ -49,7 +62,7 @@ class Inverted:
         verdict = fit.verdict
         return {
             'gait': fit.gait, 'recognised': stride.gait, 'nearest': stride.nearest,
-            'distance': stride.distance, 'margin': stride.margin,
+            'distance': stride.distance, 'margin': stride.margin, 'confidence': self.confidence,
             'frequency': stride.frequency, 'frequency_error': stride.frequency_error,
             'cycles': stride.cycles, 'begin': stride.begin, 'end': stride.end,
             'phases': {leg: float(phase) for leg, phase in stride.phases.items()},
@@ -146,19 +159,28 @@ def inverted(recording: Recording, robot: Robot | None = None, network: str = ''
         joint.name: complex(*joint.weights[:2]) for joint in robot.joints}
     stride = find_stride(recording.select(tuple(cells)), legs, kind,
                          None if robot is None else cells, gains)
-    warnings = []
+    warnings = list(stride.doubts)
     if not gait:
         gait = stride.gait or ''
         if not gait:
-            raise InputError(
+            said = ', '.join(f'{leg} {phase:.3f}' for leg, phase in stride.phases.items())
+            raise InputError('; '.join((
                 f'{recording.source}: the recorded phases are none of the gaits of the network '
                 f'{network}: the nearest is {stride.nearest}, {stride.distance:.3f} of a cycle '
-                'off; name the gait to fit it all the same')
+                'off; name the gait to fit it all the same',
+                f'phases at {stride.frequency:.4g} Hz: {said}',
+                *recording.notes, *stride.notes, *stride.doubts)))
     elif stride.gait != gait:
         warnings.append(f'the recorded phases are those of {stride.gait or "none of the gaits"}, '
                         f'not of {gait}')
     parameters = preset_of(network, preset or gait).network
     fit, given_up = fit_at_all(stride, cells, parameters, gait, free, order, starts, done)
-    return Inverted(recording, read, legs, stride, fit,
-                    {order: fit.share_at(order) for order in ORDERS},
-                    (*warnings, *given_up, *fit.warnings))
+    found = Inverted(recording, read, legs, stride, fit,
+                     {order: fit.share_at(order) for order in ORDERS},
+                     (*warnings, *given_up, *fit.warnings))
+    if not found.poor:
+        return found
+    return replace(found, warnings=(
+        f'a poor fit: {100.0 * fit.mean_rms_share:.0f} % of the joints\' range are left on '
+        f'average; what was recorded may be no {fit.gait}, but turning, hopping or several gaits',
+        *found.warnings))

@@ -4,4 +4,5 @@ Imports ``files``; knows nothing of ROS.
 """
 
 __all__ = ['bag_reader', 'bag_storage', 'cdr', 'csv_reader', 'joint_streams', 'live_buffer',
-           'recording', 'servo', 'stray_samples', 'table_text', 'unfinished_mcap']
+           'recording', 'rosbags_library', 'servo', 'stray_samples', 'table_text',
+           'unfinished_mcap']

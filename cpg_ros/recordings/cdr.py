@@ -12,10 +12,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from rosbags.serde import SerdeError
-from rosbags.typesys import Stores, get_typestore
 
 from cpg_ros.errors import CpgError
+from cpg_ros.recordings.rosbags_library import SerdeError, Stores, get_typestore
 
 JOINT_STATE = 'sensor_msgs/msg/JointState'
 #: The layout of a JointState is the same in all ROS 2 distributions.

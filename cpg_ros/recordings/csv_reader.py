@@ -62,6 +62,10 @@ def read_csv(path: str | Path, unit: str | None = None, time: str | None = None,
     columns are called positions (`JointPosFR_hip`), only those are joints, named `FR_hip`.
     Otherwise every column but the time is a joint.
 
+    The file may be packed by gzip or have OpenSim's preamble (.mot, .sto), a second header row of
+    units, decimal commas where commas do not part the columns, and delimiters at the ends of its
+    lines. A single time far ahead of both neighbours is left out.
+
     Args:
         path: the file.
         unit: 'rad' or 'deg', of columns whose header names no unit.

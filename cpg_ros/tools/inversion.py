@@ -50,7 +50,8 @@ def _parser() -> Parser:
                     formatter_class=RawDescriptionHelpFormatter)
     source = parser.add_mutually_exclusive_group(required=True)
     source.add_argument('--bag', type=Path, metavar='DIR', help='a rosbag2 bag, sqlite3 or mcap')
-    source.add_argument('--csv', type=Path, metavar='FILE', help='a table with a head')
+    source.add_argument('--csv', type=Path, metavar='FILE', help="a table with a head, "
+                        "packed by gzip or not, or OpenSim's .mot or .sto")
     parser.add_argument('--topics', nargs='+', default=[], metavar='TOPIC', help='topics of the '
                         'bag to read (default: all of type sensor_msgs/msg/JointState)')
     parser.add_argument('--joints', nargs='+', default=[], metavar='NAME', help='joints to take '

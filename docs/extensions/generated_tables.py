@@ -5,6 +5,7 @@ The page and the code must name the same things, or the build fails.
 """
 
 import importlib
+import re
 from collections.abc import Iterable, Sequence
 from typing import Any
 
@@ -26,7 +27,7 @@ from cpg_ros.robots.robot_file import find_robot
 
 def cell(text: object) -> str:
     """Return text for a cell of a table in Markdown."""
-    return str(text).replace('|', r'\|').replace('~/', r'\~/').replace('*', r'\*')
+    return str(text).replace('|', r'\|').replace('*', r'\*')
 
 
 def table(head: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
@@ -152,9 +153,9 @@ class Topics(Generated):
         """Return the table."""
         found = graph_names.of(self.arguments[0])
         texts = described('topics', found, self.content, self.env.docname)
-        return table(('name', 'type', 'direction', 'what'),
-                     [[code(name), code(found[name][1]), found[name][0], text]
-                      for name, text in texts.items()])
+        return table(('name', 'direction, type', 'what'),
+                     [[code(name), f'{direction} {code(kind)}', texts[name]]
+                      for name, (direction, kind) in ((name, found[name]) for name in texts)])
 
 
 class RobotFile(Generated):
@@ -205,14 +206,27 @@ def rst(blocks: Iterable[str]) -> str:
     return '```{eval-rst}\n' + '\n'.join(blocks) + '```\n'
 
 
+#: Docstring of a constant, as it is.
+_PLAIN: dict[str, list[str]] = {}
+
+
 def escaped(app: Sphinx, what: str, name: str, thing: Any, options: Any, lines: list[str]
             ) -> None:
     """Make of a docstring, which is plain text, what reStructuredText reads as such."""
     for k, line in enumerate(lines):
         parts = line.split('``')
-        parts[::2] = [part.replace('|', r'\|').replace('*', r'\*').replace('`', r'\`')
+        parts[::2] = [re.sub(r'([|`]|(?<![\w*])\*+(?=\w+[^*]*$))', r'\\\1', part)
                       for part in parts[::2]]
         lines[k] = '``'.join(parts)
+    if what in ('data', 'attribute'):
+        _PLAIN[name] = list(lines)
+
+
+def restored(app: Sphinx, what: str, name: str, thing: Any, options: Any, lines: list[str]
+             ) -> None:
+    """Undo what napoleon does to a constant, whose text before a colon it takes for a type."""
+    if name in _PLAIN:
+        lines[:] = _PLAIN.pop(name)
 
 
 def setup(app: Sphinx) -> dict[str, bool]:
@@ -223,4 +237,5 @@ def setup(app: Sphinx) -> dict[str, bool]:
                             'robotfile': RobotFile}.items():
         app.add_directive(name, directive)
     app.connect('autodoc-process-docstring', escaped, priority=400)
+    app.connect('autodoc-process-docstring', restored, priority=600)
     return {'parallel_read_safe': False}

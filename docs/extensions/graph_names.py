@@ -1,12 +1,12 @@
 """Topics and services of the nodes, asked of the nodes themselves."""
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import rclpy
 
-from cpg_ros.nodes.generator import NAME, Generator
+from cpg_ros.nodes.generator import Generator
 from cpg_ros.nodes.inversion_node import Inversion
 from cpg_ros.nodes.node_base import StartedNode
 from cpg_ros.nodes.robot_sim import RobotSim
@@ -35,26 +35,24 @@ def of(kind: str) -> dict[str, tuple[str, str]]:
         os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
         rclpy.init(args=['--ros-args', *words, '--log-level', 'ERROR'], domain_id=231)
         try:
-            found |= _names(make())
+            for name, (direction, type_) in _names(make()):
+                before = found.get(name, (direction, type_))[0]
+                both = before if direction in before else f'{before}, {direction}'
+                found[name] = both, type_
         finally:
             rclpy.shutdown()
     return found
 
 
-def _names(node: Any) -> dict[str, tuple[str, str]]:
+def _names(node: Any) -> Iterator[tuple[str, tuple[str, str]]]:
     own, space = node.get_name(), node.get_namespace()
     asked = {'published': node.get_publisher_names_and_types_by_node,
              'subscribed': node.get_subscriber_names_and_types_by_node,
              'service': node.get_service_names_and_types_by_node}
-    found = {}
     for direction, ask in asked.items():
         for name, kinds in ask(own, space):
             if name.endswith(COMMON):
                 continue
             plain = name.replace(f'/{own}/', '~/') if name.startswith(f'/{own}/') else (
                 name if name in ('/diagnostics', '/clock', '/tf') else name.lstrip('/'))
-            found[plain] = direction, kinds[0]
-    return found
-
-
-__all__ = ['NAME', 'of']
+            yield plain, (direction, kinds[0].replace('/msg/', '/').replace('/srv/', '/'))

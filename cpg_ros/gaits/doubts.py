@@ -1,0 +1,124 @@
+"""What speaks against what was found in a recording, and how sure it is all the same."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from cpg_ros.errors import InputError
+from cpg_ros.gaits.leg_phases import leg_phases
+from cpg_ros.gaits.phase_average import warped
+
+#: Fewer samples a stride may be those of a gait several times as fast.
+SAMPLES = 20.0
+#: Strides slower than this (Hz) are of no leg; with their times in another unit they may lie
+#: between the others.
+SLOW, USUAL = 0.05, (0.2, 12.5)
+UNITS = {'ms': 1e3, 'us': 1e6, 'ns': 1e9}
+#: No joint of a leg swings by more (rad).
+SWING = 2.0 * np.pi
+#: Legs whose phases differ by more between the parts of a stretch (cycles) change gait.
+CHANGE = 0.1
+#: The first and last of so many parts of a stretch are compared, of so many strides at least, and
+#: of so many samples of each joint.
+PARTS, STRIDES, FEWEST = 3, 2, 16
+#: A leg limps that moves by less than this share of what the others do.
+LIMPS = 0.6
+
+
+@dataclass(frozen=True)
+class Doubt:
+    """Something that speaks against what was found.
+
+    Attributes:
+        said: one line.
+        left: the share of the confidence that it leaves.
+
+    """
+
+    said: str
+    left: float
+
+
+def doubts_of_rhythm(frequency: float, samples: float) -> list[Doubt]:
+    """Doubt a stride frequency (Hz) that rests on so many samples of a joint a stride."""
+    found = []
+    if samples < SAMPLES:
+        found.append(Doubt(f'only {samples:.1f} samples a stride: a gait several times as fast '
+                           'would look the same; record faster', 0.5))
+    if frequency < SLOW:
+        unit = next((unit for unit, more in UNITS.items()
+                     if USUAL[0] <= frequency * more <= USUAL[1]), '')
+        found.append(Doubt(f'a stride of {1.0 / frequency:.4g} s is slower than any leg' + (
+            f': if the times are in {unit}, it is {frequency * UNITS[unit]:.4g} Hz; declare it '
+            f'(--time {unit})' if unit else ''), 0.02))
+    return found
+
+
+def doubts_of_angles(joints: Sequence[str], mean: np.ndarray) -> list[Doubt]:
+    """Doubt mean cycles of joints, rad, shape (joints, m), that swing too far."""
+    swing = np.ptp(mean, axis=1)
+    k = int(np.argmax(swing))
+    if swing[k] <= SWING:
+        return []
+    return [Doubt(f'{joints[k]} swings by {swing[k]:.3g} rad, more than a turn: if the angles are '
+                  'in degrees, declare it (--unit deg)', 0.5)]
+
+
+def doubts_of_legs(vague: Sequence[str]) -> list[Doubt]:
+    """Doubt the phases of legs that may be half a cycle off."""
+    if not vague:
+        return []
+    return [Doubt(f'nothing tells in which sense {", ".join(vague)} count angles: half a cycle '
+                  'is uncertain', 0.5)]
+
+
+def doubts_of_change(phases: np.ndarray, x: np.ndarray, legs: Mapping[str, Sequence[str]],
+                     names: Sequence[str]) -> list[Doubt]:
+    """Doubt one gait where the legs' phases differ between the first and the last part.
+
+    Args:
+        phases: of the samples of a stretch, cycles, shape (n,).
+        x: rad, nan where missing, shape (n, joints).
+        legs: leg -> its joints.
+        names: of the joints.
+
+    """
+    parts = _by_parts(phases, x, legs, names)
+    if not parts:
+        return []
+    first, last = parts[0], parts[-1]
+    moved = {leg: (last[leg] - first[leg] + 0.5) % 1.0 - 0.5 for leg in first}
+    leg = max(moved, key=lambda one: abs(moved[one]))
+    if abs(moved[leg]) <= CHANGE:
+        return []
+    return [Doubt(f'the gait changes within the stretch: {leg} is at {first[leg]:.2f} of a cycle '
+                  f'at its beginning and at {last[leg]:.2f} at its end', 0.2)]
+
+
+def _by_parts(phases: np.ndarray, x: np.ndarray, legs: Mapping[str, Sequence[str]],
+              names: Sequence[str]) -> list[dict[str, float]]:
+    """Find the legs' phases in the first and the last part of a stretch, if it is that long."""
+    span, found = phases[-1] - phases[0], []
+    for place in (phases - phases[0] < span / PARTS, phases[-1] - phases < span / PARTS):
+        if span < PARTS * STRIDES or (np.isfinite(x[place]).sum(axis=0) < FEWEST).any():
+            return []
+        try:
+            part = warped(phases[place], x[place], np.zeros(1), [0])
+        except InputError:
+            return []
+        c = dict(zip(names, part.coefficients.T, strict=True))
+        found.append(leg_phases(legs, c)[0])
+    return found
+
+
+def limping(legs: Mapping[str, Sequence[str]], c: Mapping[str, np.ndarray]) -> list[str]:
+    """Say which leg moves by much less than the others do."""
+    size = {leg: float(np.sqrt(sum(np.sum(np.abs(c[name][1:])**2) for name in listed)
+                               / len(listed))) for leg, listed in legs.items()}
+    said = []
+    for leg, own in size.items():
+        usual = float(np.median([other for name, other in size.items() if name != leg]))
+        if own < LIMPS * usual:
+            said.append(f'{leg} moves by {own / usual:.2f} of what the other legs do')
+    return said
