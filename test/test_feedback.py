@@ -265,16 +265,15 @@ def test_a_recording_with_a_gap_in_the_stride_is_refused():
 
 # -- the loop -----------------------------------------------------------------------------------
 
-def patterns(gains, steps=1500):
+def patterns(loop, expected, gains, steps=1500):
     """A body with a real pattern: angles and speeds told, ticks held by a limit, place, m."""
     made = program('trot')
     body = Body('go2', GO2)
     pattern = Pattern(made, drive=Drive(4))
     pattern.steer(*made.steer(0.4, 0.0))
     if gains is not None:
-        loop = ClosedLoop('go2', made)
-        close(pattern, Feedback(made, loop.geometry, measure_efference(loop, (0.3, 0.4)), gains),
-              Proprioception(body), 0.4, dt=DT)
+        close(pattern, Feedback(made, loop.geometry, expected, gains), Proprioception(body), 0.4,
+              dt=DT)
     told, spun, held = np.empty((steps, 12)), np.empty((steps, 12)), np.zeros(steps, dtype=bool)
     for k, (row, rate) in enumerate(zip(told, spun, strict=True)):
         before = pattern.held
@@ -286,15 +285,15 @@ def patterns(gains, steps=1500):
     return told, spun, held, body.base.copy()
 
 
-def test_with_all_laws_off_the_pattern_is_the_same_bit_for_bit():
+def test_with_all_laws_off_the_pattern_is_the_same_bit_for_bit(loop, expected):
     off = Gains(**{field.name: False for field in fields(Gains) if field.type is bool})
-    for one, other in zip(patterns(None), patterns(off), strict=True):
+    for one, other in zip(patterns(loop, None, None), patterns(loop, expected, off), strict=True):
         assert (one == other).all()
 
 
 def test_a_real_pattern_walks_as_those_of_many_runs(loop, expected):
     """Velocities are the slopes of the positions, and limits hold."""
-    told, spun, held, base = patterns(GAINS)
+    told, spun, held, base = patterns(loop, expected, GAINS)
     ran = loop.run([Trial()], 3.0, gains=GAINS, expected=expected)
     assert base[:2] == pytest.approx(ran.place[0, -1], abs=0.05)
     slopes = np.diff(told, axis=0) / DT

@@ -92,10 +92,11 @@ def add_ground(spec: Any) -> None:
 def lay(model: Any, terrain: Terrain) -> None:
     """Put ground in place of the floor of a model that has had it added."""
     mujoco = engine()
-    # The compiler's tree of bounding boxes, and its mark of what is not turned, no longer hold.
+    # The tree of bounding boxes, and marks of what is where its body is, no longer hold.
     model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_MIDPHASE
     model.geom_sameframe[model.geom('ramp').id] = mujoco.mjtSameFrame.mjSAMEFRAME_NONE
     place, floor = model.geom_pos, model.geom_type == mujoco.mjtGeom.mjGEOM_PLANE
+    model.geom_sameframe[floor] = mujoco.mjtSameFrame.mjSAMEFRAME_NONE
     place[floor, 2] = AWAY
     if terrain.kind == 'ramp':
         half = 0.5 * math.radians(terrain.size)
