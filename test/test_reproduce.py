@@ -231,7 +231,7 @@ def test_wrong_arguments_end_with_one_line(arguments, capsys):
 
 def test_it_is_installed_as_an_executable():
     setup = (Path(__file__).parent.parent / 'setup.py').read_text()
-    assert 'reproduce = cpg_ros.tools.reproduce:main' in setup
+    assert 'reproduce = cpg_ros.tools.executables:reproduce' in setup
 
 
 def test_groups_are_those_known():
