@@ -22,6 +22,7 @@ from cpg_ros.nodes.deadline_thread import Ticker
 from cpg_ros.nodes.diagnostics import Diagnostics
 from cpg_ros.nodes.generator import find_robot
 from cpg_ros.nodes.joint_publishers import Outputs
+from cpg_ros.nodes.rivals import Rivals
 
 
 def main() -> None:
@@ -44,7 +45,7 @@ def main() -> None:
                                   period=1.0, network=SimpleNamespace(name='none')))
     still = SimpleNamespace(program=program, robot=robot, faults=0, held=0, recovering=False,
                             standing=True)
-    diagnostics = Diagnostics(node, still, ticker, None)
+    diagnostics = Diagnostics(node, still, ticker, Rivals(node, ()), None)
     node.create_service(SetBool, '~/enable', lambda request, response: response)
     executor = SingleThreadedExecutor()
     executor.add_node(node)
