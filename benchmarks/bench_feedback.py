@@ -17,7 +17,7 @@ from cpg_ros.feedback.gains import Gains
 from cpg_ros.motion.plan import plan
 from cpg_ros.networks.registry import PRESETS
 from cpg_ros.robots.robot_file import load_robot
-from cpg_ros.simulation.closed_loop import ClosedLoop, Trial
+from cpg_ros.simulation.closed_loop import ClosedLoop, Scenario
 from cpg_ros.simulation.efference_measurement import measure_efference
 from cpg_ros.simulation.terrain import Terrain
 
@@ -32,11 +32,11 @@ SLOPES = {'up': Terrain('ramp', 15.0), 'down': Terrain('ramp', -15.0),
 
 
 def pushes(impulse: float, directions: int, phases: int, rng: np.random.Generator
-           ) -> list[Trial]:
+           ) -> list[Scenario]:
     """All directions at all phases, turned by the same random angle."""
     first = rng.uniform(0.0, 2.0 * math.pi)
     ways = first + np.arange(directions) * 2.0 * math.pi / directions
-    return [Trial(push=(impulse * math.cos(way), impulse * math.sin(way)), when=2.5,
+    return [Scenario(push=(impulse * math.cos(way), impulse * math.sin(way)), when=2.5,
                   phase=k / phases) for way in ways for k in range(phases)]
 
 
@@ -65,14 +65,14 @@ def figures(gait: str, quick: bool, rng: np.random.Generator) -> dict[str, objec
         log(f'{gait}, {name}: ground')
         crossed = {}
         for kind, size in (('height_field', 0.06), ('height_field', 0.08), ('boxes', 0.05)):
-            ran = loop.run([Trial(terrain=Terrain(kind, size, seed)) for seed in seeds], 18.0,
+            ran = loop.run([Scenario(terrain=Terrain(kind, size, seed)) for seed in seeds], 18.0,
                            gains=gains, expected=expected)
             in_time = np.arange(ran.place.shape[1]) * loop.timestep < ran.fell[:, None]
             crossed[f'{kind}_{100 * size:.0f}_cm'] = float(
                 ((ran.place[:, :, 0] > 5.0) & in_time).any(axis=1).mean())
-        slopes = loop.run([Trial(terrain=one) for one in SLOPES.values()], 10.0, gains=gains,
+        slopes = loop.run([Scenario(terrain=one) for one in SLOPES.values()], 10.0, gains=gains,
                           expected=expected)
-        flat, slippery = (loop.run([Trial(friction)], 20.0 if friction == 1.0 else 10.0,
+        flat, slippery = (loop.run([Scenario(friction)], 20.0 if friction == 1.0 else 10.0,
                                    gains=gains, expected=expected) for friction in (1.0, 0.3))
         found[name] = {
             'survived': dict(zip(map(str, impulses), shares, strict=True)),

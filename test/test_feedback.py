@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from cpg_ros.errors import InputError
 from cpg_ros.feedback import heading, pace, placement, posture, slope, speed
 from cpg_ros.feedback.efference_copy import BINS, SIGNALS, EfferenceCopy, fold
-from cpg_ros.feedback.estimate import GRAVITY, Estimate, Senses
+from cpg_ros.feedback.estimate import GRAVITY, BodyState, Senses
 from cpg_ros.feedback.feedback import Feedback, close
 from cpg_ros.feedback.gains import Gains
 from cpg_ros.feedback.kinematics import Geometry, displace, forward, inverse, jacobian
@@ -25,7 +25,7 @@ if any(importlib.util.find_spec(name) is None for name in ('mujoco', 'gym_quadru
     pytest.skip('the extra [sim] is not installed', allow_module_level=True)
 
 from cpg_ros.simulation.body import Body
-from cpg_ros.simulation.closed_loop import ClosedLoop, Trial
+from cpg_ros.simulation.closed_loop import ClosedLoop, Scenario
 from cpg_ros.simulation.efference_measurement import measure_efference
 from cpg_ros.simulation.proprioception import Proprioception
 from cpg_ros.simulation.terrain import Terrain, heights
@@ -117,7 +117,7 @@ def test_a_place_out_of_reach_stretches_the_leg_towards_it(loop):
 
 def test_the_estimate_is_the_bodys_own_velocity(loop, expected):
     """Also while it staggers from a push; 5 cm/s is what rolling feet alone would be off."""
-    ran = loop.run([Trial(), Trial(push=(0.0, 12.0), when=3.0)], 5.0, gains=GAINS,
+    ran = loop.run([Scenario(), Scenario(push=(0.0, 12.0), when=3.0)], 5.0, gains=GAINS,
                    expected=expected)
     assert ran.upright.all()
     off = np.sqrt(((ran.estimated - ran.velocity)[:, 500:, :2]**2).mean(axis=1))
@@ -132,7 +132,7 @@ def standing(loads, rates=None, push=(0.0, 0.0, GRAVITY)):
 
 
 def test_contact_has_hysteresis(loop):
-    weight, estimate = loop.geometry.weight, Estimate(loop.geometry)
+    weight, estimate = loop.geometry.weight, BodyState(loop.geometry)
     seen = []
     for share in (0.07, 0.2, 0.07, 0.01, 0.07):
         estimate.update(standing([share * weight] * 4), DT)
@@ -142,7 +142,7 @@ def test_contact_has_hysteresis(loop):
 
 def test_a_foot_that_slips_is_not_believed(loop):
     """Three feet stand, one is drawn back at 2 m/s, as on ice; all bear the same."""
-    geometry, estimate = loop.geometry, Estimate(loop.geometry)
+    geometry, estimate = loop.geometry, BodyState(loop.geometry)
     rates = np.zeros((1, 12))
     drawn = np.linalg.solve(jacobian(geometry, GO2.column('offset'))[0], [-2.0, 0.0, 0.0])
     rates[0, geometry.columns[0]] = drawn
@@ -294,7 +294,7 @@ def test_with_all_laws_off_the_pattern_is_the_same_bit_for_bit(loop, expected):
 def test_a_real_pattern_walks_as_those_of_many_runs(loop, expected):
     """Velocities are the slopes of the positions, and limits hold."""
     told, spun, held, base = patterns(loop, expected, GAINS)
-    ran = loop.run([Trial()], 3.0, gains=GAINS, expected=expected)
+    ran = loop.run([Scenario()], 3.0, gains=GAINS, expected=expected)
     assert base[:2] == pytest.approx(ran.place[0, -1], abs=0.05)
     slopes = np.diff(told, axis=0) / DT
     free = ~(held[1:] | held[:-1])
@@ -305,7 +305,7 @@ def test_a_real_pattern_walks_as_those_of_many_runs(loop, expected):
 
 
 def test_the_closed_trot_survives_pushes_that_fell_the_open_one(loop, expected):
-    trials = [Trial(push=(22.0 * math.cos(way), 22.0 * math.sin(way)), when=2.0, phase=phase)
+    trials = [Scenario(push=(22.0 * math.cos(way), 22.0 * math.sin(way)), when=2.0, phase=phase)
               for way, phase in np.random.default_rng(7).uniform(0.0, [2.0 * math.pi, 1.0],
                                                                  (12, 2))]
     fell = ~loop.run(trials, 4.5).upright
@@ -314,13 +314,13 @@ def test_the_closed_trot_survives_pushes_that_fell_the_open_one(loop, expected):
 
 
 def test_the_closed_trot_keeps_its_line_and_speed(loop, expected):
-    ran = loop.run([Trial()], 12.0, gains=GAINS, expected=expected)
+    ran = loop.run([Scenario()], 12.0, gains=GAINS, expected=expected)
     assert np.abs(ran.place[0, :, 1]).max() < 0.3
     assert ran.velocity[0, 1500:, 0].mean() == pytest.approx(0.4, rel=0.03)
 
 
 def test_the_closed_trot_climbs_where_the_open_one_falls(loop, expected):
-    trials = [Trial(terrain=Terrain('ramp', 12.0)), Trial(terrain=Terrain('ramp', 12.0,
+    trials = [Scenario(terrain=Terrain('ramp', 12.0)), Scenario(terrain=Terrain('ramp', 12.0,
                                                                          across=True))]
     assert loop.run(trials, 10.0, gains=GAINS, expected=expected).upright.all()
 

@@ -43,7 +43,7 @@ def upward(lean: np.ndarray) -> np.ndarray:
                      np.cos(roll) * np.cos(pitch)], axis=-1)
 
 
-class Estimate:
+class BodyState:
     """State of the base and of its contacts.
 
     Attributes:

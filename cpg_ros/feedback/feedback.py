@@ -7,7 +7,7 @@ import numpy as np
 
 from cpg_ros.feedback import heading, pace, placement, posture, slope, speed
 from cpg_ros.feedback.efference_copy import EfferenceCopy
-from cpg_ros.feedback.estimate import Estimate, Senses
+from cpg_ros.feedback.estimate import BodyState, Senses
 from cpg_ros.feedback.gains import Gains
 from cpg_ros.feedback.kinematics import Geometry, displace, forward
 from cpg_ros.feedback.reflexes import Reflexes
@@ -37,7 +37,7 @@ class Feedback:
         """Prepare for a gait; without an efference copy nothing but its speed is expected."""
         self.geometry, self.gains = geometry, gains or Gains()
         self.expected = expected or EfferenceCopy.blank()
-        self.estimate = Estimate(geometry, runs)
+        self.estimate = BodyState(geometry, runs)
         self.timetable = Timetable(program, geometry)
         self._steering = program.motion.steering
         legs = len(geometry.hips)

@@ -146,10 +146,6 @@ class Network(ABC):
         """Derivative of the rates by the state now, shape (..., components, components)."""
         return Field(self).linearised(x, past)[1]
 
-    def delayed_jacobian(self, x: np.ndarray, past: np.ndarray | None = None) -> np.ndarray:
-        """Derivative of the rates by the state a delay ago, shape as of ``jacobian``."""
-        return Field(self).linearised(x, past)[2]
-
     def by_parameter(self, x: np.ndarray, past: np.ndarray | None = None) -> np.ndarray:
         """Derivative of the rates by the parameters, shape (..., components, parameters)."""
         return Field(self).by_parameter(x, past)

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from cpg_ros.feedback.efference_copy import EfferenceCopy
-from cpg_ros.feedback.estimate import Estimate, Senses, upward
+from cpg_ros.feedback.estimate import BodyState, Senses, upward
 from cpg_ros.feedback.feedback import Feedback
 from cpg_ros.feedback.gains import Gains
 from cpg_ros.motion.plan import Program
@@ -33,7 +33,7 @@ RAMP = 1.0
 
 
 @dataclass(frozen=True)
-class Trial:
+class Scenario:
     """What a robot meets in a run, flat ground and nothing else if not told.
 
     Attributes:
@@ -116,7 +116,7 @@ class ClosedLoop:
         self._start = np.empty(mujoco.mj_stateSize(self.body.model, full))
         mujoco.mj_getState(self.body.model, self.body.data, self._start, full)
 
-    def run(self, trials: Sequence[Trial], duration: float, speed: float = 0.4,
+    def run(self, trials: Sequence[Scenario], duration: float, speed: float = 0.4,
             gains: Gains | None = None, expected: EfferenceCopy | None = None) -> Outcome:
         """Let bodies walk from the stand.
 
@@ -148,7 +148,7 @@ class ClosedLoop:
         record = {key: np.zeros((runs, steps, size)) for key, size in
                   (('place', 2), ('lean', 3), ('velocity', 3), ('estimated', 3), ('turning', 3),
                    ('phase', 1), ('work', 1))}
-        estimate = feedback.estimate if gains is not None else Estimate(self.geometry, runs)
+        estimate = feedback.estimate if gains is not None else BodyState(self.geometry, runs)
         for k in range(steps):
             planned, level = pose.advance()
             senses, velocity = self._feel(state, sensors, before, order, legs)
@@ -204,7 +204,7 @@ class ClosedLoop:
                          *limits.T)
         return np.maximum(torque * senses.rates, 0.0).sum(axis=1, keepdims=True)
 
-    def _model(self, trial: Trial) -> Any:
+    def _model(self, trial: Scenario) -> Any:
         key = (trial.friction, trial.terrain)
         if key not in self._models:
             model = copy.copy(self.body.model)
@@ -225,7 +225,7 @@ class _Pattern:
 
     """
 
-    def __init__(self, program: Program, feedback: Feedback, trials: Sequence[Trial],
+    def __init__(self, program: Program, feedback: Feedback, trials: Sequence[Scenario],
                  speed: float, dt: float) -> None:
         robot = program.robot
         self._program, self._feedback, self._dt = program, feedback, dt

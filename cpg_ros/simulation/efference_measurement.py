@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from cpg_ros.feedback.efference_copy import EfferenceCopy, fold
-from cpg_ros.simulation.closed_loop import ClosedLoop, Trial
+from cpg_ros.simulation.closed_loop import ClosedLoop, Scenario
 
 #: Length of a run, and what of it says nothing about the gait itself, s.
 DURATION, BEGINNING = 10.0, 3.0
@@ -24,7 +24,7 @@ def measure_efference(loop: ClosedLoop, speeds: Sequence[float] = (0.1, 0.2, 0.3
     first = round(BEGINNING / loop.timestep)
     found, tables = [], []
     for speed in asked:
-        ran = loop.run([Trial()], DURATION, speed)
+        ran = loop.run([Scenario()], DURATION, speed)
         signals = np.concatenate([ran.velocity[0, first:, :2], ran.turning[0, first:, :2],
                                   ran.lean[0, first:, :2]], axis=1)
         table = fold(ran.phase[0, first:], signals)
