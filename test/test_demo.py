@@ -47,7 +47,7 @@ def alive(pid):
 @pytest.mark.parametrize('number', [signal.SIGTERM, signal.SIGHUP, signal.SIGINT])
 def test_no_node_outlives_it(tmp_path, number):
     with demo(tmp_path) as process:
-        until(lambda: len(nodes_of(process)) == 2, 'two nodes')
+        until(lambda: len(nodes_of(process)) == 3, 'three nodes')
         nodes = nodes_of(process)
         process.send_signal(number)
         output, _ = process.communicate(timeout=60)
@@ -63,7 +63,7 @@ def test_no_node_outlives_it_when_it_walks(tmp_path):
         process.terminate()
         process.communicate(timeout=60)
         assert process.returncode == 0
-        assert len(nodes) == 2
+        assert len(nodes) == 3
         assert not any(alive(pid) for pid in nodes)
         assert (tmp_path / 'footfalls.png').is_file()
 

@@ -46,7 +46,8 @@ const scene = new Scene(at('scene'), camera, () => {
 });
 const plots = new Plots(view, remember);
 // What tests look at.
-window.panel = { get frames() { return frames; }, last, get state() { return state; } };
+window.panel = { get frames() { return frames; }, last, get state() { return state; },
+  get body() { return body; }, scene };
 
 function say(text, kind) {
   const line = Object.assign(document.createElement('p'), { textContent: text, className: kind });

@@ -31,11 +31,11 @@ export class Plots {
     const [states, cells] = (names.cells || ['', '']).map((text) => text.split(':'));
     this.cellCount = +cells[1] || 0;
     this.states = states[0].split(',');
-    const pairs = this.states.length > 1 ? Array.from({ length: this.cellCount }, (_, k) =>
-      [`${this.states[0]}${k + 1} ${this.states[1]}${k + 1}`, [k, this.cellCount + k]])
-      : Array.from({ length: this.cellCount - 1 }, (_, k) => [`${this.states[0]}1 ${this.states[0]}${k + 2}`,
-        [0, k + 1]]);
-    this.pairs = Object.fromEntries(pairs);
+    // A cell's second variable against its first; of cells that have but one, how fast it changes.
+    const [x, y] = this.states, rest = (k) => y ? [`${y}${k + 1}`, this.cellCount + k]
+      : [`d${x}${k + 1}/dt`, -1];
+    this.pairs = Object.fromEntries(Array.from({ length: this.cellCount }, (_, k) =>
+      [`cell ${k + 1}`, [[`${x}${k + 1}`, k], rest(k)]]));
     this.fill(this.portrait, Object.keys(this.pairs), 'portrait');
     this.fill(this.leg, [...new Set(this.legs())], 'leg');
   }
@@ -99,14 +99,19 @@ export class Plots {
   phase(chart, shown) {
     const pair = this.pairs?.[this.portrait.value];
     if (!pair || !shown.at(-1).cells) return chart.say('the generator publishes no ~/cells');
-    const [xs, ys] = pair.map((k) => shown.map((frame) => frame.cells?.[k]));
+    const [[x, first], [y, second]] = pair;
+    const xs = shown.map((frame) => frame.cells?.[first]);
+    const ys = second >= 0 ? shown.map((frame) => frame.cells?.[second]) : xs.map((value, k) => {
+      const [from, to] = [Math.max(k - 1, 0), Math.min(k + 1, xs.length - 1)];
+      const passed = shown[to].time - shown[from].time;
+      return passed > 0 ? (xs[to] - xs[from]) / passed : null;
+    });
     const span = (values) => {
       const known = values.filter((value) => value != null);
       const low = Math.min(...known), high = Math.max(...known), rim = 0.08 * (high - low) + 1e-3;
       return [low - rim, high + rim];
     };
-    const [x, y] = this.portrait.value.split(' ');
-    chart.begin([...span(xs), `cell variable ${x} [1]`], [...span(ys), `${y} [1]`]);
+    chart.begin([...span(xs), `${x} [1]`], [...span(ys), second < 0 ? `${y} [1/s]` : `${y} [1]`]);
     chart.line(xs, ys, colour(0), 1);
     chart.dot(xs.at(-1), ys.at(-1), colour(1));
   }
@@ -142,14 +147,15 @@ export class Plots {
           chart.context.setLineDash([]);
         }
     });
-    chart.legend(chosen.map((j, k) => [joints[j].replace(/_?joint$/, ''), colour(k)]));
+    chart.legend([...chosen.map((j, k) => [joints[j].replace(/_?joint$/, ''), colour(k)]),
+      ['limits', ink('--danger')]]);
     return undefined;
   }
 
   limits(chart, shown) {
     const { joints } = this.names, angles = shown.at(-1).angles;
     if (!joints || !angles) return chart.say('no joint states');
-    const rows = joints.length, legs = [...new Set(this.legs())], of = this.legs();
+    const rows = joints.length, of = this.legs(), legs = Object.keys(this.shape?.feet || {});
     const spans = joints.map((joint) => this.shape?.limits[joint] || [null, null]);
     const ends = [...spans.flat(), ...angles].filter((value) => value != null);
     chart.begin([Math.min(...ends) - 0.1, Math.max(...ends) + 0.1, 'angle [rad]'],
@@ -163,7 +169,7 @@ export class Plots {
         least = Math.min(least, one[k]);
         most = Math.max(most, one[k]);
       }
-      const shade = colour(legs.indexOf(of[k]));
+      const shade = colour(Math.max(legs.indexOf(of[k]), 0));
       if (most >= least) chart.box(least, y - 0.22, most, y + 0.22, shade);
       const tight = (low != null && angles[k] < low + 0.02) || (high != null && angles[k] > high - 0.02);
       if (angles[k] != null) chart.dot(angles[k], y, tight ? ink('--danger') : ink('--ink'), 3);
