@@ -25,6 +25,8 @@ class Link:
         axis: of the joint, in the link's own frame.
         place, pose: of the link in its parent at angle 0: m, and a rotation matrix.
         zero: angle of the joint at which the link is where ``pose`` has it, rad.
+        vertices, colours: what it is drawn with: triangles, shape (n, 3, 3), m, and a colour of
+            each, (n, 3), 0 to 1.
 
     """
 
