@@ -4,25 +4,25 @@ import asyncio
 import socket
 import sys
 import threading
+import traceback
 from pathlib import Path
 from typing import Any
 
 import rclpy
 from rclpy.node import Node
-from std_srvs.srv import SetBool, Trigger
 
 from cpg_ros.errors import CpgError
 from cpg_ros.nodes.node_base import StartedNode, StartError, asked_for_help, run
 from cpg_ros.nodes.parameter_spec import Spec
 from cpg_ros.panel import requests, shape_source
 from cpg_ros.panel.door import Door, DoorError, is_loopback
-from cpg_ros.panel.graph import Graph, look, namespace
-from cpg_ros.panel.pages import Page, Pages
+from cpg_ros.panel.graph import Graph, look
+from cpg_ros.panel.orders import Orders
+from cpg_ros.panel.pages import SLOW, Page, Pages
 from cpg_ros.panel.recorder import Recorder
-from cpg_ros.panel.requests import Request, RequestError
+from cpg_ros.panel.requests import RequestError
 from cpg_ros.panel.robot_view import RobotView
 from cpg_ros.panel.service_calls import Services
-from cpg_ros.panel.steering import push
 from cpg_ros.panel.web_server import WebServer
 
 NAME = 'cpg_panel'
@@ -76,6 +76,7 @@ class Panel(StartedNode):
             self._watch, Path(self._value('recordings')).expanduser(),
             round(1e6 * self._value('recording_limit')),
             lambda why: self._pages.later(self._recorded, why))
+        self._orders = Orders(self._pages, self._calls, self._recorder, self._recorded)
         self._server = WebServer(door, self._pages, self._recorder.packed, self._come,
                                  self._asked, self._gone)
         self.thread = threading.Thread(target=self._run, name='pages', daemon=True)
@@ -190,6 +191,8 @@ class Panel(StartedNode):
         view = self._views.get(name)
         if view is None:
             raise RequestError(f"there is no generator '{name}'")
+        if page.waiting() > SLOW:
+            raise RequestError('the page has not taken yet what it was sent')
         self._gone(page)
         page.node = name
         self._pages.send([page], {'type': 'chosen', 'node': name})
@@ -199,70 +202,23 @@ class Panel(StartedNode):
 
     async def _asked(self, page: Page, text: str | bytes) -> None:
         try:
-            reason = await self._do(page, requests.read(text))
+            request = requests.read(text)
+            if request.action == 'choose':
+                self._choose(page, request.values['node'])
+            elif page.node not in self._views:
+                raise RequestError('there is no generator on the graph')
+            else:
+                await self._orders.carry_out(page, self._views[page.node], request)
         except CpgError as error:
-            reason = str(error)
-        if reason:
-            self._pages.say([page], reason)
+            self._pages.say([page], str(error))
+        except Exception:
+            # One request must not end a node that others look through.
+            self.get_logger().error('a request failed:\n' + traceback.format_exc())
 
-    async def _do(self, page: Page, request: Request) -> str:
-        """Do what a page asks; return why that was refused, or ''."""
-        values, action = request.values, request.action
-        if action == 'choose':
-            self._choose(page, values['node'])
-            return ''
-        if action == 'record':
-            return await self._record(values['on'])
-        view = self._views.get(page.node)
-        if view is None:
-            return 'there is no generator on the graph'
-        now = asyncio.get_running_loop().time()
-        if action == 'set':
-            view.controls.set(values['name'], values['value'])
-        elif action == 'steer':
-            if view.controls.value('cmd_vel') is not True:
-                return f'{view.name} does not listen to cmd_vel: start it with cmd_vel:=true'
-            view.steering.hold(page, now, values['speed'], values['turn'])
-        elif action == 'stop':
-            view.steering.stop()
-        elif action == 'enable':
-            if not values['on']:
-                view.steering.stop()
-            return await self._call(page, SetBool, f'{view.name}/enable',
-                                    SetBool.Request(data=values['on']))
-        elif action == 'push':
-            return await asyncio.to_thread(view.push, push(values['force'], values['direction']))
-        else:
-            kind, what = {'reset': ('simulations', 'simulated robot'),
-                          'fit': ('inversions', 'inversion node')}[action]
-            node = self._graph.beside(view.name, getattr(self._graph, kind))
-            if not node:
-                return f'there is no {what} beside {view.name}'
-            return await self._call(page, Trigger, f'{node}/{action}', Trigger.Request())
-        return ''
-
-    async def _call(self, page: Page, kind: Any, service: str, request: Any) -> str:
-        answer = await self._calls.call(kind, service, request)
-        if answer.success:
-            self._pages.say([page], answer.message, 'told')
-        return '' if answer.success else answer.message or f'{service} refused'
-
-    async def _record(self, on: bool) -> str:
-        if on:
-            spaces = {namespace(name) for name in self._graph.generators}
-            bag = self._recorder.start(
-                (topic, kind) for topic, kind in self._graph.topics
-                if topic in ('/diagnostics', '/tf', '/tf_static', '/clock')
-                or any(topic.startswith(f'{space}/') for space in spaces))
-            self._pages.say(self._pages.open, f'recording to {bag}', 'told')
-        else:
-            await asyncio.to_thread(self._recorder.stop)
-        self._pages.send(self._pages.open, self._state())
-        return ''
-
-    def _recorded(self, why: str) -> None:
-        """Tell of a recording that ended by itself."""
-        self._pages.say(self._pages.open, why)
+    def _recorded(self, why: str = '') -> None:
+        """Tell of a recording that began or ended, by itself if that has a reason."""
+        if why:
+            self._pages.say(self._pages.open, why)
         self._pages.send(self._pages.open, self._state())
 
 

@@ -10,13 +10,11 @@ from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import Twist, Wrench
 from nav_msgs.msg import Odometry
 from rcl_interfaces.msg import ParameterEvent
-from rcl_interfaces.srv import GetParameters
 from rclpy.node import Node
-from rclpy.parameter import parameter_value_to_python
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray, String
 
-from cpg_ros.panel import shape_source
+from cpg_ros.panel import shape_facts, shape_source
 from cpg_ros.panel.controls import Controls
 from cpg_ros.panel.graph import Graph, namespace
 from cpg_ros.panel.service_calls import CallError, Services
@@ -64,13 +62,22 @@ class RobotView:
         self._kept: dict[str, dict[str, Any]] = {}
         self._joints: dict[str, float] = {}
         self._names: dict[str, list[str]] = {}
+        self._urdf = str(node.get_parameter('urdf').value)
         self._readied: asyncio.Task | None = None
+        self._stale = True
+        self._sources: tuple[str, ...] = ()
 
     # -- what there is ----------------------------------------------------------------------
 
     def ready(self) -> None:
-        """Begin to read parameters and shape, if that has not begun."""
-        if self._readied is None:
+        """Begin to read parameters and shape, if that has not begun or there is more to read."""
+        sources = (self.graph.beside(self.name, self.graph.simulations),
+                   *sorted(name for name, _ in self.graph.topics
+                           if name in shape_facts.descriptions(self._space)))
+        if self._stale or sources != self._sources:
+            self._stale, self._sources = False, sources
+            if self._readied is not None:
+                self._readied.cancel()
             self._readied = asyncio.get_running_loop().create_task(self._ready())
 
     async def _ready(self) -> None:
@@ -78,7 +85,9 @@ class RobotView:
             await self.controls.read()
             self._keep({'type': 'controls', 'node': self.name,
                         'controls': list(self.controls.known.values())})
-            known = await self._known()
+            known = await shape_facts.ask(
+                self._watch, self._services, self.graph, self.name,
+                str(self.controls.value('robot') or ''), self._urdf)
             doubts: list[str] = []
             shape = await asyncio.to_thread(shape_source.find, known, doubts.append)
             for doubt in doubts[:5]:
@@ -86,40 +95,7 @@ class RobotView:
             self._keep({**shape.message(), 'doubts': doubts[:5]})
         except CallError as error:
             self._said(str(error))
-            self._readied = None
-
-    async def _known(self) -> shape_source.Known:
-        """Find out what is known of the robot's shape."""
-        description, model, legs = '', '', {}
-        urdf = self._node.get_parameter('urdf').value
-        for topic in (f'{self._space}/robot_description', '/robot_description'):
-            if not (urdf or description) and (topic, 'std_msgs/msg/String') in self.graph.topics:
-                description = getattr(await self._once(String, topic), 'data', '')
-        simulation = self.graph.beside(self.name, self.graph.simulations)
-        if simulation:
-            answer = await self._services.call(
-                GetParameters, f'{simulation}/get_parameters',
-                GetParameters.Request(names=['model']))
-            model = parameter_value_to_python(answer.values[0]) if answer.values else ''
-        for topic, kind in sorted(self.graph.topics):
-            leg = topic.removeprefix(f'{self._space}/').removesuffix('/joint_states')
-            if kind == 'sensor_msgs/msg/JointState' and '/' not in leg and leg != 'joint_states':
-                message = await self._once(JointState, topic)
-                legs[leg] = list(message.name) if message else []
-        robot = str(self.controls.value('robot') or '')
-        return shape_source.Known(urdf, description, model or '', robot, legs)
-
-    async def _once(self, kind: type, name: str) -> Any:
-        """Return a topic's next or latched message, None if there is none within a second."""
-        topic = Topic(self._watch, kind, name, latched() if kind is String else None)
-        try:
-            for _ in range(50):
-                if (message := topic.newest()) is not None:
-                    return message
-                await asyncio.sleep(0.02)
-            return None
-        finally:
-            topic.close()
+            self._stale = True
 
     def messages(self) -> list[dict[str, Any]]:
         """Return all that a page must know that comes only now."""
@@ -205,6 +181,8 @@ class RobotView:
             self._keep({'type': 'gait', 'gait': gait.data})
         if events := self._topics.get('/parameter_events'):
             for event, _ in events.take():
+                # One of the same name has started anew.
+                self._stale |= event.node == self.name and bool(event.new_parameters)
                 if values := self.controls.hear(event):
                     self._tell({'type': 'values', 'values': values})
         if health := self._topics.get('/diagnostics'):
@@ -224,18 +202,22 @@ class RobotView:
 
     # -- what is done -----------------------------------------------------------------------
 
-    def push(self, message: Wrench) -> str:
-        """Push the robot, if it is simulated here; return why not, '' if it was."""
+    def push(self, message: Wrench) -> None:
+        """Push the robot.
+
+        Raises:
+            CallError: it is not simulated.
+
+        """
         simulation = self.graph.beside(self.name, self.graph.simulations)
         if not simulation:
-            return 'there is no simulated robot to push beside this generator'
+            raise CallError(f'there is no simulated robot beside {self.name}')
         if self._pushes is None:
             self._pushes = self._node.create_publisher(Wrench, f'{simulation}/push', 10)
         end = time.monotonic() + 1.0
         while not self._pushes.get_subscription_count() and time.monotonic() < end:
             time.sleep(0.01)
         self._pushes.publish(message)
-        return ''
 
     def close(self) -> None:
         """Let go of all of it."""

@@ -22,8 +22,8 @@ class Services:
         self._node = node
         self._clients: dict[str, Any] = {}
 
-    async def call(self, kind: Any, name: str, request: Any) -> Any:
-        """Call a service and return its response.
+    async def call(self, kind: Any, name: str, request: Any, patience: float = PATIENCE) -> Any:
+        """Call a service and return its response, which may take so long, s.
 
         Raises:
             CallError: nobody answers in time.
@@ -41,10 +41,10 @@ class Services:
         future = client.call_async(request)
         future.add_done_callback(lambda _: loop.call_soon_threadsafe(answered.set))
         try:
-            await asyncio.wait_for(answered.wait(), PATIENCE)
+            await asyncio.wait_for(answered.wait(), patience)
         except asyncio.TimeoutError:
             client.remove_pending_request(future)
-            raise CallError(f'{name} did not answer within {PATIENCE:g} s') from None
+            raise CallError(f'{name} did not answer within {patience:g} s') from None
         return future.result()
 
     def forget(self, node: str) -> None:

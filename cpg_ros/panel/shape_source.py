@@ -36,6 +36,15 @@ class Known:
     legs: dict[str, list[str]] = field(default_factory=dict)
 
 
+def is_known(robot: str) -> bool:
+    """Tell whether a robot file can be read here."""
+    try:
+        find_robot(robot)
+    except (CpgError, OSError):
+        return False
+    return True
+
+
 def find(known: Known, said: Callable[[str], None]) -> Shape:
     """Return the first of: the user's URDF, the description, the model, a stick figure.
 

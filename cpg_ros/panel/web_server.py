@@ -86,13 +86,17 @@ class WebServer:
     async def _page(self, connection: ServerConnection) -> None:
         page = Page(connection)
         self._pages.open.add(page)
+        # One request may wait for another node; a stop must not wait for that.
+        under_way: set[asyncio.Task] = set()
         try:
             self._come(page)
             async for message in connection:
                 if not page.may_ask():
                     await connection.close(1008, 'too many requests')
                     break
-                await self._asked(page, message)
+                task = asyncio.ensure_future(self._asked(page, message))
+                under_way.add(task)
+                task.add_done_callback(under_way.discard)
         except ConnectionClosed:
             pass
         finally:

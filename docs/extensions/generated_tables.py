@@ -22,6 +22,7 @@ from cpg_ros.dynamics.orbit import solve_preset
 from cpg_ros.networks.registry import SHIPPED
 from cpg_ros.nodes import generator_parameters, inversion_node, robot_sim
 from cpg_ros.nodes.parameter_spec import Spec
+from cpg_ros.panel import panel_node
 from cpg_ros.robots.robot_file import find_robot
 
 
@@ -64,6 +65,8 @@ def parameters(what: str) -> str:
         fixed = {name: Spec(one.default, one.text, one.low, one.high, True, one.constraints)
                  for name, one in robot_sim.SPECS.items()}
         return table(HEAD, parameter_rows(fixed))
+    if what == 'panel':
+        return table(HEAD, parameter_rows(panel_node.SPECS))
     if what == 'inversion':
         free = [code('free'), 'string[]', 'not set', '',
                 "parameters to fit; not set: the network's usual ones"]
