@@ -54,7 +54,7 @@ def open_page(rig, browser):
     opened, wrong = [], []
 
     def open_one(more='', **options):
-        context = browser.new_context(viewport={'width': 1100, 'height': 800}, **options)
+        context = browser.new_context(viewport={'width': 900, 'height': 500}, **options)
         page = context.new_page()
         page.on('pageerror', lambda error: wrong.append(str(error)))
         page.on('requestfailed', lambda request: wrong.append(request.url))

@@ -111,7 +111,7 @@ export class Scene {
   draw(forces) {
     const { gl, canvas, camera } = this;
     if (!gl) return;
-    const scale = Math.min(window.devicePixelRatio || 1, 2);
+    const scale = this.sharpness() * Math.min(window.devicePixelRatio || 1, 2);
     const [wide, high] = [canvas.clientWidth, canvas.clientHeight].map((one) => one * scale | 0);
     if (canvas.width !== wide || canvas.height !== high)
       [canvas.width, canvas.height] = [wide, high];
@@ -161,6 +161,16 @@ export class Scene {
       gl.bindVertexArray(this.arrow.array);
       gl.drawArrays(gl.TRIANGLES, 0, this.arrow.count);
     }
+  }
+
+  // Fewer pixels where they take too long, as without a graphics card; 1 is one for each.
+  sharpness() {
+    const now = performance.now(), passed = now - (this.before ?? now);
+    this.before = now;
+    if (passed > 0 && passed < 1000) this.pace = 0.8 * (this.pace ?? 33) + 0.2 * passed;
+    if (this.pace > 70) this.share = Math.max(0.3, 0.9 * (this.share ?? 1));
+    else if (this.pace < 40) this.share = Math.min(1, 1.01 * (this.share ?? 1));
+    return this.share ?? 1;
   }
 
   // Every pixel of the floor is darkened once, however many links are above it.
