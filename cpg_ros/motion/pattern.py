@@ -128,7 +128,7 @@ class Pattern:
 
     @property
     def state(self) -> np.ndarray:
-        """The newest network's state and its rate, shape (2, components); advance overwrites it."""
+        """The newest network's state and its rate, shape (2, components), of advance's own."""
         return self._tracks[-1].stepper.now[:2]
 
     @property
