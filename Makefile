@@ -24,7 +24,7 @@ demo: install/.built
 shell: install/.built
 	@$(ENTER); export PATH=$(CURDIR)/install/cpg_ros/lib/cpg_ros:$(CURDIR)/$(VENV)/bin:$$PATH; \
 		echo 'generator, cpg, analyze, inversion ... are on the path (--help); exit leaves this shell'; \
-		$${SHELL:-/bin/bash} -i || true
+		exec bash --rcfile <(cat ~/.bashrc 2>/dev/null; echo "PATH=$$PATH"; cpg completion) -i
 
 docs: install/.built
 	@$(ENTER); $(VENV)/bin/sphinx-build -W --keep-going -q -b html docs docs/_build

@@ -13,7 +13,8 @@ PLACES = {'generator': 'nodes.generator', 'robot_sim': 'nodes.robot_sim', **{
                                        'optimize', 'reproduce', 'tune')}}
 
 
-def _run(name: str) -> int:
+def start(name: str) -> int:
+    """Run an executable on the words of the command line; return its exit code."""
     def leave(number: int, _: FrameType | None) -> None:
         # An exception amid the loading of compiled code would become another error there.
         print(f'{name}: stopped', file=sys.stderr, flush=True)
@@ -26,4 +27,4 @@ def _run(name: str) -> int:
 
 
 (generator, robot_sim, inversion, cpg, demo, analyze, check_robot, optimize, reproduce,
- tune) = (partial(_run, name) for name in PLACES)
+ tune) = (partial(start, name) for name in PLACES)
