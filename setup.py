@@ -26,7 +26,7 @@ setup(
                     'test': ['pytest', 'hypothesis', 'jitcdde']},
     zip_safe=False,
     maintainer='cpg_ros maintainers',
-    maintainer_email='maintainers@cpg-ros.example',
+    maintainer_email='issue-tracker@cpg-ros.invalid',
     description='Central pattern generators for legged robots on ROS 2',
     license='Apache-2.0',
     entry_points={'console_scripts': [

@@ -16,6 +16,9 @@ from cpg_ros.recordings.bag_storage import opened
 from cpg_ros.recordings.recording import RecordingError
 from cpg_ros.tools.graph_topics import message_class
 
+#: How long a player waits for listeners, s.
+PATIENCE = 1.0
+
 
 def play(node: Node, path: Path, wanted: Sequence[str] = (), rate: float = 1.0) -> Counter[str]:
     """Publish a bag's messages at the pace at which they were received.
@@ -41,6 +44,7 @@ def play(node: Node, path: Path, wanted: Sequence[str] = (), rate: float = 1.0) 
             if topic not in there:
                 raise RecordingError(f'{path}: no topic {topic!r}; there are {", ".join(there)}')
         publishers = {topic: _publisher(node, there[topic]) for topic in chosen}
+        _wait_for_listeners(node, list(publishers.values()))
         expected = bag.expected()
         with progress_bar(f'playing {path.name}', max(1, sum(expected[one] for one in chosen))
                           ) as bar:
@@ -53,6 +57,13 @@ def play(node: Node, path: Path, wanted: Sequence[str] = (), rate: float = 1.0) 
                 counts[topic] += 1
                 bar(done + 1)
     return counts
+
+
+def _wait_for_listeners(node: Node, publishers: Sequence[Publisher]) -> None:
+    """Give those who listen a moment to find the publishers: the first messages count, too."""
+    end = time.monotonic() + PATIENCE
+    while time.monotonic() < end and not all(one.get_subscription_count() for one in publishers):
+        rclpy.spin_once(node, timeout_sec=0.02)
 
 
 def _publisher(node: Node, connection: Connection) -> Publisher:

@@ -210,9 +210,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return start(chosen.executable)
     import rclpy
     from rclpy.exceptions import NameValidationException
+    from rclpy.signals import SignalHandlerOptions
     from rclpy.utilities import try_shutdown
     try:
-        rclpy.init(args=[])
+        # The context stays valid while a signal ends what goes on.
+        rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
         told = _DOERS[chosen.action](chosen, rclpy.create_node('cpg', enable_rosout=False))
     except CpgError as error:
         print(f'cpg: {error}', file=sys.stderr)
