@@ -1,4 +1,4 @@
-"""Gaits that simulation finds and the solver does not: random sets, each from twelve random starts.
+"""Gaits that simulation finds and the solver does not: random sets from twelve starts each.
 
 Simulation is the whole network without a lock, for 1500 units of model time; what it does in the
 end is compared with every gait's shifts. A gait that it settles on must be found by solve_orbit,
