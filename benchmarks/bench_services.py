@@ -16,8 +16,7 @@ from client import ParameterClient, text
 from common import emit, log
 from processes import Process, enter_workspace, start_node
 
-from cpg_ros.networks.registry import PRESETS
-from cpg_ros.nodes.generator_parameters import USUAL
+from cpg_ros.networks.registry import NETWORKS, PRESETS
 
 TARGETS = {'answer_ms_max': 100.0, 'end_s_max': 1.0}
 
@@ -49,12 +48,12 @@ def main() -> None:
     enter_workspace()
     rclpy.init()
     ours = {}
-    for network, (robot, _) in USUAL.items():
+    for network, kind in NETWORKS.items():
         gaits = [name for name, preset in PRESETS[network].items() if name == preset.gait]
         pairs = list(itertools.permutations(gaits, 2))
         random.Random(0).shuffle(pairs)
         with start_node('generator', rate=1000.0, transition=0.4, network=network,
-                        robot=robot) as node:
+                        robot=kind.usual_robot) as node:
             log(f'{network}: {len(pairs)} ordered pairs of gaits')
             ours[network] = answers(node, [gait for pair in pairs for gait in pair], 'gait')
             ours[network]['pairs'] = len(pairs)
