@@ -36,7 +36,7 @@ def measure(kind: str, seconds: float) -> tuple[np.ndarray, int]:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument('--seconds', type=float, default=6.0, help='length of each of four windows')
+    parser.add_argument('--seconds', type=float, default=6.0, help='length of each window')
     arguments = parser.parse_args()
     enter_workspace()
     errors: dict[str, list[np.ndarray]] = {kind: [] for kind in PRIORITIES}

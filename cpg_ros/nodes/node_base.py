@@ -223,6 +223,7 @@ def run(make: Callable[[], StartedNode], name: str, args: list[str] | None) -> i
     gc.freeze()
     node.begin()
     serving.start()
+    node.parameter_service.thread.start()
     # A bare wait() can miss a signal that another thread received, and a stop must not wait.
     while not node.stop.wait(0.02):
         pass

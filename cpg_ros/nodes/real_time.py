@@ -1,8 +1,9 @@
-"""Real-time scheduling of a thread: priority, cores and locked memory, as controller_manager."""
+"""Real-time scheduling of a thread: priority, cores and locked memory, as controller_manager's."""
 
 import contextlib
 import ctypes
 import os
+import threading
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -14,8 +15,8 @@ MCL_CURRENT, MCL_FUTURE = 1, 2
 LIMITS = 'in /etc/security/limits.conf, and log in again'
 
 SPECS = {
-    'thread_priority': Spec(0, 'real-time priority (SCHED_FIFO) of the publishing thread; 0 for '
-                            'none', 0, 99, read_only=True),
+    'thread_priority': Spec(0, 'real-time priority (SCHED_FIFO) of the publishing thread, before '
+                            "the others' 1; 0 for none", 0, 99, read_only=True),
     'cpu_affinity': Spec([-1], 'cores that the publishing thread may run on, one or a list; -1 '
                          'for any', read_only=True),
     'lock_memory': Spec(False, 'keep all memory of the process in RAM, so that no tick waits for '
@@ -73,15 +74,29 @@ class RealTime:
             granted.append(f'core {", ".join(map(str, self.cores))}')
         if self.priority:
             try:
-                # What the thread starts in its turn has no priority.
-                os.sched_setscheduler(0, os.SCHED_FIFO | os.SCHED_RESET_ON_FORK,
-                                      os.sched_param(self.priority))
+                os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(self.priority))
+                _raise_others()
                 granted.append(f'SCHED_FIFO, priority {self.priority}')
             except OSError as error:
                 refused.append(f'thread_priority {self.priority} refused: {error.strerror}. Raise '
                                f'the limit rtprio (@realtime - rtprio {max(98, self.priority)}) '
                                f'{LIMITS}')
         return granted, refused
+
+
+def _raise_others() -> None:
+    """Put the other threads of the process before all ordinary processes, and behind this one.
+
+    Any of them may hold the interpreter lock or one of the middleware's, and would keep it while
+    an ordinary process runs in its place. Stops are served by one of them, too.
+    """
+    own = threading.get_native_id()
+    # Once more for what has been started meanwhile by one that was still an ordinary thread.
+    for thread in (int(name) for _ in range(2) for name in os.listdir('/proc/self/task')):
+        if thread != own:
+            # It may have ended.
+            with contextlib.suppress(ProcessLookupError):
+                os.sched_setscheduler(thread, os.SCHED_RR, os.sched_param(1))
 
 
 def _lock_memory() -> str:
