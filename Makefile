@@ -22,6 +22,9 @@ endif
 ENTER := set -e; source install/setup.bash; \
 	export AMENT_PREFIX_PATH=$(CURDIR)/install/cpg_ros:$(PREFIXES)
 
+# Live tests wait for most of their time: so many of them run at once.
+LIVE ?= $(shell echo $$((2 * $$(nproc))))
+
 .PHONY: build run demo shell test docs bench clean
 
 build: install/.built
@@ -45,7 +48,8 @@ test: install/.built docs
 	@$(VENV)/bin/ruff check .
 	@$(VENV)/bin/mypy
 	@$(VENV)/bin/lint-imports --no-logo
-	@$(ENTER); for part in '-n auto -m "not live"' '-m live'; do \
+	@$(ENTER); for part in '-n auto -m "not live"' \
+		'-n $(LIVE) --dist loadgroup -m "live and not alone"' '-m alone'; do \
 		eval $(VENV)/bin/pytest test $$part $(ARGS) || [ $$? = 5 ]; done  # 5: none selected
 
 bench: install/.built

@@ -6,6 +6,9 @@ from typing import Any
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
 from rclpy.parameter import Parameter
 
+#: What a parameter of a type is called.
+KINDS = {bool: 'a bool', int: 'an integer', float: 'a double', str: 'a string'}
+
 
 @dataclass(frozen=True)
 class Spec:
@@ -40,3 +43,17 @@ def as_doubles(parameters: list[Parameter], doubles: set[str]) -> list[Parameter
     return [Parameter(p.name, Parameter.Type.DOUBLE, float(p.value))
             if p.name in doubles and p.type_ == Parameter.Type.INTEGER else p
             for p in parameters]
+
+
+def as_list(parameter: Parameter, default: list) -> Parameter:
+    """Turn one value given for a list of such values into a list of it."""
+    if type(parameter.value) is type(default[0]):
+        return Parameter(parameter.name, value=[parameter.value])
+    return parameter
+
+
+def kind_of(default: Any) -> str:
+    """Say what a parameter of a default must be."""
+    if isinstance(default, list):
+        return f'a list of {KINDS[type(default[0])].split()[1]}s'
+    return KINDS[type(default)]
