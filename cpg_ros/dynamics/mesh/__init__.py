@@ -1,3 +1,3 @@
 """Periodic orbits as polynomials on a mesh: for networks without delay."""
 
-__all__ = ['collocation', 'curve', 'floquet', 'newton', 'orbit', 'solve']
+__all__ = ['collocation', 'condensation', 'curve', 'floquet', 'newton', 'orbit', 'solve']

@@ -11,7 +11,8 @@ from functools import lru_cache
 import numpy as np
 
 from cpg_ros.dynamics.isotypic_split import split
-from cpg_ros.dynamics.mesh.newton import Reduced, summed, transfer
+from cpg_ros.dynamics.mesh.condensation import summed, transfer
+from cpg_ros.dynamics.mesh.newton import Reduced
 from cpg_ros.dynamics.mesh.orbit import MeshOrbit
 
 
