@@ -5,4 +5,4 @@ Imports ``files``; knows nothing of ROS.
 
 __all__ = ['bag_reader', 'bag_storage', 'cdr', 'csv_reader', 'joint_streams', 'live_buffer',
            'recording', 'rosbags_library', 'servo', 'stray_samples', 'table_text',
-           'unfinished_mcap']
+           'thinned', 'unfinished_mcap']
