@@ -5,4 +5,4 @@ Imports ``files``; knows nothing of ROS, but for ``rosbag2_library``, which read
 
 __all__ = ['bag_library', 'bag_reader', 'bag_storage', 'cdr', 'csv_reader', 'joint_streams',
            'live_buffer', 'recording', 'rosbag2_library', 'rosbags_library', 'servo',
-           'stray_samples', 'table_text', 'unfinished_mcap']
+           'stray_samples', 'table_text', 'thinned', 'unfinished_mcap']
