@@ -1,4 +1,4 @@
-# make run | demo | shell | test | docs | bench | build | clean; all is set up in .venv and install/.
+# make run | demo | shell | test | docs | bench | build | unitree | clean; all is set up in .venv and install/.
 PYTHON ?= python3
 SHELL := /bin/bash
 
@@ -11,7 +11,7 @@ export ROS_AUTOMATIC_DISCOVERY_RANGE ?= LOCALHOST
 ENTER := set -e; source install/setup.bash; \
 	export AMENT_PREFIX_PATH=$(CURDIR)/install/cpg_ros:$(CURDIR)/$(VENV)
 
-.PHONY: build run demo shell test docs bench clean
+.PHONY: build run demo shell test docs bench unitree clean
 
 build: install/.built
 
@@ -30,7 +30,7 @@ docs: install/.built
 	@$(ENTER); $(VENV)/bin/sphinx-build -W --keep-going -q -b html docs docs/_build
 	@echo 'built: docs/_build/index.html'
 
-test: install/.built docs
+test: install/.built docs unitree
 	@$(VENV)/bin/ruff check .
 	@$(VENV)/bin/mypy
 	@$(VENV)/bin/lint-imports --no-logo
@@ -39,6 +39,15 @@ test: install/.built docs
 
 bench: install/.built
 	@$(ENTER); for file in benchmarks/bench_*.py; do $(VENV)/bin/python $$file; done
+
+# Messages of Unitree's robots, for unitree_bridge on ROS 2 as pip installs it.
+unitree: $(VENV)/.unitree
+
+$(VENV)/.unitree: $(VENV)/.installed interfaces/build.py $(wildcard interfaces/unitree_*/msg/*.msg)
+	@$(VENV)/bin/python interfaces/build.py interfaces/unitree_go interfaces/unitree_api >$(VENV)/unitree.log 2>&1 || \
+		{ tail -n 5 $(VENV)/unitree.log >&2; exit 1; }
+	@tail -n 2 $(VENV)/unitree.log
+	@touch $@
 
 $(VENV)/.installed: requirements.txt requirements-docs.txt requirements-models.txt
 	@test -x $(VENV)/bin/pip || $(PYTHON) -m venv --clear $(VENV) || \

@@ -6,4 +6,5 @@ Imports every room but ``tools``.
 __all__ = ['cmd_vel', 'command_topics', 'deadline_thread', 'diagnostics', 'generator',
            'generator_parameters', 'inversion_node', 'joint_publishers', 'launch_arguments',
            'lockstep', 'measured_pose', 'node_base', 'parameter_services', 'parameter_spec',
-           'rivals', 'robot_sim', 'sensor_publishers', 'shutdown', 'unserved']
+           'rivals', 'robot_sim', 'sensor_publishers', 'shutdown', 'unitree',
+           'unserved']

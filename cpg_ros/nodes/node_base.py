@@ -26,14 +26,11 @@ from rclpy.utilities import remove_ros_args
 
 from cpg_ros.errors import CpgError
 from cpg_ros.nodes.parameter_services import StrictParameterService
-from cpg_ros.nodes.parameter_spec import Spec, as_doubles
+from cpg_ros.nodes.parameter_spec import Spec, as_doubles, as_numbers, kind_of, of_numbers
 from cpg_ros.nodes.shutdown import ended
 
 #: The ports of the domains after it are too high for UDP.
 LAST_DOMAIN = 232
-#: What a parameter of a type is called.
-KINDS = {bool: 'a bool', int: 'an integer', float: 'a double', str: 'a string',
-         list: 'a list of strings'}
 
 
 class StartError(CpgError):
@@ -66,10 +63,12 @@ class StartedNode(Node):
             self._doubles.add(name)
             if override is not None and override.type_ == Parameter.Type.INTEGER:
                 self._parameter_overrides[name] = as_doubles([override], {name})[0]
+        elif of_numbers(spec.default) and override is not None:
+            self._parameter_overrides[name] = as_numbers(override)
         try:
             self.declare_parameter(name, spec.default, spec.descriptor())
         except InvalidParameterTypeException as error:
-            raise StartError(f'parameter {name} must be {KINDS[type(spec.default)]}, not '
+            raise StartError(f'parameter {name} must be {kind_of(spec.default)}, not '
                              f'{self._parameter_overrides[name].value!r}') from error
         except InvalidParameterValueException as error:
             raise StartError(f'parameter {name}: {self._parameter_overrides[name].value} is not '

@@ -1,10 +1,14 @@
 """What a node's parameters are, and the numbers that they are given."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
 from rclpy.parameter import Parameter
+
+#: What a value of a type is called.
+KINDS = {bool: 'a bool', int: 'an integer', float: 'a double', str: 'a string',
+         list: 'a list of strings'}
 
 
 @dataclass(frozen=True)
@@ -17,6 +21,10 @@ class Spec:
     high: float | None = None
     read_only: bool = False
     constraints: str = ''
+
+    def fixed(self) -> 'Spec':
+        """Return the same parameter, to be set at the start only."""
+        return replace(self, read_only=True)
 
     def descriptor(self) -> ParameterDescriptor:
         """Return it as a ROS descriptor."""
@@ -40,3 +48,23 @@ def as_doubles(parameters: list[Parameter], doubles: set[str]) -> list[Parameter
     return [Parameter(p.name, Parameter.Type.DOUBLE, float(p.value))
             if p.name in doubles and p.type_ == Parameter.Type.INTEGER else p
             for p in parameters]
+
+
+def of_numbers(default: object) -> bool:
+    """Tell whether a default is a list of numbers, and not one of strings."""
+    return isinstance(default, list) and bool(default) and isinstance(default[0], float)
+
+
+def kind_of(default: object) -> str:
+    """Return what values like a default are called."""
+    return 'a list of numbers' if of_numbers(default) else KINDS[type(default)]
+
+
+def as_numbers(parameter: Parameter) -> Parameter:
+    """Turn one number or whole numbers, given for a list of numbers, into such a list."""
+    types = Parameter.Type
+    if parameter.type_ in (types.INTEGER, types.DOUBLE):
+        return Parameter(parameter.name, types.DOUBLE_ARRAY, [float(parameter.value)])
+    if parameter.type_ == types.INTEGER_ARRAY:
+        return Parameter(parameter.name, types.DOUBLE_ARRAY, [float(x) for x in parameter.value])
+    return parameter
