@@ -38,13 +38,17 @@ def _table():
 TABLE = tuple(_table())
 
 
-def check_sum(data: bytes) -> int:
-    """CRC of a C struct's words, from the highest byte of each on."""
+def mpeg2(data: bytes) -> int:
+    """CRC-32/MPEG-2 of bytes."""
     value, table = 0xffffffff, TABLE
-    for word, in struct.iter_unpack('<I', data):
-        for byte in word.to_bytes(4, 'big'):
-            value = (value << 8) & 0xffffffff ^ table[value >> 24 ^ byte]
+    for byte in data:
+        value = (value << 8) & 0xffffffff ^ table[value >> 24 ^ byte]
     return value
+
+
+def check_sum(data: bytes) -> int:
+    """The same of a C struct's little-endian words, from the highest byte of each on."""
+    return mpeg2(struct.pack(f'>{len(data) // 4}I', *struct.unpack(f'<{len(data) // 4}I', data)))
 
 
 class StandIn(threading.Thread):

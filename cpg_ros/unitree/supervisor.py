@@ -140,8 +140,10 @@ class Supervisor:
 
     def _bearable(self, kd: float | np.ndarray) -> np.ndarray:
         """Return kd, less where it would ask for more torque than a joint bears."""
-        # A speed that is no number comes out as no limit.
-        return np.fmin(kd, self._settings.torque / np.fmax(np.abs(self.state.dq), 1e-3))
+        speed = np.abs(self.state.dq)
+        # What is no number limits nothing: damped too hard is better than not at all.
+        speed[~np.isfinite(speed)] = 0.0
+        return np.minimum(kd, self._settings.torque / np.maximum(speed, 1e-3))
 
     def _danger(self, now: float) -> str:
         timeout = self._settings.state_timeout

@@ -72,7 +72,8 @@ class UnitreeBridge(StartedNode):
             raise StartError(str(error)) from error
         self._order = places(robot)
         self._button = BUTTONS[value('stop_button')]
-        self._supervisor = Supervisor(settings, self._tell)
+        self._changes: deque[tuple[Phase, str]] = deque()
+        self._supervisor = Supervisor(settings, lambda *change: self._changes.append(change))
         topic = self.resolve_topic_name('/lowcmd')
         self._lock = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
         self._dry, domain = value('dry_run'), self.context.get_domain_id()
@@ -111,9 +112,14 @@ class UnitreeBridge(StartedNode):
 
     def _tell(self, phase: Phase, reason: str) -> None:
         """Say what the robot is made to do now, and why."""
-        logger, text = self.get_logger(), f'{phase.value}: {reason}'
-        (logger.error if phase is Phase.DAMPING else logger.warning if phase is Phase.SITTING
-         else logger.info)(text)
+        text = f'{phase.value}: {reason}'
+        # rclpy knows a call by its line, and wants one severity of it.
+        if phase is Phase.DAMPING:
+            self.get_logger().error(text)
+        elif phase is Phase.SITTING:
+            self.get_logger().warning(text)
+        else:
+            self.get_logger().info(text)
         self._phase.publish(String(data=phase.value))
 
     # -- the thread -----------------------------------------------------------------------
@@ -132,6 +138,9 @@ class UnitreeBridge(StartedNode):
             if self._watchdog is not None and (
                     wrong := self._watchdog.tick(supervisor.damping, now)):
                 supervisor.sit(now, wrong)
+        # The robot comes first.
+        while self._changes:
+            self._tell(*self._changes.popleft())
         if self._new and not self.ticker.ticks % self._every:
             self._sensors.publish(stamp)
             self._new = False
