@@ -10,6 +10,7 @@ from cpg_ros.nodes.generator import Generator
 from cpg_ros.nodes.inversion_node import Inversion
 from cpg_ros.nodes.node_base import StartedNode
 from cpg_ros.nodes.robot_sim import RobotSim
+from cpg_ros.nodes.unitree.bridge import UnitreeBridge
 
 #: Node -> what makes one, and the parameters under which it has all of its topics.
 KINDS: dict[str, tuple[Callable[[], StartedNode], tuple[dict[str, str], ...]]] = {
@@ -19,7 +20,11 @@ KINDS: dict[str, tuple[Callable[[], StartedNode], tuple[dict[str, str], ...]]] =
         {'command': 'forward_position', 'exclusive': 'false', 'combined_topic': '""'})),
     'robot_sim': (RobotSim, ({'clock': 'true'}, {'command': 'joint_trajectory'},
                              {'command': 'forward_position'})),
+    'unitree_bridge': (UnitreeBridge, ({}, {'command': 'joint_trajectory'},
+                                       {'command': 'forward_position'})),
     'inversion': (Inversion, ({},))}
+#: Topics whose names are the same in every namespace.
+ABSOLUTE = ('/diagnostics', '/clock', '/tf', '/lowcmd', '/lowstate')
 #: Every node of ROS has these.
 COMMON = ('/rosout', '/parameter_events', 'parameters', 'parameter_types',
           'parameters_atomically', 'get_type_description')
@@ -54,5 +59,5 @@ def _names(node: Any) -> Iterator[tuple[str, tuple[str, str]]]:
             if name.endswith(COMMON):
                 continue
             plain = name.replace(f'/{own}/', '~/') if name.startswith(f'/{own}/') else (
-                name if name in ('/diagnostics', '/clock', '/tf') else name.lstrip('/'))
+                name if name in ABSOLUTE else name.lstrip('/'))
             yield plain, (direction, kinds[0].replace('/msg/', '/').replace('/srv/', '/'))

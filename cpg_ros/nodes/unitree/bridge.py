@@ -98,7 +98,7 @@ class UnitreeBridge(StartedNode):
         self._refused = ''
         self._ending = False
         self._new, self._received, self._sent, self._before = False, 0, 0, (0, 0, 0)
-        self._phase = self.create_publisher(String, '~/phase', QoSProfile(
+        self._phase = self.create_publisher(String, '~/state', QoSProfile(
             depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL))
         self._phase.publish(String(data=Phase.IDLE.value))
         self.create_service(Trigger, '~/stop', self._stop)
@@ -193,7 +193,7 @@ class UnitreeBridge(StartedNode):
                                 f'it is {phase.value}')
             return response
         self._begin_start()
-        response.success, response.message = True, 'starting: ~/phase and the log say how it goes'
+        response.success, response.message = True, 'starting: ~/state and the log say how it goes'
         return response
 
     def _begin_start(self) -> None:
