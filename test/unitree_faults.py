@@ -55,9 +55,10 @@ class Walk:
         return self.phases[-1][1] if self.phases else ''
 
     def wait_for(self, phase):
-        before = len(self.phases)
+        before, lines = len(self.phases), len(self.bridge.lines)
         until(lambda: self.phase == phase or not self.bridge.alive or
-              any(one == 'damping' for _, one in self.phases[before:]), phase)
+              any(one == 'damping' for _, one in self.phases[before:])
+              or 'not started' in '\n'.join(self.bridge.lines[lines:]), phase)
         assert self.phase == phase, self.bridge.log
         return self
 
@@ -83,8 +84,12 @@ class Walk:
 
     def damped_after(self, instant):
         """Seconds from an instant until the first command that damps for good."""
-        until(lambda: self.robot.damped, f'damping:\n{self.bridge.log}')
-        time.sleep(0.05)
+        def for_good():
+            # A watchdog that a busy machine made look up damps for a tick or two.
+            last = [row[1] for row in list(self.robot.commands)[-25:]]
+            return self.robot.commands[-1][0] > instant and not any(last)
+
+        until(for_good, 'damping')
         rows = self.robot.since(instant)
         return rows[np.flatnonzero(rows[:, 1] > 0.0).max(initial=-1) + 1, 0] - instant
 

@@ -91,6 +91,7 @@ def main():
             print(json.dumps({
                 'time': round(data.time, 2), 'rates': rates, 'wrong': seen['wrong'],
                 'commands': seen['commands'], 'x': round(float(data.qpos[0]), 3),
+                'y': round(float(data.qpos[1]), 3),
                 'height': round(float(data.qpos[2]), 3), 'lean': round(lean, 1),
                 'torque': round(float(abs(data.ctrl).max()), 2), 'slow': slow,
                 'fallen': fallen}), flush=True)

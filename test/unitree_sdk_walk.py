@@ -4,8 +4,8 @@ usage: unshare --net python unitree_sdk_walk.py FOLDER [SECONDS_A_GAIT SECONDS_A
 Prints JSON: what the robot saw.
 """
 
-import itertools
 import json
+import math
 import os
 import signal
 import subprocess
@@ -29,17 +29,15 @@ SUBNET = {'ROS_AUTOMATIC_DISCOVERY_RANGE': 'SUBNET', 'ROS_PYTHON_CHECK_FIELDS': 
 
 
 def switches():
-    """All 30 switches in one way: back to the first gait after each pair."""
-    left = set(itertools.permutations(GAITS, 2))
-    now, way = GAITS[0], []
-    while left:
-        step = min((pair for pair in left if pair[0] == now), default=None,
-                   key=lambda pair: -sum(one[0] == pair[1] for one in left))
-        assert step is not None
-        left.remove(step)
-        way.append(step[1])
-        now = step[1]
-    return way
+    """All 30 switches as one way from the first gait back to it (Hierholzer's)."""
+    left = {gait: [one for one in GAITS if one != gait] for gait in GAITS}
+    open_, way = [GAITS[0]], []
+    while open_:
+        if left[open_[-1]]:
+            open_.append(left[open_[-1]].pop())
+        else:
+            way.append(open_.pop())
+    return way[-2::-1]
 
 
 def process(name, *parameters):
@@ -64,7 +62,7 @@ threading.Thread(target=read, daemon=True).start()
 generator = process('generator', 'robot:=unitree_go2', 'rate:=500.0', "combined_topic:=''",
                     'command:=forward_position', f'gait:={GAITS[0]}')
 bridge = process('unitree_bridge', 'command:=forward_position', 'motion_switcher:=false',
-                 'state_timeout:=0.1')
+                 'state_timeout:=0.2')
 watcher = Watcher(1)
 states = []
 watcher.node.create_subscription(
@@ -82,7 +80,7 @@ try:
         time.sleep(GAIT)
         rows = seen[first:]
         result['gaits'][gait] = {
-            'distance': round(rows[-1]['x'] - rows[0]['x'], 2),
+            'distance': round(math.dist(*([row['x'], row['y']] for row in (rows[0], rows[-1]))), 2),
             'most lean': max(row['lean'] for row in rows),
             'least height': min(row['height'] for row in rows)}
     watcher.set(gait=GAITS[0])

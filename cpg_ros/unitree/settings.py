@@ -33,7 +33,8 @@ class Settings:
         state_timeout: longest time without a fresh state, s.
         tilt: largest lean of the body, rad.
         hottest: temperature of a motor at which it is let go, deg C.
-        margin: of the joint limits, for what is measured, rad.
+        margin: beyond the joint limits that what is measured may be, rad: a leg that swings
+            runs into its stop.
         astray: largest distance from the stand after rising, rad.
 
     """
@@ -56,7 +57,7 @@ class Settings:
     state_timeout: float = 0.02
     tilt: float = math.radians(50.0)
     hottest: float = 85.0
-    margin: float = 0.1
+    margin: float = 0.2
     astray: float = 0.4
 
 

@@ -1,6 +1,7 @@
 """Topics and services of the nodes, asked of the nodes themselves."""
 
 import os
+import time
 from collections.abc import Callable, Iterator
 from typing import Any
 
@@ -40,12 +41,21 @@ def of(kind: str) -> dict[str, tuple[str, str]]:
         os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
         rclpy.init(args=['--ros-args', *words, '--log-level', 'ERROR'], domain_id=231)
         try:
-            for name, (direction, type_) in _names(make()):
+            for name, (direction, type_) in _settled(make()):
                 before = found.get(name, (direction, type_))[0]
                 both = before if direction in before else f'{before}, {direction}'
                 found[name] = both, type_
         finally:
             rclpy.shutdown()
+    return found
+
+
+def _settled(node: Any) -> list[tuple[str, tuple[str, str]]]:
+    """Return what the node has, once the graph has heard of all of it."""
+    found: list[tuple[str, tuple[str, str]]] = []
+    while (now := sorted(_names(node))) != found or not found:
+        found = now
+        time.sleep(0.3)
     return found
 
 

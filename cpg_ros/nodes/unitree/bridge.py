@@ -169,9 +169,13 @@ class UnitreeBridge(StartedNode):
 
     def _halt(self, reason: str, now: float) -> None:
         """Stop at once, and whatever was about to start."""
-        if self._start is not None:
-            self._start.give_up(reason)
+        self._give_up(reason)
         self._supervisor.damp(now, reason)
+
+    def _give_up(self, reason: str) -> None:
+        # Read once: the thread that starts forgets itself at its end.
+        if (start := self._start) is not None:
+            start.give_up(reason)
 
     def _resting(self, now: float) -> bool:
         phase = self._supervisor.phase
@@ -209,9 +213,13 @@ class UnitreeBridge(StartedNode):
     def _rise(self) -> str:
         """Let the thread that commands begin, for the one that starts; return why not, or ''."""
         answer: deque[str] = deque()
-        self._requests.append(lambda now: answer.append(
-            self._supervisor.rise(now) if self._start is not None and not self._ending
-            and not self._start.given_up else 'it is stopped'))
+        start = self._start
+
+        def rise(now: float) -> None:
+            wanted = start is not None and not start.given_up and not self._ending
+            answer.append(self._supervisor.rise(now) if wanted else 'it is stopped')
+
+        self._requests.append(rise)
         while not answer:
             if self.stop.wait(0.001):
                 return 'the bridge ends'
@@ -278,16 +286,14 @@ class UnitreeBridge(StartedNode):
                               else self._sit_down(name, now))
 
     def _sit_down(self, reason: str, now: float) -> None:
-        if self._start is not None:
-            self._start.give_up(reason)
+        self._give_up(reason)
         self._supervisor.sit(now, reason)
 
     def finish(self) -> None:
         """End the threads; the watchdog, too, where the robot rests."""
         self.ticker.end()
         self.ticker.join(timeout=1.0)
-        if self._start is not None:
-            self._start.give_up('the bridge ends')
+        self._give_up('the bridge ends')
         if self._watchdog is not None and self.failure is None:
             self._watchdog.end()
 

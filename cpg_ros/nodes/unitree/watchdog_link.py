@@ -43,7 +43,7 @@ class WatchdogLink:
         self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
         self._socket.setblocking(False)
         self._process: subprocess.Popen | None = None
-        self._read = 0.0
+        self._read = float('inf')
         self._told = False
 
     def start(self) -> str:
@@ -79,6 +79,7 @@ class WatchdogLink:
         try:
             self._socket.send(Vigil.tick(kd))
         except BlockingIOError:
+            self._read = min(self._read, now)
             return 'the watchdog hangs' if now - self._read > HANGS else ''
         except OSError:
             return 'the watchdog is gone'
