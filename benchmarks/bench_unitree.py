@@ -61,8 +61,8 @@ def measure(seconds: float) -> None:
     from stand_in import StandIn
     domain, robot = free_domain(), None
     with tempfile.NamedTemporaryFile() as file, Process(
-            ['env', f'ROS_DOMAIN_ID={domain}', *BRIDGE], command='forward_position',
-            motion_switcher='false', sensor_rate='500.0') as bridge:
+            ['env', f'ROS_DOMAIN_ID={domain}', *BRIDGE, '--ros-args', '-p',
+             'command:=forward_position', '-p', 'motion_switcher:=false']) as bridge:
         np.zeros(round((seconds + 30.0) / PERIOD)).tofile(file.name)
         robot = StandIn(domain)
         robot.start()
