@@ -1,4 +1,4 @@
-# make run | demo | shell | test | docs | bench | build | clean; all is set up in .venv and install/.
+# make run | demo | shell | test | docs | bench | build | unitree | clean; all is set up in .venv and install/.
 PYTHON ?= python3
 SHELL := /bin/bash
 comma := ,
@@ -25,7 +25,7 @@ ENTER := set -e; source install/setup.bash; \
 # Live tests wait for most of their time: so many of them run at once.
 LIVE ?= $(shell echo $$((2 * $$(nproc))))
 
-.PHONY: build run demo shell test docs bench clean
+.PHONY: build run demo shell test docs bench unitree clean
 
 build: install/.built
 
@@ -44,7 +44,7 @@ docs: install/.built
 	@$(ENTER); $(VENV)/bin/sphinx-build -W --keep-going -q -b html docs docs/_build
 	@echo 'built: docs/_build/index.html'
 
-test: install/.built docs
+test: install/.built docs unitree
 	@$(VENV)/bin/ruff check .
 	@$(VENV)/bin/mypy
 	@$(VENV)/bin/lint-imports --no-logo
@@ -54,6 +54,15 @@ test: install/.built docs
 
 bench: install/.built
 	@$(ENTER); for file in benchmarks/bench_*.py; do $(VENV)/bin/python $$file; done
+
+# Messages of Unitree's robots, for unitree_bridge on ROS 2 as pip installs it.
+unitree: $(VENV)/.unitree
+
+$(VENV)/.unitree: $(INSTALLED) interfaces/build.py $(wildcard interfaces/unitree_*/msg/*.msg)
+	@$(VENV)/bin/python interfaces/build.py interfaces/unitree_go interfaces/unitree_api >$(VENV)/unitree.log 2>&1 || \
+		{ tail -n 5 $(VENV)/unitree.log >&2; exit 1; }
+	@tail -n 2 $(VENV)/unitree.log
+	@touch $@
 
 $(INSTALLED): requirements.txt requirements-docs.txt requirements-models.txt $(WHEELS)
 	@test -x $(VENV)/bin/pip -a -e $@ || $(PYTHON) -m venv --clear $(SITE) $(VENV) || \

@@ -32,6 +32,7 @@ setup(
     entry_points={'console_scripts': [
         'generator = cpg_ros.tools.executables:generator',
         'robot_sim = cpg_ros.tools.executables:robot_sim',
+        'unitree_bridge = cpg_ros.tools.executables:unitree_bridge',
         'inversion = cpg_ros.tools.executables:inversion',
         'cpg = cpg_ros.tools.executables:cpg',
         'demo = cpg_ros.tools.executables:demo',

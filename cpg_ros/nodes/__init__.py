@@ -7,4 +7,4 @@ __all__ = ['cmd_vel', 'command_topics', 'deadline_thread', 'diagnostics', 'gener
            'generator_parameters', 'inversion_node', 'joint_publishers', 'launch_arguments',
            'lockstep', 'measured_pose', 'message_block', 'node_base', 'parameter_services',
            'parameter_spec', 'real_time', 'rivals', 'robot_sim', 'sensor_publishers', 'shutdown',
-           'unserved']
+           'unitree', 'unserved']

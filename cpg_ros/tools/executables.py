@@ -8,7 +8,8 @@ from importlib import import_module
 from types import FrameType
 
 #: Executable -> module whose ``main`` it runs.
-PLACES = {'generator': 'nodes.generator', 'robot_sim': 'nodes.robot_sim', **{
+PLACES = {'generator': 'nodes.generator', 'robot_sim': 'nodes.robot_sim',
+          'unitree_bridge': 'nodes.unitree.bridge', **{
     name: f'tools.{name}' for name in ('inversion', 'cpg', 'demo', 'analyze', 'check_robot',
                                        'optimize', 'reproduce', 'tune')}}
 
@@ -26,5 +27,5 @@ def start(name: str) -> int:
     return main()
 
 
-(generator, robot_sim, inversion, cpg, demo, analyze, check_robot, optimize, reproduce,
- tune) = (partial(start, name) for name in PLACES)
+(generator, robot_sim, unitree_bridge, inversion, cpg, demo, analyze, check_robot, optimize,
+ reproduce, tune) = (partial(start, name) for name in PLACES)
