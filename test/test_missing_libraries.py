@@ -17,7 +17,8 @@ def run(missing, text):
 
 @pytest.mark.parametrize(('missing', 'module'), [
     ('numba', 'cpg_ros.nodes.generator'), ('numba', 'cpg_ros.tools.analyze'),
-    ('numba', 'cpg_ros.motion.readout'), ('rosbags', 'cpg_ros.tools.inversion')])
+    ('numba', 'cpg_ros.motion.readout'), ('rosbags', 'cpg_ros.tools.inversion'),
+    ('websockets', 'cpg_ros.panel.panel_node')])
 def test_one_line_says_how_to_get_it(missing, module):
     found = run(missing, f'import {module}')
     assert found.returncode == 1 and not found.stdout

@@ -9,7 +9,7 @@ from types import FrameType
 
 #: Executable -> module whose ``main`` it runs.
 PLACES = {'generator': 'nodes.generator', 'robot_sim': 'nodes.robot_sim',
-          'unitree_bridge': 'nodes.unitree.bridge', **{
+          'unitree_bridge': 'nodes.unitree.bridge', 'panel': 'panel.panel_node', **{
     name: f'tools.{name}' for name in ('inversion', 'cpg', 'demo', 'analyze', 'check_robot',
                                        'optimize', 'reproduce', 'tune')}}
 
@@ -27,5 +27,5 @@ def start(name: str) -> int:
     return main()
 
 
-(generator, robot_sim, unitree_bridge, inversion, cpg, demo, analyze, check_robot, optimize,
- reproduce, tune) = (partial(start, name) for name in PLACES)
+(generator, robot_sim, unitree_bridge, panel, inversion, cpg, demo, analyze, check_robot,
+ optimize, reproduce, tune) = (partial(start, name) for name in PLACES)

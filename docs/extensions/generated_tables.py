@@ -21,8 +21,9 @@ import cpg_ros
 from cpg_ros.dynamics.orbit import solve_preset
 from cpg_ros.networks.registry import SHIPPED
 from cpg_ros.nodes import generator_parameters, inversion_node, robot_sim
-from cpg_ros.nodes.parameter_spec import Spec, of_numbers
+from cpg_ros.nodes.parameter_spec import Spec
 from cpg_ros.nodes.unitree import parameters as unitree_parameters
+from cpg_ros.panel import panel_node
 from cpg_ros.robots.robot_file import find_robot
 
 
@@ -69,6 +70,8 @@ def parameters(what: str) -> str:
     if what in FIXED:
         return table(HEAD, parameter_rows({name: one.fixed()
                                            for name, one in FIXED[what].items()}))
+    if what == 'panel':
+        return table(HEAD, parameter_rows(panel_node.SPECS))
     if what == 'inversion':
         free = [code('free'), 'string[]', 'not set', '',
                 "parameters to fit; not set: the network's usual ones"]
