@@ -48,7 +48,8 @@ def parameter_rows(specs: dict[str, Spec], defaults: bool = True) -> list[list[s
     rows = []
     for name, spec in specs.items():
         span = '' if spec.low is None else f'{spec.low:g} to {spec.high:g}'
-        type_ = 'numbers' if of_numbers(spec.default) else type(spec.default).__name__
+        numbers = isinstance(spec.default, list) and spec.default and isinstance(spec.default[0], float)
+        type_ = 'numbers' if numbers else type(spec.default).__name__
         kind = {'str': 'string', 'float': 'double', 'list': 'string[]',
                 'numbers': 'double[]'}.get(type_, type_)
         default = str(spec.default).lower() if isinstance(spec.default, bool) else spec.default
