@@ -10,7 +10,7 @@ from pathlib import Path
 from launch.actions import OpaqueFunction, Shutdown
 from launch.substitutions import LaunchConfiguration
 
-from cpg_ros.nodes.launch_arguments import declared, started
+from cpg_ros.nodes.launch_arguments import declared, page, started
 from launch import LaunchDescription
 
 BOTH = {
@@ -53,7 +53,8 @@ def nodes(context):
                 'rate': 500.0, 'combined_topic': '', 'command': COMMANDS.get(command, command),
                 'use_sim_time': True}, on_exit=Shutdown()),
             started(context, 'robot_sim', 'robot_sim', {**BOTH, **SIMULATION}, {
-                'lockstep': True, **unwanted}, on_exit=Shutdown(), sigterm_timeout=DRAWING)]
+                'lockstep': True, **unwanted}, on_exit=Shutdown(), sigterm_timeout=DRAWING),
+            *page(context)]
     for picture, folder in folders.items():
         try:
             folder.mkdir(parents=True, exist_ok=True)
