@@ -233,7 +233,7 @@ def test_a_fifth_of_noise_leaves_the_name_and_says_how_sure_it_is():
         gait, t = table[name], np.arange(0.0, 8.0, 0.02)
         for symmetry in (gait, Symmetry.of(gait.group, {})):
             signals = Rhythm(symmetry, seed)(t)
-            signals = signals + 0.2 * np.ptp(signals, axis=0) * rng.normal(size=signals.shape)
+            signals = signals + 0.2 * signals.std(axis=0) * rng.normal(size=signals.shape)
             found = recognise(t, signals, gait.group, table, period=1.0)
             assert 0.0 <= found.confidence <= 1.0
             if symmetry is gait:

@@ -24,7 +24,7 @@ FEWEST = 8
 #: Largest distance of a symmetry that holds in whatever noise; the distance, in what noise and
 #: tolerance explain, at which a gait is as likely as none; and the largest distance of several in
 #: noise, over the usual.
-MOST, NONE, LARGER = 0.6, 3.0, 1.25
+MOST, NONE, LARGER = 0.3, 3.0, 1.25
 
 
 @dataclass(frozen=True)

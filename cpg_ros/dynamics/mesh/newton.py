@@ -14,7 +14,7 @@ import numpy as np
 from numpy.polynomial import polynomial
 
 from cpg_ros.dynamics.mesh import collocation
-from cpg_ros.dynamics.mesh.condensation import chained, summed, transfer
+from cpg_ros.dynamics.mesh.elimination import chained, summed, transfer
 from cpg_ros.dynamics.mesh.orbit import MeshOrbit
 from cpg_ros.dynamics.periodic import NoOrbit
 from cpg_ros.networks.field import Field

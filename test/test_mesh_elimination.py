@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from cpg_ros.dynamics.mesh import collocation
-from cpg_ros.dynamics.mesh.condensation import chained, transfer
+from cpg_ros.dynamics.mesh.elimination import chained, transfer
 
 
 @pytest.mark.parametrize('d', [1, 2, 4, 8, 9])
