@@ -1,4 +1,4 @@
-"""Pictures that come in two: where NAME_dark.png stands beside NAME.png, each theme has its own."""
+"""Pictures in two: where NAME_dark.png stands beside NAME.png, each theme shows its own."""
 
 from pathlib import Path
 from typing import Any
