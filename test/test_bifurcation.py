@@ -10,6 +10,7 @@ from cpg_ros.dynamics.continuation import follow
 from cpg_ros.dynamics.floquet import multipliers
 from cpg_ros.dynamics.mesh.newton import collocate
 from cpg_ros.dynamics.orbit import solve_preset
+from cpg_ros.dynamics.switching import switched
 from cpg_ros.networks.biped import Biped
 from cpg_ros.networks.parameter_line import ParameterLine
 from cpg_ros.networks.quadruped import Quadruped
@@ -55,3 +56,9 @@ def test_the_hop_doubles_its_period_where_the_walk_ends():
     doubled = [one for one in bifurcations(branch) if one.kind == 'period doubling']
     # The walk turns back a little beyond.
     assert min(abs(one.value - value) for one in doubled) < 1e-3
+    # There the walk leaves: left and right, flexor and extensor half a cycle apart.
+    (point,) = (one for one in doubled if abs(one.value - value) < 1e-3)
+    leaving = switched(point, line, -1.0, 0.4, most=4)
+    assert dict(leaving.points[0].orbit.symmetry.shifts) == dict(
+        last.network.symmetry('walk').shifts)
+    assert leaving.points[0].orbit.period == pytest.approx(2.0 * hop.period, rel=1e-3)

@@ -96,7 +96,7 @@ def _crossings(branch: Branch, spectra: list[list[np.ndarray]]
                 # At a fold one multiplier of the class is 1, to rounding.
                 if part == 0 and folds and any(abs(mu - 1.0) < 1e-3 for mu in pair):
                     continue
-                if min(abs(np.log(np.abs(mu))) for mu in pair) > NEUTRAL:
+                if max(abs(np.log(np.abs(mu))) for mu in pair) > NEUTRAL:
                     yield k, part, rank
 
 
