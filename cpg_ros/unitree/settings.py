@@ -54,7 +54,7 @@ class Settings:
     rise: float = 2.0
     approach: float = 1.0
     sit: float = 1.5
-    fold: float = 0.25
+    fold: float = 0.15
     target_timeout: float = 0.1
     state_timeout: float = 0.02
     tilt: float = math.radians(50.0)
