@@ -89,7 +89,7 @@ def described(monkeypatch):
             else:
                 described.includes.append(entity.arguments[0].arguments[0])
         assert not set(given) - set(described.arguments) or name == 'rviz'
-        context = {'namespace': '', 'params_file': '', 'use_sim_time': 'false',
+        context = {'namespace': '', 'params_file': '', 'use_sim_time': 'false', 'panel': 'false',
                    **described.arguments, **given}
         made = [one for function in functions for one in function(context) or ()]
         described.nodes = [one for one in made if isinstance(one, kinds['Node'])]
@@ -257,6 +257,15 @@ def test_go2_speaks_one_command_and_takes_turns(described, given, command, monke
             assert type(value) is type(SPECS[name].default), name
     # Neither is of use without the other.
     assert 'on_exit' in simulation.options and 'on_exit' in generator.options
+
+
+@pytest.mark.parametrize('name', ['generator', 'inversion', 'go2'])
+def test_a_page_comes_with_them_if_asked_for(described, name, monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    page = node_of(described(name, panel='true'), 'panel')
+    assert page.options['name'] == 'cpg_panel' and 'parameters' not in page.options
+    with pytest.raises(RuntimeError, match='panel:=maybe is not true or false'):
+        described(name, panel='maybe')
 
 
 def test_go2_without_pictures(described, monkeypatch, tmp_path):

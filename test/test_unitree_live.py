@@ -136,7 +136,7 @@ def test_without_a_robot_it_says_what_to_look_at():
 
 @pytest.mark.parametrize(('parameter', 'words'), [
     ('kp:=[200.0]', 'kp: 200 is not from 0 to 150'), ('robot:=goat', "no joint 'FR_hip_joint'"),
-    ('kp:=high', "parameter kp must be a list of numbers, not 'high'"),
+    ('kp:=high', "parameter kp must be a list of doubles, not 'high'"),
     ('model:=spot', "model 'spot' is not one of go2, go1, b2")])
 def test_what_cannot_be_used_is_refused_in_one_line(parameter, words):
     process = alone(parameter)

@@ -16,7 +16,7 @@ from cpg_ros.gaits.leg_names import Legs, legs_of
 from cpg_ros.motion.plan import plan
 from cpg_ros.networks.registry import NETWORKS, SHIPPED
 from cpg_ros.robots.robot import HARMONICS, Joint, Robot
-from cpg_ros.robots.robot_file import LARGEST
+from cpg_ros.robots.robot_file import LARGEST, LIMITS
 from cpg_ros.robots.urdf import UrdfError, UrdfJoint, chain, direction
 
 #: How far the knees are bent at the stand, rad, by the number of legs.
@@ -24,7 +24,7 @@ BEND = {2: 0.5, 4: 1.4}
 #: How far legs swing and knees bend at first, rad.
 SWING, LIFT = 0.15, 0.15
 #: Angles and speeds where the URDF has no limits, rad and rad/s.
-UNBOUNDED, SPEED = pi, 10.0
+UNBOUNDED, SPEED = pi, 20.0
 #: Share of a joint's range that the stand keeps from either end, and of the room that gaits take.
 MARGIN, USED = 0.1, 0.8
 
@@ -83,7 +83,7 @@ def _leg(urdf: Mapping[str, UrdfJoint], legs: Legs, leg: str, cell: int
     speed = {joint: min(urdf[joint].velocity, LARGEST) if urdf[joint].velocity < inf else SPEED
              for joint in names}
     made = tuple(Joint(joint, leg, cell, stand[joint], weights[joint], *_range(urdf[joint]),
-                       speed[joint]) for joint in legs[leg])
+                       speed[joint], _missing(urdf[joint])) for joint in legs[leg])
     return made, f'{leg}: ' + ', '.join(f'{joint} {roles[joint]}' for joint in names)
 
 
@@ -93,6 +93,11 @@ def _range(joint: UrdfJoint) -> tuple[float, float]:
         raise UrdfError(f"the joint '{joint.name}' has no room to move: its limits are "
                         f'{joint.lower:g} to {joint.upper:g} rad')
     return lower, upper
+
+
+def _missing(joint: UrdfJoint) -> tuple[str, ...]:
+    """Return which limits the URDF does not give."""
+    return tuple(key for key in LIMITS if getattr(joint, key) in (-inf, inf))
 
 
 def _inside(joint: UrdfJoint, angle: float) -> float:

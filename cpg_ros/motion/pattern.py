@@ -127,6 +127,11 @@ class Pattern:
         return self._tracks[-1].legs
 
     @property
+    def state(self) -> np.ndarray:
+        """The newest network's state and its rate, shape (2, components), of advance's own."""
+        return self._tracks[-1].stepper.now[:2]
+
+    @property
     def level(self) -> float:
         """0 at the stand, 1 in the full gait."""
         return self._ramp.level

@@ -7,8 +7,7 @@ from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescri
 from rclpy.parameter import Parameter
 
 #: What a value of a type is called.
-KINDS = {bool: 'a bool', int: 'an integer', float: 'a double', str: 'a string',
-         list: 'a list of strings'}
+KINDS = {bool: 'a bool', int: 'an integer', float: 'a double', str: 'a string'}
 
 
 @dataclass(frozen=True)
@@ -50,21 +49,18 @@ def as_doubles(parameters: list[Parameter], doubles: set[str]) -> list[Parameter
             for p in parameters]
 
 
-def of_numbers(default: object) -> bool:
-    """Tell whether a default is a list of numbers, and not one of strings."""
-    return isinstance(default, list) and bool(default) and isinstance(default[0], float)
+def as_list(parameter: Parameter, default: list) -> Parameter:
+    """Turn one value, or whole numbers, given for a list of such values into the list."""
+    value = parameter.value
+    given = value if parameter.type_.name.endswith('_ARRAY') else [value]
+    wanted = type(default[0]) if default else str
+    if wanted is float and all(type(one) in (int, float) for one in given):
+        return Parameter(parameter.name, Parameter.Type.DOUBLE_ARRAY, [float(x) for x in given])
+    return Parameter(parameter.name, value=[value]) if type(value) is wanted else parameter
 
 
-def kind_of(default: object) -> str:
-    """Return what values like a default are called."""
-    return 'a list of numbers' if of_numbers(default) else KINDS[type(default)]
-
-
-def as_numbers(parameter: Parameter) -> Parameter:
-    """Turn one number or whole numbers, given for a list of numbers, into such a list."""
-    types = Parameter.Type
-    if parameter.type_ in (types.INTEGER, types.DOUBLE):
-        return Parameter(parameter.name, types.DOUBLE_ARRAY, [float(parameter.value)])
-    if parameter.type_ == types.INTEGER_ARRAY:
-        return Parameter(parameter.name, types.DOUBLE_ARRAY, [float(x) for x in parameter.value])
-    return parameter
+def kind_of(default: Any) -> str:
+    """Say what a parameter of a default must be."""
+    if isinstance(default, list):
+        return f'a list of {KINDS[type(default[0]) if default else str].split()[1]}s'
+    return KINDS[type(default)]

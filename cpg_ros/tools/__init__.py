@@ -3,6 +3,7 @@
 Imports every room; nothing imports it.
 """
 
-__all__ = ['analysis_plot', 'analysis_report', 'analyze', 'arguments', 'check_robot', 'cpg',
-           'demo', 'executables', 'gait_diagram', 'inversion', 'optimize', 'reproduce',
-           'reproduction_report', 'tune']
+__all__ = ['analysis_plot', 'analysis_report', 'analyze', 'arguments', 'bag_playing',
+           'bag_recording', 'check_robot', 'completion', 'cpg', 'demo', 'executables',
+           'gait_diagram', 'graph_topics', 'inversion', 'optimize', 'reproduce',
+           'reproduction_report', 'running_node', 'tune']

@@ -9,12 +9,13 @@ from types import FrameType
 
 #: Executable -> module whose ``main`` it runs.
 PLACES = {'generator': 'nodes.generator', 'robot_sim': 'nodes.robot_sim',
-          'unitree_bridge': 'nodes.unitree.bridge', **{
+          'unitree_bridge': 'nodes.unitree.bridge', 'panel': 'panel.panel_node', **{
     name: f'tools.{name}' for name in ('inversion', 'cpg', 'demo', 'analyze', 'check_robot',
                                        'optimize', 'reproduce', 'tune')}}
 
 
-def _run(name: str) -> int:
+def start(name: str) -> int:
+    """Run an executable on the words of the command line; return its exit code."""
     def leave(number: int, _: FrameType | None) -> None:
         # An exception amid the loading of compiled code would become another error there.
         print(f'{name}: stopped', file=sys.stderr, flush=True)
@@ -26,5 +27,5 @@ def _run(name: str) -> int:
     return main()
 
 
-(generator, robot_sim, unitree_bridge, inversion, cpg, demo, analyze, check_robot, optimize,
- reproduce, tune) = (partial(_run, name) for name in PLACES)
+(generator, robot_sim, unitree_bridge, panel, inversion, cpg, demo, analyze, check_robot,
+ optimize, reproduce, tune) = (partial(start, name) for name in PLACES)

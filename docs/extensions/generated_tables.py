@@ -21,8 +21,9 @@ import cpg_ros
 from cpg_ros.dynamics.orbit import solve_preset
 from cpg_ros.networks.registry import SHIPPED
 from cpg_ros.nodes import generator_parameters, inversion_node, robot_sim
-from cpg_ros.nodes.parameter_spec import Spec, of_numbers
+from cpg_ros.nodes.parameter_spec import Spec
 from cpg_ros.nodes.unitree import parameters as unitree_parameters
+from cpg_ros.panel import panel_node
 from cpg_ros.robots.robot_file import find_robot
 
 
@@ -47,9 +48,11 @@ def parameter_rows(specs: dict[str, Spec], defaults: bool = True) -> list[list[s
     rows = []
     for name, spec in specs.items():
         span = '' if spec.low is None else f'{spec.low:g} to {spec.high:g}'
-        type_ = 'numbers' if of_numbers(spec.default) else type(spec.default).__name__
-        kind = {'str': 'string', 'float': 'double', 'list': 'string[]',
-                'numbers': 'double[]'}.get(type_, type_)
+        kind = type(spec.default).__name__
+        kind = {'str': 'string', 'float': 'double', 'int': 'integer'}.get(kind, kind)
+        if isinstance(spec.default, list):
+            first = type(spec.default[0]) if spec.default else str
+            kind = {float: 'double[]', int: 'integer[]', str: 'string[]'}[first]
         default = str(spec.default).lower() if isinstance(spec.default, bool) else spec.default
         text = spec.text + (f' ({spec.constraints})' if spec.constraints else '')
         rows.append([code(name), kind + (', read-only' if spec.read_only else ''),
@@ -69,6 +72,8 @@ def parameters(what: str) -> str:
     if what in FIXED:
         return table(HEAD, parameter_rows({name: one.fixed()
                                            for name, one in FIXED[what].items()}))
+    if what == 'panel':
+        return table(HEAD, parameter_rows(panel_node.SPECS))
     if what == 'inversion':
         free = [code('free'), 'string[]', 'not set', '',
                 "parameters to fit; not set: the network's usual ones"]

@@ -1,0 +1,47 @@
+"""The cells of the network, for whoever looks on: no more often than people can see."""
+
+import numpy as np
+from rclpy.node import Node
+from rclpy.qos import QoSProfile
+from rclpy.qos_overriding_options import QoSOverridingOptions
+from std_msgs.msg import Float64MultiArray, MultiArrayDimension
+
+from cpg_ros.networks.network import Network
+from cpg_ros.nodes.array_view import view_of
+
+#: At most this many messages a second.
+FASTEST = 50.0
+
+
+class Cells:
+    """Publishes the network on ``~/cells``: a row for each variable of a cell, one for each rate.
+
+    Rates are in model time.
+    """
+
+    def __init__(self, node: Node, network: type[Network]) -> None:
+        self._message = Float64MultiArray()
+        rows = [*network.states, *(f'd{name}/dt' for name in network.states)]
+        self._view = view_of(self._message, 'data', network.cells * len(rows))
+        self._message.layout.dim = [
+            MultiArrayDimension(label=','.join(rows), size=len(rows),
+                                stride=len(rows) * network.cells),
+            MultiArrayDimension(label='cells', size=network.cells, stride=network.cells)]
+        self._publisher = node.create_publisher(
+            Float64MultiArray, '~/cells', QoSProfile(depth=10),
+            qos_overriding_options=QoSOverridingOptions.with_default_policies())
+        self._elapsed = 1.0 / FASTEST
+
+    def publish(self, dt: float, state: np.ndarray) -> None:
+        """Publish a state and its rate, if it is time.
+
+        Args:
+            dt: since the last call, s.
+            state: and its rate, shape (2, variables * cells).
+
+        """
+        self._elapsed += dt
+        if self._elapsed >= (1.0 - 1e-6) / FASTEST:
+            self._elapsed = 0.0
+            self._view[:] = state.ravel()
+            self._publisher.publish(self._message)
