@@ -1,14 +1,13 @@
 """The numbers of all feedback laws, each law on or off by itself."""
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 
-@dataclass(frozen=True)
-class Gains:
+class Gains(NamedTuple):
     """Which laws are on, and their gains; SI units, found on a simulated Go2.
 
     Attributes:
-        posture, placement, pace, reflexes, slope, heading, speed: whether the law is on.
+        posture, placement, pace, reflexes, slope, heading, speed, sidestep: whether the law is on.
         roll, roll_rate: metres a foot is drawn in per metre to the left and rad, or rad/s.
         pitch, pitch_rate: the same of pitch, by metres to the front.
         posture_most: most that posture moves a foot in stance, m.
@@ -32,6 +31,7 @@ class Gains:
         turn_most: largest one, rad/s.
         speed_share, speed_rate: stride per m/s of missing speed, and per m of missing way.
         speed_most: most that strides are changed for it.
+        sidestep_most: most that a foot is carried sideways, m.
         smooth: time constant of every displacement, s.
 
     """
@@ -43,6 +43,7 @@ class Gains:
     slope: bool = True
     heading: bool = True
     speed: bool = True
+    sidestep: bool = True
 
     roll: float = 1.29
     roll_rate: float = 0.109
@@ -78,5 +79,7 @@ class Gains:
     speed_share: float = 0.5
     speed_rate: float = 0.3
     speed_most: float = 0.3
+
+    sidestep_most: float = 0.08
 
     smooth: float = 0.008

@@ -33,11 +33,6 @@ class Timetable:
         self.swinging = np.stack([one for one, _ in columns], axis=1)
         self.progress = np.stack([one for _, one in columns], axis=1)
 
-    def __call__(self, phase: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return swinging and progress at phases in cycles, shape (runs,) -> (runs, legs)."""
-        row = (phase * POINTS).astype(int) % POINTS
-        return self.swinging[row], self.progress[row]
-
 
 def _periodic(values: np.ndarray, phase: np.ndarray) -> np.ndarray:
     grid = np.arange(values.size + 1) / values.size
