@@ -9,10 +9,11 @@ import numpy as np
 
 from cpg_ros.errors import InputError
 from cpg_ros.integration.jit import jit
+from cpg_ros.robots import body_keys
+from cpg_ros.robots.body_keys import EfferenceTable
 
-#: Bins of a stride; the signals are the velocity forward and to the left in m/s, the rates of
-#: roll and pitch in rad/s, and roll and pitch in rad.
-BINS, SIGNALS = 64, 6
+#: Bins of a stride, and how many signals there are; see ``body_keys.SIGNALS``.
+BINS, SIGNALS = body_keys.BINS, len(body_keys.SIGNALS)
 #: Most speeds of a table.
 SPEEDS = 8
 
@@ -36,6 +37,18 @@ class EfferenceCopy:
         table = np.zeros((2, BINS, SIGNALS))
         table[:, :, 0] = [[-10.0], [10.0]]
         return cls(np.array([-10.0, 10.0]), table)
+
+    @classmethod
+    def of(cls, table: EfferenceTable) -> 'EfferenceCopy':
+        """Take a robot file's table."""
+        return cls(np.array(table.speeds),
+                   np.stack([table.rows[key] for key in body_keys.SIGNALS], axis=-1))
+
+    def as_table(self) -> EfferenceTable:
+        """Return it as a robot file has it."""
+        return EfferenceTable(tuple(self.speeds.tolist()), {
+            key: tuple(tuple(row) for row in self.table[:, :, k].tolist())
+            for k, key in enumerate(body_keys.SIGNALS)})
 
     def __call__(self, phase: np.ndarray, speed: np.ndarray) -> np.ndarray:
         """Return what is expected, shape (runs, SIGNALS).

@@ -5,10 +5,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cpg_ros.feedback.kinematics import Geometry, foot_of, slopes_of
+from cpg_ros.feedback.kinematics import GRAVITY, Geometry, foot_of, slopes_of
 from cpg_ros.integration.jit import entry, jit, sources_digest
 
-GRAVITY = 9.81
 #: A foot counts as on the ground above this share of the weight, until below the other.
 TOUCH, LEAVE = 0.10, 0.04
 #: Stance legs pull the velocity to theirs with this time constant, s, when they bear the weight.
@@ -103,7 +102,7 @@ def update(rows, columns, radius, weight, angles, rates, loads, lean, turning, p
         share = max(loads[leg], 0.0) / weight
         contact[leg] = share > (LEAVE if contact[leg] else TOUCH)
         seen[leg, 3] = 0.0
-        if not contact[leg]:
+        if not contact[leg] or rows[leg, 1] == 0.0:
             continue
         one, two, three = columns[leg, 0], columns[leg, 1], columns[leg, 2]
         now[0], now[1], now[2] = angles[one], angles[two], angles[three]

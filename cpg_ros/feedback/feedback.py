@@ -42,9 +42,11 @@ class Feedback:
     def learn(self, program: Program, expected: EfferenceCopy | None = None) -> int:
         """Get to know a gait; return its slot.
 
-        The oldest is forgotten where there is no room. Without an efference copy nothing but the
-        gait's speed is expected.
+        The oldest is forgotten where there is no room. Without an efference copy, and without one
+        in the robot file, nothing but the gait's speed is expected.
         """
+        if expected is None and program.motion.efference is not None:
+            expected = EfferenceCopy.of(program.motion.efference)
         slot = self._learnt % SLOTS
         self._tables.fill(slot, Timetable(program, self.geometry),
                           expected or EfferenceCopy.blank(), program)

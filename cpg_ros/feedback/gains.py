@@ -11,12 +11,12 @@ class Gains(NamedTuple):
         roll, roll_rate: metres a foot is drawn in per metre to the left and rad, or rad/s.
         pitch, pitch_rate: the same of pitch, by metres to the front.
         posture_most: most that posture moves a foot in stance, m.
-        step: s, by which a velocity error is turned into a longer step.
+        step, step_left: s, by which a velocity error forward or sideways makes a longer step.
         step_pitch_rate, step_roll_rate: m per rad/s, forward and sideways.
         step_filter: time constant, s.
         step_most: most that a foot is placed elsewhere, m.
         step_decay: rate at which that is given up in stance, 1/s.
-        give: share of the sideways velocity that feet in stance yield to.
+        give, give_left: shares of the velocity error that feet in stance yield to.
         pace_from: velocity error at which strides get faster, m/s.
         pace_gain: share of the frequency per m/s above that.
         pace_most: largest share.
@@ -52,12 +52,14 @@ class Gains(NamedTuple):
     posture_most: float = 0.08
 
     step: float = 0.16
+    step_left: float = 0.16
     step_pitch_rate: float = 0.045
     step_roll_rate: float = 0.01
     step_filter: float = 0.032
     step_most: float = 0.17
     step_decay: float = 3.1
-    give: float = 0.55
+    give: float = 0.0
+    give_left: float = 0.55
 
     pace_from: float = 0.25
     pace_gain: float = 2.4

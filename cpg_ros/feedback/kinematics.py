@@ -9,7 +9,13 @@ from functools import cached_property
 
 import numpy as np
 
+from cpg_ros.errors import InputError
 from cpg_ros.integration.jit import entry, jit, sources_digest
+from cpg_ros.robots.body_keys import BodyGeometry
+from cpg_ros.robots.robot import Robot
+
+#: Of free fall, m/s^2.
+GRAVITY = 9.81
 
 
 @dataclass(frozen=True)
@@ -19,7 +25,8 @@ class Geometry:
     Attributes:
         columns: index of each leg's hip, thigh and calf among the joints, shape (legs, 3); of a
             leg without a hip joint the first is any, and its turn 0.
-        turns: 1 or -1 by the sense of each joint about x, y and y, shape (legs, 3).
+        turns: 1 or -1 by the sense of each joint about x, y and y, shape (legs, 3); 0 of legs
+            whose geometry is not known.
         hips: a point on the axis of each hip, m, shape (legs, 3).
         thighs: from there to the thigh joint, m, shape (legs, 3).
         uppers: from thigh to calf joint in their plane as z + i x, m, complex, shape (legs,).
@@ -45,6 +52,41 @@ class Geometry:
         """A row for each leg as the kernels take it, shape (legs, 14)."""
         return np.column_stack([self.turns, self.hips, self.thighs, self.uppers.real,
                                 self.uppers.imag, self.lowers.real, self.lowers.imag, self.bends])
+
+
+def geometry_of(robot: Robot, body: BodyGeometry | None = None) -> Geometry:
+    """Return the geometry of a robot's legs: its file's, or another one.
+
+    Legs that the file does not have stay where they are.
+
+    Raises:
+        InputError: there is none.
+
+    """
+    body = body or robot.geometry
+    if body is None:
+        raise InputError(f"robot file '{robot.name}' has no geometry of the legs (part geometry: "
+                         'check_robot --make writes it, and tune)')
+    joints = {joint.name: k for k, joint in enumerate(robot.joints)}
+    offsets = robot.column('offset')
+    count = len(robot.legs)
+    columns, turns = np.zeros((count, 3), dtype=np.int64), np.zeros((count, 3))
+    hips, thighs, bends = np.zeros((count, 3)), np.zeros((count, 3)), np.ones(count)
+    uppers, lowers = np.full((2, count), -0.1 + 0.0j)
+    for k, name in enumerate(robot.legs):
+        if name not in body.legs:
+            continue
+        leg = body.legs[name]
+        own = [joints[joint] for joint in leg.joints]
+        columns[k], turns[k, -len(own):] = own if len(own) == 3 else [own[0], *own], leg.turns
+        hips[k], thighs[k] = leg.hip, leg.thigh
+        # What the links themselves are off sideways belongs to the leg's plane.
+        thighs[k, 1] += leg.calf[1] + leg.foot[1]
+        uppers[k], lowers[k] = (complex(link[2], link[0]) for link in (leg.calf, leg.foot))
+        bend = turns[k, 2] * offsets[own[-1]] + np.angle(lowers[k] / uppers[k])
+        bends[k] = 1.0 if np.sin(bend) >= 0.0 else -1.0
+    return Geometry(columns, turns, hips, thighs, uppers, lowers, bends, body.foot_radius,
+                    GRAVITY * body.mass)
 
 
 @jit
@@ -110,9 +152,10 @@ def joints_of(leg, x, y, z):
 def move_foot(leg, columns, angles, foot, way):
     """Move a foot at a place by a way, m, shapes (3,): changes its leg's of all angles, rad.
 
-    No way changes no bit of them; limits are the caller's business.
+    No way changes no bit of them, nor does any of a leg whose geometry is not known; limits are
+    the caller's business.
     """
-    if way[0] == 0.0 and way[1] == 0.0 and way[2] == 0.0:
+    if leg[1] == 0.0 or (way[0] == 0.0 and way[1] == 0.0 and way[2] == 0.0):
         return
     now = joints_of(leg, foot[0], foot[1], foot[2])
     then = joints_of(leg, foot[0] + way[0], foot[1] + way[1], foot[2] + way[2])

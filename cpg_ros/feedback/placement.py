@@ -28,6 +28,6 @@ def swing(way, wanted, gains, dt):
 
 @jit
 def stand(way, giving, gains, dt):
-    """Let a foot on the ground go back, and yield to a velocity in m/s."""
-    found = way * math.exp(-gains.step_decay * dt) - gains.give * dt * giving
+    """Let a foot on the ground go back, and give way at a speed in m/s."""
+    found = way * math.exp(-gains.step_decay * dt) - dt * giving
     return min(max(found, -gains.step_most), gains.step_most)

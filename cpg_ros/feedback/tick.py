@@ -20,6 +20,7 @@ from cpg_ros.feedback.estimate import update
 from cpg_ros.feedback.kinematics import foot_of, move_foot
 from cpg_ros.feedback.timetable import POINTS
 from cpg_ros.integration.jit import entry, jit, sources_digest
+from cpg_ros.motion.steering import TIME_CONSTANT
 
 #: Joints are where they are told to be a little later: corrections come ahead by this, cycles.
 LEAD = 0.04
@@ -40,6 +41,8 @@ class Memory(NamedTuple):
         stride: to be added to each leg's stride, shape (runs, legs).
         hurry: factor of the stride frequency, shape (runs,).
         phase: of the first leg at the last tick, cycles, shape (runs,).
+        asked: wanted speed forward and to the left as it is approached, m/s, and its rates,
+            m/s^2, shape (runs, 2, 2).
         seen, scratch, own: for passing on within a tick.
 
     """
@@ -55,6 +58,7 @@ class Memory(NamedTuple):
     stride: np.ndarray
     hurry: np.ndarray
     phase: np.ndarray
+    asked: np.ndarray
     seen: np.ndarray
     scratch: np.ndarray
     own: np.ndarray
@@ -65,8 +69,19 @@ class Memory(NamedTuple):
         return cls(np.zeros((runs, 3)), np.zeros((runs, legs), dtype=bool),
                    np.zeros((runs, legs, 3)), np.zeros((runs, legs, 2)), np.zeros((runs, legs)),
                    np.zeros((runs, legs, 5)), np.zeros((runs, 2)), np.zeros(runs),
-                   np.zeros((runs, legs)), np.ones(runs), np.zeros(runs), np.zeros((legs, 4)),
-                   np.zeros((5, 3)), np.zeros(SIGNALS))
+                   np.zeros((runs, legs)), np.ones(runs), np.zeros(runs), np.zeros((runs, 2, 2)),
+                   np.zeros((legs, 4)), np.zeros((5, 3)), np.zeros(SIGNALS))
+
+
+@jit
+def _approach(asked, wanted, dt):
+    """Let each wish, a value and its rate, go to what is wanted as strides do; see Drive."""
+    decay = math.exp(-dt / TIME_CONSTANT)
+    for k in range(len(wanted)):
+        gap, rate = asked[k, 0] - wanted[k], asked[k, 1]
+        pull = rate + gap / TIME_CONSTANT
+        asked[k, 0] = wanted[k] + (gap + pull * dt) * decay
+        asked[k, 1] = (rate - pull * dt / TIME_CONSTANT) * decay
 
 
 @jit
@@ -108,7 +123,9 @@ def _cached(digest):
                    memory.seen, memory.scratch)
             old, new = gaits[run, 0], gaits[run, 1]
             slot = new if mix[run] > 0.5 else old
-            phase, forward, left = phases[run], wanted[run, 0], wanted[run, 1]
+            _approach(memory.asked[run], wanted[run], dt)
+            phase = phases[run]
+            forward, left = memory.asked[run, 0, 0], memory.asked[run, 1, 0]
             own[:] = 0.0
             expect(tables.speeds[old], tables.expected[old], phase, forward, 1.0 - mix[run], own)
             if mix[run] > 0.0:
@@ -125,7 +142,7 @@ def _cached(digest):
             if gains.slope:
                 uphill_x, uphill_y = slope.shift(ground[1], gains), -slope.shift(ground[0], gains)
             step_x = placement.step(vx, wy, gains.step, gains.step_pitch_rate, gains)
-            step_y = placement.step(vy, wx, gains.step, gains.step_roll_rate, gains)
+            step_y = placement.step(vy, wx, gains.step_left, gains.step_roll_rate, gains)
             strode = (phase - memory.phase[run] + 0.5) % 1.0 - 0.5
             memory.phase[run] = phase
             row = int((phase + LEAD) % 1.0 * POINTS) % POINTS
@@ -149,8 +166,8 @@ def _cached(digest):
                         stepped[0] = placement.swing(stepped[0], step_x, gains, dt)
                         stepped[1] = placement.swing(stepped[1], step_y, gains, dt)
                     else:
-                        stepped[0] = placement.stand(stepped[0], 0.0, gains, dt)
-                        stepped[1] = placement.stand(stepped[1], vy, gains, dt)
+                        stepped[0] = placement.stand(stepped[0], gains.give * vx, gains, dt)
+                        stepped[1] = placement.stand(stepped[1], gains.give_left * vy, gains, dt)
                     x, y = x + stepped[0], y + stepped[1]
                 if gains.sidestep:
                     carried = memory.carried[run, leg]

@@ -40,9 +40,11 @@ def _periodic(values: np.ndarray, phase: np.ndarray) -> np.ndarray:
 
 
 def _swing(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Find the swing from the foot furthest back to the foot furthest ahead."""
+    """Find the swing from the foot furthest back to the foot furthest ahead, if it moves."""
     lift, land = int(x.argmin()), int(x.argmax())
     swing = (land - lift) % x.size
+    if np.ptp(x) < 1e-9:
+        return np.zeros(x.size, dtype=bool), np.zeros(x.size)
     since = (np.arange(x.size) - lift) % x.size
     swinging = since < swing
     return swinging, np.where(swinging, since / swing, (since - swing) / (x.size - swing))

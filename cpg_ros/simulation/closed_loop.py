@@ -15,6 +15,7 @@ from cpg_ros.feedback.efference_copy import EfferenceCopy
 from cpg_ros.feedback.estimate import BodyState, Senses
 from cpg_ros.feedback.feedback import Feedback
 from cpg_ros.feedback.gains import Gains
+from cpg_ros.feedback.kinematics import geometry_of
 from cpg_ros.feedback.timetable import Timetable
 from cpg_ros.motion.plan import Program
 from cpg_ros.simulation.batch import PUSH
@@ -56,7 +57,8 @@ class ClosedLoop:
         self._robot = programs[0].robot
         self.body = Body(name, self._robot, timestep=timestep, add=add_ground)
         self.parts = Anatomy(self.body)
-        self.geometry = read_geometry(self.body, self.parts)
+        self.geometry = geometry_of(self._robot, self._robot.geometry
+                                    or read_geometry(self.body, self.parts))
         self.body.reset()
         self._tables = [Timetable(program, self.geometry) for program in programs]
         self._models: dict[tuple[float, Terrain | None], Any] = {}

@@ -4,7 +4,8 @@ import math
 
 import numpy as np
 
-from cpg_ros.feedback.estimate import GRAVITY, Senses
+from cpg_ros.feedback.estimate import Senses
+from cpg_ros.feedback.kinematics import GRAVITY
 from cpg_ros.integration.jit import entry, sources_digest
 from cpg_ros.simulation.body import Body
 from cpg_ros.simulation.scenario import Noise
