@@ -28,7 +28,7 @@ from feedback_figures import (
 from cpg_ros.simulation.scenario import Noise
 
 ROBOT = ROOT / 'config' / 'unitree_go2.yaml'
-OPEN, CLOSED = (12.0, 16.0, 20.0, 24.0, 28.0), (24.0, 30.0, 34.0, 38.0, 42.0)
+OPEN, CLOSED = (12.0, 16.0, 20.0, 24.0), (24.0, 30.0, 34.0, 38.0, 42.0)
 #: Force sensors 10 % wrong with 5 % noise, 0.5 degrees of IMU bias, 0.02 rad/s on the gyro.
 DULL = {'delay': 0.01, 'force_bias': 0.1, 'force_noise': 0.05, 'lean_bias': 0.00873,
         'turning_noise': 0.02}

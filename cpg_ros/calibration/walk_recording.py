@@ -16,7 +16,10 @@ from cpg_ros.robots.robot import Robot
 
 #: What is read: key -> type of its topic.
 TYPES = {'joint_states': JOINT_STATE, 'imu': 'sensor_msgs/msg/Imu',
-         'foot_contacts': 'std_msgs/msg/Float64MultiArray'}
+         'foot_contacts': 'std_msgs/msg/Float64MultiArray',
+         'phase': 'std_msgs/msg/Float64MultiArray'}
+#: What a bag may be without.
+OPTIONAL = ('phase',)
 
 
 @dataclass(frozen=True)
@@ -28,6 +31,7 @@ class WalkRecording:
         joints: names, leg by leg.
         times: of the IMU's stamps, rising, s, shape (n,).
         senses: at these, n runs' worth.
+        phase: of the first leg's cell, as the generator told it, cycles, shape (n,), or None.
 
     """
 
@@ -35,6 +39,7 @@ class WalkRecording:
     joints: tuple[str, ...]
     times: np.ndarray
     senses: Senses
+    phase: np.ndarray | None = None
 
     @property
     def positions(self) -> np.ndarray:
@@ -59,13 +64,15 @@ def read_walk(path: str | Path, robot: Robot, topics: Mapping[str, str]) -> Walk
     names = {key: '/' + topic.lstrip('/') for key, topic in topics.items()}
     with opened(path) as bag:
         kinds = {one.topic: one.msgtype for one in bag.connections}
-        for key, topic in names.items():
-            if kinds.get(topic) != TYPES[key]:
+        for key, topic in list(names.items()):
+            if key in OPTIONAL and topic not in kinds:
+                del names[key]
+            elif kinds.get(topic) != TYPES[key]:
                 there = ', '.join(f'{name} ({kind})' for name, kind in list(kinds.items())[:8])
                 raise RecordingError(f'{path}: no topic {topic} of type {TYPES[key]} (--'
                                      f'{key.replace("_", "-")}); it has {there or "none"}')
         key_of = {topic: key for key, topic in names.items()}
-        found: dict[str, list[tuple[int, Any]]] = {key: [] for key in TYPES}
+        found: dict[str, list[tuple[int, Any]]] = {key: [] for key in names}
         for topic, received, data in bag.messages(list(names.values())):
             key = key_of[topic]
             try:
@@ -103,13 +110,21 @@ def _joined(path: Path, robot: Robot, found: dict[str, list[tuple[int, Any]]]) -
     angles, rates = (np.array([getattr(one, part)[places] if len(getattr(one, part)) else
                                np.full(len(places), np.nan) for one in states])
                      for part in ('position', 'velocity'))
-    contacts = found['foot_contacts']
-    loads = np.array([message.data for _, message in contacts if len(message.data)])
-    if loads.ndim != 2 or loads.shape[1] != len(robot.legs):
-        raise RecordingError(f'{path}: foot_contacts does not have {len(robot.legs)} numbers, '
-                             'one a leg')
-    at = np.interp([at for at, _ in contacts], received, stamps)
-    order = np.argsort(at)
+    # Without stamps: by when they were received, beside the IMU's.
+    by_leg = {}
+    for key in ('foot_contacts', 'phase'):
+        rows = [message.data for _, message in found.get(key, [])]
+        if {len(row) for row in rows} - {len(robot.legs)}:
+            raise RecordingError(f'{path}: {key} does not have {len(robot.legs)} numbers, one a '
+                                 'leg')
+        at = np.interp([when for when, _ in found.get(key, [])], received, stamps)
+        by_leg[key] = np.array(rows), at
+    loads, at = by_leg['foot_contacts']
+    phase = None
+    if len(by_leg['phase'][0]):
+        first_leg = 2.0 * np.pi * by_leg['phase'][0][:, :1]
+        phase = to_imu('phase', np.unwrap(first_leg, axis=0), by_leg['phase'][1])[:, 0] / (
+            2.0 * np.pi)
 
     def vectors(part: str) -> np.ndarray:
         return np.array([[getattr(one, part).x, getattr(one, part).y, getattr(one, part).z]
@@ -119,9 +134,9 @@ def _joined(path: Path, robot: Robot, found: dict[str, list[tuple[int, Any]]]) -
                         one.orientation.z] for one in messages])
     senses = Senses(to_imu('joint_states.position', angles, own),
                     to_imu('joint_states.velocity', rates, own),
-                    to_imu('foot_contacts', loads[order], at[order]), _lean(turned),
+                    to_imu('foot_contacts', loads, at), _lean(turned),
                     vectors('angular_velocity'), vectors('linear_acceleration'))
-    return WalkRecording(str(path), joints, times, senses)
+    return WalkRecording(str(path), joints, times, senses, phase)
 
 
 def _stamp(message: Any) -> float:

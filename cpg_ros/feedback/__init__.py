@@ -6,4 +6,4 @@ robots at a time: arrays have a leading axis of runs, which is 1 for a robot alo
 
 __all__ = ['efference_copy', 'estimate', 'feedback', 'gains', 'gait_tables', 'heading',
            'kinematics', 'pace', 'placement', 'posture', 'reflexes', 'sidestep', 'slope', 'speed',
-           'tick', 'timetable']
+           'tegotae', 'tick', 'timetable', 'touchdown']

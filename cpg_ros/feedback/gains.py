@@ -8,6 +8,7 @@ class Gains(NamedTuple):
 
     Attributes:
         posture, placement, pace, reflexes, slope, heading, speed, sidestep: whether the law is on.
+        touchdown, tegotae: the same of two laws of the phase, see their files.
         roll, roll_rate: metres a foot is drawn in per metre to the left and rad, or rad/s.
         pitch, pitch_rate: the same of pitch, by metres to the front.
         posture_most: most that posture moves a foot in stance, m.
@@ -32,6 +33,8 @@ class Gains(NamedTuple):
         speed_share, speed_rate: stride per m/s of missing speed, and per m of missing way.
         speed_most: most that strides are changed for it.
         sidestep_most: most that a foot is carried sideways, m.
+        touchdown_gain: share of a landing's error that phases are changed by.
+        tegotae_gain: rad/s for the whole weight on a leg.
         smooth: time constant of every displacement, s.
 
     """
@@ -44,6 +47,8 @@ class Gains(NamedTuple):
     heading: bool = True
     speed: bool = True
     sidestep: bool = True
+    touchdown: bool = False
+    tegotae: bool = False
 
     roll: float = 1.6
     roll_rate: float = 0.14
@@ -83,5 +88,8 @@ class Gains(NamedTuple):
     speed_most: float = 0.3
 
     sidestep_most: float = 0.08
+
+    touchdown_gain: float = 0.5
+    tegotae_gain: float = 4.0
 
     smooth: float = 0.008

@@ -14,6 +14,8 @@ from cpg_ros.feedback import (
     sidestep,
     slope,
     speed,
+    tegotae,
+    touchdown,
 )
 from cpg_ros.feedback.efference_copy import SIGNALS, expect
 from cpg_ros.feedback.estimate import update
@@ -41,9 +43,10 @@ class Memory(NamedTuple):
         stride: to be added to each leg's stride, shape (runs, legs).
         hurry: factor of the stride frequency, shape (runs,).
         phase: of the first leg at the last tick, cycles, shape (runs,).
+        owed: by the touchdown reset to the phase, cycles, shape (runs,).
         asked: wanted speed forward and to the left as it is approached, m/s, and its rates,
             m/s^2, shape (runs, 2, 2).
-        seen, scratch, own: for passing on within a tick.
+        landed, seen, scratch, own: for passing on within a tick.
 
     """
 
@@ -58,7 +61,9 @@ class Memory(NamedTuple):
     stride: np.ndarray
     hurry: np.ndarray
     phase: np.ndarray
+    owed: np.ndarray
     asked: np.ndarray
+    landed: np.ndarray
     seen: np.ndarray
     scratch: np.ndarray
     own: np.ndarray
@@ -69,7 +74,8 @@ class Memory(NamedTuple):
         return cls(np.zeros((runs, 3)), np.zeros((runs, legs), dtype=bool),
                    np.zeros((runs, legs, 3)), np.zeros((runs, legs, 2)), np.zeros((runs, legs)),
                    np.zeros((runs, legs, 5)), np.zeros((runs, 2)), np.zeros(runs),
-                   np.zeros((runs, legs)), np.ones(runs), np.zeros(runs), np.zeros((runs, 2, 2)),
+                   np.zeros((runs, legs)), np.ones(runs), np.zeros(runs), np.zeros(runs),
+                   np.zeros((runs, 2, 2)), np.zeros(legs, dtype=bool),
                    np.zeros((legs, 4)), np.zeros((5, 3)), np.zeros(SIGNALS))
 
 
@@ -118,6 +124,7 @@ def _cached(digest):
         quick = 1.0 - math.exp(-dt / gains.smooth)
         own, foot = memory.own, memory.scratch[0]
         for run in range(planned.shape[0]):
+            memory.landed[:] = memory.contact[run]
             update(rows, columns, radius, weight, angles[run], rates[run], loads[run], lean[run],
                    turning[run], push[run], dt, memory.velocity[run], memory.contact[run],
                    memory.seen, memory.scratch)
@@ -148,6 +155,7 @@ def _cached(digest):
             row = int((phase + LEAD) % 1.0 * POINTS) % POINTS
             now = int(phase % 1.0 * POINTS) % POINTS
             out[run] = planned[run]
+            leaning = 0.0
             for leg in range(rows.shape[0]):
                 hip, thigh, calf = columns[leg, 0], columns[leg, 1], columns[leg, 2]
                 foot[0], foot[1], foot[2] = foot_of(rows[leg], planned[run, hip],
@@ -183,6 +191,14 @@ def _cached(digest):
                     z += reflexes.advance(memory.built[run, leg], memory.contact[run, leg],
                                           tables.swinging[slot, now, leg],
                                           tables.progress[slot, now, leg], foot[2], gains, dt)
+                if gains.tegotae:
+                    leaning += tegotae.rate(max(loads[run, leg], 0.0) / weight,
+                                            tables.swinging[slot, now, leg],
+                                            tables.progress[slot, now, leg], gains)
+                if gains.touchdown and memory.contact[run, leg] and not memory.landed[leg]:
+                    memory.owed[run] += touchdown.change(
+                        tables.swinging[slot, now, leg], tables.progress[slot, now, leg],
+                        tables.duty[slot, leg], gains) / rows.shape[0]
                 way = memory.way[run, leg]
                 way[0] += quick * (share * x - way[0])
                 way[1] += quick * (share * y - way[1])
@@ -191,6 +207,13 @@ def _cached(digest):
             memory.hurry[run] = 1.0
             if gains.pace:
                 memory.hurry[run] += share * (pace.hurry(vx, vy, gains) - 1.0)
+            frequency = max(strode / dt, 0.1)
+            memory.hurry[run] += share * leaning / (2.0 * math.pi * frequency * rows.shape[0])
+            if gains.touchdown:
+                more = share * touchdown.hurry(memory.owed[run], frequency)
+                memory.owed[run] -= more * strode
+                memory.hurry[run] += more
+            memory.hurry[run] = max(memory.hurry[run], 0.2)
             _steer(tables, slot, sides, gains, memory, run, -vx, forward, course[run],
                    lean[run, 2], dt, share)
 

@@ -21,7 +21,8 @@ DESCRIPTION = '''\
 Measure a gait's efference copy: the velocity, lean and angular rates that walking itself gives the
 base, by the phase of the stride. Feedback then answers only what differs from it. Record the robot
 walking straight on flat ground without feedback, each gait and speed for ten strides or more in a
-bag of its own: joint_states, imu, foot_contacts.'''
+bag of its own: joint_states, imu, foot_contacts, and the generator's phase (without that, the
+lag of the joints is guessed).'''
 EPILOG = '''\
 examples:
   calibrate trot_slow trot_fast walk --robot my_robot.yaml
@@ -45,7 +46,8 @@ def _parser() -> Parser:
                         "each or one for all (default: as the legs' phases tell), or of the "
                         'simulation (default: all of the robot file)')
     for key, kind in TYPES.items():
-        parser.add_argument(f'--{key.replace("_", "-")}', default=key, metavar='TOPIC',
+        parser.add_argument(f'--{key.replace("_", "-")}', metavar='TOPIC',
+                            default={'phase': 'cpg_generator/phase'}.get(key, key),
                             help=f'{kind} (default: %(default)s)')
     parser.add_argument('--out', type=Path, metavar='FILE',
                         help='robot file to write (default: that of --robot)')
