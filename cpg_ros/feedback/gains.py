@@ -45,25 +45,25 @@ class Gains(NamedTuple):
     speed: bool = True
     sidestep: bool = True
 
-    roll: float = 1.29
-    roll_rate: float = 0.109
+    roll: float = 1.6
+    roll_rate: float = 0.14
     pitch: float = 1.10
     pitch_rate: float = 0.062
     posture_most: float = 0.08
 
     step: float = 0.16
     step_left: float = 0.16
-    step_pitch_rate: float = 0.045
-    step_roll_rate: float = 0.01
+    step_pitch_rate: float = 0.02
+    step_roll_rate: float = 0.0
     step_filter: float = 0.032
     step_most: float = 0.17
     step_decay: float = 3.1
-    give: float = 0.0
-    give_left: float = 0.55
+    give: float = 0.3
+    give_left: float = 0.8
 
-    pace_from: float = 0.25
-    pace_gain: float = 2.4
-    pace_most: float = 0.6
+    pace_from: float = 0.12
+    pace_gain: float = 4.0
+    pace_most: float = 0.8
 
     lift: float = 0.06
     reach_rate: float = 0.3

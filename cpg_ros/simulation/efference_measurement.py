@@ -1,11 +1,16 @@
 """A gait's efference copy, measured: what its body does on flat ground with nothing fed back."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from cpg_ros.feedback.efference_copy import EfferenceCopy, fold
+from cpg_ros.motion.plan import plan
+from cpg_ros.networks.registry import NETWORKS
+from cpg_ros.robots.robot import Robot
 from cpg_ros.simulation.closed_loop import ClosedLoop
+from cpg_ros.simulation.leg_geometry import read_geometry
 from cpg_ros.simulation.scenario import Scenario
 
 #: Length of a run, and what of it says nothing about the gait itself, s.
@@ -32,3 +37,30 @@ def measure_efference(loop: ClosedLoop, speeds: Sequence[float] = (0.1, 0.2, 0.3
     found = np.array([table[:, 0].mean() for table in tables])
     rising = np.argsort(found)
     return EfferenceCopy(found[rising], np.array(tables)[rising])
+
+
+def calibrated(robot: Robot, model: str, gaits: Sequence[str],
+               update: Callable[[str], None] = lambda gait: None) -> Robot:
+    """Return a robot with the geometry of a model, and with efference copies measured on it.
+
+    Args:
+        robot: whose first network is used.
+        model: as of ``robot_model.load``.
+        gaits: that are measured; others keep theirs.
+        update: called with each gait when it has been measured.
+
+    Raises:
+        SimulationError: the model cannot be used.
+        Refused: a gait cannot be run.
+        InputError: a robot did not go through all phases of a stride.
+
+    """
+    presets, motions = NETWORKS[robot.networks[0]].presets(), dict(robot.motions)
+    for gait in gaits:
+        preset, motion = presets[gait], robot.motion(gait, gait)
+        program = plan(robot, gait, preset, preset.network, motion.frequency or 0.0)
+        loop = ClosedLoop(model, program)
+        motions[gait] = replace(motion, efference=measure_efference(loop).as_table())
+        robot = replace(robot, geometry=read_geometry(loop.body, loop.parts))
+        update(gait)
+    return replace(robot, motions=motions)

@@ -3,7 +3,7 @@
 from cpg_ros.robots.body_keys import BodyGeometry, leg_of
 from cpg_ros.simulation.body import Body
 from cpg_ros.simulation.model_indices import Anatomy
-from cpg_ros.simulation.robot_model import engine
+from cpg_ros.simulation.robot_model import engine, legs
 
 
 def read_geometry(body: Body, parts: Anatomy) -> BodyGeometry:
@@ -14,14 +14,14 @@ def read_geometry(body: Body, parts: Anatomy) -> BodyGeometry:
     mujoco, model, robot = engine(), body.model, body.robot
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
-    base, legs = data.xpos[parts.base], {}
-    for foot, (leg, joints) in zip(parts.feet, robot.legs.items(), strict=True):
-        chain = sorted((joint.name for joint in joints),
+    base, shapes = data.xpos[parts.base], {}
+    for foot, leg in zip(parts.feet, legs(robot), strict=True):
+        chain = sorted((joint.name for joint in robot.legs[leg]),
                        key=lambda name: model.joint(name).bodyid[0])
         ids = [model.joint(name).id for name in chain]
         found = leg_of(chain, data.xaxis[ids], data.xanchor[ids] - base,
                        data.geom_xpos[foot] - base)
         if found is not None:
-            legs[leg] = found
+            shapes[leg] = found
     return BodyGeometry(round(float(model.body_mass.sum()), 6),
-                        float(model.geom_size[parts.feet[0], 0]), legs)
+                        float(model.geom_size[parts.feet[0], 0]), shapes)

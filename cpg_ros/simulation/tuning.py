@@ -18,6 +18,7 @@ from cpg_ros.motion.plan import Program, Refused, gait_of, plan
 from cpg_ros.networks.registry import NETWORKS
 from cpg_ros.robots.robot import Motion, Robot, Steering
 from cpg_ros.simulation.batch import Batch, Scenario, targets
+from cpg_ros.simulation.efference_measurement import calibrated
 from cpg_ros.simulation.foot_path import Feet
 from cpg_ros.simulation.gait_design import AIMS, LENGTH, Aim, Design
 from cpg_ros.simulation.robot_model import SimulationError
@@ -216,7 +217,8 @@ def tune(robot: Robot, model: str, gaits: Sequence[str], evaluations: int, seed:
             one = replace(one, motion=replace(one.motion, steering=steering))
             motions[gait] = one.motion
             found.append(one)
-    return replace(robot, motions=motions), found
+    # What feedback wants to know, too.
+    return calibrated(replace(robot, motions=motions), model, gaits), found
 
 
 def _search() -> ModuleType:

@@ -3,6 +3,6 @@
 Imports every room; nothing imports it.
 """
 
-__all__ = ['analysis_plot', 'analysis_report', 'analyze', 'arguments', 'check_robot', 'cpg',
-           'demo', 'executables', 'gait_diagram', 'inversion', 'optimize', 'reproduce',
-           'reproduction_report', 'tune']
+__all__ = ['analysis_plot', 'analysis_report', 'analyze', 'arguments', 'calibrate',
+           'check_robot', 'cpg', 'demo', 'executables', 'gait_diagram', 'inversion',
+           'optimize', 'reproduce', 'reproduction_report', 'tune']

@@ -10,7 +10,7 @@ from types import FrameType
 #: Executable -> module whose ``main`` it runs.
 PLACES = {'generator': 'nodes.generator', 'robot_sim': 'nodes.robot_sim', **{
     name: f'tools.{name}' for name in ('inversion', 'cpg', 'demo', 'analyze', 'check_robot',
-                                       'optimize', 'reproduce', 'tune')}}
+                                       'optimize', 'reproduce', 'tune', 'calibrate')}}
 
 
 def _run(name: str) -> int:
@@ -25,5 +25,5 @@ def _run(name: str) -> int:
     return main()
 
 
-(generator, robot_sim, inversion, cpg, demo, analyze, check_robot, optimize, reproduce,
- tune) = (partial(_run, name) for name in PLACES)
+(generator, robot_sim, inversion, cpg, demo, analyze, check_robot, optimize, reproduce, tune,
+ calibrate) = (partial(_run, name) for name in PLACES)
