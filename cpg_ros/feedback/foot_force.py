@@ -52,14 +52,10 @@ def _cached(digest):
 
     @entry
     def loads_of(rows, columns, angles, efforts, roll, pitch, out):
-        """Fill out, N, shape (legs,), with the upward forces on one robot's feet.
+        """Fill out, N, shape (legs,), with the upward forces on the feet of one robot.
 
-        Args:
-            rows, columns: of the geometry.
-            angles, efforts: of all joints, rad and N m, shape (joints,).
-            roll, pitch: of the base, rad.
-            out: filled.
-
+        Rows and columns are the geometry's; angles in rad, efforts in N m, shape (joints,); roll
+        and pitch in rad.
         """
         digest  # noqa: B018
         up = (-math.sin(pitch), math.sin(roll) * math.cos(pitch),
