@@ -4,6 +4,7 @@ Imports ``motion``, ``robots`` and what is below; knows nothing of ROS. All of i
 robots at a time: arrays have a leading axis of runs, which is 1 for a robot alone.
 """
 
-__all__ = ['efference_copy', 'estimate', 'feedback', 'gains', 'gait_tables', 'heading',
-           'kinematics', 'pace', 'placement', 'posture', 'reflexes', 'sidestep', 'slope', 'speed',
-           'tegotae', 'tick', 'timetable', 'touchdown']
+__all__ = ['efference_copy', 'estimate', 'feedback', 'foot_force', 'gains', 'gait_tables',
+           'heading', 'kinematics', 'pace', 'placement', 'plausibility', 'posture',
+           'precompile', 'reflexes', 'sidestep', 'slope', 'speed', 'tegotae', 'tick',
+           'timetable', 'touchdown', 'watch']

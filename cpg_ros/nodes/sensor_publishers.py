@@ -10,19 +10,21 @@ from nav_msgs.msg import Odometry
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
 from rclpy.qos_overriding_options import QoSOverridingOptions
-from sensor_msgs.msg import JointState
+from sensor_msgs.msg import Imu, JointState
 from std_msgs.msg import Float64MultiArray, MultiArrayDimension
 
 from cpg_ros.nodes.joint_publishers import view_of
 from cpg_ros.simulation.body import Body
+from cpg_ros.simulation.inertial_unit import InertialUnit
 from cpg_ros.simulation.robot_model import legs
 
 
 class Measurements:
-    """``joint_states``, ``odom``, ``foot_contacts`` and, where tf2 is, ``/tf`` of one body."""
+    """``joint_states``, ``odom``, ``foot_contacts``, ``imu`` and, where tf2 is, ``/tf``."""
 
-    def __init__(self, node: Node, body: Body) -> None:
-        self._body = body
+    def __init__(self, node: Node, body: Body, unit: InertialUnit) -> None:
+        """Publish what a body does, and what an inertial unit on it shows."""
+        self._body, self._unit = body, unit
         names, feet = list(body.robot.order), legs(body.robot)
         self._joints = JointState(name=names)
         self._views = [view_of(self._joints, field, len(names))
@@ -42,6 +44,9 @@ class Measurements:
         self._publish = [(publisher(JointState, 'joint_states'), self._joints),
                          (publisher(Odometry, 'odom'), self._odometry),
                          (publisher(Float64MultiArray, 'foot_contacts'), self._contacts)]
+        self._imu = Imu()
+        self._imu.header.frame_id = 'base'
+        self._publish_imu = publisher(Imu, 'imu')
         self._transform = TransformStamped(child_frame_id='base')
         self._transform.header.frame_id = 'odom'
         if util.find_spec('tf2_msgs'):
@@ -66,6 +71,15 @@ class Measurements:
         moving = body.twist
         _fill(twist.linear, 'xyz', moving[:3])
         _fill(twist.angular, 'xyz', moving[3:])
+        # First of all what feedback needs.
+        arrived = self._unit.measure(stamp)
+        if arrived is not None:
+            imu, values = self._imu, arrived[1]
+            imu.header.stamp.sec, imu.header.stamp.nanosec = divmod(arrived[0], 1_000_000_000)
+            _fill(imu.orientation, 'xyzw', values[:4])
+            _fill(imu.angular_velocity, 'xyz', values[4:7])
+            _fill(imu.linear_acceleration, 'xyz', values[7:])
+            self._publish_imu(imu)
         for publish, message in self._publish:
             publish(message)
 

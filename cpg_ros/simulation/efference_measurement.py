@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from cpg_ros.feedback.efference_copy import EfferenceCopy, fold
+from cpg_ros.feedback.efference_copy import SPEEDS, EfferenceCopy, fold
 from cpg_ros.motion.plan import plan
 from cpg_ros.networks.registry import NETWORKS
 from cpg_ros.robots.robot import Robot
@@ -17,16 +17,18 @@ from cpg_ros.simulation.scenario import Scenario
 DURATION, BEGINNING = 10.0, 3.0
 
 
-def measure_efference(loop: ClosedLoop, speeds: Sequence[float] = (0.1, 0.2, 0.3, 0.4)
-                      ) -> EfferenceCopy:
+def measure_efference(loop: ClosedLoop, speeds: Sequence[float] | None = None) -> EfferenceCopy:
     """Measure what a gait makes the body do at several wanted speeds.
 
     Args:
         loop: bodies, whose first gait it is.
-        speeds: to be asked for, m/s; a gait that cannot be steered has but its own.
+        speeds: to be asked for, m/s, or else as many as a table takes, from 0 to the fastest; a
+            gait that cannot be steered has but its own.
 
     """
-    asked = speeds if loop.program.motion.steering is not None else speeds[:1]
+    asked: Sequence[float] | np.ndarray = [0.0]
+    if loop.program.motion.steering is not None:
+        asked = np.linspace(0.0, loop.program.speeds[1], SPEEDS) if speeds is None else speeds
     ran = loop.run([Scenario(speed=speed) for speed in asked], DURATION)
     first = round(BEGINNING / loop.timestep)
     tables = []
