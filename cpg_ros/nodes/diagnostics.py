@@ -57,7 +57,7 @@ class Diagnostics:
             level, text = DiagnosticStatus.WARN, f'{new["dropped ticks"]} ticks dropped'
         elif self._feedback.out:
             level, text = DiagnosticStatus.WARN, f'no feedback: {self._feedback.out}'
-        elif new['ticks held by limits']:
+        elif new['ticks held by limits'] and not self._feedback.active:
             level, text = DiagnosticStatus.WARN, 'a joint limit held the pattern back'
         elif 100 * new['late ticks'] > new['ticks']:
             level, text = DiagnosticStatus.WARN, f'{new["late ticks"]} late ticks'

@@ -305,9 +305,11 @@ def compile_kernels(network: str) -> None:
 
 def main(args: list[str] | None = None) -> int:
     """Run the node until SIGINT or SIGTERM; return the exit code."""
-    known = {'network': NETWORK, **specs(find_network(NETWORK.default))}
+    known = {'network': NETWORK, **specs(find_network(NETWORK.default)),
+             'feedback': feedback_parameters.switch(False), **feedback_parameters.TOPICS}
     code = asked_for_help('generator', 'Publishes the joint states of a gait; the parameters of '
-                          'the networks are listed by ros2 param describe.', known, args)
+                          "the networks and the feedback's gains are listed by ros2 param "
+                          'describe.', known, args)
     return run(Generator, NAME, args) if code is None else code
 
 

@@ -4,5 +4,5 @@ Imports every room; nothing imports it.
 """
 
 __all__ = ['analysis_plot', 'analysis_report', 'analyze', 'arguments', 'calibrate',
-           'check_robot', 'cpg', 'demo', 'executables', 'gait_diagram', 'inversion',
+           'check_robot', 'cpg', 'demo', 'demo_course', 'executables', 'gait_diagram', 'inversion',
            'optimize', 'reproduce', 'reproduction_report', 'tune']
