@@ -108,9 +108,8 @@ def spoilt(topic: str, data: bytes, factor: float) -> bytes:
     """Multiply all measured numbers."""
     message = deserialize_message(data, TOPICS[topic])
     parts = ('orientation', 'angular_velocity', 'linear_acceleration')
-    for part, axis in ((part, axis) for part in parts if hasattr(message, part) for axis in 'xyzw'):
-        held = getattr(message, part)
-        if hasattr(held, axis):
+    for held in (getattr(message, part) for part in parts if hasattr(message, part)):
+        for axis in (axis for axis in 'xyzw' if hasattr(held, axis)):
             setattr(held, axis, factor * getattr(held, axis))
     for field in ('position', 'velocity', 'effort', 'data'):
         if hasattr(message, field):

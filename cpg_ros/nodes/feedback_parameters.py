@@ -9,7 +9,7 @@ from cpg_ros.nodes.parameter_spec import Spec
 from cpg_ros.nodes.senses_input import CONTACTS
 
 PREFIX = 'feedback.'
-#: A gain may be this many times the default.
+#: A gain may be this many times the default, and up to 1 where that is 0.
 RANGE = 10.0
 
 
@@ -44,16 +44,16 @@ def _texts() -> dict[str, str]:
     return texts
 
 
-def _law(name: str) -> Spec:
-    return Spec(True, f'the law {name}')
+def _law(name: str, default: bool) -> Spec:
+    return Spec(default, f'the law {name}')
 
 
 def _gain(name: str, default: float, text: str) -> Spec:
-    return Spec(default, text, 0.0, RANGE * default)
+    return Spec(default, text, 0.0, round(RANGE * default, 6) or 1.0)
 
 
 #: Laws and gains, all of which can be set at any time.
-GAINS = {f'{PREFIX}{name}': _law(name) if isinstance(default, bool)
+GAINS = {f'{PREFIX}{name}': _law(name, default) if isinstance(default, bool)
          else _gain(name, default, _texts().get(name, ''))
          for name, default in Gains._field_defaults.items()}
 SPECS = {**TOPICS, **GAINS}
