@@ -1,4 +1,5 @@
-# make run | demo | shell | test | docs | bench | build | unitree | clean; all is set up in .venv and install/.
+# make run | demo | shell | test | docs | figures | coverage | bench | build | unitree | clean; all is
+# set up in .venv and install/.
 PYTHON ?= python3
 SHELL := /bin/bash
 comma := ,
@@ -25,7 +26,7 @@ ENTER := set -e; source install/setup.bash; \
 # Live tests wait for most of their time: so many of them run at once.
 LIVE ?= $(shell echo $$((2 * $$(nproc))))
 
-.PHONY: build run demo shell test docs bench unitree clean
+.PHONY: build run demo shell test docs figures coverage bench unitree clean
 
 build: install/.built
 
@@ -43,6 +44,14 @@ shell: install/.built
 docs: install/.built
 	@$(ENTER); $(VENV)/bin/sphinx-build -W --keep-going -q -b html docs docs/_build
 	@echo 'built: docs/_build/index.html'
+
+figures: install/.built
+	@$(ENTER); $(VENV)/bin/python docs/figures.py $(ARGS)
+
+# Of what needs no graph, branches included; compiled code is not seen by it.
+coverage: install/.built
+	@$(ENTER); $(VENV)/bin/pytest test -n auto -m 'not live' --cov=cpg_ros --cov-branch \
+		--cov-report=term --cov-report=html:out/coverage $(ARGS)
 
 test: install/.built docs unitree
 	@$(VENV)/bin/ruff check .

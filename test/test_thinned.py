@@ -1,4 +1,4 @@
-"""Long recordings are smoothed to a coarser grid while they are read; short ones are left alone."""
+"""Long recordings are smoothed to a coarser grid while they are read; short ones are not."""
 
 import numpy as np
 import pytest

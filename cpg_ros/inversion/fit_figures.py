@@ -1,5 +1,7 @@
 """The pictures of an inverted recording."""
 
+from typing import Any
+
 import matplotlib
 import numpy as np
 from matplotlib.figure import Figure
@@ -85,11 +87,11 @@ def phases(found: Inverted) -> Figure:
     wanted = {leg: float(orbit.phases[own[0] - 1]) for leg, own in cells.items()}
     for row, (leg, phase) in enumerate(found.stride.phases.items()):
         height = len(found.stride.phases) - 1 - row
-        for value, style in ((phase, {'marker': 'o', 'markersize': 8, 'color': RECORDED,
-                                      'label': 'recorded'}),
-                             (wanted.get(leg), {'marker': 'D', 'markersize': 11,
-                                                'color': FITTED, 'markerfacecolor': 'none',
-                                                'label': found.fit.gait})):
+        marks: list[tuple[float | None, dict[str, Any]]] = [
+            (phase, {'marker': 'o', 'markersize': 8, 'color': RECORDED, 'label': 'recorded'}),
+            (wanted.get(leg), {'marker': 'D', 'markersize': 11, 'color': FITTED,
+                               'markerfacecolor': 'none', 'label': found.fit.gait})]
+        for value, style in marks:
             # What is near the seam stands on both sides of it.
             places = [] if value is None else [
                 at for at in (value % 1.0 - 1.0, value % 1.0, value % 1.0 + 1.0)

@@ -7,7 +7,7 @@ from rclpy.qos_overriding_options import QoSOverridingOptions
 from std_msgs.msg import Float64MultiArray, MultiArrayDimension
 
 from cpg_ros.networks.network import Network
-from cpg_ros.nodes.joint_publishers import view_of
+from cpg_ros.nodes.array_view import view_of
 
 #: At most this many messages a second.
 FASTEST = 50.0

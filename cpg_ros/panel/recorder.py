@@ -14,13 +14,11 @@ from rclpy.qos import QoSProfile
 
 from cpg_ros.errors import CpgError
 from cpg_ros.panel.topics import Topic, latched
-from cpg_ros.recordings.rosbags_library import Stores, get_typestore
 
 #: How often messages are fetched, s, and how many a topic may have had by then.
 EVERY, DEPTH = 0.02, 1000
 #: Topics whose last message waits for who comes later.
 LATCHED = ('/gait', '/robot_description', '/tf_static')
-STORE = Stores.ROS2_JAZZY
 
 
 class RecordingError(CpgError):
@@ -63,7 +61,8 @@ class Recorder:
         if self.running:
             raise RecordingError(f'{self.bag} is being recorded already')
         from rosbags.rosbag2 import StoragePlugin, Writer, WriterError
-        store = get_typestore(STORE)
+        from rosbags.typesys import Stores, get_typestore
+        store = get_typestore(Stores.ROS2_JAZZY)
         known = sorted((name, kind) for name, kind in topics if kind in store.types)
         if not known:
             raise RecordingError('there is nothing to record')

@@ -61,7 +61,8 @@ class Stream:
     @property
     def stamped_so_far(self) -> bool:
         """Whether most messages at hand have a header stamp."""
-        return sum(np.count_nonzero(stamps) for stamps, *_ in self.parts) > 0.5 * self._size
+        stamped = sum(int(np.count_nonzero(stamps)) for stamps, *_ in self.parts)
+        return stamped > 0.5 * self._size
 
     @property
     def stamped(self) -> bool:

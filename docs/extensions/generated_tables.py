@@ -48,9 +48,11 @@ def parameter_rows(specs: dict[str, Spec], defaults: bool = True) -> list[list[s
     rows = []
     for name, spec in specs.items():
         span = '' if spec.low is None else f'{spec.low:g} to {spec.high:g}'
-        type_ = 'numbers' if of_numbers(spec.default) else type(spec.default).__name__
-        kind = {'str': 'string', 'float': 'double', 'list': 'string[]',
-                'numbers': 'double[]'}.get(type_, type_)
+        kind = type(spec.default).__name__
+        kind = {'str': 'string', 'float': 'double', 'int': 'integer'}.get(kind, kind)
+        if isinstance(spec.default, list):
+            first = type(spec.default[0]) if spec.default else str
+            kind = {float: 'double[]', int: 'integer[]', str: 'string[]'}[first]
         default = str(spec.default).lower() if isinstance(spec.default, bool) else spec.default
         text = spec.text + (f' ({spec.constraints})' if spec.constraints else '')
         rows.append([code(name), kind + (', read-only' if spec.read_only else ''),

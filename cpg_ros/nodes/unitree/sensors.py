@@ -10,7 +10,7 @@ from rclpy.qos_overriding_options import QoSOverridingOptions
 from sensor_msgs.msg import BatteryState, Imu, JointState
 from std_msgs.msg import Float64MultiArray, MultiArrayDimension
 
-from cpg_ros.nodes.joint_publishers import view_of
+from cpg_ros.nodes.array_view import view_of
 from cpg_ros.robots.robot import Robot
 from cpg_ros.unitree.low_state import LowState
 from cpg_ros.unitree.models import JOINTS, PARTS
