@@ -9,8 +9,8 @@ from cpg_ros.nodes.parameter_spec import Spec
 from cpg_ros.nodes.senses_input import CONTACTS
 
 PREFIX = 'feedback.'
-#: A gain may be this many times the default.
-RANGE = 10.0
+#: A gain may be this many times the default, or up to the other where that is 0.
+RANGE, MOST = 10.0, 1.0
 
 
 def switch(calibrated: bool) -> Spec:
@@ -44,16 +44,16 @@ def _texts() -> dict[str, str]:
     return texts
 
 
-def _law(name: str) -> Spec:
-    return Spec(True, f'the law {name}')
+def _law(name: str, default: bool) -> Spec:
+    return Spec(default, f'the law {name}')
 
 
 def _gain(name: str, default: float, text: str) -> Spec:
-    return Spec(default, text, 0.0, RANGE * default)
+    return Spec(default, text, 0.0, RANGE * default or MOST)
 
 
 #: Laws and gains, all of which can be set at any time.
-GAINS = {f'{PREFIX}{name}': _law(name) if isinstance(default, bool)
+GAINS = {f'{PREFIX}{name}': _law(name, default) if isinstance(default, bool)
          else _gain(name, default, _texts().get(name, ''))
          for name, default in Gains._field_defaults.items()}
 SPECS = {**TOPICS, **GAINS}
