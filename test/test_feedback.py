@@ -43,7 +43,7 @@ from cpg_ros.simulation.body import Body
 from cpg_ros.simulation.closed_loop import ClosedLoop
 from cpg_ros.simulation.efference_measurement import measure_efference
 from cpg_ros.simulation.proprioception import Proprioception
-from cpg_ros.simulation.scenario import Scenario
+from cpg_ros.simulation.scenario import Noise, Scenario
 from cpg_ros.simulation.terrain import Terrain, heights
 
 GAINS = Gains()
@@ -242,6 +242,7 @@ def test_strides_lengthen_while_speed_is_missing():
     assert speed.longer(0.1, way, GAINS) == pytest.approx(
         0.1 * GAINS.speed_share + 0.02 * GAINS.speed_rate)
     assert speed.longer(9.0, way, GAINS) == GAINS.speed_most
+    assert speed.gather(0.0, -0.1, GAINS, DT) == 0.0
     for _ in range(100):
         way = speed.gather(way, 1e3, GAINS, DT)
     assert speed.longer(0.0, way, GAINS) <= GAINS.speed_most
@@ -356,3 +357,20 @@ def test_ground_is_flat_at_the_start_and_as_high_as_it_says(kind):
     rows, columns = ground.shape
     # 1.5 of 9.5 m lie behind the start.
     assert ground[rows // 2, round(columns * 1.5 / 9.5)] == 0.0
+
+
+def test_wishes_switches_and_dull_senses_reach_the_runs(loop, expected):
+    """To the left while it walks, turning, and another gait; then once more with dull senses."""
+    loop = ClosedLoop('go2', program('trot'), program('walk'))
+    wishes = [Scenario(speed=0.3, commands=((1.5, 0.3, 0.1, 0.0),)),
+              Scenario(speed=0.3, commands=((1.5, 0.3, 0.0, 0.3),)),
+              Scenario(speed=0.3, switches=((1.5, 'walk'),))]
+    for noise in (None, Noise(0.01, 0.1, 0.05, math.radians(0.5), 0.02)):
+        ran = loop.run(wishes, 5.0, GAINS, noise=noise)
+        assert ran.upright.all()
+        late = slice(1500, None)
+        assert 0.05 < ran.velocity[0, late, 1].mean() < 0.2
+        assert ran.turning[1, late, 2].mean() == pytest.approx(0.3, abs=0.1)
+        # Strides a second: those of the walk at the end.
+        assert (np.diff(ran.phase[2, -500:]) % 1.0).sum() == pytest.approx(
+            program('walk').frequency, rel=0.3)

@@ -7,7 +7,7 @@ from cpg_ros.integration.jit import jit
 def landing(wanted, stance, gains):
     """Return where a foot is to land, m to the left of where the gait has it.
 
-    Half of the way that the body is to go over the foot.
+    Half of the way that the body is to go over the foot, and a share more.
 
     Args:
         wanted: speed to the left, m/s.
@@ -15,10 +15,12 @@ def landing(wanted, stance, gains):
         gains: of the law.
 
     """
-    return min(max(0.5 * stance * wanted, -gains.sidestep_most), gains.sidestep_most)
+    far = 0.5 * stance * gains.sidestep_share * wanted
+    return min(max(far, -gains.sidestep_most), gains.sidestep_most)
 
 
 @jit
 def carry(way, wanted, gains, dt):
     """Return how far to the left a foot on the ground is of where the gait has it, m, dt later."""
-    return min(max(way - wanted * dt, -gains.sidestep_most), gains.sidestep_most)
+    way -= dt * gains.sidestep_share * wanted
+    return min(max(way, -gains.sidestep_most), gains.sidestep_most)
