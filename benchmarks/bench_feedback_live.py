@@ -16,6 +16,7 @@ import rclpy
 from common import ROOT, emit, log
 from nav_msgs.msg import Odometry
 from processes import GENERATOR, Process, enter_workspace
+from rclpy.node import Node
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.serialization import deserialize_message, serialize_message
 from sensor_msgs.msg import Imu, JointState
@@ -74,7 +75,7 @@ class Probe:
 class Relay:
     """Hands on the robot's messages, one topic of them wrong."""
 
-    def __init__(self, node: rclpy.node.Node) -> None:
+    def __init__(self, node: Node) -> None:
         self.wrong: tuple[str, str] = ('', '')
         self._late = {topic: deque[bytes](maxlen=round(0.2 * RATE)) for topic in TOPICS}
         self._frozen: dict[str, bytes] = {}
@@ -108,9 +109,8 @@ def spoilt(topic: str, data: bytes, factor: float) -> bytes:
     """Multiply all measured numbers."""
     message = deserialize_message(data, TOPICS[topic])
     parts = ('orientation', 'angular_velocity', 'linear_acceleration')
-    for part, axis in ((part, axis) for part in parts if hasattr(message, part) for axis in 'xyzw'):
-        held = getattr(message, part)
-        if hasattr(held, axis):
+    for held in (getattr(message, part) for part in parts if hasattr(message, part)):
+        for axis in (axis for axis in 'xyzw' if hasattr(held, axis)):
             setattr(held, axis, factor * getattr(held, axis))
     for field in ('position', 'velocity', 'effort', 'data'):
         if hasattr(message, field):

@@ -23,7 +23,7 @@ TARGETS = {'real_time_factor_error': 0.01}
 #: The node with its periods' delays kept: a line on standard output at its end.
 MEASURED = '''
 import sys
-from cpg_ros.nodes import ticker
+from cpg_ros.nodes import deadline_thread as ticker
 from cpg_ros.nodes.robot_sim import main
 delays, note = [], ticker.Ticker._note
 def noted(self, behind, period):

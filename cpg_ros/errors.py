@@ -24,15 +24,18 @@ class MissingLibraryError(CpgError, ImportError):
     """A library that no apt package of Ubuntu 24.04 brings is not there; says how to get it."""
 
 
-def needed(library: str) -> None:
-    """See that a library can be imported.
+def needed(library: str, part: str = '') -> None:
+    """See that a library can be imported, and a part of it that old versions lack.
 
     Raises:
         MissingLibraryError: it is not there. Where nobody catches it, it is one line.
 
     """
-    if find_spec(library) is not None:
-        return
+    try:
+        if find_spec(part or library) is not None:
+            return
+    except ModuleNotFoundError:
+        pass  # of a part: the library itself is not there
     usual = sys.excepthook
 
     def told(kind: type[BaseException], error: BaseException, trace: TracebackType | None

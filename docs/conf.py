@@ -14,7 +14,7 @@ copyright = 'cpg_ros maintainers, Apache-2.0'
 version = release = cpg_ros.__version__
 
 extensions = ['myst_parser', 'sphinx_design', 'sphinx.ext.autodoc', 'sphinx.ext.napoleon',
-              'sphinx.ext.mathjax', 'generated_tables']
+              'sphinx.ext.mathjax', 'generated_tables', 'dark_images']
 html_theme = 'furo'
 html_static_path = ['static']
 html_css_files = ['site.css']

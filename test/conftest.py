@@ -6,15 +6,24 @@ os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
 import pytest
 from graph import EXECUTABLE, Process, Watcher
 
+#: Files whose tests measure against the clock on the wall: beside others they would fail.
+ALONE = ('test_clock', 'test_closed_loop', 'test_demo', 'test_go2_live', 'test_lockstep',
+         'test_robot_sim', 'test_stalls', 'test_stop_paths')
+
 
 def pytest_collection_modifyitems(items):
-    """Mark what runs on a graph in real time: such tests have the machine to themselves."""
+    """Mark what runs on a graph in real time, and of that what must have the machine to itself."""
     for item in items:
         known = vars(item.module).values()
         given = set(getattr(item, 'callspec', item).__dict__.get('params', ()))
         if {'start', 'running'} & set(item.fixturenames) - given or any(
                 thing is one for thing in known for one in (EXECUTABLE, Process, Watcher)):
             item.add_marker('live')
+            if item.module.__name__ in ALONE:
+                item.add_marker('alone')
+        if 'running' in item.fixturenames:
+            # One generator for all of them: in one worker.
+            item.add_marker(pytest.mark.xdist_group(item.module.__name__))
 
 
 @pytest.fixture

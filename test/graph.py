@@ -42,9 +42,9 @@ class Process:
     def __init__(self, *ros_args: str, domain: int | None = None, executable: Path = EXECUTABLE,
                  environment: dict[str, str] | None = None) -> None:
         self.domain = free_domain() if domain is None else domain
-        variables = dict(os.environ, ROS_DOMAIN_ID=str(self.domain),
-                         ROS_AUTOMATIC_DISCOVERY_RANGE='LOCALHOST', ROS_PYTHON_CHECK_FIELDS='1',
-                         PYTHONUNBUFFERED='1', **environment or {})
+        variables = {**os.environ, 'ROS_DOMAIN_ID': str(self.domain),
+                     'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST', 'ROS_PYTHON_CHECK_FIELDS': '1',
+                     'PYTHONUNBUFFERED': '1', **(environment or {})}
         command = [str(executable), *(['--ros-args', *ros_args] if ros_args else [])]
         self._process = subprocess.Popen(command, env=variables, stdout=subprocess.PIPE,
                                          stderr=subprocess.STDOUT, text=True)

@@ -187,3 +187,18 @@ def test_a_walk_is_no_secondary_gait(gait, change):
         solve_preset(Preset(gait, network, WALK.start, WALK.period))
     with pytest.raises(NoOrbit):
         solve_orbit(network, gait, solve_preset(WALK))
+
+
+# Found by simulation of the whole network from random states, with their periods.
+@pytest.mark.parametrize(('network', 'gait', 'period'), [
+    (Quadruped(0.5951, 0.3249, 0.1708, -0.6501, 0.1853, -0.018), 'walk', 22.0018),
+    (Quadruped(0.5402, 0.3031, 0.4051, -0.4768), 'walk', 22.0112),
+    (Biped.symmetric(0.287705, 0.1441, 0.080699, 0.084248, -0.306101), 'hesitation_walk',
+     15.35157)])
+def test_gaits_that_the_network_does_by_itself_are_found(network, gait, period):
+    orbit = solve_orbit(network, gait)
+    assert orbit.period == pytest.approx(period, rel=1e-5)
+    start = orbit(np.array(0.0))
+    end = solve_ivp(lambda t, x: network.rates(x), (0.0, orbit.period), start, 'DOP853',
+                    rtol=1e-10, atol=1e-12).y[:, -1]
+    assert np.abs(end - start).max() < 1e-6

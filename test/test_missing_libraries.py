@@ -2,8 +2,11 @@
 
 import subprocess
 import sys
+from pathlib import Path
 
+import numpy as np
 import pytest
+from bags import walk, write_bag
 
 
 def run(missing, text):
@@ -14,7 +17,8 @@ def run(missing, text):
 
 @pytest.mark.parametrize(('missing', 'module'), [
     ('numba', 'cpg_ros.nodes.generator'), ('numba', 'cpg_ros.tools.analyze'),
-    ('numba', 'cpg_ros.motion.readout'), ('rosbags', 'cpg_ros.tools.inversion')])
+    ('numba', 'cpg_ros.motion.readout'), ('rosbags', 'cpg_ros.tools.inversion'),
+    ('websockets', 'cpg_ros.panel.panel_node')])
 def test_one_line_says_how_to_get_it(missing, module):
     found = run(missing, f'import {module}')
     assert found.returncode == 1 and not found.stdout
@@ -39,3 +43,28 @@ except ImportError:
     1 / 0''')
     assert found.returncode == 1 and 'ZeroDivisionError' in found.stderr
     assert len(found.stderr.splitlines()) > 1
+
+
+@pytest.mark.parametrize('compression', ['none', 'message'])
+def test_bags_are_read_by_ros_where_rosbags_is_missing(compression, tmp_path):
+    messages, angles = walk(60)
+    bag = write_bag(tmp_path / 'bag', messages, compression=compression)
+    found = run('nothing', f'''
+sys.path.insert(0, {str(Path(__file__).parent)!r})
+import rosbag2_stand_in
+from cpg_ros.recordings.bag_reader import read_bag
+print(*read_bag({str(bag)!r}, progress=False).positions.ravel().tolist())''')
+    assert found.returncode == 0, found.stderr
+    assert np.array_equal(np.array(found.stdout.split(), float).reshape(angles.shape), angles)
+
+
+def test_a_bag_that_ros_cannot_read_is_one_line(tmp_path):
+    (tmp_path / 'bag').mkdir()
+    (tmp_path / 'bag' / 'metadata.yaml').write_text('nothing: here\n')
+    found = run('nothing', f'''
+sys.path.insert(0, {str(Path(__file__).parent)!r})
+import rosbag2_stand_in
+from cpg_ros.tools.inversion import main
+sys.exit(main(['--bag', {str(tmp_path / 'bag')!r}]))''')
+    (line,) = found.stderr.splitlines()
+    assert found.returncode and str(tmp_path / 'bag') in line

@@ -34,6 +34,30 @@ def test_every_imported_message_package_is_declared():
         assert (f'from {name}' in text or f'import {name}' in text) == (name in declared), name
 
 
+def test_every_key_resolves_to_apt_on_ubuntu_24_04():
+    listed = yaml.safe_load((SOURCE / 'test' / 'rosdep_noble.yaml').read_text())
+    package = parse_package(SOURCE / 'package.xml')
+    for one in (*package.exec_depends, *package.test_depends, *package.build_depends):
+        if one.name in listed['jazzy']:
+            continue
+        rule = listed['rosdep'][one.name]['ubuntu']
+        rule = rule.get('noble', rule.get('*')) if isinstance(rule, dict) else rule
+        assert isinstance(rule, list) and rule, f'{one.name}: {rule} is no apt package'
+
+
+@pytest.mark.parametrize('distro', ['', 'jazzy'])
+def test_the_build_takes_a_sourced_ros_as_it_is(distro, tmp_path):
+    for name in ('Makefile', 'package.xml', 'setup.py', 'setup.cfg', *(
+            path.name for path in SOURCE.glob('requirements*.txt'))):
+        shutil.copy2(SOURCE / name, tmp_path)
+    variables = dict(os.environ, ROS_DISTRO=distro, AMENT_PREFIX_PATH='/opt/ros/jazzy')
+    told = subprocess.run(['make', '-n', 'build', 'shell'], cwd=tmp_path, env=variables,
+                          text=True, capture_output=True, check=False).stdout
+    assert ('--system-site-packages' in told) == bool(distro)
+    assert ('requirements-ros.txt' in told) != bool(distro)
+    assert ('/install/cpg_ros:/opt/ros/jazzy' in told) == bool(distro)
+
+
 def test_config_launch_and_index_are_installed():
     assert (SHARE / 'package.xml').is_file()
     assert (SHARE / 'launch' / 'generator.launch.py').is_file()

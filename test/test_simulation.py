@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from four_legs import ROBOT, stood, urdf
 
-from cpg_ros.robots.robot_file import load_robot
 from cpg_ros.simulation.robot_model import SimulationError, find_model, legs, load
 
 pytest.importorskip('mujoco')
@@ -19,19 +19,12 @@ from cpg_ros.simulation.body import Body
 from cpg_ros.simulation.footfall_diagram import plot_footfalls, speed, stances
 from cpg_ros.simulation.run_recorder import Diary
 
-ROBOT = load_robot(Path(__file__).parent / 'walker.yaml')
 GRAVITY = 9.81
 
 
 @pytest.fixture
 def body():
     return Body('go2', ROBOT)
-
-
-def stood(body, seconds=2.0):
-    for _ in range(round(seconds / body.model.opt.timestep)):
-        body.step()
-    return body
 
 
 def mass(body):
@@ -161,32 +154,6 @@ def test_physics_that_diverges_is_known_and_leaves_no_file(tmp_path, monkeypatch
     assert not list(tmp_path.iterdir())
     body.reset()
     assert not body.diverged
-
-
-LINK = """<link name="{name}"><inertial><mass value="{mass}"/>
-<inertia ixx="0.01" iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial>
-<collision><origin xyz="0 0 {z}"/><geometry><sphere radius="0.03"/></geometry></collision>
-</link>"""
-JOINT = """<joint name="{name}" type="revolute"><parent link="{parent}"/><child link="{child}"/>
-<origin xyz="{x} {y} {z}"/><axis xyz="{axis}"/>
-<limit lower="-3" upper="3" effort="{effort}" velocity="20"/></joint>"""
-
-
-def urdf(path):
-    """A robot of four legs whose base a URDF cannot say to be free."""
-    parts = [LINK.format(name='base', mass=5.0, z=0.0)]
-    for leg, x, y in (('FL', 0.2, 0.1), ('FR', 0.2, -0.1), ('RL', -0.2, 0.1), ('RR', -0.2, -0.1)):
-        parent = 'base'
-        for part, z, axis in (('hip', 0.0, '1 0 0'), ('thigh', 0.0, '0 1 0'),
-                              ('calf', -0.2, '0 1 0')):
-            name = f'{leg}_{part}'
-            parts += [LINK.format(name=name, mass=0.5, z=-0.2 if part == 'calf' else 0.0),
-                      JOINT.format(name=f'{name}_joint', parent=parent, child=name, z=z,
-                                   axis=axis, effort=25, x=x if part == 'hip' else 0,
-                                   y=y if part == 'hip' else 0)]
-            parent = name
-    path.write_text(f'<robot name="own">{"".join(parts)}</robot>')
-    return str(path)
 
 
 def test_a_urdf_without_collision_shapes_says_so(tmp_path):

@@ -2,6 +2,7 @@
 
 import importlib.util
 import math
+import re
 from dataclasses import replace
 from functools import cache
 
@@ -15,6 +16,7 @@ from cpg_ros.motion.pattern import Pattern
 from cpg_ros.motion.plan import gait_of, plan
 from cpg_ros.motion.steering import Drive
 from cpg_ros.networks.registry import PRESETS
+from cpg_ros.robots.robot import Motion
 from cpg_ros.robots.robot_file import load_robot
 from cpg_ros.simulation.robot_model import SimulationError
 
@@ -30,7 +32,7 @@ from cpg_ros.simulation.foot_path import POINTS, Feet, basis, fit  # noqa: E402
 from cpg_ros.simulation.foot_path import Path as FootPath  # noqa: E402
 from cpg_ros.simulation.gait_design import AIMS  # noqa: E402
 from cpg_ros.simulation.run_metrics import _hops  # noqa: E402
-from cpg_ros.simulation.tuning import Tuner  # noqa: E402
+from cpg_ros.simulation.tuning import REFUSED, NoDesign, Tuned, Tuner  # noqa: E402
 from cpg_ros.tools import tune as tool  # noqa: E402
 
 FEET = {'lh': 'RL', 'rh': 'RR', 'lf': 'FL', 'rf': 'FR'}
@@ -223,7 +225,7 @@ def test_the_tool_writes_a_robot_file_that_can_be_read(quick, tmp_path, capsys, 
     monkeypatch.setattr(tuning, 'measure', lambda batch, program, update: None)
     out = tmp_path / 'my_go2.yaml'
     assert tool.main(['--robot', str(FILE), '--model', 'go2', '--gaits', 'trot', '--evaluations',
-                      '7', '--seed', '2', '--out', str(out)]) == 0
+                      '7', '--seed', '2', '--jobs', '1', '--out', str(out)]) == 1
     made = load_robot(out)
     assert made.motions['walk'] == GO2.motions['walk'] != made.motions['trot']
     assert made.motions['trot'].frequency and not made.motions['trot'].steering
@@ -231,7 +233,69 @@ def test_the_tool_writes_a_robot_file_that_can_be_read(quick, tmp_path, capsys, 
     assert plan(made, 'trot', preset, preset.network, made.motions['trot'].frequency)
     text = out.read_text()
     assert '--seed 2' in text.splitlines()[0] and '# trot ' in text
-    assert 'distance [m]' in capsys.readouterr().out
+    said = capsys.readouterr()
+    # Half a trot's stride is not what a trot is aimed at.
+    assert 'distance [m]' in said.out
+    assert re.search(r'verdict\ntrot .* poor: 0\.\d\d m/s\n', said.out)
+    assert 'kp 60 N m/rad and kd 2 N m s/rad, a guess from 15.2 kg' in said.err
+    assert said.err.endswith('tune: no gait is good\n')
+
+
+def test_a_good_gait_ends_with_code_0_and_gains_are_ones_own(tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr(tuning, 'measure', lambda batch, program, update: None)
+    monkeypatch.setattr(tuning, 'LONG', 3.0)
+    monkeypatch.setattr(tuning, 'SHORT', 2.0)
+    assert tool.main(['--robot', str(FILE), '--model', 'go2', '--gaits', 'trot', '--evaluations',
+                      '1', '--kp', '80', '--kd', '3', '--out', str(tmp_path / 'a.yaml')]) == 0
+    said = capsys.readouterr()
+    assert re.search(r'^trot .* good: 0\.\d\d m/s$', said.out, re.MULTILINE)
+    assert said.err == 'tune: the joints have kp 80 N m/rad and kd 3 N m s/rad\n'
+
+
+def slow(velocity, **changes):
+    """Return the Go2 with another limit of speed for all its joints."""
+    return replace(GO2, motions={}, legs={
+        leg: tuple(replace(joint, velocity=velocity, **changes) for joint in joints)
+        for leg, joints in GO2.legs.items()})
+
+
+def test_a_gait_that_no_design_can_have_is_given_up_early_and_named(monkeypatch):
+    told = []
+    monkeypatch.setattr(tuning, 'GIVE_UP', 1)
+    with pytest.raises(NoDesign) as error:
+        Tuner(slow(0.2, invented=('velocity',)), 'go2').tune('trot', 1000, update=told.append)
+    assert told == [13]
+    assert re.fullmatch(r"trot: none of 13 designs keeps to the joints' limits; the nearest "
+                        r'moves \w+ at \d+\.\d\d rad/s, above its limit 0\.2, which is invented',
+                        str(error.value))
+
+
+def test_designs_nearer_to_the_limits_are_cheaper():
+    tuner = Tuner(slow(2.0), 'go2')
+    start = AIMS['trot'].start
+    prices = tuner.prices('trot', [start, replace(start, stride=0.5 * start.stride)])
+    assert prices[0] > prices[1] > REFUSED
+
+
+def test_gaits_that_cannot_be_had_are_named_beside_those_that_can(monkeypatch):
+    monkeypatch.setattr(tuning, 'measure', lambda batch, program, update: None)
+    monkeypatch.setattr(Tuner, 'tune', lambda self, gait, *_: refused(gait)
+                        if gait == 'jump' else Tuned(gait, None, 1.0, 2.0, Motion(), None, 1.0))
+    robot, found, missing = tuning.tune(GO2, 'go2', ['walk', 'jump'], 5, 0)
+    assert [one.gait for one in found] == ['walk'] and missing == ['jump: too fast']
+    assert robot.motions['walk'] == Motion()
+    with pytest.raises(SimulationError, match='jump: too fast'):
+        tuning.tune(GO2, 'go2', ['jump'], 5, 0)
+
+
+def refused(gait):
+    raise NoDesign(f'{gait}: too fast')
+
+
+def test_bipeds_are_told_that_they_are_not_tuned(capsys, tmp_path):
+    assert tool.main(['--robot', 'biped', '--model', 'go2', '--gaits', 'walk', '--out',
+                      str(tmp_path / 'a.yaml')]) == 1
+    assert 'has 2 legs: bipeds are not tuned' in capsys.readouterr().err
 
 
 @pytest.mark.parametrize('arguments, code, words', [
@@ -239,6 +303,9 @@ def test_the_tool_writes_a_robot_file_that_can_be_read(quick, tmp_path, capsys, 
     (['--model', 'nothing'], 1, "model 'nothing'"),
     (['--gaits', 'trot', 'trot'], 2, 'trot is given twice'),
     (['--evaluations', '0'], 2, '0 is not positive'),
+    (['--kp', '0'], 2, '0 is not above 0'),
+    (['--kd', 'much'], 2, "'much' is not a number"),
+    (['--jobs', '-1'], 2, '-1 is negative'),
     (['--out', 'no/where/file.yaml'], 2, 'no directory'),
     (['--out', '/'], 2, 'is a directory')])
 def test_the_tool_says_what_is_wrong_in_one_line(arguments, code, words, tmp_path, capsys):

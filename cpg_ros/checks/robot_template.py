@@ -16,7 +16,7 @@ from cpg_ros.gaits.leg_names import Legs, legs_of
 from cpg_ros.motion.plan import plan
 from cpg_ros.networks.registry import NETWORKS, SHIPPED
 from cpg_ros.robots.robot import HARMONICS, Joint, Robot
-from cpg_ros.robots.robot_file import LARGEST
+from cpg_ros.robots.robot_file import LARGEST, LIMITS
 from cpg_ros.robots.urdf import UrdfError, UrdfJoint, chain, direction
 
 #: How far the knees are bent at the stand, rad, by the number of legs.
@@ -83,7 +83,7 @@ def _leg(urdf: Mapping[str, UrdfJoint], legs: Legs, leg: str, cell: int
     speed = {joint: min(urdf[joint].velocity, LARGEST) if urdf[joint].velocity < inf else SPEED
              for joint in names}
     made = tuple(Joint(joint, leg, cell, stand[joint], weights[joint], *_range(urdf[joint]),
-                       speed[joint]) for joint in legs[leg])
+                       speed[joint], _missing(urdf[joint])) for joint in legs[leg])
     return made, f'{leg}: ' + ', '.join(f'{joint} {roles[joint]}' for joint in names)
 
 
@@ -93,6 +93,11 @@ def _range(joint: UrdfJoint) -> tuple[float, float]:
         raise UrdfError(f"the joint '{joint.name}' has no room to move: its limits are "
                         f'{joint.lower:g} to {joint.upper:g} rad')
     return lower, upper
+
+
+def _missing(joint: UrdfJoint) -> tuple[str, ...]:
+    """Return which limits the URDF does not give."""
+    return tuple(key for key in LIMITS if getattr(joint, key) in (-inf, inf))
 
 
 def _inside(joint: UrdfJoint, angle: float) -> float:

@@ -247,7 +247,9 @@ def follow(start: Place, low: float, high: float, visit: Callable[[Place], str],
     folds: list[int] = []
     count, here, step = 0, start, first_step
     while count < most:
-        step = min(step, longest_step, _room(here))
+        # Towards a homoclinic orbit only the period moves, and may move by ever more.
+        longer = max(1.0, float(here.z[-2] / start.z[-2]))
+        step = min(step, longest_step * longer, _room(here))
         if step < SHORTEST:
             return folds, 'lost'
         try:

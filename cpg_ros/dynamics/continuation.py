@@ -11,6 +11,7 @@ import numpy as np
 
 from cpg_ros.dynamics import arclength
 from cpg_ros.dynamics.arclength import Place
+from cpg_ros.dynamics.branch_end import End, grows_alone, without_period
 from cpg_ros.dynamics.orbit import curve_from_rest, curve_through
 from cpg_ros.dynamics.periodic import NoOrbit, Orbit, richer
 from cpg_ros.errors import InputError
@@ -41,26 +42,6 @@ class BranchPoint:
     def amplitude(self) -> float:
         """Half the range of cell 1's first variable."""
         return float(self.orbit.levels[0, 0, 1])
-
-
-@dataclass(frozen=True)
-class End:
-    """How a branch ends.
-
-    Attributes:
-        why: 'rest' (the amplitude falls to zero: a Hopf point), 'symmetry' (it runs into an
-            orbit that has more of it, where it turns back as its own mirror image), 'period'
-            (it has grown too long: near a homoclinic orbit), 'bound' (an end of the range),
-            'steps', 'steep' (the waveform cannot be resolved), 'lost' (Newton's method fails
-            however short the step), 'start' (it was not followed that way).
-        value: where; of a Hopf point, extrapolated to amplitude 0.
-        period: the same of the period.
-
-    """
-
-    why: str
-    value: float
-    period: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -242,6 +223,12 @@ def _point(place: Place) -> BranchPoint:
     return BranchPoint(place.value, place.curve.orbit(place.z), place)
 
 
+def _course(points: list[BranchPoint]) -> tuple[np.ndarray, np.ndarray]:
+    """Values and periods, each of shape (points,)."""
+    return (np.array([point.value for point in points]),
+            np.array([point.orbit.period for point in points]))
+
+
 def _run(start: Place, limits: tuple[float, float, float], steps: dict
          ) -> tuple[list[BranchPoint], list[int], End]:
     """Follow in one direction: the points after start, which are folds, and the end."""
@@ -253,13 +240,16 @@ def _run(start: Place, limits: tuple[float, float, float], steps: dict
         orbit = points[-1].orbit
         if place.amplitude < REST:
             return 'rest'
-        if orbit.period > longest:
+        if orbit.period > longest or grows_alone(*_course(points[-2:]), high - low):
             return 'period'
         return 'symmetry' if richer(orbit) else ''
 
     turns, why = arclength.follow(start, low, high, visit, **steps)
     last = points[-1] if points else _point(start)
     value, period = last.value, last.orbit.period
+    if why in ('period', 'steep', 'lost'):
+        limit = without_period(*_course(points), high - low)
+        why, value = ('period', limit) if limit is not None else (why, value)
     if why == 'rest':
         # Near a Hopf point value and period are linear in the square of the amplitude.
         before = points[-2] if len(points) > 1 else _point(start)

@@ -69,31 +69,29 @@ def multipliers(orbit: Orbit, gain: float = 0.0) -> Multipliers:
         gain: of a symmetry lock, 1/model time.
 
     """
-    rest, trivial = _parted(way(orbit.network).floquet.within(orbit))
-    outside = way(orbit.network).floquet.transverse(orbit, gain)
-    return Multipliers(orbit.period, gain, _sorted(rest), _sorted(outside), trivial)
+    rest, trivial = way(orbit.network).floquet.within(orbit)
+    return Multipliers(orbit.period, gain, _sorted(rest), _sorted(_outside(orbit, gain)), trivial)
 
 
 def leading_within(orbit: Orbit) -> float:
     """Return the modulus of the leading multiplier within the class but the trivial one."""
-    return float(np.abs(_parted(way(orbit.network).floquet.within(orbit))[0]).max(initial=0.0))
+    return float(np.abs(way(orbit.network).floquet.within(orbit)[0]).max(initial=0.0))
 
 
 def _sorted(values: np.ndarray) -> np.ndarray:
     return values[np.argsort(-np.abs(values), kind='stable')]
 
 
-def _parted(inside: np.ndarray) -> tuple[np.ndarray, complex]:
-    """Take the trivial multiplier out of those within the class."""
-    place = int(np.abs(inside - 1.0).argmin())
-    return np.delete(inside, place), complex(inside[place])
+def _outside(orbit: Orbit, gain: float) -> np.ndarray:
+    """All multipliers transverse to the class."""
+    return np.concatenate([np.zeros(0), *way(orbit.network).floquet.transverse(orbit, gain)])
 
 
 def smallest_gain(orbit: Orbit) -> float:
     """Return the symmetry gain above which every transverse disturbance decays, 1/model time."""
     def growth(gain: float) -> float:
         """Logarithm of the leading transverse multiplier."""
-        largest = np.abs(way(orbit.network).floquet.transverse(orbit, gain)).max(initial=0.0)
+        largest = np.abs(_outside(orbit, gain)).max(initial=0.0)
         return float(np.log(largest)) if largest > 0.0 else -np.inf
 
     if not orbit.network.delay:
@@ -119,8 +117,7 @@ def sufficient_gain(orbit: Orbit, rate: float) -> float:
         return bound
     gain = 0.0
     for _ in range(MOST_GAINS):
-        outside = way(orbit.network).floquet.transverse(orbit, gain)
-        largest = float(np.abs(outside).max(initial=0.0))
+        largest = float(np.abs(_outside(orbit, gain)).max(initial=0.0))
         growth = np.log(largest) / orbit.period + rate if largest > 0.0 else -np.inf
         if growth <= 1e-9:
             break

@@ -11,7 +11,7 @@ from cpg_ros.errors import InputError
 from cpg_ros.networks.network import Network
 from cpg_ros.networks.symmetry import Symmetry
 
-__all__ = ['NoOrbit', 'Orbit', 'check_values', 'richer']
+__all__ = ['NoOrbit', 'Orbit', 'added_symmetry', 'check_values', 'richer']
 
 #: Points of a cycle among which extremes are looked for before they are refined.
 POINTS = 1024
@@ -133,16 +133,27 @@ def richer(orbit: Orbit) -> str:
     Newton's method may end on an orbit with more symmetry, which every equation of the gait
     also holds for: a walk is a skip whose two waveforms agree.
     """
-    symmetry, points = orbit.symmetry, 64
+    points = 64
     x = orbit(np.arange(points) / points * orbit.period)[:, :orbit.network.cells]
-    size = np.ptp(x)
-    own = dict(symmetry.shifts)
+    return added_symmetry(orbit.symmetry, x, SAME)
+
+
+def added_symmetry(symmetry: Symmetry, x: np.ndarray, same: float) -> str:
+    """Name what a cycle has beyond a symmetry, or '' if it has nothing.
+
+    Args:
+        symmetry: that it has.
+        x: the cells' first variable at even times of a cycle, shape (points, cells).
+        same: signals that differ by less are one, over the range of all.
+
+    """
+    points, size, own = len(x), np.ptp(x), dict(symmetry.shifts)
     for name, element in symmetry.group.elements.items():
         order = symmetry.group.order(name)
         for k in range(order):
             if own.get(name) == k / order:
                 continue
             gap = x[:, list(element)] - np.roll(x, -(points * k // order), axis=0)
-            if np.abs(gap).max() < SAME * size:
+            if np.abs(gap).max() < same * size:
                 return f'{name} shifts it by {k}/{order} of a cycle'
     return ''

@@ -5,15 +5,21 @@ from collections.abc import Callable, Iterator
 import numpy as np
 
 from cpg_ros.dynamics.equilibrium import equilibrium
-from cpg_ros.integration.simulate import Trajectory, simulate
+from cpg_ros.dynamics.periodic import added_symmetry
+from cpg_ros.integration.simulate import LANES, Trajectory, simulate
 from cpg_ros.networks.network import Network
 from cpg_ros.networks.symmetry import Symmetry
 
 #: Periods the network gets to find its gait, held by a lock of this gain (1/model time).
 SETTLING, HOLD = 30, 1.0
-#: Waves about the equilibrium that a gait is sought from, where no start is known, and for how
-#: many steps of the network.
-SIZES, SOUGHT = (0.5, 0.1, 2.0), 20_000
+#: Where no start is known, gaits are sought from waves about the equilibrium of these sizes, and
+#: from so many states in the gait's class at random about it, this far in the mean.
+SIZES, RANDOM, SCATTER = (0.5, 0.1, 2.0), 12, 0.3
+#: For how many steps, and how many of them are taken at once where there is no delay.
+SOUGHT, COARSER = 25_000, 2.0
+#: How well what the network settles on has to repeat the gait's shifts, over its range, and from
+#: where on it has a further symmetry.
+KEPT, ADDED = 0.05, 0.01
 #: States over times in cycles, from a peak of cell 1 on.
 Path = Callable[[np.ndarray], np.ndarray]
 
@@ -48,8 +54,20 @@ def _cycle(run: Trajectory, first: int) -> tuple[Path, float] | None:
     return lambda theta: run(begin + theta * found), found
 
 
+def starts(network: Network, symmetry: Symmetry) -> np.ndarray:
+    """States that the gait is sought from: waves with its phases, then any of its class."""
+    variables = np.arange(network.variables)[:, None]
+    turn = 2.0 * np.pi * symmetry.phases - 0.5 * np.pi * variables
+    waves = np.multiply.outer(SIZES, np.cos(turn).ravel())
+    scattered = SCATTER * np.random.default_rng(0).standard_normal((RANDOM, network.components))
+    # On the class, of any length there: fewer numbers, each as large.
+    inside = scattered[:, :len(symmetry.basis)] @ symmetry.basis
+    inside *= np.sqrt(network.components / len(symmetry.basis))
+    return np.repeat(equilibrium(network), network.cells) + np.concatenate([waves, inside])
+
+
 def sought(network: Network, gait: str) -> Iterator[tuple[Path, float]]:
-    """Yield what the network settles on from waves of several sizes about its equilibrium.
+    """Yield what the network settles on in the gait's class, where it has the gait's symmetry.
 
     Args:
         network: parameters.
@@ -59,12 +77,20 @@ def sought(network: Network, gait: str) -> Iterator[tuple[Path, float]]:
         States over cycles, and the period in model time.
 
     """
-    symmetry, variables = network.symmetry(gait), np.arange(network.variables)[:, None]
-    turn = 2.0 * np.pi * symmetry.phases - 0.5 * np.pi * variables
-    rest = np.repeat(equilibrium(network), network.cells)
-    for size in SIZES:
-        run = simulate(network, rest + size * np.cos(turn).ravel(), SOUGHT * network.step,
-                       network.step, lock=(HOLD, symmetry), progress=False)
-        found = _cycle(run, SOUGHT // 2)
-        if found is not None:
-            yield found
+    symmetry = network.symmetry(gait)
+    step = network.step * (1.0 if network.delay_parameter else COARSER)
+    # As many at a time as advance together.
+    for some in np.split(starts(network, symmetry), (len(SIZES) + RANDOM) // LANES):
+        run = simulate(network, some, SOUGHT * step, step, lock=(HOLD, symmetry), progress=False)
+        for x, slopes in zip(run.x, run.slopes, strict=True):
+            found = _cycle(Trajectory(run.t, x, slopes), SOUGHT * 3 // 4)
+            if found is not None and _fits(found[0], symmetry):
+                yield found
+
+
+def _fits(path: Path, symmetry: Symmetry) -> bool:
+    """Whether a cycle has the symmetry of a gait, and no more."""
+    count = 24 * symmetry.order
+    x = path(np.arange(count) / count)[:, :symmetry.group.cells]
+    gap = np.abs(x[:, symmetry.turn] - np.roll(x, -24, axis=0)).max()
+    return bool(gap < KEPT * np.ptp(x)) and not added_symmetry(symmetry, x, ADDED)

@@ -9,7 +9,7 @@ of an elbow corresponds to that of a knee.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -31,6 +31,8 @@ CLEARER = 0.2
 TELLING = 0.05
 #: By how much legs in a gait are off its phases, RMS, cycles: what the odds of gaits rest on.
 SCATTER = 0.06
+#: From here on one of two gaits is told.
+TOLD = 0.95
 #: Largest violation of a symmetry, over the cells' RMS, and samples a cycle for it.
 BY_CELLS, SAMPLES = 0.2, 128
 
@@ -105,7 +107,7 @@ def _pairs(first: Sequence[str], other: Sequence[str]) -> list[tuple[str, str]]:
 
 
 def leg_phases(legs: Mapping[str, Sequence[str]], c: Mapping[str, np.ndarray]
-               ) -> tuple[dict[str, float], tuple[str, ...], tuple[str, ...]]:
+               ) -> tuple[dict[str, float], tuple[str, ...], tuple[str, ...], tuple[str, ...]]:
     """Find by how much each leg is ahead of the first one.
 
     Args:
@@ -113,8 +115,9 @@ def leg_phases(legs: Mapping[str, Sequence[str]], c: Mapping[str, np.ndarray]
         c: joint -> Fourier coefficients of its mean cycle, complex, shape (n + 1,).
 
     Returns:
-        Leg -> phase in cycles, [0, 1): x_leg(t) = x_first(t + phase T); notes; and
-        legs whose phase may be half a cycle off, as nothing tells the sense of their angles.
+        Leg -> phase in cycles, [0, 1): x_leg(t) = x_first(t + phase T); notes; legs whose
+        phase may be half a cycle off, as nothing tells the sense of their angles; and joints
+        that count angles in the opposite sense of the first leg's.
 
     """
     phases: dict[str, float] = {}
@@ -145,7 +148,7 @@ def leg_phases(legs: Mapping[str, Sequence[str]], c: Mapping[str, np.ndarray]
     if opposite:
         notes.append(f'taken to count angles in the opposite sense of {next(iter(legs))}: '
                      f'{", ".join(opposite)}')
-    return phases, tuple(notes), tuple(vague)
+    return phases, tuple(notes), tuple(vague), tuple(opposite)
 
 
 def _shift(pairs: list[tuple[str, str]], c: Mapping[str, np.ndarray]
@@ -236,6 +239,22 @@ def named(phases: Mapping[str, float], network: type[Network]) -> Named:
         notes.append(f'{kind} sequence: {", ".join(order).upper()}')
     return Named(nearest if apart[nearest] <= TOLERANCE else None, nearest, apart[nearest],
                  margin, tuple(same), 1.0 / (1.0 + sum(odds)), tuple(notes))
+
+
+def told_apart(found: Named, gait: str, share: float) -> Named:
+    """Name one of two gaits that move the legs alike, by the probability that it is this one.
+
+    Its rival is not mentioned any more where it is nineteen times as likely.
+    """
+    other = next(one for one in found.alike if one != gait)
+    nearest, loser = (gait, other) if share > 0.5 else (other, gait)
+    more = max(share, 1.0 - share)
+    notes = tuple(note for note in found.notes if 'move alike' not in note)
+    return replace(found, gait=None if found.gait is None else nearest, nearest=nearest,
+                   alike=(nearest,) if more >= TOLD else found.alike,
+                   sure=min(2.0 * found.sure, 1.0) * more,
+                   notes=(*notes, f'{nearest}, not {loser}, by how the legs are bent and for how '
+                          f'long they go with the ground: {more:.0%} sure'))
 
 
 def named_by_cells(c: np.ndarray, network: type[Network]) -> Named:

@@ -32,6 +32,9 @@ ODD, MARKED = 3.0, 0.05
 ODD_RATE, MARKED_RATE = 4.5, 0.03
 #: Harmonics that fix the phase, and most of its cycles without own knots.
 HARMONICS, FEW = 8, 4.0
+#: Variance of the phase at an end, over that of strides' lengths (found by simulation: strides of
+#: 0 to 3 % of scatter, alone and in runs, and of shapes that vary by 0 to 10 %).
+HASTE = 0.08
 #: Fewest rates of which a drift is told from wander.
 DRIFTS = 12
 #: Steps of Gauss-Newton, the most that one may move the phase, in cycles.
@@ -165,13 +168,17 @@ def followed(times: np.ndarray, positions: np.ndarray, rough: Rough) -> Warp:
 
 
 def _mean_rate(knots: np.ndarray, phases: np.ndarray) -> tuple[float, float]:
-    """Return the mean rate and its standard error.
+    """Return the mean rate of the stretch and its standard error.
 
     Phases at the knots wander, as no stride is like the last, and are in error besides. So rates
     between knots vary by 2 q/3 + 2 s and with their neighbours by q/6 - s: s is the variance of
     the errors, q that of strides, as knots lie anywhere in these. A drift is set apart. The mean
     of least variance gives all rates the same weight where they only wander, and is the slope of
     a straight line where they do not.
+
+    What is meant is the mean over this very stretch, strides that happened to be quick and all:
+    in error are the phases at the knots, the weights where they are not those of that mean, and
+    the phases at the ends, since a straight piece of phase does not follow a stride's own haste.
     """
     rates = np.diff(phases) / np.diff(knots)
     n = rates.size
@@ -181,15 +188,18 @@ def _mean_rate(knots: np.ndarray, phases: np.ndarray) -> tuple[float, float]:
         off, free = off - place * (place @ rates) / (place @ place), n - 2
     own = float(off @ off) / max(free, 1)
     next_ = float(off[1:] @ off[:-1]) / max(n - 1, 1)
-    # Of few rates a covariance as large comes by chance.
-    errors = (0.25 * own - next_ - 0.5 * own / np.sqrt(n)) / 1.5
-    errors = min(max(errors, 0.0), 0.499 * own)
+    errors = min(max((0.25 * own - next_) / 1.5, 0.0), 0.499 * own)
     wander = 1.5 * (own - 2.0 * errors)
     if own <= 0.0:
         return float(rates.mean()), 0.0
     bands = np.stack([np.full(n, wander / 6.0 - errors), np.full(n, own)])
     weights = solveh_banded(bands, np.ones(n))
-    return (float(weights @ rates / weights.sum()), float(1.0 / np.sqrt(weights.sum())))
+    weights /= weights.sum()
+    uneven, steps = weights - 1.0 / n, np.diff(weights, prepend=0.0, append=0.0)
+    variance = (errors * (steps @ steps)
+                + wander * (2.0 * (uneven @ uneven) + uneven[1:] @ uneven[:-1]) / 3.0
+                + 2.0 * HASTE * wander / n**2)
+    return float(weights @ rates), float(np.sqrt(max(variance, 0.0)))
 
 
 def _extended(at: np.ndarray, times: np.ndarray, phases: np.ndarray, slope: float) -> np.ndarray:

@@ -19,8 +19,9 @@ from cpg_ros.gaits.doubts import (
     doubts_of_rhythm,
     limping,
 )
+from cpg_ros.gaits.leg_motion import doubts_of_travel, running
 from cpg_ros.gaits.leg_names import Legs
-from cpg_ros.gaits.leg_phases import leg_phases, named, named_by_cells
+from cpg_ros.gaits.leg_phases import leg_phases, named, named_by_cells, told_apart
 from cpg_ros.gaits.phase_average import Warped, warped
 from cpg_ros.gaits.phase_estimation import Rough, Warp, followed, grown
 from cpg_ros.gaits.steady_stretch import CYCLES, FASTEST, FEWEST, FINER, best, even, stretches
@@ -189,17 +190,20 @@ def find_stride(recording: Recorded, legs: Legs | Mapping[str, Sequence[str]],
     leading = {leg: tuple(name for name in listed
                           if cells is None or cells.get(name) == own[leg][0]) or listed
                for leg, listed in chosen.items()}
-    ahead, by_legs, vague = leg_phases(leading, c)
+    ahead, by_legs, vague, opposite = leg_phases(leading, c)
     gait = named(ahead, kind)
     doubts = [*doubts_of_rhythm(warp.frequency, float(found.counts.max()) / warp.cycles),
               *doubts_of_angles(names, found.mean(theta)), *doubts_of_legs(vague),
-              *doubts_of_change(phases, x, leading, names)]
+              *doubts_of_change(phases, x, leading, names),
+              *doubts_of_travel(chosen, c, kind.girdles, opposite)]
     if warp.cycles < SURE:
         doubts.append(Doubt('', FEW_CYCLES))
     if cells is not None and gains is not None and len(gait.alike) > 1:
         by_cells = _cell_signals(c, cells, gains, kind)
         if by_cells is not None:
             gait = named_by_cells(by_cells, kind)
+    if set(gait.alike) == {'walk', 'run'} and (share := running(chosen, c)) is not None:
+        gait = told_apart(gait, 'run', share)
     if len(gait.alike) > 1:
         rivals = ' or '.join(other for other in gait.alike if other != gait.nearest)
         # The odds of the gait have this already.

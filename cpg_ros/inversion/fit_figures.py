@@ -1,14 +1,18 @@
 """The pictures of an inverted recording."""
 
+from typing import Any
+
 import matplotlib
 import numpy as np
 from matplotlib.figure import Figure
 
-from cpg_ros.inversion.recording_fit import Inverted
+from cpg_ros.inversion.recording_fit import POOR, Inverted
 
 RECORDED, FITTED, BAND = '#1a202c', '#c53030', '#cbd5e0'
 LINES = ('#2b6cb0', '#c53030', '#2f855a', '#b7791f', '#805ad5', '#00838f')
 COLUMNS = 3
+#: Columns of the picture of a recording, and how far phases are shown beyond the seam (cycles).
+COLUMN, SEAM = 1200, 0.12
 #: Points of a cycle at which errors are shown, as in Liu & Zhang's Figures 5, 6, 8 and 9.
 POINTS = 20
 
@@ -46,13 +50,16 @@ def joints(found: Inverted) -> Figure:
                           linewidth=0.0, label='spread of cycles')
         axes.plot(fit.theta, recorded, color=RECORDED, linewidth=1.4, label='recorded')
         axes.plot(fit.theta, fitted, color=FITTED, linewidth=1.4, linestyle='--', label='fitted')
-        axes.set_title(f'{name}: {100 * share[name]:.1f} % of range', fontsize=8, loc='left')
+        poor = share[name] > POOR[fit.order]
+        axes.set_title(f'{name}: {100 * share[name]:.1f} % of range{", poor" if poor else ""}',
+                       fontsize=8, loc='left', color=FITTED if poor else 'black')
         axes.set_ylabel('angle [rad]', fontsize=8)
     grid[0].legend(fontsize=7, frameon=False)
     strides = f'{stride.cycles} strides' if stride.cycles > 1 else '1 stride'
     figure.suptitle(f'Mean cycle of {strides} at {stride.frequency:.4f} Hz, and the '
                     f'{fit.gait} of the {fit.network.name} network, readout of order '
-                    f'{fit.order}', fontsize=10)
+                    f'{fit.order}{": a poor fit" if found.poor else ""}', fontsize=10,
+                    color=FITTED if found.poor else 'black')
     return figure
 
 
@@ -70,7 +77,7 @@ def errors(found: Inverted) -> Figure:
 
 
 def phases(found: Inverted) -> Figure:
-    """Recorded phases of the legs beside those of the gait."""
+    """Recorded phases of the legs beside those of the gait, round the cycle: 0 is where 1 is."""
     matplotlib.use('Agg')
     from matplotlib import pyplot
     figure, axes = pyplot.subplots(figsize=(6.0, 0.9 + 0.45 * len(found.stride.phases)),
@@ -80,18 +87,53 @@ def phases(found: Inverted) -> Figure:
     wanted = {leg: float(orbit.phases[own[0] - 1]) for leg, own in cells.items()}
     for row, (leg, phase) in enumerate(found.stride.phases.items()):
         height = len(found.stride.phases) - 1 - row
-        axes.plot(phase % 1.0, height, 'o', color=RECORDED, markersize=8,
-                  label='recorded' if row == 0 else None)
-        if leg in wanted:
-            axes.plot(wanted[leg] % 1.0, height, 'D', color=FITTED, markersize=11,
-                      markerfacecolor='none', label=found.fit.gait if row == 0 else None)
+        marks: list[tuple[float | None, dict[str, Any]]] = [
+            (phase, {'marker': 'o', 'markersize': 8, 'color': RECORDED, 'label': 'recorded'}),
+            (wanted.get(leg), {'marker': 'D', 'markersize': 11, 'color': FITTED,
+                               'markerfacecolor': 'none', 'label': found.fit.gait})]
+        for value, style in marks:
+            # What is near the seam stands on both sides of it.
+            places = [] if value is None else [
+                at for at in (value % 1.0 - 1.0, value % 1.0, value % 1.0 + 1.0)
+                if -SEAM <= at <= 1.0 + SEAM]
+            for at in places:
+                axes.plot(at, height, linestyle='none', **style)
+    for seam in (0.0, 1.0):
+        axes.axvline(seam, color=BAND, linewidth=1.0)
     axes.set_yticks(range(len(found.stride.phases)), list(found.stride.phases)[::-1])
     axes.set_ylim(-0.6, len(found.stride.phases) - 0.4)
-    axes.set_xlim(-0.05, 1.05)
-    axes.set_xlabel('phase [cycles]')
+    axes.set_xlim(-SEAM, 1.0 + SEAM)
+    axes.set_xticks(np.arange(5) / 4)
+    axes.set_xlabel('phase [cycles], 1 is 0 again')
     axes.grid(axis='y', color=BAND)
-    axes.legend(fontsize=8, frameon=False, loc='upper center', ncols=2,
-                bbox_to_anchor=(0.5, 1.2))
+    known = dict(zip(*axes.get_legend_handles_labels()[::-1], strict=True))
+    axes.legend(known.values(), known.keys(), fontsize=8, frameon=False, loc='lower center',
+                ncols=2, bbox_to_anchor=(0.5, 1.0))
+    return figure
+
+
+def stretch(found: Inverted) -> Figure:
+    """The whole recording of the joint that moves most, and where in it the stretch lies."""
+    matplotlib.use('Agg')
+    from matplotlib import pyplot
+    recording, stride = found.recording, found.stride
+    name = stride.joints[int(np.argmax(np.ptp(stride.mean, axis=1)))]
+    angles = recording.positions[:, recording.joints.index(name)]
+    figure, axes = pyplot.subplots(figsize=(10.5, 2.4), layout='constrained')
+    # Lowest and highest of each column of the picture: all there is to see of a long recording.
+    edges = np.linspace(0, len(angles), min(COLUMN, len(angles)) + 1).astype(int)[:-1]
+    low, high = (extreme.reduceat(np.where(np.isnan(angles), none, angles), edges)
+                 for extreme, none in ((np.minimum, np.inf), (np.maximum, -np.inf)))
+    there = low <= high
+    axes.fill_between(recording.times[edges][there], low[there], high[there], color=RECORDED,
+                      linewidth=0.6)
+    axes.axvspan(stride.begin, stride.end, color=FITTED, alpha=0.15, linewidth=0.0)
+    axes.set_title(f'{name}; shaded: the steady stretch, {stride.begin:.2f} to {stride.end:.2f} s '
+                   f'of {recording.times[-1]:.2f} s', fontsize=9, loc='left')
+    axes.set_xlim(0.0, recording.times[-1])
+    axes.set_xlabel('time [s]', fontsize=8)
+    axes.set_ylabel('angle [rad]', fontsize=8)
+    axes.tick_params(labelsize=8)
     return figure
 
 

@@ -12,7 +12,8 @@ from cpg_ros.inversion import fit_figures
 from cpg_ros.inversion.paper_fit import PaperFit
 from cpg_ros.inversion.recording_fit import Inverted
 
-FIGURES = (('Recorded and fitted', fit_figures.joints),
+FIGURES = (('The recording', fit_figures.stretch),
+           ('Recorded and fitted', fit_figures.joints),
            ('Error over the cycle', fit_figures.errors),
            ('Phases', fit_figures.phases),
            ('Convergence', fit_figures.convergence))
@@ -30,7 +31,10 @@ def _stride(found: Inverted) -> list[str]:
                                         for leg, phase in stride.phases.items())
         + f': {named} ({stride.distance:.3f} of a cycle off, the next one '
         f'{stride.margin:.3f} further).',
-        f'Fitted: {fit.gait} of the {fit.network.name} network, readout of order {fit.order}.']
+        f'Confidence that gait and frequency are these: {found.confidence:.0%}.',
+        f'Fitted: {fit.gait} of the {fit.network.name} network, readout of order {fit.order}, '
+        f'{100.0 * fit.mean_rms_share:.1f} % of the range left on average'
+        f'{": a poor fit" if found.poor else ""}.']
 
 
 def parameters(found: Inverted) -> list[tuple[str, ...]]:
@@ -135,6 +139,15 @@ def _image(figure: Figure, name: str) -> str:
             f'{base64.b64encode(out.getvalue()).decode("ascii")}"></figure>')
 
 
+def _warned(found: Inverted) -> str:
+    """The warnings, before anything else; red where the fit is poor."""
+    if not found.warnings:
+        return ''
+    rows = '\n'.join(f'<tr class="{"fails" if found.poor else "erratum"}"><td>{escape(text)}'
+                     '</td></tr>' for text in found.warnings)
+    return f'<table><thead><tr><th>Warnings</th></tr></thead><tbody>{rows}</tbody></table>'
+
+
 def as_html(found: Inverted) -> str:
     """The report as one page with its figures in it."""
     def paragraphs(lines: list[str]) -> str:
@@ -143,14 +156,14 @@ def as_html(found: Inverted) -> str:
     title = f'{found.fit.gait} at {found.stride.frequency:.3f} Hz: {found.recording.source}'
     parts = ['<!DOCTYPE html>', '<html lang="en"><head><meta charset="utf-8">',
              f'<title>{escape(title)}</title><style>{STYLE}</style></head><body>',
-             f'<h1>{escape(title)}</h1>', paragraphs(_stride(found)), '<h2>Parameters</h2>',
+             f'<h1>{escape(title)}</h1>', _warned(found), paragraphs(_stride(found)),
+             '<h2>Parameters</h2>',
              _html_table(parameters(found)), paragraphs(_judged(found)), '<h2>Joints</h2>',
              paragraphs([_shares(found)]), _html_table(joints(found))]
     for name, draw in FIGURES:
         parts += [f'<h2>{escape(name)}</h2>', _image(draw(found), name)]
     parts += ['<h2>Starts</h2>', _html_table(starts(found))]
     notes = [*found.recording.notes, *found.stride.notes]
-    if notes or found.warnings:
-        parts += ['<h2>Notes</h2>', paragraphs([*notes, *(f'Warning: {text}'
-                                                          for text in found.warnings)])]
+    if notes:
+        parts += ['<h2>Notes</h2>', paragraphs(notes)]
     return '\n'.join([*parts, '</body></html>', ''])

@@ -29,7 +29,7 @@ STEPS, CLOSE = 10, 0.03
 #: Closer to a bound than this share of a step is at the bound.
 NEGLIGIBLE = 1e-6
 #: A profile's descents: tolerance, evaluations, and how firmly its number is drawn.
-TOLERANCE, MOST, DRAWN = 1e-6, 30, 0.3
+TOLERANCE, MOST, DRAWN = 1e-4, 30, 0.3
 
 #: Goes down: problem, start, tolerance, evaluations at most.
 Descend = Callable[[Evaluate, np.ndarray, float, int], Trial]

@@ -11,7 +11,7 @@ from contextlib import suppress
 
 import numpy as np
 
-from cpg_ros.dynamics.periodic import NoOrbit, Orbit
+from cpg_ros.dynamics.periodic import NoOrbit
 from cpg_ros.errors import InputError
 from cpg_ros.inversion.caveats import findings
 from cpg_ros.inversion.fit_data import MeanCycle, joints_of
@@ -31,6 +31,8 @@ KNOWN_FREQUENCY = 1e-4
 TOLERANCE, LAST = 1e-6, 1e-8
 #: Times that joints are weighted anew, and the relative change of a weight that is none.
 WEIGHINGS, SAME = 4, 0.02
+#: Halvings that find where the generator begins to refuse.
+HALVINGS = 6
 
 
 def invert(cycle: MeanCycle, cells: Mapping[str, int], network: Network, gait: str,
@@ -80,40 +82,30 @@ def invert(cycle: MeanCycle, cells: Mapping[str, int], network: Network, gait: s
         period = Period(value, value * share)
     begins = [_begin(network, numbers, start) for start in starts]
 
-    def attempt(refuses: Callable[[Orbit], str]) -> tuple[Problem, list[Trial], np.ndarray]:
-        problem = Problem(joints, joints.stated, network, gait, numbers, order, harmonics, period,
-                          refuses)
-        trials: list[Trial] = []
-        for begin in begins:
-            done(0.5 * len(trials) / len(begins))
-            trials.append(_trial(problem, begin, weigh=all(other.why for other in trials)))
-        done(0.5)
-        best = min(trials, key=lambda trial: trial.cost)
-        if best.why:
-            raise NoOrbit(trials[0].why)
-        values = _weighed(problem, best.values)
-        problem.hold(values)
-        return problem, trials, values
-
-    problem, trials, values = attempt(lambda orbit: '')
-    flaw, warnings = refusal(problem.placed(values).orbit, gait, harmonics), []
+    problem = Problem(joints, joints.stated, network, gait, numbers, order, harmonics, period)
+    trials: list[Trial] = []
+    for begin in begins:
+        done(0.5 * len(trials) / len(begins))
+        trials.append(_trial(problem, begin, weigh=all(other.why for other in trials)))
+    done(0.5)
+    best = min(trials, key=lambda trial: trial.cost)
+    if best.why:
+        raise NoOrbit(trials[0].why)
+    values = _weighed(problem, best.values)
+    problem.hold(values)
+    others = [trial.values for trial in (_along_the_valley(problem, values) if profiles else [])]
+    by_cost = sorted([values, *others], key=problem.cost)
+    if by_cost[0] is not values:
+        by_cost[0] = _weighed(problem, by_cost[0])
+        problem.hold(by_cost[0])
+    runs, flaw = _that_runs(problem, by_cost, best.path[:, 1:])
+    warnings = []
     if flaw:
-        said = f'the generator would refuse the {gait} that fits best: {flaw}'
-        try:
-            problem, trials, values = attempt(lambda orbit: refusal(orbit, gait, harmonics))
-            said += '; this is the best one that it runs'
-        except NoOrbit:
-            pass
-        warnings = [said]
-    others = _along_the_valley(problem, values) if profiles else []
-    better = min(others, key=lambda trial: trial.cost, default=None)
-    left = problem(values)[0]
-    if (better is not None and better.cost < 0.5 * float(left @ left)
-            and (flaw or not refusal(problem.placed(better.values).orbit, gait, harmonics))):
-        values = _weighed(problem, better.values)
-        problem.hold(values)
-    return _judged(problem, trials, [trial.values for trial in others], values, profiles,
-                   warnings, done)
+        warnings = [f'the generator would refuse the {gait} that fits best: {flaw}' + (
+            '' if runs is None else '; this is the best one on the way there that it runs')]
+    # The cost is not least there, and no profile tells how far.
+    return _judged(problem, trials, others, by_cost[0] if runs is None else runs,
+                   profiles and not flaw, warnings, done)
 
 
 def _begin(network: Network, numbers: Sequence[Free], start: Mapping[str, float]) -> np.ndarray:
@@ -159,6 +151,47 @@ def _weighed(problem: Problem, values: np.ndarray) -> np.ndarray:
         problem.sizes = sizes
         values = problem.coordinates.descend(problem, problem.rephased(values), LAST).values
     return values
+
+
+def _that_runs(problem: Problem, by_cost: Sequence[np.ndarray], way: np.ndarray
+               ) -> tuple[np.ndarray | None, str]:
+    """Return the best values that the generator runs, and why it refuses the very best, or ''.
+
+    Stability takes longer to judge than an orbit to solve for: it is asked for of where the fit
+    has ended, and where that is refused of as many places on the way there as a bisection takes.
+
+    Args:
+        problem: the fit.
+        by_cost: where it has ended, the best first.
+        way: the values from the start on, shape (steps, values).
+
+    """
+    def flaw_at(values: np.ndarray) -> str:
+        try:
+            return refusal(problem.placed(values).orbit, problem.gait, problem.harmonics)
+        except NoOrbit as error:
+            return str(error)
+
+    first = flaw_at(by_cost[0])
+    if not first:
+        return by_cost[0], ''
+    for values in by_cost[1:]:
+        if not flaw_at(values):
+            return values, first
+    places = [*way, by_cost[0]]
+    runs, refused = 0, len(places) - 1
+    if flaw_at(places[0]):
+        return None, first
+    while refused - runs > 1:
+        middle = (runs + refused) // 2
+        runs, refused = (runs, middle) if flaw_at(places[middle]) else (middle, refused)
+    here, beyond = places[runs], places[refused]
+    for _ in range(HALVINGS):
+        between = 0.5 * (here + beyond)
+        here, beyond = (here, between) if flaw_at(between) else (between, beyond)
+    here = problem.rephased(here)
+    problem.hold(here)
+    return here, first
 
 
 def _optimum(problem: Problem, values: np.ndarray, elsewhere: Sequence[np.ndarray] = ()

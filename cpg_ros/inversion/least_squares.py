@@ -1,6 +1,6 @@
 """The fit of a gait to a mean cycle as a least-squares problem in its free numbers alone."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -51,20 +51,19 @@ class Problem:
 
     Attributes:
         joints, network, gait, free, order, harmonics: what is fitted to what.
-        refuses: why an orbit shall not count, or ''.
         coordinates: in which a trust region moves.
         sizes: standard error of each joint's mean cycle as far as it counts, rad, (joints,).
 
     """
 
     def __init__(self, joints: Joints, sizes: np.ndarray, network: Network, gait: str,
-                 free: Sequence[Free], order: int, harmonics: int, period: Period | None = None,
-                 refuses: Callable[[Orbit], str] = lambda orbit: '') -> None:
+                 free: Sequence[Free], order: int, harmonics: int, period: Period | None = None
+                 ) -> None:
         self.joints, self.sizes, self.free = joints, sizes, tuple(free)
         self.network, self.gait, self._period = network, gait, period
         self._symmetry = network.symmetry(gait)
         self.coordinates = Coordinates(network, gait, self.free)
-        self.order, self.harmonics, self.refuses = order, harmonics, refuses
+        self.order, self.harmonics = order, harmonics
         names = network.parameters()
         self._members = np.array([[float(name in one.members) for one in free]
                                   for name in names])
@@ -97,9 +96,6 @@ class Problem:
         return network
 
     def _keep(self, values: np.ndarray, orbit: Orbit) -> tuple[Orbit, Signals]:
-        flaw = self.refuses(orbit)
-        if flaw:
-            raise NoOrbit(flaw)
         while len(self._solved) >= KEPT:
             del self._solved[next(iter(self._solved))]
         numbers = np.array(values[:len(self.free)])
@@ -176,6 +172,11 @@ class Problem:
         by_period = np.append(placed.orbit.d_period @ self._members, 0.0) / self._period.error
         off = (placed.orbit.period - self._period.value) / self._period.error
         return np.append(left, off), np.vstack([slopes, by_period])
+
+    def cost(self, values: np.ndarray) -> float:
+        """Half the sum of squares; NoOrbit as in placed."""
+        left = self(values)[0]
+        return 0.5 * float(left @ left)
 
     def first_phase(self, values: np.ndarray) -> float:
         """Guess the phase: of an even grid, the one whose readouts explain most."""

@@ -135,6 +135,11 @@ class Pattern:
         return self._tracks[-1].legs
 
     @property
+    def state(self) -> np.ndarray:
+        """The newest network's state, shape (variables * cells,); overwritten by advance."""
+        return self._tracks[-1].stepper.now[0]
+
+    @property
     def level(self) -> float:
         """0 at the stand, 1 in the full gait."""
         return self._ramp.level

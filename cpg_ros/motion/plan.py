@@ -1,5 +1,6 @@
 """What the generator is asked to do, worked out and checked before anything moves."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 
@@ -15,7 +16,7 @@ from cpg_ros.motion.readout import WaveReadout, extremes
 from cpg_ros.motion.runnable import obstacle
 from cpg_ros.networks.network import Network
 from cpg_ros.networks.preset_files import Preset
-from cpg_ros.robots.robot import Motion, Robot, Steering
+from cpg_ros.robots.robot import Joint, Motion, Robot, Steering
 
 #: Strides per second below which a robot would seem to stand (Hz).
 SLOWEST = 0.01
@@ -25,6 +26,20 @@ SAME = 1e-6
 
 class Refused(CpgError):
     """The request cannot be run; the message says why, with the figures."""
+
+
+class OutOfLimits(Refused):
+    """A joint would leave its limits.
+
+    Attributes:
+        said: the joint and the figure, as 'knee at 11.46 rad/s, above its limit 10'.
+        excess: how far beyond, in rad, or as a share of the limit of speed.
+
+    """
+
+    def __init__(self, cause: str, said: str, excess: float) -> None:
+        super().__init__(f'{cause} {said}')
+        self.said, self.excess = said, excess
 
 
 @dataclass(frozen=True)
@@ -201,17 +216,34 @@ def plan(robot: Robot, name: str, preset: Preset, network: Network, frequency: f
     lows, highs = zip(*(extremes(angles) for angles, _ in swings), strict=True)
     span = shift + np.stack([np.min(lows, axis=0), np.max(highs, axis=0)])
     speed = strides * np.max([np.abs(extremes(rises)) for _, rises in swings], axis=(0, 1))
-    for joint, low, high, fastest in zip(robot.joints, *span, speed, strict=True):
-        if joint.offset + low < joint.lower - 1e-9:
-            raise Refused(f'amplitude {amplitude:g} takes {joint.name} to '
-                          f'{joint.offset + low:.3f} rad, below its limit {joint.lower:g}')
-        if joint.offset + high > joint.upper + 1e-9:
-            raise Refused(f'amplitude {amplitude:g} takes {joint.name} to '
-                          f'{joint.offset + high:.3f} rad, above its limit {joint.upper:g}')
-        if fastest > joint.velocity:
-            raise Refused(f'frequency {strides:.3g} Hz at amplitude {amplitude:g} moves '
-                          f'{joint.name} at {fastest:.2f} rad/s, above its limit '
-                          f'{joint.velocity:g}')
+    beyond = [one for joint, *reach in zip(robot.joints, *span, speed, strict=True)
+              for one in _beyond(joint, *reach)]
+    excess, key, said = max(beyond, key=lambda one: round(one[0], 9))
+    if excess > 1e-9:
+        cause = f'amplitude {amplitude:g} takes'
+        if key == 'velocity':
+            cause = f'frequency {strides:.3g} Hz at amplitude {amplitude:g} moves'
+        raise OutOfLimits(cause, said, excess)
     gain = judged.chosen if gain < 0.0 else gain
     return Program(name, robot, gait, orbit, judged, gain, strides, motion, shift, readout,
                    in_place, span, speed)
+
+
+def _beyond(joint: Joint, low: float, high: float, fastest: float
+            ) -> Iterator[tuple[float, str, str]]:
+    """Say of each limit how far a joint is beyond it, which it is, and the figure.
+
+    Args:
+        joint: which.
+        low: its smallest deviation from its offset, rad.
+        high: its largest one, rad.
+        fastest: its largest speed, rad/s.
+
+    """
+    low, high = joint.offset + low, joint.offset + high
+    for excess, key, figure in (
+            (joint.lower - low, 'lower', f'to {low:.3f} rad, below'),
+            (high - joint.upper, 'upper', f'to {high:.3f} rad, above'),
+            (fastest / joint.velocity - 1.0, 'velocity', f'at {fastest:.2f} rad/s, above')):
+        note = ', which is invented' if key in joint.invented else ''
+        yield excess, key, f'{joint.name} {figure} its limit {getattr(joint, key):g}{note}'

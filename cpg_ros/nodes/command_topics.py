@@ -35,6 +35,7 @@ class Commands:
     Attributes:
         angles: rad, in ``robot.order``; until commands come, what it was made with.
         topics: the names of the topics, resolved.
+        refused: what was wrong with messages that the last ``take`` could not use; '' if nothing.
 
     """
 
@@ -58,6 +59,7 @@ class Commands:
         self._known: dict[str, tuple[list[str], np.ndarray]] = {}
         self._fresh: list[bool] = []
         self._since = 0
+        self.refused = ''
         if kind == 'joint_states':
             for leg, joints in robot.legs.items():
                 topic = f'{leg}/joint_states'
@@ -87,6 +89,7 @@ class Commands:
 
     def take(self) -> bool:
         """Take what has arrived; return whether all topics have brought what is expected."""
+        self.refused = ''
         for k, (subscription, read) in enumerate(self._sources):
             last = None
             for message, _ in taken(subscription):
@@ -95,6 +98,7 @@ class Commands:
                 try:
                     self._fresh[k] |= read(last)
                 except _Bad as error:
+                    self.refused = str(error)
                     self._node.get_logger().warning(f'ignored: {error}',
                                                     throttle_duration_sec=QUIET)
         return all(self._fresh)

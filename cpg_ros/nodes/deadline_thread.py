@@ -54,7 +54,8 @@ class Ticker(threading.Thread):
 
     def __init__(self, node: Node, rate: float, tick: Callable[[float, int], None],
                  restart: Callable[[], None], failed: Callable[[BaseException], None],
-                 resume: Callable[[float], None] | None = None) -> None:
+                 resume: Callable[[float], None] | None = None,
+                 begin: Callable[[], None] = lambda: None) -> None:
         """Be ready to tick.
 
         Args:
@@ -64,6 +65,7 @@ class Ticker(threading.Thread):
             restart: called where simulated time jumps back.
             failed: called with what ended the thread.
             resume: called after a stall; None: up to MOST_BEHIND is made up for instead.
+            begin: called first thing in the thread.
 
         """
         super().__init__(name='ticker', daemon=True)
@@ -72,7 +74,7 @@ class Ticker(threading.Thread):
         self._worst = 0.0
         self._clock: Any = node.get_clock()
         self._tick, self._restart, self._failed = tick, restart, failed
-        self._resume = resume
+        self._resume, self._begin = resume, begin
         self._resuming = False
         self._ending = threading.Event()
         self._moved = threading.Event()
@@ -95,6 +97,7 @@ class Ticker(threading.Thread):
     def run(self) -> None:
         """Tick until ended; hand any exception to ``failed``."""
         try:
+            self._begin()
             while not self._ending.is_set():
                 if self._clock.ros_time_is_active:
                     self._run_simulated()

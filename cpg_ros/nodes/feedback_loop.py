@@ -129,7 +129,7 @@ class FeedbackLoop:
         if program.motion.efference is None:
             found.append(f"the robot file has no efference copy of the gait '{program.name}'")
         times = next((times for known, times in self._known if known is program), None)
-        if times is None or pattern.level < 1.0 or pattern.in_transition:
+        if found or times is None or pattern.level < 1.0 or pattern.in_transition:
             self._agrees = 1.0
         else:
             row = int(pattern.phases[0] * POINTS) % POINTS

@@ -9,8 +9,8 @@ from cpg_ros.nodes.parameter_spec import Spec
 from cpg_ros.nodes.senses_input import CONTACTS
 
 PREFIX = 'feedback.'
-#: A gain may be this many times the default, or up to the other where that is 0.
-RANGE, MOST = 10.0, 1.0
+#: A gain may be this many times the default, and up to 1 where that is 0.
+RANGE = 10.0
 
 
 def switch(calibrated: bool) -> Spec:
@@ -49,7 +49,7 @@ def _law(name: str, default: bool) -> Spec:
 
 
 def _gain(name: str, default: float, text: str) -> Spec:
-    return Spec(default, text, 0.0, RANGE * default or MOST)
+    return Spec(default, text, 0.0, round(RANGE * default, 6) or 1.0)
 
 
 #: Laws and gains, all of which can be set at any time.

@@ -4,7 +4,7 @@ import sys
 import time
 from pathlib import Path
 
-from rcl_interfaces.msg import SetParametersResult
+from rcl_interfaces.msg import ParameterType, SetParametersResult
 from rclpy.logging import get_logger
 from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, QoSProfile
@@ -20,15 +20,24 @@ from cpg_ros.networks.network import Network, Preset
 from cpg_ros.networks.preset_files import PresetError, read_presets
 from cpg_ros.networks.registry import NetworkError, find_network
 from cpg_ros.nodes import feedback_parameters
+from cpg_ros.nodes.cells_publisher import Cells
 from cpg_ros.nodes.cmd_vel import CmdVel
 from cpg_ros.nodes.deadline_thread import Ticker
 from cpg_ros.nodes.diagnostics import Diagnostics
 from cpg_ros.nodes.feedback_switch import FeedbackSwitch, uncalibrated
-from cpg_ros.nodes.generator_parameters import COMMANDS, NETWORK, Planner, exclusive, specs
+from cpg_ros.nodes.generator_parameters import (
+    COMMANDS,
+    NETWORK,
+    Planner,
+    exclusive,
+    gait_spec,
+    specs,
+)
 from cpg_ros.nodes.joint_publishers import Outputs
 from cpg_ros.nodes.measured_pose import MeasuredPose
 from cpg_ros.nodes.node_base import StartedNode, StartError, asked_for_help, run
 from cpg_ros.nodes.parameter_spec import as_doubles
+from cpg_ros.nodes.real_time import SPECS, NoSuchCore, RealTime
 from cpg_ros.nodes.rivals import Rivals
 from cpg_ros.nodes.senses_input import CONTACTS
 from cpg_ros.robots.robot import Robot
@@ -63,6 +72,7 @@ class Generator(StartedNode):
         self._declare('exclusive', exclusive(self._value('command')))
         presets = network.presets() | self._further_presets(network)
         self._one_of('gait', tuple(presets))
+        self._list_gaits(network, presets)
         self._one_of('command', COMMANDS)
         try:
             robot = find_robot(self._value('robot'))
@@ -100,14 +110,19 @@ class Generator(StartedNode):
         except ValueError as error:
             raise StartError(str(error)) from error
         self._feedback = self._switched()
+        self._cells = Cells(self, network)
         self._measured = self._measured_pose(robot)
         self._gait = self.create_publisher(
             String, '~/gait',
             QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL),
             qos_overriding_options=QoSOverridingOptions.with_default_policies())
         self.create_service(SetBool, '~/enable', self._enable)
+        try:
+            self._real_time = RealTime.of(*map(self._value, SPECS))
+        except NoSuchCore as error:
+            raise StartError(str(error)) from error
         self.ticker = Ticker(self, self._value('rate'), self._tick, self._restart, self._fail,
-                             self.pattern.resume)
+                             self.pattern.resume, self._claim_real_time)
         self._rivals = Rivals(self, self._outputs.topics)
         self._diagnostics = Diagnostics(self, self.pattern, self.ticker, self._rivals,
                                         self._cmd_vel, self._feedback)
@@ -128,6 +143,12 @@ class Generator(StartedNode):
             return read_presets(Path(path).expanduser(), network) if path else {}
         except PresetError as error:
             raise StartError(str(error)) from error
+
+    def _list_gaits(self, network: type[Network], presets: dict[str, Preset]) -> None:
+        """Let the descriptor of ``gait`` list those of the further presets, too."""
+        descriptor = gait_spec(network, presets).descriptor()
+        descriptor.type = ParameterType.PARAMETER_STRING
+        self.set_descriptor('gait', descriptor)
 
     def _given_groups(self) -> None:
         """Let what is given for a group at start stand for each of its members."""
@@ -249,11 +270,20 @@ class Generator(StartedNode):
         self.get_logger().info(response.message)
         return response
 
+    def _claim_real_time(self) -> None:
+        """Ask for what the publishing thread is to have; it goes on without what is refused."""
+        granted, refused = self._real_time.claim()
+        for line in refused:
+            self.get_logger().warning(line)
+        if granted:
+            self.get_logger().info(f'real time: {", ".join(granted)}')
+
     def _tick(self, dt: float, stamp: int) -> None:
         self._feedback.sense(dt, stamp)
         self.pattern.advance(dt)
         self._outputs.publish(stamp, dt, self.pattern.position, self.pattern.velocity,
                               self.pattern.phases)
+        self._cells.publish(dt, self.pattern.state)
 
     def _restart(self) -> None:
         self.get_logger().warning('simulated time jumped back: starting again from the stand')

@@ -3,6 +3,7 @@
 import contextlib
 import functools
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,6 +13,7 @@ from cpg_ros.errors import CpgError
 from cpg_ros.motion.plan import Program, Refused, gait_of, plan
 from cpg_ros.networks.network import Network, Preset
 from cpg_ros.networks.registry import NETWORKS
+from cpg_ros.nodes import real_time
 from cpg_ros.nodes.parameter_spec import Spec
 from cpg_ros.robots.robot import Robot
 
@@ -27,9 +29,7 @@ def specs(network: type[Network]) -> dict[str, Spec]:
         'presets': Spec('', 'file with further presets; empty for none', read_only=True),
         'robot': Spec(network.usual_robot, 'robot file, or the name of a shipped one',
                       read_only=True, constraints='a shipped name, or the path of a YAML file'),
-        'gait': Spec(network.usual_gait, 'gait; setting it loads its preset of network '
-                     'parameters', constraints='one of: ' + ', '.join(network.presets())
-                     + ', and those of the file given by presets'),
+        'gait': gait_spec(network, network.presets(), ', and those of the file given by presets'),
         'rate': Spec(100.0, 'messages per second on every output topic [Hz]', 1.0, 2000.0),
         'amplitude': Spec(1.0, "factor on the robot file's joint amplitudes", 0.0, 3.0),
         'transition': Spec(1.0, 'duration of a change of gait or parameters [s]; 0 leaves it to '
@@ -48,7 +48,14 @@ def specs(network: type[Network]) -> dict[str, Spec]:
                           '~/enable', read_only=True),
         'cmd_vel': Spec(False, 'walk as the topic cmd_vel asks; the robot file must say how',
                         read_only=True),
-        'cmd_vel_timeout': Spec(0.5, 'a cmd_vel older than this stops the robot [s]', 0.05, 60.0)}
+        'cmd_vel_timeout': Spec(0.5, 'a cmd_vel older than this stops the robot [s]', 0.05, 60.0),
+        **real_time.SPECS}
+
+
+def gait_spec(network: type[Network], presets: Iterable[str], further: str = '') -> Spec:
+    """Return the parameter that is one of these presets, or of some further ones."""
+    return Spec(network.usual_gait, 'gait; setting it loads its preset of network parameters',
+                constraints='one of: ' + ', '.join(presets) + further)
 
 
 def exclusive(command: str) -> Spec:

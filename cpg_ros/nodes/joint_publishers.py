@@ -1,31 +1,17 @@
-"""The generator's messages: built once, filled in place and published every tick."""
-
-from array import array
+"""The generator's messages: joint states, phases and commands, published every tick."""
 
 import numpy as np
-from builtin_interfaces.msg import Duration
 from rclpy.node import Node
-from rclpy.qos import QoSProfile
-from rclpy.qos_overriding_options import QoSOverridingOptions
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray, MultiArrayDimension
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
+from cpg_ros.nodes.message_block import MessageBlock, Template
 from cpg_ros.robots.robot import Robot
 
 #: Names under which ros2_control's controllers listen by default.
 COMMAND_TOPICS = {'joint_trajectory': 'joint_trajectory_controller/joint_trajectory',
                   'forward_position': 'forward_position_controller/commands'}
-
-
-def view_of(message: object, field: str, n: int) -> np.ndarray:
-    """Give a message's field n zeros and return a numpy view of the memory it publishes from.
-
-    The view is taken from the field as stored: rclpy copies what is assigned or not, depending
-    on whether it checks fields.
-    """
-    setattr(message, field, array('d', bytes(8 * n)))
-    return np.frombuffer(getattr(message, field), dtype=float)
 
 
 class Outputs:
@@ -43,14 +29,6 @@ class Outputs:
             ValueError: the combined topic is one of the others.
 
         """
-        joints = [joint.name for joint in robot.joints]
-        self._order = robot.places
-        self._stamps: list = []
-        self._publish: list = []
-        # Views of the messages' memory, and which joints go there.
-        self._positions: list[tuple[np.ndarray, slice | np.ndarray]] = []
-        self._velocities: list[tuple[np.ndarray, slice | np.ndarray]] = []
-        self._node = node
         own = [*(f'{leg}/joint_states' for leg in robot.legs), *COMMAND_TOPICS.values()]
         if combined_topic:
             name = node.resolve_topic_name(combined_topic)
@@ -58,66 +36,61 @@ class Outputs:
                 if name == node.resolve_topic_name(topic):
                     raise ValueError(f"combined_topic '{combined_topic}' is the generator's own "
                                      f'{topic}: it would be published twice on one topic')
-        self.topics: list[str] = []
-
+        count, legs = len(robot.joints), len(robot.legs)
+        # The block's numbers: positions, velocities, phases.
+        self._parts = slice(count), slice(count, 2 * count), slice(2 * count, 2 * count + legs)
+        places = np.arange(count)
+        messages: list[tuple[str, Template]] = []
         start = 0
-        for leg, members in robot.legs.items():
-            part = slice(start, start + len(members))
-            self._joint_state(f'{leg}/joint_states', joints[part], part)
-            start = part.stop
+        for leg, joints in robot.legs.items():
+            messages.append((f'{leg}/joint_states', joint_state(
+                [joint.name for joint in joints], places[start:start + len(joints)], count)))
+            start += len(joints)
+        order = np.asarray(robot.places)
         if combined_topic:
-            self._joint_state(combined_topic, list(robot.order), self._order)
-
-        phases = Float64MultiArray()
-        self._phases = view_of(phases, 'data', len(robot.legs))
-        phases.layout.dim = [MultiArrayDimension(label=','.join(robot.legs), stride=1,
-                                                 size=len(robot.legs))]
-        self._add(Float64MultiArray, '~/phase', phases)
-        self.topics.remove(node.resolve_topic_name('~/phase'))
-        self._point: JointTrajectoryPoint | None = None
+            messages.append((combined_topic, joint_state(list(robot.order), order, count)))
+        messages.append(('~/phase', labelled(tuple(robot.legs), 2 * count + np.arange(legs))))
         if command == 'joint_trajectory':
-            self._trajectory(robot.order)
+            # One point a message, reached a period after it: stamp 0 means from now.
+            point = JointTrajectoryPoint()
+            messages.append((COMMAND_TOPICS[command], Template(
+                JointTrajectory(joint_names=list(robot.order), points=[point]),
+                durations=[point.time_from_start],
+                numbers=[(point, 'positions', order), (point, 'velocities', count + order)])))
         elif command == 'forward_position':
-            message = Float64MultiArray()
-            self._positions.append((view_of(message, 'data', len(joints)), self._order))
-            self._add(Float64MultiArray, COMMAND_TOPICS[command], message)
-
-    def _add(self, kind: type, topic: str, message: object) -> None:
-        publisher = self._node.create_publisher(
-            kind, topic, QoSProfile(depth=100),
-            qos_overriding_options=QoSOverridingOptions.with_default_policies())
-        self._publish.append((publisher.publish, message))
-        self.topics.append(publisher.topic_name)
-
-    def _joint_state(self, topic: str, names: list[str], part: slice | np.ndarray) -> None:
-        message = JointState(name=names)
-        self._positions.append((view_of(message, 'position', len(names)), part))
-        self._velocities.append((view_of(message, 'velocity', len(names)), part))
-        self._stamps.append(message.header.stamp)
-        self._add(JointState, topic, message)
-
-    def _trajectory(self, names: tuple[str, ...]) -> None:
-        """One point a message, reached a period after it: stamp 0 means from now."""
-        self._point = JointTrajectoryPoint()
-        self._positions.append((view_of(self._point, 'positions', len(names)), self._order))
-        self._velocities.append((view_of(self._point, 'velocities', len(names)), self._order))
-        message = JointTrajectory(joint_names=list(names))
-        message.points = [self._point]
-        self._add(JointTrajectory, COMMAND_TOPICS['joint_trajectory'], message)
+            array = Float64MultiArray()
+            messages.append((COMMAND_TOPICS[command],
+                             Template(array, numbers=[(array, 'data', order)])))
+        self._block = MessageBlock(node, 2 * count + legs, messages)
+        phase = node.resolve_topic_name('~/phase')
+        self.topics = [topic for topic in self._block.topics if topic != phase]
 
     def publish(self, stamp: int, dt: float, position: np.ndarray, velocity: np.ndarray,
                 phases: np.ndarray) -> None:
         """Publish everything: stamp in ns, dt in s, rad and rad/s by joint, phases in cycles."""
-        seconds, nanoseconds = divmod(stamp, 1_000_000_000)
-        for time in self._stamps:
-            time.sec = seconds
-            time.nanosec = nanoseconds
-        for view, part in self._positions:
-            view[:] = position[part]
-        for view, part in self._velocities:
-            view[:] = velocity[part]
-        self._phases[:] = phases
-        if self._point is not None:
-            self._point.time_from_start = Duration(sec=int(dt), nanosec=round(dt % 1 * 1e9))
-        for publish, message in self._publish:
-            publish(message)
+        values = self._block.values
+        for part, given in zip(self._parts, (position, velocity, phases), strict=True):
+            values[part] = given
+        self._block.publish(stamp, round(1e9 * dt))
+
+
+def joint_state(names: list[str], positions: np.ndarray, *further: int) -> Template:
+    """Return a template of joint states.
+
+    Args:
+        names: of the joints.
+        positions: which of a block's numbers are their positions.
+        further: how far behind them the velocities are, and the efforts if there are any.
+
+    """
+    message = JointState(name=names)
+    fields = zip(('position', 'velocity', 'effort'), (0, *further), strict=False)
+    return Template(message, [message.header.stamp],
+                    numbers=[(message, name, positions + behind) for name, behind in fields])
+
+
+def labelled(names: tuple[str, ...], places: np.ndarray) -> Template:
+    """Return a template of an array with a number for each name, which its label lists."""
+    message = Float64MultiArray()
+    message.layout.dim = [MultiArrayDimension(label=','.join(names), stride=1, size=len(names))]
+    return Template(message, numbers=[(message, 'data', places)])

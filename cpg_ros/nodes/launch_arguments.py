@@ -21,6 +21,7 @@ Arguments = Mapping[str, tuple[str, type, str]]
 def declared(arguments: Arguments) -> list[DeclareLaunchArgument]:
     """Return the arguments, and those that every launch file has."""
     known = {**arguments, 'namespace': ('', str, 'namespace of all its topics'),
+             'panel': ('false', bool, 'show it in a browser, at http://127.0.0.1:8080/'),
              'params_file': ('', str, 'file with parameters, as inversion writes; arguments '
                              'that are not at their defaults come before it; empty for none')}
     return [DeclareLaunchArgument(name, default_value=default, description=text)
@@ -44,6 +45,19 @@ def value(context: LaunchContext, name: str, kind: type) -> Any:
     if not isinstance(found, origin):
         raise RuntimeError(f'{name}:={text} is not {WHAT[origin]}')
     return found
+
+
+def page(context: LaunchContext) -> list[Node]:
+    """Return the node that shows it all in a browser, if that was asked for.
+
+    Raises:
+        RuntimeError: the argument is neither true nor false.
+
+    """
+    if not value(context, 'panel', bool):
+        return []
+    return [Node(package='cpg_ros', executable='panel', name='cpg_panel', output='screen',
+                 namespace=LaunchConfiguration('namespace'))]
 
 
 def started(context: LaunchContext, executable: str, name: str, arguments: Arguments,

@@ -26,14 +26,11 @@ from rclpy.utilities import remove_ros_args
 
 from cpg_ros.errors import CpgError
 from cpg_ros.nodes.parameter_services import StrictParameterService
-from cpg_ros.nodes.parameter_spec import Spec, as_doubles
+from cpg_ros.nodes.parameter_spec import Spec, as_doubles, as_list, kind_of
 from cpg_ros.nodes.shutdown import ended
 
 #: The ports of the domains after it are too high for UDP.
 LAST_DOMAIN = 232
-#: What a parameter of a type is called.
-KINDS = {bool: 'a bool', int: 'an integer', float: 'a double', str: 'a string',
-         list: 'a list of strings'}
 
 
 class StartError(CpgError):
@@ -66,10 +63,12 @@ class StartedNode(Node):
             self._doubles.add(name)
             if override is not None and override.type_ == Parameter.Type.INTEGER:
                 self._parameter_overrides[name] = as_doubles([override], {name})[0]
+        elif isinstance(spec.default, list) and override is not None:
+            self._parameter_overrides[name] = as_list(override, spec.default)
         try:
             self.declare_parameter(name, spec.default, spec.descriptor())
         except InvalidParameterTypeException as error:
-            raise StartError(f'parameter {name} must be {KINDS[type(spec.default)]}, not '
+            raise StartError(f'parameter {name} must be {kind_of(spec.default)}, not '
                              f'{self._parameter_overrides[name].value!r}') from error
         except InvalidParameterValueException as error:
             raise StartError(f'parameter {name}: {self._parameter_overrides[name].value} is not '
@@ -224,6 +223,7 @@ def run(make: Callable[[], StartedNode], name: str, args: list[str] | None) -> i
     gc.freeze()
     node.begin()
     serving.start()
+    node.parameter_service.thread.start()
     # A bare wait() can miss a signal that another thread received, and a stop must not wait.
     while not node.stop.wait(0.02):
         pass

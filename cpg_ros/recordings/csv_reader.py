@@ -87,11 +87,12 @@ def read_csv(path: str | Path, unit: str | None = None, time: str | None = None,
         size = path.stat().st_size
         table = _Table(path, file, unit, time, joints)
         with progress_bar(f'reading {path.name}', max(1, size), enabled=progress) as bar:
-            chunks = []
-            for chunk in table.chunks():
-                chunks.append(chunk)
-                bar(min(size, table.read))
-    recording = merged(chunks, str(path), [column.joint for column in table.columns])
+            def chunks() -> Iterator[Chunk]:
+                for chunk in table.chunks():
+                    yield chunk
+                    bar(min(size, table.read))
+
+            recording = merged(chunks(), str(path), [column.joint for column in table.columns])
     notes = [*table.notes, *(['lines that end in a delimiter'] if table.ended else [])]
     return replace(recording, notes=(*notes, *recording.notes))
 

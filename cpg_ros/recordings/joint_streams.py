@@ -18,6 +18,7 @@ from cpg_ros.recordings.recording import (
     require,
 )
 from cpg_ros.recordings.servo import Servo
+from cpg_ros.recordings.thinned import LONG, Thinned
 
 #: Messages of a topic that are decoded together; a few MB.
 BATCH = 4096
@@ -44,6 +45,11 @@ class Stream:
         self.received: list[int] = []
         #: Header stamps and receive times in ns, names, positions.
         self.parts: list[tuple[np.ndarray, np.ndarray, tuple[str, ...], np.ndarray]] = []
+        self._size = 0
+        #: Of a long topic: joints -> samples on a grid, and by how many seconds the other clock is
+        #: ahead more than it was at first.
+        self._thinned: dict[tuple[str, ...], Thinned] = {}
+        self._by_headers, self._ahead = True, 0
         self.joints: dict[str, None] = {}
         self.count = self.mute = self.odd = self.slack = self.unstamped = 0
         #: Joints with a position, but not what the servo needs besides; and those whose effort
@@ -51,6 +57,12 @@ class Stream:
         self.lacking: dict[str, None] = {}
         self.pulled: set[str] = set()
         self.dated = False
+
+    @property
+    def stamped_so_far(self) -> bool:
+        """Whether most messages at hand have a header stamp."""
+        stamped = sum(int(np.count_nonzero(stamps)) for stamps, *_ in self.parts)
+        return stamped > 0.5 * self._size
 
     @property
     def stamped(self) -> bool:
@@ -102,6 +114,25 @@ class Stream:
                 columns = [k for k, name in enumerate(names) if name in self.wanted]
                 names, positions = tuple(names[k] for k in columns), positions[:, columns]
             self.parts.append((stamps, received, names, positions))
+            self._size += len(stamps)
+            if self._size >= LONG:
+                self._thin()
+
+    def _thin(self) -> None:
+        """Hand what has come in to what makes less of it, both clocks side by side."""
+        if not self._thinned:
+            self._by_headers = self.stamped_so_far
+        for stamps, received, names, positions in self.parts:
+            if self._by_headers and self.dated and not stamps.all():
+                there = stamps != 0
+                stamps, received, positions = stamps[there], received[there], positions[there]
+            if not len(stamps):
+                continue
+            own, other = (stamps, received) if self._by_headers else (received, stamps)
+            self._ahead = self._ahead or int(other[0] - own[0])
+            self._thinned.setdefault(names, Thinned()).add(
+                own, np.column_stack([positions, 1e-9 * (other - own - self._ahead)]))
+        self.parts, self._size = [], LONG
 
     def notes(self, headers: bool) -> list[str]:
         """Say what is left out."""
@@ -109,11 +140,19 @@ class Stream:
                   (self.odd, 'with more or fewer positions than names'),
                   (self.slack, f'without {self.servo.needs} of each joint' if self.servo else ''),
                   (self.unstamped if headers and self.dated else 0, 'without a stamp'))
-        return [f'{self.topic}: {count} of {self.count} messages {what}, left out'
-                for count, what in counts if count]
+        return [*(f'{self.topic}: {count} of {self.count} messages {what}, left out'
+                  for count, what in counts if count),
+                *(f'{self.topic}: {samples.note}' for samples in self._thinned.values()
+                  if samples.note)]
 
     def chunks(self, headers: bool) -> Iterator[Chunk]:
         """Yield the samples, and forget them."""
+        for names, samples in self._thinned.items():
+            own, values = samples.taken()
+            other = own + self._ahead + np.rint(1e9 * values[:, -1]).astype(np.int64)
+            pair = (own, other) if self._by_headers else (other, own)
+            self.parts.append((*pair, names, values[:, :-1]))
+        self._thinned = {}
         self.parts.reverse()
         while self.parts:
             stamps, received, names, positions = self.parts.pop()

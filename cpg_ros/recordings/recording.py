@@ -16,6 +16,7 @@ from cpg_ros.recordings.stray_samples import (
     without_astray,
     without_far,
 )
+from cpg_ros.recordings.thinned import Thinned
 
 #: Stamps, shape (n,), int64, ns; the joints' names; positions, shape (n, names), rad.
 Chunk = tuple[np.ndarray, Sequence[str], np.ndarray]
@@ -105,7 +106,7 @@ def merged(chunks: Iterable[Chunk], source: str, joints: Sequence[str] = ()) -> 
 
     Samples of different joints with the same stamp become one; a joint without a sample at a
     stamp is nan there. Of samples of a joint with the same stamp the first is kept. Values that
-    are not finite count as missing.
+    are not finite count as missing. A long recording is put on a coarser grid (see `thinned`).
 
     Args:
         chunks: in the order of arrival, for each set of names; see `Chunk`.
@@ -128,8 +129,11 @@ def merged(chunks: Iterable[Chunk], source: str, joints: Sequence[str] = ()) -> 
     for group in list(groups):
         columns = [k for k, name in enumerate(group) if name in wanted]
         if columns:
-            stamps, positions = _joined(groups.pop(group), columns, len(group))
-            found.append((stamps, [wanted.index(group[k]) for k in columns], positions))
+            samples = groups.pop(group)
+            stamps, positions = samples.taken()
+            notes += [samples.note] if samples.note else []
+            found.append((stamps, [wanted.index(group[k]) for k in columns],
+                          positions[:, columns] if len(columns) < len(group) else positions))
     found, astray = without_astray(found)
     notes += astray
     origin = min(int(stamps.min()) for stamps, _, _ in found)
@@ -183,9 +187,9 @@ def merged(chunks: Iterable[Chunk], source: str, joints: Sequence[str] = ()) -> 
 
 
 def _groups(chunks: Iterable[Chunk], source: str
-            ) -> dict[tuple[str, ...], list[tuple[np.ndarray, np.ndarray]]]:
+            ) -> dict[tuple[str, ...], Thinned]:
     """Sort chunks by the joints they hold."""
-    groups: dict[tuple[str, ...], list[tuple[np.ndarray, np.ndarray]]] = {}
+    groups: dict[tuple[str, ...], Thinned] = {}
     for stamps, names, positions in chunks:
         stamps, positions = np.asarray(stamps), np.asarray(positions, float)
         if stamps.ndim != 1 or positions.shape != (len(stamps), len(names)):
@@ -200,17 +204,8 @@ def _groups(chunks: Iterable[Chunk], source: str
             raise RecordingError(f'{source}: stamp of {float(stamps[far][0]) / 1e9:.6g} s')
         if len(set(names)) < len(names):
             require(names, names, source)
-        groups.setdefault(tuple(names), []).append((stamps.astype(np.int64), positions))
+        groups.setdefault(tuple(names), Thinned()).add(stamps.astype(np.int64), positions)
     return groups
-
-
-def _joined(parts: list[tuple[np.ndarray, np.ndarray]], columns: list[int], width: int
-            ) -> tuple[np.ndarray, np.ndarray]:
-    """Join the chunks of a group, as to the columns wanted."""
-    stamps = np.concatenate([stamps for stamps, _ in parts])
-    if len(columns) < width:
-        return stamps, np.concatenate([positions[:, columns] for _, positions in parts])
-    return stamps, np.concatenate([positions for _, positions in parts])
 
 
 def _one_table(parts: list[Part], width: int

@@ -1,11 +1,22 @@
-"""What is used of the library `rosbags`, and one line where it is missing."""
+"""What is used of the library `rosbags`."""
 
-from cpg_ros.errors import needed
+from typing import Any
 
-needed('rosbags')
+from rosbags.rosbag2 import Reader, ReaderError
+from rosbags.serde import SerdeError
+from rosbags.typesys import Stores, get_typestore
 
-from rosbags.rosbag2 import Reader, ReaderError  # noqa: E402
-from rosbags.serde import SerdeError  # noqa: E402
-from rosbags.typesys import Stores, get_typestore  # noqa: E402
+__all__ = ['Reader', 'ReaderError', 'SerdeError', 'deserialize']
 
-__all__ = ['Reader', 'ReaderError', 'SerdeError', 'Stores', 'get_typestore']
+#: The layout of a JointState is the same in all ROS 2 distributions.
+STORE = get_typestore(Stores.ROS2_JAZZY)
+
+
+def deserialize(message: bytes) -> Any:
+    """Return a JointState out of its bytes.
+
+    Raises:
+        SerdeError: they are none.
+
+    """
+    return STORE.deserialize_cdr(message, 'sensor_msgs/msg/JointState')

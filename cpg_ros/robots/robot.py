@@ -25,7 +25,10 @@ WEIGHTS = (1, 2, 4, 6)
 
 @dataclass(frozen=True)
 class Joint:
-    """One joint: name, leg, cell from 1; offset, weights, lower, upper in rad; velocity rad/s."""
+    """One joint: name, leg, cell from 1; offset, weights, lower, upper in rad; velocity rad/s.
+
+    What is ``invented`` (of lower, upper and velocity) is a guess, as the URDF has no limit there.
+    """
 
     name: str
     leg: str
@@ -35,6 +38,7 @@ class Joint:
     lower: float
     upper: float
     velocity: float
+    invented: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)

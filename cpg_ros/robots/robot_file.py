@@ -32,6 +32,8 @@ from cpg_ros.robots.robot import (
     Steering,
 )
 
+#: Limits of a joint.
+LIMITS = ('lower', 'upper', 'velocity')
 #: No angle (rad) or speed (rad/s) of a joint is larger.
 LARGEST = 1e6
 
@@ -67,7 +69,8 @@ class _Reader(Reader):
 
     def joint(self, tree: Any, where: str, leg: str, cells: tuple[int, ...]) -> Joint:
         numbers = {'offset', 'lower', 'upper', 'velocity'}
-        tree = self.keys(tree, where, numbers | {'name', 'cell'}, {'amplitude', 'weights'})
+        tree = self.keys(tree, where, numbers | {'name', 'cell'},
+                         {'amplitude', 'weights', 'invented'})
         name = self.text(tree['name'], f'{where}.name')
         where = f'{where} ({name})'
         values = {key: self.number(tree[key], f'{where}.{key}') for key in sorted(numbers)}
@@ -83,7 +86,19 @@ class _Reader(Reader):
                             f'{values["lower"]:g} to {values["upper"]:g}')
         if values['velocity'] <= 0.0:
             raise self.fail(f'{where}.velocity', f'{values["velocity"]:g} must be positive')
-        return Joint(name=name, leg=leg, cell=tree['cell'], weights=weights, **values)
+        invented: tuple[str, ...] = ()
+        if 'invented' in tree:
+            invented = self.guessed(tree['invented'], f'{where}.invented')
+        return Joint(name=name, leg=leg, cell=tree['cell'], weights=weights, **values,
+                     invented=invented)
+
+    def guessed(self, value: Any, where: str) -> tuple[str, ...]:
+        """Return which limits are guesses."""
+        found = tuple(self.text(key, where) for key in self.items(value, where))
+        for key in found:
+            if key not in LIMITS:
+                raise self.fail(where, f"'{key}' is not one of {', '.join(LIMITS)}")
+        return found
 
     def readout(self, tree: Mapping[str, Any], where: str) -> tuple[float, ...]:
         """Return the weights that 'amplitude' or 'weights' gives."""
@@ -266,7 +281,9 @@ def write_robot(path: str | Path, robot: Robot, comment: str = '') -> None:
         tree['legs'][leg] = {'joints': [
             {'name': joint.name, 'cell': joint.cell, 'offset': joint.offset,
              'weights': list(joint.weights), 'lower': joint.lower, 'upper': joint.upper,
-             'velocity': joint.velocity} for joint in joints]}
+             'velocity': joint.velocity}
+            | ({'invented': list(joint.invented)} if joint.invented else {})
+            for joint in joints]}
         for key, said in (('side', robot.sides), ('girdle', robot.girdles)):
             if leg in said and not any(leg in getattr(NETWORKS[name], f'{key}s')
                                        for name in robot.networks):

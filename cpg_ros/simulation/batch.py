@@ -6,7 +6,7 @@ targets are known beforehand.
 
 import copy
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -102,9 +102,10 @@ class Batch:
 
     """
 
-    def __init__(self, name: str, robot: Robot, kp: float = 60.0, kd: float = 2.0,
-                 timestep: float = 0.002) -> None:
-        """Load the model; arguments as of ``model.load``.
+    def __init__(self, name: str, robot: Robot, kp: float | None = None,
+                 kd: float | None = None, timestep: float = 0.002, threads: int = 0,
+                 say: Callable[[str], None] = lambda line: None) -> None:
+        """Load the model; arguments as of ``robot_model.load``; threads: 0 for all cores.
 
         Raises:
             SimulationError: MuJoCo is missing, or the model cannot be used.
@@ -112,12 +113,13 @@ class Batch:
         """
         mujoco = engine()
         from mujoco import rollout
-        self.body = Body(name, robot, kp, kd, timestep)
+        self.body = Body(name, robot, kp, kd, timestep, say=say)
         self.parts = Anatomy(self.body)
         self.timestep = timestep
         self._models: dict[tuple[float, float], Any] = {}
-        self._threads = len(os.sched_getaffinity(0)) if hasattr(os, 'sched_getaffinity') else (
-            os.cpu_count() or 1)
+        self._threads = threads or (
+            len(os.sched_getaffinity(0)) if hasattr(os, 'sched_getaffinity')
+            else os.cpu_count() or 1)
         self._data = [mujoco.MjData(self.body.model) for _ in range(self._threads)]
         self._pool = rollout.Rollout(nthread=self._threads)
         full = mujoco.mjtState.mjSTATE_FULLPHYSICS

@@ -32,9 +32,11 @@ class Body:
 
     """
 
-    def __init__(self, name: str, robot: Robot, kp: float = 60.0, kd: float = 2.0,
-                 timestep: float = 0.002, add: Callable[[Any], None] | None = None) -> None:
-        """Load a model and stand it up; arguments as of ``model.load``.
+    def __init__(self, name: str, robot: Robot, kp: float | None = None,
+                 kd: float | None = None, timestep: float = 0.002,
+                 add: Callable[[Any], None] | None = None,
+                 say: Callable[[str], None] = lambda line: None) -> None:
+        """Load a model and stand it up; arguments as of ``robot_model.load``.
 
         Raises:
             SimulationError: MuJoCo is missing, or the model cannot be used.
@@ -42,7 +44,7 @@ class Body:
         """
         mujoco = engine()
         self.robot = robot
-        self.model: Any = load(name, robot, kp, kd, timestep, add=add)
+        self.model: Any = load(name, robot, kp, kd, timestep, add=add, say=say)
         self.data: Any = mujoco.MjData(self.model)
         self._step = mujoco.mj_step
         self.stand = robot.column('offset')[robot.places]
@@ -126,6 +128,16 @@ class Body:
             self._pushed -= 1
             if not self._pushed:
                 self.data.xfrc_applied[self._base, :3] = 0.0
+
+    @property
+    def gains(self) -> tuple[float, float]:
+        """Proportional and damping gain of the joints, N m / rad and N m s / rad."""
+        return float(self.model.actuator_gainprm[0, 0]), -float(self.model.actuator_biasprm[0, 2])
+
+    @property
+    def mass(self) -> float:
+        """Of all of it, kg."""
+        return float(self.model.body_mass.sum())
 
     @property
     def time(self) -> float:

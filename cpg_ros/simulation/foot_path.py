@@ -89,8 +89,8 @@ class Leg:
         if np.abs(self._turns).min() < 0.99:
             raise SimulationError(f'leg {leg}: {self.thigh.name} and {self.calf.name} do not both '
                                   'turn about an axis across the body')
-        foot = parts.feet[legs(body.robot).index(leg)]
-        corners = np.stack([*data.xanchor[ids], data.geom_xpos[foot]])[:, [0, 2]]
+        foot = parts.places(data)[legs(body.robot).index(leg)]
+        corners = np.stack([*data.xanchor[ids], foot])[:, [0, 2]]
         upper, lower = np.diff(corners, axis=0)
         # As complex numbers z + i x a positive turn about y multiplies by exp(i angle).
         self._upper, self._lower = complex(upper[1], upper[0]), complex(lower[1], lower[0])

@@ -1,5 +1,7 @@
 """Where a robot's parts are in its model: indices of base, joints and feet."""
 
+from typing import Any
+
 import numpy as np
 
 from cpg_ros.simulation.body import Body
@@ -14,7 +16,10 @@ class Anatomy:
         pose: the base's position and quaternion in qpos.
         angles: joints in qpos, in the order of controllers, shape (joints,).
         speeds: joints in qvel.
-        feet: the geom of each leg that is lowest in the stand, legs as of ``model.legs``.
+        feet: the geom of each leg that is lowest in the stand, legs as of ``robot_model.legs``.
+        bodies: of these geoms, shape (legs,).
+        soles: the middle of a foot that is a ball, else its lowest point in the stand, m, in the
+            frames of these bodies, shape (legs, 3).
 
     """
 
@@ -28,7 +33,7 @@ class Anatomy:
 
         body.reset()
         floor = int(np.flatnonzero(model.geom_type == mujoco.mjtGeom.mjGEOM_PLANE)[0])
-        self.feet = []
+        self.feet, soles = [], []
         for leg in legs(body.robot):
             own = {model.joint(joint.name).bodyid[0] for joint in body.robot.legs[leg]}
             geoms = [geom for geom in range(model.ngeom)
@@ -36,8 +41,22 @@ class Anatomy:
                      and own & set(_ancestors(model, model.geom_bodyid[geom]))]
             if not geoms:
                 raise SimulationError(f'model: leg {leg} has no shape that could touch the floor')
-            self.feet.append(min(geoms, key=lambda geom: mujoco.mj_geomDistance(
-                model, data, floor, geom, 100.0, None)))
+            foot = min(geoms, key=lambda geom: mujoco.mj_geomDistance(
+                model, data, floor, geom, 100.0, None))
+            self.feet.append(foot)
+            ends = np.zeros(6)
+            mujoco.mj_geomDistance(model, data, floor, foot, 100.0, ends)
+            if model.geom_type[foot] == mujoco.mjtGeom.mjGEOM_SPHERE:
+                ends[3:] = data.geom_xpos[foot]
+            body_id = model.geom_bodyid[foot]
+            turn = data.xmat[body_id].reshape(3, 3)
+            soles.append((ends[3:] - data.xpos[body_id]) @ turn)
+        self.bodies, self.soles = model.geom_bodyid[self.feet], np.array(soles)
+
+    def places(self, data: Any) -> np.ndarray:
+        """Where the soles are in a ``mujoco.MjData``, m, shape (legs, 3)."""
+        turn = data.xmat[self.bodies].reshape(-1, 3, 3)
+        return data.xpos[self.bodies] + (turn @ self.soles[:, :, None])[:, :, 0]
 
 
 def _ancestors(model: object, body: int) -> list[int]:

@@ -16,6 +16,9 @@ import numpy as np
 from cpg_ros.errors import CpgError
 from cpg_ros.networks.registry import NETWORKS
 from cpg_ros.robots.robot import Robot
+from cpg_ros.robots.urdf import UrdfError
+from cpg_ros.simulation.servo_gains import set_gains
+from cpg_ros.simulation.urdf_model import part_touching, read_urdf
 
 #: Side of a square of the floor, m.
 SQUARE = 0.25
@@ -80,8 +83,10 @@ def legs(robot: Robot) -> tuple[str, ...]:
     return tuple(NETWORKS[robot.networks[0]].legs[robot.assignment])
 
 
-def load(name: str, robot: Robot, kp: float = 60.0, kd: float = 2.0, timestep: float = 0.002,
-         visual: bool = False, add: Callable[[Any], None] | None = None) -> Any:
+def load(name: str, robot: Robot, kp: float | None = None, kd: float | None = None,
+         timestep: float = 0.002, visual: bool = False,
+         add: Callable[[Any], None] | None = None,
+         say: Callable[[str], None] = lambda line: None) -> Any:
     """Build the model of a robot on a floor; return a ``mujoco.MjModel``.
 
     Actuators are the joints in ``robot.order``: torque = kp (control - angle) - kd speed, within
@@ -92,12 +97,13 @@ def load(name: str, robot: Robot, kp: float = 60.0, kd: float = 2.0, timestep: f
     Args:
         name: as ``find_model`` takes it.
         robot: whose joints are driven.
-        kp: proportional gain, N m / rad.
-        kd: damping gain, N m s / rad.
+        kp: proportional gain, N m / rad; None for what is usual for a robot of this mass.
+        kd: damping gain, N m s / rad; the same.
         timestep: of the integration, s.
         visual: keep what is there for pictures only, meshes coarsened to GRAIN; they take a
             second to load.
         add: adds to the ``mujoco.MjSpec`` before it is compiled.
+        say: takes what had to be changed for MuJoCo to take the file, a line for each thing.
 
     Raises:
         SimulationError: the file cannot be read, or does not go with the robot file.
@@ -105,13 +111,15 @@ def load(name: str, robot: Robot, kp: float = 60.0, kd: float = 2.0, timestep: f
     """
     mujoco, path = engine(), find_model(name)
     try:
-        spec = mujoco.MjSpec.from_file(str(path))
-        if path.suffix == '.urdf':
+        if urdf := path.suffix == '.urdf':
+            spec = read_urdf(path, robot.order, visual, say)
             _free(spec, path)
+        else:
+            spec = mujoco.MjSpec.from_file(str(path))
         joints = {joint.name: joint for joint in spec.joints}
         base = _base(spec, path)
         _check(robot, joints, path)
-        _drive(spec, robot, kp, kd)
+        _drive(spec, robot, say)
         _sense(spec, robot, joints, base)
         _surround(spec, base)
         if add is not None:
@@ -119,15 +127,21 @@ def load(name: str, robot: Robot, kp: float = 60.0, kd: float = 2.0, timestep: f
         spec.option.timestep = timestep
         spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
         spec.compiler.discardvisual = not visual
+        if urdf:
+            part_touching(spec, {joint.name: joint.offset for joint in robot.joints})
         model = spec.compile()
-        return _coarsened(spec, model) if visual else model
+        if visual:
+            model = _coarsened(spec, model)
+        set_gains(model, kp, kd, len(robot.legs))
+        mujoco.mj_setConst(model, mujoco.MjData(model))
+        return model
     except SimulationError:
         raise
-    except ValueError as error:
+    except (ValueError, UrdfError) as error:
         raise SimulationError(f'model {path}: {_reason(error)}') from error
 
 
-def _reason(error: ValueError) -> str:
+def _reason(error: Exception) -> str:
     """Put MuJoCo's reason on one line, without what it says about the state of the spec."""
     lines = str(error).splitlines()
     return ' '.join(line.strip() for line in lines if ' of the spec ' not in line)
@@ -138,7 +152,6 @@ def _free(spec: Any, path: Path) -> None:
     roots = spec.worldbody.bodies
     if len(roots) != 1:
         raise SimulationError(f'model {path}: has {len(roots)} roots, not one')
-    spec.compiler.fusestatic = False
     if not roots[0].joints:
         roots[0].add_freejoint()
 
@@ -162,12 +175,17 @@ def _check(robot: Robot, joints: dict[str, Any], path: Path) -> None:
                                   f"'{robot.name}' is not there; {others}")
 
 
-def _drive(spec: Any, robot: Robot, kp: float, kd: float) -> None:
+def _drive(spec: Any, robot: Robot, say: Callable[[str], None]) -> None:
     """Put position actuators in place of the file's own, with their limits."""
     mujoco = engine()
     limits = {motor.target: limit for motor in spec.actuators
               if motor.trntype == mujoco.mjtTrn.mjTRN_JOINT
               and (limit := _limit(motor)) is not None}
+    # A URDF's are those of joints.
+    limits |= {joint.name: list(joint.actfrcrange) for joint in spec.joints
+               if joint.name not in limits and joint.actfrcrange[0] < joint.actfrcrange[1]}
+    if unlimited := [name for name in robot.order if name not in limits]:
+        say(f'the model does not limit the torque of: {", ".join(unlimited)}')
     # Keys hold controls, and sensors may name actuators.
     for element in [*spec.actuators, *spec.sensors, *spec.keys]:
         spec.delete(element)
@@ -176,8 +194,6 @@ def _drive(spec: Any, robot: Robot, kp: float, kd: float) -> None:
             name=name, target=name, trntype=mujoco.mjtTrn.mjTRN_JOINT,
             gaintype=mujoco.mjtGain.mjGAIN_FIXED, biastype=mujoco.mjtBias.mjBIAS_AFFINE,
             ctrllimited=mujoco.mjtLimited.mjLIMITED_FALSE)
-        actuator.gainprm[0] = kp
-        actuator.biasprm[:3] = 0.0, -kp, -kd
         if name in limits:
             actuator.forcelimited = mujoco.mjtLimited.mjLIMITED_TRUE
             actuator.forcerange = limits[name]

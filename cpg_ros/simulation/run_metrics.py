@@ -95,7 +95,7 @@ def judge(body: Body, parts: Anatomy, wanted: np.ndarray, mass: float, states: n
 
     later = slice(min(round(BEGINNING / dt), len(states) // 2), None)
     every = max(1, round(LOOK / dt))
-    feet = _feet(body, parts.feet, place[later][::every])
+    feet = _feet(body, parts, place[later][::every])
     path = np.diff(pose[later, :2], axis=0)
     middle = 0.5 * (yaw[later][1:] + yaw[later][:-1])
     way = float((path[:, 0] * np.cos(middle) + path[:, 1] * np.sin(middle)).sum())
@@ -129,14 +129,14 @@ def _hops(touching: np.ndarray, dt: float) -> int:
     return int((np.diff(edges)[::2] * dt >= AIRBORNE).sum())
 
 
-def _feet(body: Body, geoms: list[int], places: np.ndarray) -> np.ndarray:
+def _feet(body: Body, parts: Anatomy, places: np.ndarray) -> np.ndarray:
     """Work out where the feet are, m, shape (places, legs, 3)."""
     mujoco, data = engine(), engine().MjData(body.model)
-    feet = np.empty((len(places), len(geoms), 3))
+    feet = np.empty((len(places), len(parts.soles), 3))
     for row, place in zip(feet, places, strict=True):
         data.qpos[:] = place
         mujoco.mj_kinematics(body.model, data)
-        row[:] = data.geom_xpos[geoms]
+        row[:] = parts.places(data)
     return feet
 
 

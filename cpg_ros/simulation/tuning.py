@@ -10,11 +10,12 @@ from dataclasses import dataclass, replace
 from functools import partial
 from itertools import cycle
 from types import ModuleType
+from typing import Any
 
 import numpy as np
 
 from cpg_ros.files.progress_bar import progress_bar
-from cpg_ros.motion.plan import Program, Refused, gait_of, plan
+from cpg_ros.motion.plan import OutOfLimits, Program, Refused, gait_of, plan
 from cpg_ros.networks.registry import NETWORKS
 from cpg_ros.robots.robot import Motion, Robot, Steering
 from cpg_ros.simulation.batch import Batch, Scenario, targets
@@ -31,12 +32,22 @@ SHORT, LONG = 6.0, 10.0
 SCENARIOS = (Scenario(), Scenario(0.9),
              Scenario(0.6, 1.05, ((2.5, 0.0, 50.0), (4.2, 50.0, 0.0))),
              Scenario(0.8, 0.95, ((3.0, -50.0, 0.0), (4.5, 0.0, -50.0))))
+#: Mass that these pushes are for, kg; others have pushes that make them as fast.
+MASS = 15.2
 #: Height that feet are to have for a tenth of the time, m.
 CLEAR = 0.02
-#: Price of a design that the joints cannot follow.
-REFUSED = 100.0
+#: Price of a design that the joints cannot follow, and what each unit beyond a limit adds.
+REFUSED, BEYOND = 1000.0, 100.0
+#: Generations after which a search that has met no other design ends.
+GIVE_UP = 8
+#: Share of the speed aimed at from which a gait is good.
+GOOD = 0.3
 #: Designs in a generation, and how far about the start the first ones are (1: all there is).
 GENERATION, SPREAD = 12, 0.15
+
+
+class NoDesign(SimulationError):
+    """None of a gait's designs can be run; the message says what is in the way."""
 
 
 @dataclass(frozen=True)
@@ -50,6 +61,7 @@ class Tuned:
         first: price of the design that the search started from.
         motion: what it makes of the robot.
         trial: LONG seconds of it on a good floor, nothing disturbing it.
+        aim: speed that it was to reach on this robot, m/s.
 
     """
 
@@ -59,14 +71,27 @@ class Tuned:
     first: float
     motion: Motion
     trial: RunMetrics
+    aim: float
+
+    @property
+    def good(self) -> bool:
+        """Whether it stays upright and gets on."""
+        return self.trial.upright and self.trial.speed >= GOOD * self.aim
+
+    @property
+    def verdict(self) -> str:
+        """Good or poor, and why."""
+        if not self.trial.upright:
+            return f'poor: falls after {self.trial.fell:.1f} s'
+        return f'{"good" if self.good else "poor"}: {self.trial.speed:.2f} m/s'
 
 
-def price(trial: RunMetrics, aim: Aim, duration: float) -> float:
+def price(trial: RunMetrics, aim: Aim, duration: float, scale: float = 1.0) -> float:
     """Weigh a run's figures; 0 would be perfect.
 
     Slower or much faster than wanted, fewer hops or, where none are wanted, bobbing, turning,
     leaning, dragging feet, drifting, sliding, torques at their limit and work all cost; a fall
-    costs most.
+    costs most. Lengths are weighed by the robot's scale.
     """
     fall = 0.0 if trial.upright else 15.0 + 25.0 * (1.0 - trial.fell / duration)
     share = trial.speed / aim.speed
@@ -74,8 +99,8 @@ def price(trial: RunMetrics, aim: Aim, duration: float) -> float:
     turning = (0.15 * min(abs(math.degrees(trial.turn)) / 0.5, 8.0)**2
                + 0.1 * min(abs(trial.heading) / 4.0, 8.0)**2)
     leaning = (trial.sway / 5.0)**1.5
-    dragging = 6.0 * max(0.0, 1.0 - trial.lift / CLEAR)
-    restless = 0.5 * trial.bob / 0.01
+    dragging = 6.0 * max(0.0, 1.0 - trial.lift / (CLEAR * scale))
+    restless = 0.5 * trial.bob / (0.01 * scale)
     if aim.hops:
         restless = 5.0 * max(0.0, 1.0 - trial.hops / (0.85 * aim.hops * duration))
     return (fall + speed + turning + leaning + dragging + restless + 0.3 * (trial.drift / 0.4)**2
@@ -85,18 +110,33 @@ def price(trial: RunMetrics, aim: Aim, duration: float) -> float:
 class Tuner:
     """Tunes one robot's gaits, one after the other."""
 
-    def __init__(self, robot: Robot, model: str) -> None:
-        """Load the model.
+    def __init__(self, robot: Robot, model: str, kp: float | None = None, kd: float | None = None,
+                 threads: int = 0, say: Callable[[str], None] = lambda line: None) -> None:
+        """Load the model; arguments as of Batch.
 
         Raises:
-            SimulationError: MuJoCo or CMA-ES is missing, or the model cannot be used.
+            SimulationError: MuJoCo or CMA-ES is missing, the model cannot be used, or the robot
+                does not have four legs.
 
         """
         self._cma = _search()
+        if len(robot.legs) != 4:
+            raise SimulationError(f"robot file '{robot.name}' has {len(robot.legs)} legs: bipeds "
+                                  'are not tuned, as they need balance, and foot paths alone do '
+                                  'not give it')
         self.robot = robot
-        self.batch = Batch(model, robot)
+        self._nearest: OutOfLimits | None = None
+        self.batch = Batch(model, robot, kp, kd, threads=threads, say=say)
+        body = self.batch.body
+        say('the joints have kp {:g} N m/rad and kd {:g} N m s/rad'.format(*body.gains)
+            + (f', a guess from {body.mass:.1f} kg' if None in (kp, kd) else ''))
         self.feet = Feet(self.batch.body, self.batch.parts)
         self.scale = self.feet.length / LENGTH
+        # Of a push the same speed.
+        heavy = body.mass / MASS * math.sqrt(self.scale)
+        self.scenarios = tuple(replace(one, pushes=tuple(
+            (when, heavy * forward, heavy * left) for when, forward, left in one.pushes))
+            for one in SCENARIOS)
 
     def motion(self, gait: str, design: Design) -> Motion:
         """Return what a design makes of the robot."""
@@ -130,11 +170,17 @@ class Tuner:
             try:
                 angles = [targets(self.program(gait, motion, network), SHORT, self.batch.timestep)
                           for network in range(len(self.robot.networks))]
+            except OutOfLimits as error:
+                found[k] += BEYOND * error.excess
+                if self._nearest is None or error.excess < self._nearest.excess:
+                    self._nearest = error
+                continue
             except Refused:
                 continue
-            runs += list(zip(cycle(angles), SCENARIOS, strict=False))
+            runs += list(zip(cycle(angles), self.scenarios, strict=False))
             runnable.append(k)
-        prices = [price(trial, aim, SHORT) for trial in self.batch.run(runs)]
+        prices = [min(price(trial, aim, SHORT, self.scale), REFUSED - 1.0)
+                  for trial in self.batch.run(runs)]
         for k, own in zip(runnable, np.reshape(prices, (-1, len(SCENARIOS))), strict=True):
             found[k] = 0.6 * own.mean() + 0.4 * own.max()
         return found
@@ -150,10 +196,10 @@ class Tuner:
             update: takes the number tried so far.
 
         Raises:
-            SimulationError: no design can be run.
+            NoDesign: no design can be run.
 
         """
-        aim = AIMS[gait]
+        aim, self._nearest = AIMS[gait], None
         best, cheapest = aim.start, float(self.prices(gait, [aim.start])[0])
         first = cheapest
         search = self._cma.CMAEvolutionStrategy(
@@ -169,20 +215,24 @@ class Tuner:
             update(min(tried, evaluations))
             if prices.min() < cheapest:
                 best, cheapest = designs[int(prices.argmin())], float(prices.min())
+            if cheapest >= REFUSED and tried > GIVE_UP * GENERATION:
+                break
         if cheapest >= REFUSED:
-            raise SimulationError(f"{gait}: no design keeps to the joints' limits")
+            raise NoDesign(f"{gait}: none of {tried} designs keeps to the joints' limits"
+                           + (f'; the nearest moves {self._nearest.said}'
+                              if self._nearest else ''))
         motion = self.motion(gait, best)
         angles = targets(self.program(gait, motion), LONG, self.batch.timestep)
         return Tuned(gait, best, cheapest, first, motion,
-                     self.batch.run([(angles, Scenario())])[0])
+                     self.batch.run([(angles, Scenario())])[0], aim.speed * math.sqrt(self.scale))
 
 
 def _onward(bar: Callable[[int], None], begun: int, done: int) -> None:
     bar(begun + done)
 
 
-def tune(robot: Robot, model: str, gaits: Sequence[str], evaluations: int, seed: int
-         ) -> tuple[Robot, list[Tuned]]:
+def tune(robot: Robot, model: str, gaits: Sequence[str], evaluations: int, seed: int,
+         **options: Any) -> tuple[Robot, list[Tuned], list[str]]:
     """Tune some gaits of a robot, and measure how those that can be steered go and turn.
 
     Args:
@@ -191,25 +241,31 @@ def tune(robot: Robot, model: str, gaits: Sequence[str], evaluations: int, seed:
         gaits: of AIMS.
         evaluations: how many designs to try for each, about.
         seed: the same one finds the same.
+        options: as of Batch: gains of the joints, threads, and who is told what the model lacks.
 
     Returns:
-        The robot with these motions, its others kept, and what was found, gait by gait.
+        The robot with these motions, its others kept, what was found, gait by gait, and for each
+        gait that cannot be had why.
 
     Raises:
-        SimulationError: the simulation cannot be built, or a gait cannot be had.
+        SimulationError: the simulation cannot be built, or no gait can be had.
 
     """
-    tuner = Tuner(robot, model)
+    tuner = Tuner(robot, model, **options)
     known = NETWORKS[robot.networks[0]].presets()
     for gait in gaits:
         if gait not in known:
             raise SimulationError(f'the network {robot.networks[0]} has no gait {gait}')
-    motions, found = dict(robot.motions), []
+    motions, found, missing = dict(robot.motions), [], []
     each = evaluations + len(STRIDES)
     with progress_bar('tuning', each * len(gaits)) as bar:
         for k, gait in enumerate(gaits):
             begun = k * each
-            one = tuner.tune(gait, evaluations, seed, partial(_onward, bar, begun))
+            try:
+                one = tuner.tune(gait, evaluations, seed, partial(_onward, bar, begun))
+            except NoDesign as error:
+                missing.append(str(error))
+                continue
             steering = None
             if not AIMS[gait].hops:
                 steering = measure(tuner.batch, tuner.program(gait, one.motion),
@@ -217,8 +273,11 @@ def tune(robot: Robot, model: str, gaits: Sequence[str], evaluations: int, seed:
             one = replace(one, motion=replace(one.motion, steering=steering))
             motions[gait] = one.motion
             found.append(one)
+    if not found:
+        raise SimulationError('; '.join(missing))
     # What feedback wants to know, too.
-    return calibrated(replace(robot, motions=motions), model, gaits), found
+    measured = [one.gait for one in found]
+    return calibrated(replace(robot, motions=motions), model, measured), found, missing
 
 
 def _search() -> ModuleType:

@@ -1,44 +1,45 @@
-"""Executable ``cpg``: a running node's parameters and topics, where ROS's own command line is not.
+"""Executable ``cpg``: the package's executables, and a running graph, from one command line.
 
-``cpg set gait walk`` is ``ros2 param set /cpg_generator gait walk``, by the same services; ros2
-comes with ROS and is not on PyPI.
+``cpg param set gait walk`` is ``ros2 param set /cpg_generator gait walk``, by the same services;
+ros2 comes with ROS and is not on PyPI.
 """
 
 import sys
 import time
-from argparse import ArgumentTypeError, Namespace, RawDescriptionHelpFormatter
+from argparse import REMAINDER, ArgumentTypeError, Namespace, RawDescriptionHelpFormatter
 from collections.abc import Sequence
-from importlib import import_module
-from typing import Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
-import rclpy
 import yaml
-from rcl_interfaces.srv import DescribeParameters, GetParameters, ListParameters, SetParameters
-from rclpy.exceptions import NameValidationException
-from rclpy.node import Node
-from rclpy.parameter import Parameter, parameter_value_to_python
-from rclpy.qos import qos_profile_sensor_data
-from rclpy.utilities import try_shutdown
-from std_srvs.srv import SetBool
 
 from cpg_ros.errors import CpgError
+from cpg_ros.tools import completion
 from cpg_ros.tools.arguments import Parser, number, say
+from cpg_ros.tools.executables import PLACES, start
+
+#: How often the graph is asked for new topics while recording, s.
+LOOK = 0.5
+
+if TYPE_CHECKING:
+    from rclpy.node import Node
 
 DESCRIPTION = '''\
-Ask and change a running node: a small stand-in for ros2 param, topic and service.'''
+Run an executable of the package, or ask, change, record and play a running graph: a small stand-in
+for ros2 run, param, topic, service and bag.'''
 EPILOG = '''\
 examples:
-  cpg set gait walk
-  cpg set frequency 2
-  cpg get gait
-  cpg echo joint_states
+  cpg run generator --ros-args -p gait:=walk
+  cpg gait trot
+  cpg param set frequency 2
+  cpg topic hz joint_states
   cpg disable
+  cpg record walk_bag
+  cpg run inversion --bag walk_bag --out fitted.yaml
+
+eval "$(cpg completion)" makes the shell complete all of it, parameters and topics included.
 
 exit codes: 0 done, 1 refused, or nothing answered in time, 2 wrong arguments.'''
-
-
-class Failed(CpgError):
-    """What was asked for was refused, or nobody answered."""
 
 
 def parser() -> Parser:
@@ -50,17 +51,49 @@ def parser() -> Parser:
     made.add_argument('--wait', type=number, default=60.0, metavar='S',
                       help='how long to wait for an answer, s (default: %(default)g)')
     actions = made.add_subparsers(dest='action', required=True, metavar='ACTION')
-    for name, text, words in (('set', 'set a parameter', ('parameter', 'value')),
-                              ('get', 'print a parameter', ('parameter',)),
-                              ('list', 'print all parameters, and what they are', ()),
-                              ('echo', 'print the next message of a topic', ('topic',)),
-                              ('hz', 'count the messages of a topic for 3 s', ('topic',)),
-                              ('enable', 'ramp into the gait', ()),
-                              ('disable', 'ramp down to the stand', ())):
-        action = actions.add_parser(name, help=text, description=text.capitalize() + '.')
-        for word in words:
-            action.add_argument(word, metavar=word.upper(),
-                                type=parameter_value if word == 'value' else str)
+
+    def add(group: Any, name: str, text: str) -> Any:
+        return group.add_parser(name, help=text, description=text.capitalize() + '.')
+
+    run = add(actions, 'run', 'run an executable of the package')
+    run.add_argument('executable', choices=[name for name in PLACES if name != 'cpg'],
+                     metavar='EXECUTABLE')
+    run.add_argument('arguments', nargs=REMAINDER, metavar='...', help='its own arguments')
+    gait = add(actions, 'gait', 'switch the gait')
+    gait.add_argument('gait', metavar='NAME').completer = completion.gaits
+    for name, text in (('enable', 'ramp into the gait'), ('disable', 'ramp down to the stand'),
+                       ('reset', 'put robot_sim back to its start (--node /robot_sim)')):
+        add(actions, name, text)
+
+    parameters = add(actions, 'param', 'a node\'s parameters').add_subparsers(
+        dest='what', required=True, metavar='WHAT')
+    for name, text in (('set', 'set a parameter'), ('get', 'print a parameter')):
+        one = add(parameters, name, text)
+        one.add_argument('parameter', metavar='PARAMETER').completer = completion.parameters
+        if name == 'set':
+            value = one.add_argument('value', metavar='VALUE', type=parameter_value)
+            value.completer = completion.values
+    add(parameters, 'list', 'print all parameters, and what they are')
+
+    topics = add(actions, 'topic', 'a graph\'s topics').add_subparsers(
+        dest='what', required=True, metavar='WHAT')
+    add(topics, 'list', 'print all topics and their types')
+    echo = add(topics, 'echo', 'print the messages of a topic until Ctrl-C')
+    echo.add_argument('--once', action='store_true', help='print the next message only')
+    for one in (echo, add(topics, 'hz', 'count the messages of a topic for 3 s')):
+        one.add_argument('topic', metavar='TOPIC').completer = completion.topics
+
+    record = add(actions, 'record', 'record topics into a bag until Ctrl-C')
+    record.add_argument('bag', type=Path, metavar='BAG', help='folder that is not there yet')
+    recorded = record.add_argument('topics', nargs='*', metavar='TOPIC',
+                                   help='which (default: all that are published)')
+    recorded.completer = completion.topics
+    play = add(actions, 'play', 'publish the messages of a bag')
+    play.add_argument('bag', type=Path, metavar='BAG', help='folder, or one of its files')
+    play.add_argument('topics', nargs='*', metavar='TOPIC', help='which (default: all)')
+    play.add_argument('--rate', type=rate, default=1.0, metavar='R',
+                      help='recorded seconds a second (default: %(default)g)')
+    add(actions, 'completion', 'print what makes bash or zsh complete cpg')
     return made
 
 
@@ -71,6 +104,7 @@ def parameter_value(text: str) -> Any:
         argparse.ArgumentTypeError: it is of no kind that a parameter can be.
 
     """
+    from rclpy.parameter import Parameter
     try:
         value = yaml.safe_load(text)
         Parameter('one', value=value)
@@ -79,106 +113,109 @@ def parameter_value(text: str) -> Any:
     return value
 
 
-class Asker:
-    """Asks a node by its services, and listens to topics."""
+def rate(text: str) -> float:
+    """Read a positive number.
 
-    def __init__(self, chosen: Namespace, node: Node) -> None:
-        self._chosen, self._node = chosen, node
-        self._end = time.monotonic() + chosen.wait
+    Raises:
+        argparse.ArgumentTypeError: it is none.
 
-    def _call(self, kind: Any, service: str, request: Any) -> Any:
-        name = f'{self._chosen.node}/{service}'
-        client = self._node.create_client(kind, name)
-        if not client.wait_for_service(max(self._end - time.monotonic(), 0.0)):
-            raise Failed(f'{self._chosen.node} does not answer (no service {name})')
-        future = client.call_async(request)
-        rclpy.spin_until_future_complete(self._node, future,
-                                         timeout_sec=max(self._end - time.monotonic(), 0.0))
-        if not future.done():
-            raise Failed(f'{name} did not answer within {self._chosen.wait:g} s')
-        return future.result()
+    """
+    if not 0.0 < number(text) < float('inf'):
+        raise ArgumentTypeError(f"'{text}' is not positive")
+    return number(text)
 
-    def do_set(self) -> str:
-        """Set a parameter."""
-        message = Parameter(self._chosen.parameter, value=self._chosen.value).to_parameter_msg()
-        (result,) = self._call(SetParameters, 'set_parameters',
-                               SetParameters.Request(parameters=[message])).results
-        if not result.successful:
-            raise Failed(result.reason)
-        return ''
 
-    def do_get(self) -> str:
-        """Return a parameter's value."""
-        name = self._chosen.parameter
-        (value,) = self._call(GetParameters, 'get_parameters',
-                              GetParameters.Request(names=[name])).values or [None]
-        if value is None or not value.type:
-            raise Failed(f"{self._chosen.node} has no parameter '{name}'")
-        return str(parameter_value_to_python(value))
+def _asked(chosen: Namespace, node: 'Node') -> str:
+    from cpg_ros.tools.running_node import RunningNode
+    other = RunningNode(node, chosen.node, chosen.wait)
+    if chosen.action in ('enable', 'disable'):
+        return other.enable(chosen.action == 'enable')
+    if chosen.action == 'reset':
+        return other.reset()
+    if chosen.action == 'gait':
+        other.set('gait', chosen.gait)
+    elif chosen.what == 'set':
+        other.set(chosen.parameter, chosen.value)
+    elif chosen.what == 'get':
+        return str(other.get(chosen.parameter))
+    else:
+        return '\n'.join(f'{one.name}  {one.description}' for one in other.parameters())
+    return ''
 
-    def do_list(self) -> str:
-        """Return a line for each parameter."""
-        names = sorted(self._call(ListParameters, 'list_parameters',
-                                  ListParameters.Request()).result.names)
-        found = self._call(DescribeParameters, 'describe_parameters',
-                           DescribeParameters.Request(names=names)).descriptors
-        return '\n'.join(f'{one.name}  {one.description}' for one in found)
 
-    def do_enable(self) -> str:
-        """Ramp up; return the answer."""
-        return self._enable(True)
+def _listened(chosen: Namespace, node: 'Node') -> str:
+    from cpg_ros.tools.graph_topics import Topic, shown, topics
+    if chosen.what == 'list':
+        return '\n'.join(f'{name}  {kind}' for name, kind in topics(node).items())
+    topic = Topic(node, chosen.topic, chosen.wait)
+    if chosen.what == 'hz':
+        return f'{topic.rate():.1f} Hz'
+    for message in topic.messages():
+        say(shown(message) + ('' if chosen.once else '\n---'))
+        if chosen.once:
+            break
+    return ''
 
-    def do_disable(self) -> str:
-        """Ramp down; return the answer."""
-        return self._enable(False)
 
-    def _enable(self, up: bool) -> str:
-        answer = self._call(SetBool, 'enable', SetBool.Request(data=up))
-        if not answer.success:
-            raise Failed(answer.message)
-        return str(answer.message)
+def _recorded(chosen: Namespace, node: 'Node') -> str:
+    import rclpy
 
-    def _subscribe(self, heard: list[Any]) -> None:
-        topic = self._node.resolve_topic_name(self._chosen.topic)
-        kinds: list[str] = []
-        while not kinds and time.monotonic() < self._end:
-            rclpy.spin_once(self._node, timeout_sec=0.05)
-            kinds = dict(self._node.get_topic_names_and_types()).get(topic, [])
-        if not kinds:
-            raise Failed(f'nobody publishes on {topic}')
-        package, _, kind = kinds[0].partition('/msg/')
-        self._node.create_subscription(getattr(import_module(f'{package}.msg'), kind), topic,
-                                       heard.append, qos_profile_sensor_data)
+    from cpg_ros.tools.bag_recording import Recorder
+    recorder = Recorder(node, chosen.bag, chosen.topics)
+    try:
+        looked = 0.0
+        while True:
+            if time.monotonic() > looked + LOOK:
+                looked = time.monotonic()
+                for topic in recorder.look():
+                    print(f'recording {topic}', file=sys.stderr, flush=True)
+            rclpy.spin_once(node, timeout_sec=0.05)
+    except KeyboardInterrupt:
+        pass
+    finally:
+        recorder.close()
+    for topic, why in recorder.passed_over.items():
+        print(f'{topic} was not recorded: {why}', file=sys.stderr)
+    count = sum(recorder.counts.values())
+    return f'{chosen.bag}: {count} messages' if count else 'nothing was published: no bag'
 
-    def do_echo(self) -> str:
-        """Return the next message of a topic."""
-        heard: list[Any] = []
-        self._subscribe(heard)
-        while not heard:
-            if time.monotonic() > self._end:
-                raise Failed(f'nothing came on {self._chosen.topic}')
-            rclpy.spin_once(self._node, timeout_sec=0.05)
-        message = heard[0]
-        return '\n'.join(f'{field}: {getattr(message, field)}'
-                         for field in message.get_fields_and_field_types())
 
-    def do_hz(self) -> str:
-        """Return how many messages a second come on a topic."""
-        heard: list[Any] = []
-        self._subscribe(heard)
-        end = time.monotonic() + 3.0
-        while time.monotonic() < end:
-            rclpy.spin_once(self._node, timeout_sec=0.05)
-        return f'{len(heard) / 3.0:.1f} Hz'
+def _played(chosen: Namespace, node: 'Node') -> str:
+    from cpg_ros.tools.bag_playing import play
+    counts = play(node, chosen.bag, chosen.topics, chosen.rate)
+    return '\n'.join(f'{topic}: {count} messages' for topic, count in counts.items())
+
+
+_DOERS = {'param': _asked, 'gait': _asked, 'enable': _asked, 'disable': _asked, 'reset': _asked,
+          'topic': _listened, 'record': _recorded, 'play': _played}
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Do one thing; return the exit code."""
-    chosen = parser().parse_args(arguments)
+    made = parser()
+    completion.complete(made)
+    words = list(sys.argv[1:] if arguments is None else arguments)
+    if words and words[0] in PLACES and words[0] != 'cpg':
+        words.insert(0, 'run')
+    chosen = made.parse_args(words)
+    if chosen.action == 'completion':
+        try:
+            say(completion.shell_code())
+        except CpgError as error:
+            print(f'cpg: {error}', file=sys.stderr)
+            return 1
+        return 0
+    if chosen.action == 'run':
+        sys.argv = [chosen.executable, *chosen.arguments]
+        return start(chosen.executable)
+    import rclpy
+    from rclpy.exceptions import NameValidationException
+    from rclpy.signals import SignalHandlerOptions
+    from rclpy.utilities import try_shutdown
     try:
-        rclpy.init(args=[])
-        told = getattr(Asker(chosen, rclpy.create_node('cpg', enable_rosout=False)),
-                       f'do_{chosen.action}')()
+        # The context stays valid while a signal ends what goes on.
+        rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
+        told = _DOERS[chosen.action](chosen, rclpy.create_node('cpg', enable_rosout=False))
     except CpgError as error:
         print(f'cpg: {error}', file=sys.stderr)
         return 1

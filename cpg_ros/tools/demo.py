@@ -6,12 +6,14 @@ generator's parameter ``gait``, by itself or as typed. A film and a footfall dia
 
 import queue
 import signal
+import socket
 import subprocess
 import sys
 import threading
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
+from importlib.util import find_spec
 from pathlib import Path
 
 import rclpy
@@ -22,6 +24,7 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import try_shutdown
+from std_msgs.msg import String
 
 from cpg_ros.errors import CpgError
 from cpg_ros.tools import demo_course
@@ -30,6 +33,8 @@ from cpg_ros.tools.arguments import Parser, say
 TOUR = ('trot', 'walk', 'pace', 'bound', 'jump', 'pronk', 'trot')
 #: A node must answer within this time, s: the very first start compiles for 20 s.
 PATIENCE = 120.0
+#: Where the page is, if the port is free.
+PORT = 8080
 #: The generator and the body are in step at this rate, Hz.
 RATE = 500
 
@@ -39,19 +44,30 @@ class DemoError(CpgError):
 
 
 class Operator(Node):
-    """Sets the gait of the generator and knows where the robot is, and its time in s."""
+    """Sets the gait of the generator and knows where the robot is, and its time in s.
 
-    def __init__(self) -> None:
+    Attributes:
+        taken_over: whether somebody else has set another gait.
+
+    """
+
+    def __init__(self, gait: str) -> None:
         super().__init__('cpg_demo')
         self.place: tuple[float, float] | None = None
         self.time = 0.0
         self._client = self.create_client(SetParametersAtomically,
                                           'cpg_generator/set_parameters_atomically')
+        self._asked, self.taken_over = gait, False
         self.create_subscription(Odometry, 'odom', self._odom, 1)
+        self.create_subscription(String, 'cpg_generator/gait', self._gait, 10)
 
     def _odom(self, message: Odometry) -> None:
         self.place = message.pose.pose.position.x, message.pose.pose.position.y
         self.time = message.header.stamp.sec + 1e-9 * message.header.stamp.nanosec
+
+    def _gait(self, message: String) -> None:
+        # Who chooses a gait on the page, or by a parameter, has ended the tour.
+        self.taken_over |= message.data != self._asked
 
     def alone(self) -> None:
         """Go on if these are the only robot and the only generator.
@@ -72,6 +88,7 @@ class Operator(Node):
             DemoError: the generator does not answer.
 
         """
+        self._asked = gait
         request = SetParametersAtomically.Request(
             parameters=[Parameter('gait', value=gait).to_parameter_msg()])
         answer = self._client.call_async(request)
@@ -100,6 +117,17 @@ def running(*arguments: str) -> Iterator[subprocess.Popen]:
     finally:
         process.terminate()
         process.wait()
+
+
+def free_port() -> int:
+    """Return the usual port, or another one where that is taken."""
+    for port in (PORT, 0):
+        try:
+            with socket.create_server(('127.0.0.1', port)) as one:
+                return int(one.getsockname()[1])
+        except OSError:
+            continue
+    return PORT
 
 
 class Interruption:
@@ -158,7 +186,7 @@ def typed() -> queue.Queue:
 
 def guide(operator: Operator, gaits: Sequence[str], every: float,
           interruption: Interruption) -> None:
-    """Take the robot through the gaits; from the first line that is typed on, as typed.
+    """Take the robot through the gaits, until a line is typed or a gait chosen elsewhere.
 
     Where what is typed ends, as in ``echo walk | demo``, the last gait has its time, too.
 
@@ -180,6 +208,8 @@ def guide(operator: Operator, gaits: Sequence[str], every: float,
         interruption.look()
         operator.alone()
         wanted = None
+        if operator.taken_over:
+            tour, due = [], None
         if not lines.empty():
             wanted = lines.get()
             if wanted == 'q':
@@ -221,6 +251,7 @@ def parser() -> Parser:
                       help='seconds of simulated time for each (default: 6)')
     made.add_argument('--out', type=Path, default=Path('out'), metavar='DIR',
                       help='where go2.gif and footfalls.png are left (default: out)')
+    made.add_argument('--no-panel', action='store_true', help='no page in the browser')
     made.add_argument('--no-film', action='store_true', help='leave the diagram only')
     return made
 
@@ -244,15 +275,23 @@ def main(arguments: Sequence[str] | None = None) -> int:
                  '-p', f'rate:={RATE}.0', '-p', 'combined_topic:=""', '-p', 'use_sim_time:=true']
     if chosen.course:
         body, generator = [*body, *demo_course.GROUND], [*generator, *demo_course.GENERATOR]
+    port = free_port()
+    page = not chosen.no_panel and find_spec('websockets')
     interruption = Interruption()
     nodes = interruption.nodes
     try:
         rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
-        operator = Operator()
+        operator = Operator(chosen.gaits[0])
         with ExitStack() as stack:
             for node in (body, generator):
                 nodes.append(stack.enter_context(running(*node)))
+            if page:
+                # The robot walks on without it.
+                stack.enter_context(running('panel', '-p', f'port:={port}', '-p',
+                                            f'recordings:={chosen.out}'))
             wait_for(operator, interruption)
+            if page:
+                say(f'watch and drive it in a browser: http://127.0.0.1:{port}/')
             if chosen.course:
                 demo_course.Runner(operator).run(interruption.look)
             else:

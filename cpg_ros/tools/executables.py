@@ -8,12 +8,14 @@ from importlib import import_module
 from types import FrameType
 
 #: Executable -> module whose ``main`` it runs.
-PLACES = {'generator': 'nodes.generator', 'robot_sim': 'nodes.robot_sim', **{
+PLACES = {'generator': 'nodes.generator', 'robot_sim': 'nodes.robot_sim',
+          'unitree_bridge': 'nodes.unitree.bridge', 'panel': 'panel.panel_node', **{
     name: f'tools.{name}' for name in ('inversion', 'cpg', 'demo', 'analyze', 'check_robot',
                                        'optimize', 'reproduce', 'tune', 'calibrate')}}
 
 
-def _run(name: str) -> int:
+def start(name: str) -> int:
+    """Run an executable on the words of the command line; return its exit code."""
     def leave(number: int, _: FrameType | None) -> None:
         # An exception amid the loading of compiled code would become another error there.
         print(f'{name}: stopped', file=sys.stderr, flush=True)
@@ -25,5 +27,5 @@ def _run(name: str) -> int:
     return main()
 
 
-(generator, robot_sim, inversion, cpg, demo, analyze, check_robot, optimize, reproduce, tune,
- calibrate) = (partial(_run, name) for name in PLACES)
+(generator, robot_sim, unitree_bridge, panel, inversion, cpg, demo, analyze, check_robot,
+ optimize, reproduce, tune, calibrate) = (partial(start, name) for name in PLACES)

@@ -12,19 +12,22 @@ from pathlib import Path
 
 from cpg_ros.errors import CpgError
 from cpg_ros.files.plain_text import table
-from cpg_ros.robots.robot_file import find_robot, write_robot
+from cpg_ros.robots.robot import Robot
+from cpg_ros.robots.robot_file import LIMITS, find_robot, write_robot
 from cpg_ros.simulation.gait_design import AIMS
 from cpg_ros.simulation.robot_model import SimulationError
-from cpg_ros.simulation.tuning import LONG, Tuned, tune
-from cpg_ros.tools.arguments import Parser, say, twice
+from cpg_ros.simulation.tuning import GOOD, LONG, Tuned, tune
+from cpg_ros.tools.arguments import Parser, number, say, twice
 
 DESCRIPTION = '''\
 Tune a robot's gaits in simulation: foot paths of a few lengths and times, turned into the joints'
 readout by inverse kinematics, chosen by CMA-ES over runs on good and slippery floors, with more
 and less load and with pushes. Then measure how fast each gait goes and turns with shorter strides,
 which is what cmd_vel asks for.'''
-EPILOG = '''\
-exit codes: 0 written, 1 a gait cannot be had, 2 wrong arguments, 130 stopped (nothing written).'''
+EPILOG = f'''\
+exit codes: 0 written, 1 no gait is good (written if any can be had), 2 wrong arguments, 130
+stopped (nothing written). A gait is good if the robot stays upright and reaches {100 * GOOD:g} %
+of the speed aimed at.'''
 
 
 def _parser() -> Parser:
@@ -42,6 +45,12 @@ def _parser() -> Parser:
                         help='designs that are tried for each gait (default: %(default)s)')
     parser.add_argument('--seed', type=int, default=0, metavar='N',
                         help='the same seed finds the same (default: %(default)s)')
+    parser.add_argument('--kp', type=number, metavar='NM', help='proportional gain of the joints, '
+                        "N m/rad (default: a Go2's, for the robot's mass)")
+    parser.add_argument('--kd', type=number, metavar='NMS', help='damping gain of the joints, '
+                        'N m s/rad (default: the same)')
+    parser.add_argument('--jobs', type=int, default=0, metavar='N',
+                        help='cores for the physics (default: all)')
     parser.add_argument('--out', type=Path, required=True, metavar='FILE',
                         help='the robot file to write')
     return parser
@@ -51,14 +60,26 @@ def figures(tuned: Sequence[Tuned]) -> list[str]:
     """Return a table of what was found, in lines."""
     rows: list[tuple[str, ...]] = [
         ('gait', 'distance [m]', 'heading [deg]', 'speed [m/s]', 'Hz', 'duty', 'hops',
-         'lift [cm]', 'pitch [deg]', 'cost of transport', 'slip')]
+         'lift [cm]', 'pitch [deg]', 'cost of transport', 'slip', 'verdict')]
     for one in tuned:
         trial = one.trial
         rows.append((one.gait, f'{trial.distance:.2f}', f'{trial.heading:+.1f}',
                      f'{trial.speed:.2f}', f'{one.motion.frequency:.2f}', f'{trial.duty:.2f}',
                      str(trial.hops), f'{100.0 * trial.lift:.1f}', f'{trial.pitch:.1f}',
-                     f'{trial.cost:.2f}', f'{trial.slip:.2f}'))
-    return table(rows, '<>>>>>>>>>>')
+                     f'{trial.cost:.2f}', f'{trial.slip:.2f}', one.verdict))
+    return table(rows, '<>>>>>>>>>><')
+
+
+def invented(robot: Robot) -> list[str]:
+    """Return a line for each kind of limit that is a guess, with its joints."""
+    lines = []
+    for key in LIMITS:
+        joints = [joint for joint in robot.joints if key in joint.invented]
+        if joints:
+            values = sorted({f'{getattr(joint, key):g}' for joint in joints})
+            lines.append(f'limits that the URDF does not have, invented: {key} '
+                         f'{" and ".join(values)} of {", ".join(j.name for j in joints)}')
+    return lines
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -68,6 +89,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     chosen = parser.parse_args(arguments)
     if chosen.evaluations < 1:
         parser.error(f'argument --evaluations: {chosen.evaluations} is not positive')
+    for option, value in (('kp', chosen.kp), ('kd', chosen.kd)):
+        if value is not None and not 0.0 < value <= 1e5:
+            parser.error(f'argument --{option}: {value:g} is not above 0 and up to 100000')
+    if chosen.jobs < 0:
+        parser.error(f'argument --jobs: {chosen.jobs} is negative')
     if name := twice(chosen.gaits):
         parser.error(f'argument --gaits: {name} is given twice')
     try:
@@ -77,8 +103,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
             parser.error(f'argument --out: there is no directory {chosen.out.parent}')
         if chosen.out.is_dir():
             parser.error(f'argument --out: {chosen.out} is a directory')
-        robot, found = tune(robot, chosen.model, chosen.gaits, chosen.evaluations, chosen.seed)
-        lines = figures(found)
+        robot, found, missing = tune(
+            robot, chosen.model, chosen.gaits, chosen.evaluations, chosen.seed, kp=chosen.kp,
+            kd=chosen.kd, threads=chosen.jobs, say=_note)
+        lines = [*figures(found), *missing, *invented(robot)]
         command = shlex.join(['ros2', 'run', 'cpg_ros', 'tune', *arguments])
         write_robot(chosen.out, robot, '\n'.join([
             f'Gaits made by: {command}',
@@ -94,7 +122,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return 130
     say('\n'.join([f'{LONG:g} s from the stand in simulation:', *lines,
                    f'written: {chosen.out}']))
+    if not any(one.good for one in found):
+        print('tune: no gait is good', file=sys.stderr)
+        return 1
     return 0
+
+
+def _note(line: str) -> None:
+    print(f'tune: {line}', file=sys.stderr)
 
 
 if __name__ == '__main__':

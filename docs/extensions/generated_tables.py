@@ -22,6 +22,8 @@ from cpg_ros.dynamics.orbit import solve_preset
 from cpg_ros.networks.registry import SHIPPED
 from cpg_ros.nodes import feedback_parameters, generator_parameters, inversion_node, robot_sim
 from cpg_ros.nodes.parameter_spec import Spec
+from cpg_ros.nodes.unitree import parameters as unitree_parameters
+from cpg_ros.panel import panel_node
 from cpg_ros.robots.robot_file import find_robot
 
 
@@ -46,8 +48,11 @@ def parameter_rows(specs: dict[str, Spec], defaults: bool = True) -> list[list[s
     rows = []
     for name, spec in specs.items():
         span = '' if spec.low is None else f'{spec.low:g} to {spec.high:g}'
-        kind = {'str': 'string', 'float': 'double', 'list': 'string[]'}.get(
-            type(spec.default).__name__, type(spec.default).__name__)
+        kind = type(spec.default).__name__
+        kind = {'str': 'string', 'float': 'double', 'int': 'integer'}.get(kind, kind)
+        if isinstance(spec.default, list):
+            first = type(spec.default[0]) if spec.default else str
+            kind = {float: 'double[]', int: 'integer[]', str: 'string[]'}[first]
         default = str(spec.default).lower() if isinstance(spec.default, bool) else spec.default
         text = spec.text + (f' ({spec.constraints})' if spec.constraints else '')
         rows.append([code(name), kind + (', read-only' if spec.read_only else ''),
@@ -58,12 +63,17 @@ def parameter_rows(specs: dict[str, Spec], defaults: bool = True) -> list[list[s
 HEAD = ('parameter', 'type', 'default', 'range', 'what')
 
 
+#: Nodes whose parameters are read-only.
+FIXED = {'robot_sim': robot_sim.SPECS, 'unitree_bridge': unitree_parameters.SPECS}
+
+
 def parameters(what: str) -> str:
     """Return the parameters of a node, or those of a network in the generator."""
-    if what == 'robot_sim':
-        fixed = {name: Spec(one.default, one.text, one.low, one.high, True, one.constraints)
-                 for name, one in robot_sim.SPECS.items()}
-        return table(HEAD, parameter_rows(fixed))
+    if what in FIXED:
+        return table(HEAD, parameter_rows({name: one.fixed()
+                                           for name, one in FIXED[what].items()}))
+    if what == 'panel':
+        return table(HEAD, parameter_rows(panel_node.SPECS))
     if what == 'feedback':
         return table(HEAD, parameter_rows(feedback_parameters.TOPICS))
     if what == 'feedback_gains':

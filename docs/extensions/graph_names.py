@@ -1,6 +1,7 @@
 """Topics and services of the nodes, asked of the nodes themselves."""
 
 import os
+import time
 from collections.abc import Callable, Iterator
 from typing import Any
 
@@ -10,6 +11,7 @@ from cpg_ros.nodes.generator import Generator
 from cpg_ros.nodes.inversion_node import Inversion
 from cpg_ros.nodes.node_base import StartedNode
 from cpg_ros.nodes.robot_sim import RobotSim
+from cpg_ros.nodes.unitree.bridge import UnitreeBridge
 
 #: Node -> what makes one, and the parameters under which it has all of its topics.
 KINDS: dict[str, tuple[Callable[[], StartedNode], tuple[dict[str, str], ...]]] = {
@@ -20,7 +22,11 @@ KINDS: dict[str, tuple[Callable[[], StartedNode], tuple[dict[str, str], ...]]] =
         {'robot': 'unitree_go2', 'feedback': 'true', 'combined_topic': '""'})),
     'robot_sim': (RobotSim, ({'clock': 'true'}, {'command': 'joint_trajectory'},
                              {'command': 'forward_position'})),
+    'unitree_bridge': (UnitreeBridge, ({}, {'command': 'joint_trajectory'},
+                                       {'command': 'forward_position'})),
     'inversion': (Inversion, ({},))}
+#: Topics whose names are the same in every namespace.
+ABSOLUTE = ('/diagnostics', '/clock', '/tf', '/lowcmd', '/lowstate')
 #: Every node of ROS has these.
 COMMON = ('/rosout', '/parameter_events', 'parameters', 'parameter_types',
           'parameters_atomically', 'get_type_description')
@@ -36,12 +42,21 @@ def of(kind: str) -> dict[str, tuple[str, str]]:
         os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
         rclpy.init(args=['--ros-args', *words, '--log-level', 'ERROR'], domain_id=231)
         try:
-            for name, (direction, type_) in _names(make()):
+            for name, (direction, type_) in _settled(make()):
                 before = found.get(name, (direction, type_))[0]
                 both = before if direction in before else f'{before}, {direction}'
                 found[name] = both, type_
         finally:
             rclpy.shutdown()
+    return found
+
+
+def _settled(node: Any) -> list[tuple[str, tuple[str, str]]]:
+    """Return what the node has, once the graph has heard of all of it."""
+    found: list[tuple[str, tuple[str, str]]] = []
+    while (now := sorted(_names(node))) != found or not found:
+        found = now
+        time.sleep(0.3)
     return found
 
 
@@ -55,5 +70,5 @@ def _names(node: Any) -> Iterator[tuple[str, tuple[str, str]]]:
             if name.endswith(COMMON):
                 continue
             plain = name.replace(f'/{own}/', '~/') if name.startswith(f'/{own}/') else (
-                name if name in ('/diagnostics', '/clock', '/tf') else name.lstrip('/'))
+                name if name in ABSOLUTE else name.lstrip('/'))
             yield plain, (direction, kinds[0].replace('/msg/', '/').replace('/srv/', '/'))

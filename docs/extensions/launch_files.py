@@ -20,4 +20,5 @@ def arguments(name: str) -> dict[str, tuple[str, str]]:
                                     'the shipped one', ast.literal_eval(text))
     if name == 'rviz':
         found = {**arguments('generator'), **found}
-    return {**found, 'namespace': ('', 'namespace of all its topics')}
+    return {**found, 'namespace': ('', 'namespace of all its topics'),
+            'panel': ('false', 'show it in a browser, at http://127.0.0.1:8080/')}

@@ -97,19 +97,20 @@ class Variation:
         nearby = values[elements[:, None] * degree + np.arange(degree + 1)]
         return np.einsum('mk,mkds->mds', rows, nearby).reshape(size, size)
 
-    def transverse(self, gain: float) -> np.ndarray:
-        """Return the multipliers transverse to the gait's class under a symmetry lock."""
-        return np.concatenate([np.zeros(0), *(np.linalg.eigvals(self.monodromy(columns, gain))
-                                              for columns in self.outside)])
+    def transverse(self, gain: float) -> tuple[np.ndarray, ...]:
+        """Return the multipliers of each subspace transverse to the class, with a lock."""
+        return tuple(np.linalg.eigvals(self.monodromy(columns, gain)) for columns in self.outside)
 
 
-def within(orbit: FourierOrbit) -> np.ndarray:
-    """Return the multipliers within the gait's class, 1 among them."""
-    return variation(orbit)[1]
+def within(orbit: FourierOrbit) -> tuple[np.ndarray, complex]:
+    """Return the multipliers within the gait's class but the trivial one, and that."""
+    found = variation(orbit)[1]
+    place = int(np.abs(found - 1.0).argmin())
+    return np.delete(found, place), complex(found[place])
 
 
-def transverse(orbit: FourierOrbit, gain: float = 0.0) -> np.ndarray:
-    """Return the multipliers transverse to the gait's class, with a symmetry lock."""
+def transverse(orbit: FourierOrbit, gain: float = 0.0) -> tuple[np.ndarray, ...]:
+    """Return the multipliers of each subspace transverse to the class, with a symmetry lock."""
     return variation(orbit)[0].transverse(gain)
 
 

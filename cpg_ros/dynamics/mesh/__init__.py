@@ -1,3 +1,4 @@
 """Periodic orbits as polynomials on a mesh: for networks without delay."""
 
-__all__ = ['collocation', 'curve', 'floquet', 'newton', 'orbit', 'solve']
+__all__ = ['collocation', 'curve', 'elimination', 'floquet', 'newton', 'orbit',
+           'periodic_schur', 'solve']

@@ -10,6 +10,8 @@ from numpy.polynomial import legendre, polynomial
 
 #: Nodes of an interval.
 S = 8
+#: Least density of a mesh, over the mean.
+FLOOR = 0.2
 
 _X, _W = legendre.leggauss(S)
 #: Places of the nodes in an interval [0, 1], weights, and the integration matrix A.
@@ -64,8 +66,9 @@ def spread(mesh: np.ndarray, density: np.ndarray, n: int) -> np.ndarray:
         n: intervals of the new mesh.
 
     """
-    # A floor, and neighbours smoothed: no interval may be far longer than the next one.
-    density = np.maximum(density, 0.02 * density.max())
+    # A floor, and neighbours smoothed: no interval may be far longer than the next one. The floor
+    # is a share of the mean, so that a long rest before a short jump takes few of the intervals.
+    density = np.maximum(density, FLOOR * (density * np.diff(mesh)).sum())
     for _ in range(2):
         padded = np.concatenate([density[-1:], density, density[:1]])
         density = np.maximum(density, 0.5 * np.maximum(padded[:-2], padded[2:]))

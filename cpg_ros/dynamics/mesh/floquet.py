@@ -4,6 +4,10 @@ A gait lies in Fix(K), K its spatial symmetries. Along it the linearised flow ke
 orthogonal complement apart, so the multipliers split: those within the class, 1 among them, and
 those transverse to it. The symmetry lock -g (I - P) x adds -g on the complement and nothing else:
 it multiplies the transverse multipliers by exp(-g T) exactly.
+
+The multiplier 1 belongs to the direction of the flow, which is known. The others of the class are
+those of what is left across it, so that none of them is mixed up with it at a fold, where it is
+double.
 """
 
 from functools import lru_cache
@@ -11,51 +15,84 @@ from functools import lru_cache
 import numpy as np
 
 from cpg_ros.dynamics.isotypic_split import split
-from cpg_ros.dynamics.mesh.newton import Reduced, summed, transfer
+from cpg_ros.dynamics.mesh.elimination import summed, transfer
+from cpg_ros.dynamics.mesh.newton import Reduced
 from cpg_ros.dynamics.mesh.orbit import MeshOrbit
+from cpg_ros.dynamics.mesh.periodic_schur import eigenvalues
 
 
-def within(orbit: MeshOrbit) -> np.ndarray:
-    """Return the multipliers within the gait's class, 1 among them."""
-    return multipliers(orbit)[0]
+def within(orbit: MeshOrbit) -> tuple[np.ndarray, complex]:
+    """Return the multipliers within the gait's class but the trivial one, and that."""
+    found, _, trivial = multipliers(orbit)
+    return found, complex(trivial)
 
 
-def transverse(orbit: MeshOrbit, gain: float = 0.0) -> np.ndarray:
-    """Return the multipliers transverse to the gait's class, with a symmetry lock."""
-    found: np.ndarray = multipliers(orbit)[1] * np.exp(-gain * orbit.period)
-    return found
+def transverse(orbit: MeshOrbit, gain: float = 0.0) -> tuple[np.ndarray, ...]:
+    """Return the multipliers of each subspace transverse to the class, with a symmetry lock."""
+    return tuple(part * np.exp(-gain * orbit.period) for part in multipliers(orbit)[1])
 
 
 @lru_cache(maxsize=4)
-def multipliers(orbit: MeshOrbit) -> tuple[np.ndarray, np.ndarray]:
-    """Return the multipliers within the class and transverse to it, without a lock.
+def multipliers(orbit: MeshOrbit) -> tuple[np.ndarray, tuple[np.ndarray, ...], float]:
+    """Return the multipliers within the class, transverse to it, and the trivial one, no lock.
 
     They come from the variational equation, by the orbit's own collocation.
     """
-    symmetry, network = orbit.symmetry, orbit.network
-    states = orbit.stages[..., Reduced(network, symmetry).place]
-    jacobians = network.jacobian(states)
-    lengths = np.diff(orbit.mesh) * orbit.period / symmetry.order
-    blocks = np.arange(network.variables)[:, None] * network.cells
-    turn = np.eye(network.components)[(symmetry.turn + blocks).ravel()]
-    found = []
-    inside, outside = split(symmetry)
-    for columns in (inside, *outside):
-        step = _propagated(columns.T @ jacobians @ columns, lengths)
-        # After T/m the cells have changed places; m of these make a period. After m changes a
-        # cell is another one of its class, which only matters outside Fix(K).
-        change, m = columns.T @ turn @ columns, symmetry.order
-        found.append(np.linalg.eigvals(np.linalg.matrix_power(change, m)
-                                       @ np.linalg.matrix_power(change.T @ step, m)))
-    return found[0], np.concatenate([np.zeros(0, dtype=complex), *found[1:]])
+    m, (inside, outside) = orbit.symmetry.order, split(orbit.symmetry)
+    linear = Flow(orbit)
+    steps, change = linear.on(inside)
+    network = Reduced(orbit.network, orbit.symmetry)
+    points = np.vstack([orbit.coefficients[0], orbit.coefficients[:, -1].sum(axis=0)])
+    rates = network.rates(points)[:, network.place] @ inside
+    sizes = np.linalg.norm(rates, axis=1)
+    along = rates / sizes[:, None]
+    # What is left of the way along the flow: 1, but for what collocation makes wrong.
+    kept = np.einsum('ni,nij,nj->n', along[1:], steps, along[:-1]) * sizes[:-1] / sizes[1:]
+    across = _across(along)
+    inner = across[1:].transpose(0, 2, 1) @ steps @ across[:-1]
+    back = across[0].T @ change.T @ across[-1]
+    # After T/m the cells have changed places; m of these make a period.
+    found = eigenvalues(np.concatenate([inner, back[None]] * m))
+    others = []
+    for columns in outside:
+        steps, change = linear.on(columns)
+        # After m changes a cell is another one of its class.
+        again = np.linalg.matrix_power(change, m)
+        others.append(eigenvalues(np.concatenate([*[steps, change.T[None]] * m, again[None]])))
+    return found, tuple(others), float(np.prod(kept)**m)
 
 
-def _propagated(jacobians: np.ndarray, lengths: np.ndarray) -> np.ndarray:
-    """Solution of the linear equation over all intervals, shape (d, d)."""
-    d = jacobians.shape[-1]
-    answers = transfer(jacobians, lengths, np.zeros((*jacobians.shape[:3], 0)))
-    steps = np.eye(d) + summed(jacobians, lengths, answers)
-    whole = np.eye(d)
-    for step in steps:
-        whole = step @ whole
-    return whole
+class Flow:
+    """The linearised flow along an orbit, over T/m."""
+
+    def __init__(self, orbit: MeshOrbit) -> None:
+        """Linearise about an orbit."""
+        symmetry, network = orbit.symmetry, orbit.network
+        place = Reduced(network, symmetry).place
+        self._jacobians = network.jacobian(orbit.stages[..., place])
+        self._lengths = np.diff(orbit.mesh) * orbit.period / symmetry.order
+        self._turn = (symmetry.turn
+                      + np.arange(network.variables)[:, None] * network.cells).ravel()
+
+    def on(self, columns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return the flow over each interval, and how cells change places after T/m.
+
+        Args:
+            columns: orthonormal, of a subspace that the flow keeps, shape (components, d).
+
+        Returns:
+            Matrices of the intervals, shape (n, d, d), and x -> x[turn], shape (d, d).
+
+        """
+        jacobians = columns.T @ (self._jacobians @ columns)
+        answers = transfer(jacobians, self._lengths, np.zeros((*jacobians.shape[:3], 0)))
+        steps = np.eye(columns.shape[1]) + summed(jacobians, self._lengths, answers)
+        return steps, columns.T @ columns[self._turn]
+
+
+def _across(along: np.ndarray) -> np.ndarray:
+    """Orthonormal columns that are normal to unit vectors, by reflection, (n, d, d - 1)."""
+    mirror = along.copy()
+    mirror[:, 0] += np.where(along[:, 0] < 0.0, -1.0, 1.0)
+    mirror /= np.linalg.norm(mirror, axis=1)[:, None]
+    return (np.eye(along.shape[1]) - 2.0 * mirror[:, :, None] * mirror[:, None, :])[:, :, 1:]

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.polynomial import polynomial
 
 from cpg_ros.dynamics.mesh import collocation
+from cpg_ros.dynamics.mesh.elimination import chained, summed, transfer
 from cpg_ros.dynamics.mesh.orbit import MeshOrbit
 from cpg_ros.dynamics.periodic import NoOrbit
 from cpg_ros.networks.field import Field
@@ -58,38 +59,6 @@ class Solution:
     length: float
 
 
-def transfer(jacobians: np.ndarray, lengths: np.ndarray, sources: np.ndarray) -> np.ndarray:
-    """Solve the linear problem of every interval: ``dY = 1 dy + L h A J dY + g``.
-
-    Args:
-        jacobians: of the rates at the nodes, shape (n, S, d, d).
-        lengths: of the intervals in model time, shape (n,).
-        sources: g at the nodes for k right-hand sides, shape (n, S, d, k).
-
-    Returns:
-        Nodes' answer to dy, then to the sources, shape (n, S, d, d + k).
-
-    """
-    n, s, d = jacobians.shape[:3]
-    matrix = np.empty((n, s, d, s, d))
-    np.multiply(-collocation.A[:, None, :, None],
-                (lengths[:, None, None, None] * jacobians).transpose(0, 2, 1, 3)[:, None],
-                out=matrix)
-    whole = matrix.reshape(n, s * d, s * d)
-    whole[:, np.arange(s * d), np.arange(s * d)] += 1.0
-    right = np.empty((n, s, d, d + sources.shape[-1]))
-    right[..., :d], right[..., d:] = np.eye(d), sources
-    return np.linalg.solve(whole, right.reshape(n, s * d, -1)).reshape(right.shape)
-
-
-def summed(jacobians: np.ndarray, lengths: np.ndarray, answers: np.ndarray) -> np.ndarray:
-    """Integrate ``J dY`` over every interval, dY the answers at the nodes, (n, d, k)."""
-    n, s, d = jacobians.shape[:3]
-    weighted = lengths[:, None, None, None] * collocation.WEIGHTS[:, None] * jacobians.transpose(
-        0, 2, 1, 3)
-    return weighted.reshape(n, d, s * d) @ answers.reshape(n, s * d, -1)
-
-
 def linearised(reduced: Reduced, now: Solution, extra: np.ndarray | None = None
                ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Linearise: return increments at mesh points as functions of (dy0, dL, extras).
@@ -115,12 +84,7 @@ def linearised(reduced: Reduced, now: Solution, extra: np.ndarray | None = None
     steps = summed(jacobians, step, answers)
     steps[..., :d] += np.eye(d)
     steps[..., d:] += np.concatenate(ends, axis=-1)
-    reached = np.zeros((h.size + 1, d, steps.shape[-1]))
-    reached[0, :, :d] = np.eye(d)
-    for k, (phi, rest) in enumerate(zip(steps[..., :d], steps[..., d:], strict=True)):
-        ahead = reached[k + 1]
-        np.matmul(phi, reached[k], out=ahead)
-        ahead[:, d:] += rest
+    reached = chained(steps)
     return reached[..., :d], reached[..., d:], answers[..., :d], answers[..., d:]
 
 

@@ -1,8 +1,8 @@
 """Finding the orbit of a gait of a network without delay, from the nearest one known.
 
 From the given start Newton's method is tried at once; failing that, the network is left to find
-its gait by itself, held in its symmetry; failing that, the orbit is followed from the known
-parameters to the wanted ones, which also tells how far it exists.
+its gait by itself, held in its symmetry, from there and from many other states; failing that, the
+orbit is followed from the known parameters to the wanted ones, which also tells how far it exists.
 """
 
 from collections.abc import Callable
@@ -11,6 +11,7 @@ from functools import lru_cache
 
 import numpy as np
 
+from cpg_ros.dynamics.equilibrium import NoEquilibrium
 from cpg_ros.dynamics.mesh.newton import collocate as from_path
 from cpg_ros.dynamics.mesh.newton import predicted
 from cpg_ros.dynamics.mesh.orbit import MeshOrbit
@@ -50,12 +51,21 @@ def from_preset(preset: Preset) -> MeshOrbit:
 
 
 def _sought(network: Network, gait: str) -> MeshOrbit:
+    orbit = _settled(network, gait)
+    if orbit is None:
+        raise NoOrbit(f'no {gait} at these parameters was found from any state about the '
+                      'equilibrium')
+    return orbit
+
+
+def _settled(network: Network, gait: str) -> MeshOrbit | None:
+    """What the network settles on from many states of the gait's class."""
     symmetry = network.symmetry(gait)
-    for path, period in sought(network, gait):
-        orbit = _accepted(from_path(network, symmetry, path, period))
-        if orbit is not None:
-            return orbit
-    raise NoOrbit(f'no {gait} at these parameters was found from any wave about the equilibrium')
+    try:
+        found = (_accepted(from_path(network, symmetry, *one)) for one in sought(network, gait))
+        return next((orbit for orbit in found if orbit is not None), None)
+    except NoEquilibrium:
+        return None
 
 
 def _by_itself(network: Network, symmetry: Symmetry, start: np.ndarray, period: float
@@ -132,7 +142,7 @@ def solve(network: Network, gait: str, near: MeshOrbit | None = None) -> MeshOrb
         if near.symmetry != symmetry and near.symmetry.h == symmetry.h:
             # A wave that runs the other way: the same signals with other phases.
             start = _states(near, symmetry)
-        orbit = _by_itself(network, symmetry, start, near.period)
+        orbit = _by_itself(network, symmetry, start, near.period) or _settled(network, gait)
     if orbit is not None:
         return orbit
     if near.symmetry == symmetry:

@@ -1,0 +1,66 @@
+"""Every fault of the bridge's table many times against a stand-in robot: when it damps.
+
+usage: bench_unitree_faults.py [--times 20] [--patient]
+"""
+
+import argparse
+import sys
+
+import numpy as np
+from common import ROOT, emit, log
+from processes import enter_workspace
+
+sys.path.append(str(ROOT / 'test'))
+
+
+def main() -> None:
+    """Walk, break something, see what happens, mend it; as often as asked."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument('--times', type=int, default=20)
+    parser.add_argument('--only', default='')
+    parser.add_argument('--patient', action='store_true', help='time limits for a busy machine')
+    given = parser.parse_args()
+    enter_workspace()
+    from unitree_faults import FAULTS, Walk, inflict, mend
+    limits = ('state_timeout:=0.2', 'target_timeout:=0.3') if given.patient else ()
+    found = {}
+    for fault, (within, sitting) in FAULTS.items():
+        if given.only and given.only not in fault.__name__:
+            continue
+        rows, failures, restarts, walk = [], [], 0, None
+        while len(rows) + len(failures) < given.times and restarts < given.times:
+            if walk is None:
+                walk = Walk(*limits)
+            try:
+                walk.walking()
+            except AssertionError as error:
+                # The machine made it damp before there was a fault.
+                log(str(error).splitlines()[-1][-200:])
+                restarts += 1
+                walk.end()
+                walk = None
+                continue
+            try:
+                damped, sat, torque, step = inflict(walk, fault)
+                rows.append((damped, sat[0] if sat else np.nan, torque, step,
+                             bool(sat) == (sitting is not None)))
+            except AssertionError as error:
+                failures.append(str(error)[-300:])
+            mend(walk)
+        if walk is not None:
+            walk.end()
+        table = np.array(rows, dtype=float).reshape(-1, 5)
+        found[fault.__name__] = {
+            'times': len(rows), 'failed': len(failures), 'as promised': int(table[:, 4].sum()),
+            'within': within, 'in time': int((table[:, 0] <= within).sum()),
+            'damped_s': [*map(float, np.percentile(table[:, 0], (50, 100)))] if rows else [],
+            'sat_s': [float(np.nanmedian(table[:, 1])), float(np.nanmax(table[:, 1]))]
+            if rows and sitting else [],
+            'largest_torque_of_limit': float(table[:, 2].max(initial=0)),
+            'largest_step_nm': float(table[:, 3].max(initial=0)), 'restarts': restarts}
+        log(f'{fault.__name__}: {found[fault.__name__]}')
+    emit(benchmark='unitree_faults', patient=given.patient, faults=found)
+
+
+if __name__ == '__main__':
+    main()

@@ -1,0 +1,108 @@
+"""Real-time scheduling of a thread: priority, cores and locked memory, as controller_manager's."""
+
+import contextlib
+import ctypes
+import os
+import threading
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from cpg_ros.errors import CpgError
+from cpg_ros.nodes.parameter_spec import Spec
+
+#: Of mlockall: the pages that are there, and those to come.
+MCL_CURRENT, MCL_FUTURE = 1, 2
+LIMITS = 'in /etc/security/limits.conf, and log in again'
+
+SPECS = {
+    'thread_priority': Spec(0, 'real-time priority (SCHED_FIFO) of the publishing thread, before '
+                            "the others' 1; 0 for none", 0, 99, read_only=True),
+    'cpu_affinity': Spec([-1], 'cores that the publishing thread may run on, one or a list; -1 '
+                         'for any', read_only=True),
+    'lock_memory': Spec(False, 'keep all memory of the process in RAM, so that no tick waits for '
+                        'a page', read_only=True)}
+
+
+class NoSuchCore(CpgError):
+    """The process may not run on a core that is asked for."""
+
+
+@dataclass(frozen=True)
+class RealTime:
+    """What is asked of the scheduler.
+
+    Attributes:
+        priority: of SCHED_FIFO, 0 for none.
+        cores: that the thread may run on, empty for any.
+        lock: whether the memory of the process is locked.
+
+    Raises:
+        NoSuchCore: this process cannot run on one of the cores.
+
+    """
+
+    priority: int = 0
+    cores: tuple[int, ...] = ()
+    lock: bool = False
+
+    def __post_init__(self) -> None:
+        usable = sorted(os.sched_getaffinity(0))
+        for core in self.cores:
+            if core not in usable:
+                raise NoSuchCore(f'cpu_affinity: {core} is not one of the cores that this process '
+                                 f'may run on ({", ".join(map(str, usable))})')
+
+    @classmethod
+    def of(cls, priority: int, cores: Sequence[int], lock: bool) -> 'RealTime':
+        """Take the parameters' values; errors as of the class."""
+        return cls(priority, () if list(cores) == [-1] else tuple(cores), lock)
+
+    def claim(self) -> tuple[list[str], list[str]]:
+        """Ask the system for it, for the calling thread; return what is granted and what is not.
+
+        What is refused comes with the reason and with what to set, a line each.
+        """
+        granted, refused = [], []
+        if self.lock:
+            if reason := _lock_memory():
+                refused.append(f'lock_memory refused: {reason}. Raise the limit memlock '
+                               f'(@realtime - memlock unlimited) {LIMITS}')
+            else:
+                granted.append('memory locked')
+        if self.cores:
+            os.sched_setaffinity(0, self.cores)
+            granted.append(f'core {", ".join(map(str, self.cores))}')
+        if self.priority:
+            try:
+                os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(self.priority))
+                _raise_others()
+                granted.append(f'SCHED_FIFO, priority {self.priority}')
+            except OSError as error:
+                refused.append(f'thread_priority {self.priority} refused: {error.strerror}. Raise '
+                               f'the limit rtprio (@realtime - rtprio {max(98, self.priority)}) '
+                               f'{LIMITS}')
+        return granted, refused
+
+
+def _raise_others() -> None:
+    """Put the other threads of the process before all ordinary processes, and behind this one.
+
+    Any of them may hold the interpreter lock or one of the middleware's, and would keep it while
+    an ordinary process runs in its place. Stops are served by one of them, too.
+    """
+    own = threading.get_native_id()
+    # Once more for what has been started meanwhile by one that was still an ordinary thread.
+    for thread in (int(name) for _ in range(2) for name in os.listdir('/proc/self/task')):
+        if thread != own:
+            # It may have ended.
+            with contextlib.suppress(ProcessLookupError):
+                os.sched_setscheduler(thread, os.SCHED_RR, os.sched_param(1))
+
+
+def _lock_memory() -> str:
+    """Lock the memory of the process; return why not, or ''."""
+    with contextlib.suppress(AttributeError):
+        if ctypes.CDLL(None, use_errno=True).mlockall(MCL_CURRENT | MCL_FUTURE) == 0:
+            return ''
+        return os.strerror(ctypes.get_errno())
+    return 'this system has no mlockall'

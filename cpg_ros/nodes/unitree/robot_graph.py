@@ -1,0 +1,51 @@
+"""What of the ROS graph belongs to a Unitree robot: topics, and who else commands it."""
+
+from rclpy.node import Node
+from rclpy.qos import QoSProfile, ReliabilityPolicy
+
+#: Names of the nodes, of which there is one each.
+BRIDGE, WATCHDOG = 'unitree_bridge', 'unitree_watchdog'
+#: Names as DDS participants without ROS have them in the graph.
+BARE = '_CREATED_BY_BARE_DDS_APP_'
+
+
+def quality() -> QoSProfile:
+    """Return the quality of service of commands: an old one is of no use any more."""
+    return QoSProfile(depth=1)
+
+
+def best_effort() -> QoSProfile:
+    """Return that of states: it goes with every publisher."""
+    return QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
+
+
+class Others:
+    """Who else publishes the commands that move the robot."""
+
+    def __init__(self, node: Node, topic: str, own: int, tolerated: int) -> None:
+        """Look at a topic.
+
+        Args:
+            node: that looks, and publishes there.
+            topic: resolved.
+            own: how many publishers of it the bridge has itself, without the watchdog's.
+            tolerated: how many the robot has by itself.
+
+        """
+        self._node, self._topic, self._own, self._tolerated = node, topic, own, tolerated
+
+    def found(self) -> str:
+        """Return who else publishes there, or ''."""
+        if self._node.count_publishers(self._topic) <= self._own + self._tolerated:
+            return ''
+        names = [f'{one.node_namespace.rstrip("/")}/{one.node_name}'
+                 for one in self._node.get_publishers_info_by_topic(self._topic)]
+        for name, count in ((self._node.get_fully_qualified_name(), self._own),
+                            (f'/{WATCHDOG}', 1)):
+            for _ in range(count):
+                if name in names:
+                    names.remove(name)
+        if len(names) <= self._tolerated:
+            return ''
+        return ', '.join('a program without ROS' if BARE in name else name
+                         for name in sorted(names))

@@ -1,0 +1,95 @@
+"""What a Unitree robot measures, under the topics that robot_sim has, and its health."""
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from rclpy.node import Node
+from rclpy.qos import QoSProfile
+from rclpy.qos_overriding_options import QoSOverridingOptions
+from sensor_msgs.msg import BatteryState, Imu, JointState
+from std_msgs.msg import Float64MultiArray, MultiArrayDimension
+
+from cpg_ros.nodes.array_view import view_of
+from cpg_ros.robots.robot import Robot
+from cpg_ros.unitree.low_state import LowState
+from cpg_ros.unitree.models import JOINTS, PARTS
+from cpg_ros.unitree.settings import places
+
+#: Unitree's feet are in the order of its legs.
+FEET = tuple(name.partition('_')[0] for name in JOINTS[::len(PARTS)])
+
+
+class Sensors:
+    """Publishes ``joint_states``, ``imu``, ``foot_contacts``; once a second ``battery``."""
+
+    def __init__(self, node: Node, robot: Robot, state: LowState) -> None:
+        """Be ready to publish what ``state`` holds, joints in ``robot.order``."""
+        self._node, self._robot, self._state = node, robot, state
+        names = list(robot.order)
+        self._from = [JOINTS.index(name) for name in names]
+        self._joints = JointState(name=names)
+        self._views = [view_of(self._joints, field, len(names))
+                       for field in ('position', 'velocity', 'effort')]
+        self._imu = Imu()
+        self._imu.header.frame_id = 'imu'
+        self._feet = [FEET.index(leg[0].name.partition('_')[0]) for leg in robot.legs.values()]
+        self._contacts = Float64MultiArray()
+        self._forces = view_of(self._contacts, 'data', len(self._feet))
+        self._contacts.layout.dim = [MultiArrayDimension(label=','.join(robot.legs), stride=1,
+                                                         size=len(self._feet))]
+
+        def publisher(kind: type, topic: str) -> Callable[[Any], None]:
+            return node.create_publisher(
+                kind, topic, QoSProfile(depth=100),
+                qos_overriding_options=QoSOverridingOptions.with_default_policies()).publish
+
+        self._publish = [(publisher(JointState, 'joint_states'), self._joints),
+                         (publisher(Imu, 'imu'), self._imu),
+                         (publisher(Float64MultiArray, 'foot_contacts'), self._contacts)]
+        self._battery = publisher(BatteryState, 'battery')
+        self._health = node.create_publisher(DiagnosticArray, '/diagnostics', 10)
+        places(robot)
+
+    def publish(self, stamp: int) -> None:
+        """Publish the state; stamp in ns."""
+        state = self._state
+        for header in (self._joints.header, self._imu.header):
+            header.stamp.sec, header.stamp.nanosec = divmod(stamp, 1_000_000_000)
+        for view, values in zip(self._views, (state.q, state.dq, state.torque), strict=True):
+            view[:] = values[self._from]
+        for part, names, numbers in (
+                (self._imu.orientation, 'wxyz', state.quaternion),
+                (self._imu.angular_velocity, 'xyz', state.gyroscope),
+                (self._imu.linear_acceleration, 'xyz', state.accelerometer)):
+            for name, value in zip(names, numbers.tolist(), strict=True):
+                setattr(part, name, value)
+        self._forces[:] = state.feet[self._feet]
+        for publish, message in self._publish:
+            publish(message)
+
+    def publish_battery(self, stamp: int) -> None:
+        """Publish the battery's state; stamp in ns."""
+        state = self._state
+        message = BatteryState(
+            voltage=state.voltage, current=state.current, percentage=state.charge,
+            temperature=float('nan'), charge=float('nan'), capacity=float('nan'),
+            design_capacity=float('nan'), cell_voltage=state.cells, present=bool(state.cells),
+            power_supply_status=BatteryState.POWER_SUPPLY_STATUS_DISCHARGING,
+            power_supply_technology=BatteryState.POWER_SUPPLY_TECHNOLOGY_LION)
+        message.header.stamp.sec, message.header.stamp.nanosec = divmod(stamp, 1_000_000_000)
+        self._battery(message)
+
+    def publish_health(self, level: bytes, text: str, values: Mapping[str, object]) -> None:
+        """Publish a status with these values, and temperatures in deg C."""
+        state = self._state
+        heat = {f'{name} [deg C]': value
+                for name, value in zip(JOINTS, state.temperature.tolist(), strict=True)}
+        known = {**values, **heat, 'imu [deg C]': state.imu_temperature,
+                 'battery [%]': round(100.0 * state.charge)}
+        message = DiagnosticArray(status=[DiagnosticStatus(
+            level=level, name=f'{self._node.get_fully_qualified_name()}: robot', message=text,
+            hardware_id=self._robot.name,
+            values=[KeyValue(key=key, value=str(value)) for key, value in known.items()])])
+        message.header.stamp = self._node.get_clock().now().to_msg()
+        self._health.publish(message)

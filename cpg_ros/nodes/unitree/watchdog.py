@@ -1,0 +1,79 @@
+"""A process that damps the robot while its bridge says nothing: see ``unitree.vigil``.
+
+The bridge starts it: python -m cpg_ros.nodes.unitree.watchdog DOMAIN TOPIC PERIOD PROCESS. It ends
+when a bridge says that the robot rests, or when the bridge is gone before it ever drove the robot.
+"""
+
+import contextlib
+import os
+import select
+import signal
+import socket
+import sys
+import time
+
+import rclpy
+from rclpy.impl.rcutils_logger import RcutilsLogger
+from rclpy.publisher import Publisher
+from rclpy.signals import SignalHandlerOptions
+
+from cpg_ros.nodes.unitree.interfaces import message
+from cpg_ros.nodes.unitree.robot_graph import WATCHDOG, quality
+from cpg_ros.nodes.unitree.watchdog_link import address
+from cpg_ros.unitree.low_cmd import LowCmd
+from cpg_ros.unitree.vigil import Vigil
+
+#: How often it looks whether a bridge that has not driven yet is there, s.
+LOOK = 1.0
+
+
+def alive(process: int) -> bool:
+    """Tell whether there is a process of this number."""
+    try:
+        os.kill(process, 0)
+    except ProcessLookupError:
+        return False
+    return True
+
+
+def watch(line: socket.socket, publisher: Publisher, period: float, process: int,
+          told: RcutilsLogger) -> None:
+    """Damp whenever ticks are missing, until the end is told."""
+    vigil, command = Vigil(period), LowCmd()
+    while not vigil.over:
+        wait = vigil.wait(time.monotonic())
+        ready, _, _ = select.select([line], [], [], LOOK if wait is None else wait)
+        if ready:
+            # Of what waits, the last word counts: ticks that were late are no sign of life.
+            with contextlib.suppress(BlockingIOError):
+                while not vigil.over:
+                    vigil.hear(line.recv(1024), time.monotonic())
+        elif wait is None and not alive(process):
+            return
+        if vigil.due(time.monotonic()):
+            before = vigil.alarms
+            command.damp(vigil.kd[:len(command.kd)])
+            publisher.publish(command.sealed())
+            if before != vigil.alarms:
+                told.error('the bridge is silent: damping until it is back')
+
+
+def main(args: list[str]) -> int:
+    """Watch until told to end; return the exit code."""
+    domain, topic, period, process = int(args[0]), args[1], float(args[2]), int(args[3])
+    # Ctrl-C in the bridge's terminal is the bridge's to handle.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    rclpy.init(domain_id=domain, signal_handler_options=SignalHandlerOptions.NO)
+    node = rclpy.create_node(WATCHDOG, enable_rosout=False, start_parameter_services=False,
+                             use_global_arguments=False)
+    publisher = node.create_publisher(message('unitree_go/LowCmd'), topic, quality())
+    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as line:
+        line.bind(address('watchdog', domain, topic))
+        line.setblocking(False)
+        watch(line, publisher, period, process, node.get_logger())
+    rclpy.shutdown()
+    return 0
+
+
+if __name__ == '__main__':
+    sys.exit(main(sys.argv[1:]))

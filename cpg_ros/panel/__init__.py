@@ -1,0 +1,15 @@
+"""A page in the browser that shows, drives and records what is on the graph.
+
+Speaks only ROS: topics, services and parameters of whatever runs. Imports ``nodes`` and what is
+below; nothing but its executable imports it.
+"""
+
+from cpg_ros.errors import needed
+
+# Before any of its modules: one line where the extra is missing, not a traceback.
+needed('websockets', part='websockets.asyncio')
+
+__all__ = ['body_shape', 'controls', 'door', 'graph', 'mesh_files', 'model_shape', 'orders',
+           'pages', 'panel_node', 'recorder', 'requests', 'robot_view', 'service_calls',
+           'shape_facts', 'shape_source', 'steering', 'stick_figure', 'topics', 'urdf_shape',
+           'web_server']

@@ -1,0 +1,136 @@
+"""The parameters of a node as controls of a page, made from its own descriptors."""
+
+import asyncio
+import re
+from collections.abc import Callable
+from typing import Any
+
+from rcl_interfaces.msg import Parameter as ParameterMessage
+from rcl_interfaces.msg import ParameterEvent, ParameterType
+from rcl_interfaces.srv import (
+    DescribeParameters,
+    GetParameters,
+    ListParameters,
+    SetParametersAtomically,
+)
+from rclpy.parameter import Parameter, parameter_value_to_python
+
+from cpg_ros.panel.requests import RequestError
+from cpg_ros.panel.service_calls import CallError, Services
+
+#: Types that a page has a control for.
+KINDS = {ParameterType.PARAMETER_BOOL: 'bool', ParameterType.PARAMETER_INTEGER: 'integer',
+         ParameterType.PARAMETER_DOUBLE: 'double', ParameterType.PARAMETER_STRING: 'text'}
+#: What every node of ROS has, which says nothing of this one.
+COMMON = ('qos_overrides.', 'start_type_description_service')
+
+
+def choices(constraints: str) -> list[str]:
+    """Return the words that a descriptor's constraints list as ``one of: a, b, c``, if they do."""
+    found = re.search(r'one of: (.*)', constraints)
+    words = found[1].split(', ') if found else []
+    return [word for word in words if re.fullmatch(r'[\w.-]+', word)]
+
+
+def unit(text: str) -> str:
+    """Return the unit in a description, as in ``rate [Hz]``; '' if it has none."""
+    found = re.search(r'\[([^\]]+)\]', text)
+    return found[1] if found else ''
+
+
+class Controls:
+    """One node's parameters.
+
+    Attributes:
+        known: name -> what a page needs to draw its control, with the value.
+
+    """
+
+    def __init__(self, services: Services, node: str, told: Callable[[str], None]) -> None:
+        """Be those of a node; what it refuses is told."""
+        self._services, self._node, self._told = services, node, told
+        self.known: dict[str, dict[str, Any]] = {}
+        self._waiting: dict[str, Any] = {}
+        self._work: asyncio.Task | None = None
+
+    async def _ask(self, kind: Any, service: str, **request: Any) -> Any:
+        return await self._services.call(kind, f'{self._node}/{service}', kind.Request(**request))
+
+    async def read(self) -> None:
+        """Ask the node for everything.
+
+        Raises:
+            CallError: it does not answer.
+
+        """
+        names = [name for name in (await self._ask(ListParameters, 'list_parameters')).result.names
+                 if not name.startswith(COMMON)]
+        described = await self._ask(DescribeParameters, 'describe_parameters', names=names)
+        values = await self._ask(GetParameters, 'get_parameters', names=names)
+        known = {}
+        for name, about, value in zip(names, described.descriptors, values.values, strict=True):
+            if about.type not in KINDS:
+                continue
+            (span,) = (*about.floating_point_range, *about.integer_range)[:1] or (None,)
+            known[name] = {
+                'name': name, 'kind': KINDS[about.type], 'text': about.description,
+                'unit': unit(about.description), 'fixed': about.read_only,
+                'choices': choices(about.additional_constraints),
+                'value': parameter_value_to_python(value),
+                'low': span.from_value if span else None, 'high': span.to_value if span else None}
+        self.known = known
+
+    def hear(self, event: ParameterEvent) -> dict[str, Any]:
+        """Take note of what has changed; return name -> value if it is this node's."""
+        if event.node != self._node:
+            return {}
+        values = {one.name: parameter_value_to_python(one.value)
+                  for one in event.changed_parameters if one.name in self.known}
+        for name, value in values.items():
+            self.known[name]['value'] = value
+        return values
+
+    def value(self, name: str) -> Any:
+        """Return a parameter's value, None if there is none."""
+        return self.known.get(name, {}).get('value')
+
+    def set(self, name: str, value: Any) -> None:
+        """Set a parameter soon; of several values that wait the last one is sent.
+
+        Raises:
+            RequestError: the node has no such parameter, or it cannot be this.
+
+        """
+        about = self.known.get(name)
+        if about is None:
+            raise RequestError(f"{self._node} has no parameter '{name}'")
+        if about['fixed']:
+            raise RequestError(f'{name} cannot be changed while the node runs')
+        self._waiting[name] = _fitting(about, value)
+        if self._work is None or self._work.done():
+            self._work = asyncio.get_running_loop().create_task(self._send())
+
+    async def _send(self) -> None:
+        while self._waiting:
+            name = next(iter(self._waiting))
+            value = self._waiting.pop(name)
+            message: ParameterMessage = Parameter(name, value=value).to_parameter_msg()
+            try:
+                answer = await self._ask(SetParametersAtomically, 'set_parameters_atomically',
+                                         parameters=[message])
+                if not answer.result.successful:
+                    self._told(f'{name} {value}: {answer.result.reason}')
+            except CallError as error:
+                self._told(str(error))
+
+
+def _fitting(about: dict[str, Any], value: Any) -> Any:
+    """Return a value as its parameter's kind has it."""
+    kind, name = about['kind'], about['name']
+    right: Any = {'bool': bool, 'integer': int, 'double': (int, float), 'text': str}[kind]
+    if not isinstance(value, right) or (kind != 'bool' and isinstance(value, bool)):
+        raise RequestError(f'{name} must be a {kind}, not {value!r}')
+    low, high = about['low'], about['high']
+    if low is not None and not low <= value <= high:
+        raise RequestError(f'{name} {value:g} is not from {low:g} to {high:g}')
+    return float(value) if kind == 'double' else value

@@ -1,0 +1,88 @@
+"""What is done when a page asks for it."""
+
+import asyncio
+from collections.abc import Callable
+from typing import Any
+
+from std_srvs.srv import SetBool, Trigger
+
+from cpg_ros.errors import CpgError
+from cpg_ros.panel.graph import namespace
+from cpg_ros.panel.pages import Page, Pages
+from cpg_ros.panel.recorder import Recorder
+from cpg_ros.panel.requests import Request
+from cpg_ros.panel.robot_view import RobotView
+from cpg_ros.panel.service_calls import PATIENCE, Services
+from cpg_ros.panel.steering import push
+
+#: A fit may take this long, s.
+FIT = 120.0
+#: Recorded whatever the generator's namespace.
+EVERYWHERE = ('/diagnostics', '/tf', '/tf_static', '/clock')
+
+
+class OrderError(CpgError):
+    """It cannot be done, or was refused; one line for whoever asked."""
+
+
+class Orders:
+    """Does to the robot of a page, or to the recording, what that page asks for."""
+
+    def __init__(self, pages: Pages, services: Services, recorder: Recorder,
+                 recorded: Callable[[], None]) -> None:
+        """Work with these; recorded is called when a recording has begun or ended."""
+        self._pages, self._services, self._recorder = pages, services, recorder
+        self._recorded = recorded
+
+    async def carry_out(self, page: Page, view: RobotView, request: Request) -> None:
+        """Do what a page asks of the generator that it looks at.
+
+        Raises:
+            CpgError: that was refused; says why.
+
+        """
+        values, action = request.values, request.action
+        if action == 'set':
+            view.controls.set(values['name'], values['value'])
+        elif action == 'steer':
+            if view.controls.value('cmd_vel') is not True:
+                raise OrderError(f'{view.name} does not listen to cmd_vel: start it with '
+                                 'cmd_vel:=true')
+            view.steering.hold(page, asyncio.get_running_loop().time(), values['speed'],
+                               values['turn'])
+        elif action == 'stop':
+            view.steering.stop()
+        elif action == 'enable':
+            if not values['on']:
+                view.steering.stop()
+            await self._call(page, SetBool, f'{view.name}/enable',
+                             SetBool.Request(data=values['on']))
+        elif action == 'push':
+            await asyncio.to_thread(view.push, push(values['force'], values['direction']))
+        elif action == 'record':
+            await self._record(view, values['on'])
+        else:
+            nodes, what = {'reset': (view.graph.simulations, 'simulated robot'),
+                           'fit': (view.graph.inversions, 'inversion node')}[action]
+            node = view.graph.beside(view.name, nodes)
+            if not node:
+                raise OrderError(f'there is no {what} beside {view.name}')
+            await self._call(page, Trigger, f'{node}/{action}', Trigger.Request(), FIT)
+
+    async def _call(self, page: Page, kind: Any, service: str, request: Any,
+                    patience: float = PATIENCE) -> None:
+        answer = await self._services.call(kind, service, request, patience)
+        if not answer.success:
+            raise OrderError(answer.message or f'{service} refused')
+        self._pages.say([page], answer.message, 'told')
+
+    async def _record(self, view: RobotView, on: bool) -> None:
+        if on:
+            space = namespace(view.name)
+            bag = self._recorder.start(
+                (topic, kind) for topic, kind in view.graph.topics
+                if topic in EVERYWHERE or topic.startswith(f'{space}/'))
+            self._pages.say(self._pages.open, f'recording to {bag}', 'told')
+        else:
+            await asyncio.to_thread(self._recorder.stop)
+        self._recorded()

@@ -1,0 +1,263 @@
+// The page: what the node tells goes to its parts, what people do goes to the node.
+import { Body } from './body.js';
+import { Parameters } from './parameters.js';
+import { Plots } from './plots.js';
+import { Scene } from './scene.js';
+import { Steering } from './steering.js';
+
+const at = (id) => document.getElementById(id);
+const token = new URLSearchParams(location.search).get('token');
+
+// -- the view, which the address carries ------------------------------------------------------
+
+const given = new URLSearchParams(location.hash.slice(1));
+const [azimuth, elevation, distance] = (given.get('camera') || '').split(',').map(Number);
+const camera = { azimuth: azimuth || 50, elevation: elevation || 18, distance: distance || 1.7 };
+const view = { node: given.get('node') || '', leg: given.get('leg') || '',
+  portrait: given.get('portrait') || '', theme: given.get('theme') || '' };
+const dark = matchMedia('(prefers-color-scheme: dark)');
+
+function paint() {
+  document.documentElement.dataset.theme = view.theme || (dark.matches ? 'dark' : 'light');
+}
+
+function remember() {
+  const words = new URLSearchParams({ camera: [camera.azimuth, camera.elevation, camera.distance]
+    .map((value) => +value.toFixed(2)).join(',') });
+  for (const [key, value] of Object.entries(view)) if (value) words.set(key, value);
+  history.replaceState(null, '', `#${words}`);
+}
+
+paint();
+dark.addEventListener('change', paint);
+
+// -- its parts --------------------------------------------------------------------------------
+
+let socket = null, state = {}, body = null, frames = 0, counted = 0, fresh = true;
+const last = {};
+const send = (request) => {
+  if (socket?.readyState === WebSocket.OPEN) socket.send(JSON.stringify(request));
+};
+const parameters = new Parameters((name, value) => send({ do: 'set', name, value }));
+const steering = new Steering(send);
+const scene = new Scene(at('scene'), camera, () => {
+  fresh = true;
+  remember();
+});
+const plots = new Plots(view, remember);
+// What tests look at.
+window.panel = { get frames() { return frames; }, last, get state() { return state; },
+  get body() { return body; }, scene };
+
+function say(text, kind) {
+  const line = Object.assign(document.createElement('p'), { textContent: text, className: kind });
+  at('said').append(line);
+  while (at('said').children.length > 4) at('said').firstChild.remove();
+  setTimeout(() => line.remove(), kind === 'refused' ? 9000 : 4000);
+}
+
+function chip(element, text, kind = '') {
+  element.textContent = text;
+  element.className = `chip ${kind}`;
+}
+
+function beside() {
+  const { simulation, inversion } = state.beside?.[view.node] || {};
+  at('reset').disabled = !simulation;
+  at('pushing').hidden = !simulation;
+  at('fit').disabled = !inversion;
+  const steered = parameters.known.cmd_vel?.value === true;
+  steering.enable(steered);
+  at('steered').textContent = steered ? `up to ${state.fastest[0]} m/s and ${state.fastest[1]} rad/s`
+    : 'this generator does not listen to cmd_vel: start it with cmd_vel:=true';
+}
+
+const takes = {
+  state(message) {
+    state = message;
+    at('generators').replaceChildren(...message.generators.map((name) => new Option(name)));
+    at('generators').value = view.node;
+    at('record').textContent = message.recording ? 'Stop recording' : 'Record';
+    at('record').classList.toggle('on', message.recording);
+    at('download').hidden = message.recording || !message.bag;
+    at('download').href = `bags/${message.bag}.zip${token ? `?token=${encodeURIComponent(token)}`
+      : ''}`;
+    if (!message.generators.length) chip(at('now'), 'no generator yet: start one');
+    beside();
+  },
+  chosen(message) {
+    if (view.node && view.node !== message.node && state.generators?.includes(view.node)
+        && !takes.wanted) {
+      // The address names another one than the node offers first.
+      takes.wanted = true;
+      send({ do: 'choose', node: view.node });
+      return;
+    }
+    takes.wanted = true;
+    view.node = message.node;
+    at('generators').value = message.node;
+    for (const key of Object.keys(last)) delete last[key];
+    body = null;
+    plots.clear();
+    parameters.show([]);
+    at('health').replaceChildren();
+    chip(at('now'), 'no gait');
+    beside();
+    remember();
+  },
+  controls(message) {
+    parameters.show(message.controls);
+    beside();
+  },
+  values(message) {
+    parameters.take(message.values);
+  },
+  shape(message) {
+    body = new Body(message);
+    scene.show(body);
+    plots.shaped(message);
+    at('source').textContent = `shape: ${message.source}`;
+    at('source').title = message.doubts.join('\n');
+    fresh = true;
+  },
+  names(message) {
+    plots.named(message);
+  },
+  gait(message) {
+    chip(at('now'), message.gait, 'ok');
+    last.gait = message.gait;
+    parameters.mark(message.gait);
+  },
+  health(message) {
+    at('health').replaceChildren(...Object.entries(message.parts).map(([name, part]) => {
+      const made = document.createElement('div'), head = document.createElement('span');
+      chip(head, `${name}: ${part.text}`, part.level);
+      const table = document.createElement('table');
+      for (const pair of Object.entries(part.values)) {
+        const row = table.insertRow();
+        for (const text of pair) row.insertCell().textContent = text;
+      }
+      made.append(head, table);
+      return made;
+    }));
+  },
+  said(message) {
+    say(message.text, message.kind);
+    if (message.kind === 'refused') parameters.restore();
+  },
+  frame(message) {
+    frames++;
+    Object.assign(last, message);
+    plots.take(message);
+    fresh = true;
+  },
+};
+
+function connect() {
+  const where = new URL('socket', location.href);
+  where.protocol = location.protocol === 'https:' ? 'wss:' : 'ws:';
+  where.hash = '';
+  where.search = token ? `?token=${encodeURIComponent(token)}` : '';
+  socket = new WebSocket(where);
+  let opened = false;
+  socket.onopen = () => {
+    opened = true;
+    takes.wanted = false;
+    chip(at('link-state'), 'connected', 'ok');
+  };
+  socket.onmessage = (event) => {
+    const message = JSON.parse(event.data);
+    takes[message.type]?.(message);
+  };
+  socket.onclose = () => {
+    steering.release();
+    chip(at('link-state'), opened ? 'the panel is gone: trying again'
+      : 'no way in: is the token in the address right, and does the panel run?', 'error');
+    setTimeout(connect, 1000);
+  };
+}
+
+// -- drawing ----------------------------------------------------------------------------------
+
+function draw() {
+  requestAnimationFrame(draw);
+  if (!fresh) return;
+  fresh = false;
+  const named = (key) => Object.fromEntries((plots.names[key] || []).map((name, k) =>
+    [name, last[key === 'joints' ? 'angles' : key]?.[k]]).filter(([, value]) => value != null));
+  if (body) {
+    body.take(named('joints'), last.base);
+    body.place();
+  }
+  scene.draw(named('forces'));
+}
+
+setInterval(() => {
+  if (document.hidden) return;
+  plots.draw();
+  const digits = (value, unit) => value == null ? '–' : `${value.toFixed(2)} ${unit}`;
+  at('speed').textContent = digits(last.speed?.[0], 'm/s');
+  at('turning').textContent = digits(last.speed?.[2], 'rad/s');
+  at('time').textContent = digits(last.time == null ? null : last.time % 1e5, 's');
+}, 150);
+setInterval(() => {
+  at('updates').textContent = `${((frames - counted) / 2).toFixed(0)} a second`;
+  counted = frames;
+}, 2000);
+
+// -- what people do ---------------------------------------------------------------------------
+
+const stop = () => {
+  steering.release();
+  send({ do: 'enable', on: false });
+};
+at('generators').onchange = () => send({ do: 'choose', node: at('generators').value });
+at('stop').onclick = stop;
+at('enable').onclick = () => send({ do: 'enable', on: true });
+at('reset').onclick = () => send({ do: 'reset' });
+at('fit').onclick = () => send({ do: 'fit' });
+at('record').onclick = () => send({ do: 'record', on: !state.recording });
+at('push').onclick = () => send({ do: 'push', force: +at('force').value,
+  direction: +at('direction').value });
+at('theme').onclick = () => {
+  view.theme = document.documentElement.dataset.theme === 'dark' ? 'light' : 'dark';
+  paint();
+  fresh = true;
+  remember();
+};
+at('copy').onclick = () => {
+  remember();
+  navigator.clipboard?.writeText(location.href).then(() => say('copied', 'told'),
+    () => say(location.href, 'told')) ?? say(location.href, 'told');
+};
+const side = (degrees) => degrees === 0 ? 'ahead' : Math.abs(degrees) === 180 ? 'back'
+  : `${Math.abs(degrees)}° ${degrees > 0 ? 'left' : 'right'}`;
+for (const [id, text] of [['force', (value) => `${value} N`], ['direction', (value) => side(+value)]]) {
+  const show = () => { at(`${id}-is`).textContent = text(at(id).value); };
+  at(id).addEventListener('input', show);
+  show();
+}
+
+window.addEventListener('keydown', (event) => {
+  const typing = event.target.matches('input, select, textarea');
+  if (event.ctrlKey || event.metaKey || event.altKey) return;
+  if (event.key === ' ' && !event.target.matches('input[type="text"], input[type="number"]')) {
+    event.preventDefault();
+    if (!event.repeat) stop();
+  } else if (typing) {
+    // Its own keys.
+  } else if (event.key.startsWith('Arrow')) {
+    event.preventDefault();
+    if (!event.repeat) steering.key(event.key, true);
+  } else if (/^[1-9]$/.test(event.key) && !event.repeat) {
+    at('gaits').children[event.key - 1]?.click();
+  }
+});
+window.addEventListener('keyup', (event) => {
+  if (event.key === ' ' && event.target.matches('button')) event.preventDefault();
+  if (event.key.startsWith('Arrow')) steering.key(event.key, false);
+});
+
+remember();
+connect();
+draw();

@@ -1,0 +1,74 @@
+// The pad and the arrow keys: the robot is steered only while one of them is held.
+
+const AGAIN = 100;  // ms; the node stops the robot if it hears nothing for three times as long
+
+export class Steering {
+  constructor(send) {
+    this.send = send;
+    this.pad = document.getElementById('pad');
+    this.knob = this.pad.querySelector('i');
+    this.keys = new Set();
+    this.able = false;
+    this.held = null;
+    this.listen();
+  }
+
+  enable(able) {
+    this.able = able;
+    this.pad.classList.toggle('off', !able);
+    if (!able) this.release();
+  }
+
+  hold(speed, turn) {
+    if (!this.able) return;
+    this.held = [speed, turn];
+    this.knob.style.transform = `translate(${-4 * turn}rem, ${-4 * speed}rem)`;
+    this.say();
+    this.timer ??= setInterval(() => this.say(), AGAIN);
+  }
+
+  say() {
+    if (this.held) this.send({ do: 'steer', speed: this.held[0], turn: this.held[1] });
+  }
+
+  // Let go: whatever was held, and nothing is sent after it.
+  release() {
+    this.keys.clear();
+    this.knob.style.transform = '';
+    clearInterval(this.timer);
+    this.timer = null;
+    if (this.held) this.send({ do: 'stop' });
+    this.held = null;
+  }
+
+  listen() {
+    const { pad } = this, clip = (value) => Math.max(-1, Math.min(1, +value.toFixed(3)));
+    const follow = (event) => {
+      const box = pad.getBoundingClientRect(), reach = 0.4 * box.width;
+      this.hold(clip((box.top + box.height / 2 - event.clientY) / reach),
+        clip((box.left + box.width / 2 - event.clientX) / reach));
+    };
+    pad.addEventListener('pointerdown', (event) => {
+      pad.setPointerCapture(event.pointerId);
+      follow(event);
+    });
+    pad.addEventListener('pointermove', (event) => {
+      if (pad.hasPointerCapture(event.pointerId)) follow(event);
+    });
+    for (const kind of ['pointerup', 'pointercancel', 'lostpointercapture'])
+      pad.addEventListener(kind, () => this.release());
+    // A dead man: who does not see the robot does not steer it.
+    document.addEventListener('visibilitychange', () => document.hidden && this.release());
+    window.addEventListener('pagehide', () => this.release());
+    window.addEventListener('blur', () => this.release());
+  }
+
+  key(name, down) {
+    if (down) this.keys.add(name);
+    else this.keys.delete(name);
+    const is = (key) => this.keys.has(key) ? 1 : 0;
+    const speed = is('ArrowUp') - is('ArrowDown'), turn = is('ArrowLeft') - is('ArrowRight');
+    if (speed || turn) this.hold(speed, turn);
+    else this.release();
+  }
+}

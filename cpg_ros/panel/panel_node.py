@@ -1,0 +1,233 @@
+"""The node ``cpg_panel``: a page in the browser for every generator on the graph."""
+
+import asyncio
+import socket
+import sys
+import threading
+import traceback
+from pathlib import Path
+from typing import Any
+
+import rclpy
+from rclpy.node import Node
+
+from cpg_ros.errors import CpgError
+from cpg_ros.nodes.node_base import StartedNode, StartError, asked_for_help, run
+from cpg_ros.nodes.parameter_spec import Spec
+from cpg_ros.panel import requests, shape_source
+from cpg_ros.panel.door import Door, DoorError, is_loopback
+from cpg_ros.panel.graph import Graph, look
+from cpg_ros.panel.orders import Orders
+from cpg_ros.panel.pages import SLOW, Page, Pages
+from cpg_ros.panel.recorder import Recorder
+from cpg_ros.panel.requests import RequestError
+from cpg_ros.panel.robot_view import RobotView
+from cpg_ros.panel.service_calls import Services
+from cpg_ros.panel.web_server import WebServer
+
+NAME = 'cpg_panel'
+#: Frames a second, and how often it is seen what is on the graph, s.
+FRAMES, LOOK = 30.0, 0.5
+
+SPECS = {
+    'host': Spec('127.0.0.1', 'address to listen on; any but one of this machine alone needs a '
+                 'token', read_only=True),
+    'port': Spec(8080, 'port to listen on; 0 for a free one', 0, 65535, read_only=True),
+    'token': Spec('', 'word that the address must carry to come in, as ?token=WORD; empty for '
+                  'none', read_only=True),
+    'urdf': Spec('', "URDF file of the robot's shape; empty: robot_description, the simulation's "
+                 'model, or a stick figure', read_only=True),
+    'max_speed': Spec(0.5, 'speed that the steering pad asks for at most [m/s]', 0.0, 5.0, True),
+    'max_turn': Spec(0.6, 'turning rate that the steering pad asks for at most [rad/s]', 0.0, 5.0,
+                     True),
+    'recordings': Spec('out/recordings', 'folder for the bags that are recorded', read_only=True),
+    'recording_limit': Spec(200.0, 'size at which a recording ends [MB]', 1.0, 2000.0, True)}
+
+
+class Panel(StartedNode):
+    """Serves pages from one thread; the executor's does nothing but receive answers."""
+
+    def __init__(self) -> None:
+        """Declare everything and check it.
+
+        Raises:
+            StartError: a parameter cannot be used, or the address cannot be had.
+
+        """
+        super().__init__(NAME)
+        for name, spec in SPECS.items():
+            self._declare(name, spec)
+        try:
+            door = Door(self._value('host'), self._value('token'))
+            shape_source.check(self._value('urdf'))
+        except CpgError as error:
+            kind = '' if isinstance(error, DoorError) else 'urdf: '
+            raise StartError(f'{kind}{error}') from error
+        self._free()
+        # Its subscriptions are fetched from, not called back: it is never spun.
+        self._watch: Node = rclpy.create_node(
+            f'{self.get_name()}_watch', namespace=self.get_namespace(), enable_rosout=False,
+            start_parameter_services=False, use_global_arguments=False)
+        self._pages = Pages()
+        self._calls = Services(self)
+        self._views: dict[str, RobotView] = {}
+        self._graph = Graph()
+        self._recorder = Recorder(
+            self._watch, Path(self._value('recordings')).expanduser(),
+            round(1e6 * self._value('recording_limit')),
+            lambda why: self._pages.later(self._recorded, why))
+        self._orders = Orders(self._pages, self._calls, self._recorder, self._recorded)
+        self._server = WebServer(door, self._pages, self._recorder.packed, self._come,
+                                 self._asked, self._gone)
+        self.thread = threading.Thread(target=self._run, name='pages', daemon=True)
+        self._warn_of_unknown()
+
+    def _free(self) -> None:
+        """See that the address can be had."""
+        host, port = self._value('host'), self._value('port')
+        try:
+            found = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
+            with socket.socket(found[0], socket.SOCK_STREAM) as one:
+                one.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+                one.bind(found[4])
+        except OSError as error:
+            raise StartError(f'{host} port {port}: {error.strerror} (another port: '
+                             '-p port:=N, 0 for a free one)') from error
+
+    # -- the thread -------------------------------------------------------------------------
+
+    def begin(self) -> None:
+        """Start to serve."""
+        assert self.thread is not None
+        self.thread.start()
+
+    def _run(self) -> None:
+        try:
+            asyncio.run(self._serve())
+        except Exception as error:
+            self._fail(error)
+
+    async def _serve(self) -> None:
+        self._pages.begin()
+        server, port = await self._server.start(self._value('host'), self._value('port'))
+        token = '?token=' + self._value('token') if self._value('token') else ''
+        host = self._value('host')
+        shown = socket.gethostname() if host in ('0.0.0.0', '::') else host
+        shown = f'[{shown}]' if ':' in shown else shown
+        self.get_logger().info(f'watch and drive it in a browser: http://{shown}:{port}/{token}')
+        if not is_loopback(host):
+            self.get_logger().warning('the page is open to this network for whoever has the '
+                                      'token, and nothing is encrypted')
+        loop = asyncio.get_running_loop()
+        due, looked = loop.time(), -LOOK
+        while not self.stop.is_set():
+            if due - looked >= LOOK:
+                looked = due
+                self._look()
+            for view in self._views.values():
+                view.steering.beat(loop.time())
+                if pages := self._pages.of(view.name):
+                    view.news()
+                    if frame := view.frame():
+                        self._pages.frame(pages, {'type': 'frame', **frame})
+            due = max(due + 1.0 / FRAMES, loop.time() - 1.0 / FRAMES)
+            await asyncio.sleep(max(due - loop.time(), 0.0))
+        for view in self._views.values():
+            view.steering.stop()
+            view.steering.beat(loop.time())
+        self._recorder.stop()
+        server.close()
+        await server.wait_closed()
+
+    def _look(self) -> None:
+        graph = look(self)
+        if graph != self._graph:
+            self._graph = graph
+            self._pages.send(self._pages.open, self._state())
+        for name in set(self._views) - set(graph.generators):
+            self._views.pop(name).close()
+        for name in graph.generators:
+            if name not in self._views:
+                self._views[name] = self._view(name)
+            self._views[name].listen(graph, bool(self._pages.of(name)))
+            self._views[name].ready()
+        for page in self._pages.open:
+            if page.node not in self._views and graph.generators:
+                self._choose(page, graph.generators[0])
+
+    def _view(self, name: str) -> RobotView:
+        return RobotView(
+            self, self._watch, self._calls, name,
+            (self._value('max_speed'), self._value('max_turn')),
+            lambda text: self._pages.say(self._pages.of(name), text),
+            lambda message: self._pages.send(self._pages.of(name), message))
+
+    def finish(self) -> None:
+        """Stop what the pages steer, end the recording, and serve no more."""
+        if self.thread is not None:
+            self.thread.join(timeout=3.0)
+
+    # -- the pages --------------------------------------------------------------------------
+
+    def _state(self) -> dict[str, Any]:
+        graph, recorder = self._graph, self._recorder
+        return {'type': 'state', 'generators': graph.generators, 'beside': {
+            name: {'simulation': graph.beside(name, graph.simulations),
+                   'inversion': graph.beside(name, graph.inversions)}
+            for name in graph.generators},
+            'recording': recorder.running, 'bag': recorder.bag,
+            'fastest': [self._value('max_speed'), self._value('max_turn')]}
+
+    def _come(self, page: Page) -> None:
+        self._pages.send([page], self._state())
+        if self._graph.generators:
+            self._choose(page, self._graph.generators[0])
+
+    def _gone(self, page: Page) -> None:
+        for view in self._views.values():
+            view.steering.release(page)
+
+    def _choose(self, page: Page, name: str) -> None:
+        view = self._views.get(name)
+        if view is None:
+            raise RequestError(f"there is no generator '{name}'")
+        if page.waiting() > SLOW:
+            raise RequestError('the page has not taken yet what it was sent')
+        self._gone(page)
+        page.node = name
+        self._pages.send([page], {'type': 'chosen', 'node': name})
+        for message in view.messages():
+            self._pages.send([page], message)
+        view.listen(self._graph, wanted=True)
+
+    async def _asked(self, page: Page, text: str | bytes) -> None:
+        try:
+            request = requests.read(text)
+            if request.action == 'choose':
+                self._choose(page, request.values['node'])
+            elif page.node not in self._views:
+                raise RequestError('there is no generator on the graph')
+            else:
+                await self._orders.carry_out(page, self._views[page.node], request)
+        except CpgError as error:
+            self._pages.say([page], str(error))
+        except Exception:
+            # One request must not end a node that others look through.
+            self.get_logger().error('a request failed:\n' + traceback.format_exc())
+
+    def _recorded(self, why: str = '') -> None:
+        """Tell of a recording that began or ended, by itself if that has a reason."""
+        if why:
+            self._pages.say(self._pages.open, why)
+        self._pages.send(self._pages.open, self._state())
+
+
+def main(args: list[str] | None = None) -> int:
+    """Run the node until SIGINT or SIGTERM; return the exit code."""
+    code = asked_for_help('panel', 'Shows, drives and records what is on the graph in a browser.',
+                          SPECS, args)
+    return run(Panel, NAME, args) if code is None else code
+
+
+if __name__ == '__main__':
+    sys.exit(main())

@@ -1,0 +1,106 @@
+"""What a page may ask for: every word of it checked before anybody acts on it."""
+
+import json
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from cpg_ros.errors import CpgError
+
+#: Longest text that a request may hold, characters.
+LONGEST = 500
+#: Hardest push, N.
+HARDEST = 500.0
+
+
+class RequestError(CpgError):
+    """It is not understood; one line for whoever asked."""
+
+
+@dataclass(frozen=True)
+class Request:
+    """What is to be done, and with what."""
+
+    action: str
+    values: Mapping[str, Any] = field(default_factory=dict)
+
+
+def _text(value: Any) -> str:
+    if not isinstance(value, str) or len(value) > LONGEST or not value.isprintable():
+        raise RequestError(f'must be a text of at most {LONGEST} characters')
+    return value
+
+
+def _flag(value: Any) -> bool:
+    if not isinstance(value, bool):
+        raise RequestError('must be true or false')
+    return value
+
+
+def _number(low: float, high: float) -> Callable[[Any], float]:
+    def check(value: Any) -> float:
+        if (isinstance(value, bool) or not isinstance(value, (int, float))
+                or not low <= value <= high):
+            raise RequestError(f'must be a number from {low:g} to {high:g}')
+        return float(value)
+
+    return check
+
+
+def _setting(value: Any) -> bool | int | float | str:
+    """Take what a parameter can be set to; which kind and range is for its node to judge."""
+    if isinstance(value, str):
+        return _text(value)
+    if isinstance(value, bool):
+        return value
+    if isinstance(value, int) and -2**63 <= value < 2**63:
+        return value
+    if isinstance(value, float) and math.isfinite(value):
+        return value
+    raise RequestError('must be true or false, a text or a finite number')
+
+
+#: Action -> what it needs, and how that is checked. A direction is in degrees to the left.
+ACTIONS: dict[str, dict[str, Callable[[Any], Any]]] = {
+    'choose': {'node': _text}, 'set': {'name': _text, 'value': _setting},
+    'steer': {'speed': _number(-1.0, 1.0), 'turn': _number(-1.0, 1.0)},
+    'stop': {}, 'enable': {'on': _flag}, 'reset': {},
+    'push': {'force': _number(0.0, HARDEST), 'direction': _number(-360.0, 360.0)},
+    'record': {'on': _flag}, 'fit': {}}
+
+
+def _constant(name: str) -> float:
+    raise RequestError(f'{name} is no number')
+
+
+def read(text: str | bytes) -> Request:
+    """Read what a page sent.
+
+    Raises:
+        RequestError: anything about it is not as it should be.
+
+    """
+    if not isinstance(text, str):
+        raise RequestError('requests are texts')
+    try:
+        found = json.loads(text, parse_constant=_constant)
+    except RequestError:
+        raise
+    except (ValueError, RecursionError) as error:
+        raise RequestError('this is not JSON') from error
+    if not isinstance(found, dict):
+        raise RequestError('a request is a JSON object')
+    action = found.pop('do', None)
+    if not isinstance(action, str) or action not in ACTIONS:
+        raise RequestError(f"'do' is not one of {', '.join(ACTIONS)}")
+    wanted = ACTIONS[action]
+    if set(found) != set(wanted):
+        raise RequestError(f"'{action}' takes {', '.join(wanted) or 'nothing'}")
+    values = {}
+    for name, check in wanted.items():
+        try:
+            values[name] = check(found[name])
+        except RequestError as error:
+            raise RequestError(f'{action}: {name} {error}') from error
+    return Request(action, values)

@@ -1,0 +1,235 @@
+"""One generator and the robot that it moves, as pages see them."""
+
+import asyncio
+import math
+import time
+from collections.abc import Callable
+from typing import Any
+
+from diagnostic_msgs.msg import DiagnosticArray
+from geometry_msgs.msg import Twist, Wrench
+from nav_msgs.msg import Odometry
+from rcl_interfaces.msg import ParameterEvent
+from rclpy.node import Node
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Float64MultiArray, String
+
+from cpg_ros.panel import shape_facts, shape_source
+from cpg_ros.panel.controls import Controls
+from cpg_ros.panel.graph import Graph, namespace
+from cpg_ros.panel.service_calls import CallError, Services
+from cpg_ros.panel.steering import Steering
+from cpg_ros.panel.topics import Topic, latched
+
+LEVELS = {0: 'ok', 1: 'warn', 2: 'error', 3: 'stale'}
+#: Digits of what is sent: a tenth of a milliradian is less than a pixel.
+DIGITS = 4
+
+
+class RobotView:
+    """Topics, parameters and shape of one generator.
+
+    Attributes:
+        controls: its parameters.
+        steering: what its ``cmd_vel`` is told.
+
+    """
+
+    def __init__(self, node: Node, watch: Node, services: Services, name: str,
+                 fastest: tuple[float, float], said: Callable[[str], None],
+                 tell: Callable[[dict[str, Any]], None]) -> None:
+        """View a generator.
+
+        Args:
+            node: which is spun, and publishes.
+            watch: which is not, and listens.
+            services: of others.
+            name: the generator's full name.
+            fastest: speed in m/s and turn in rad/s of a whole deflection.
+            said: shows the pages a line.
+            tell: sends them a message.
+
+        """
+        self.name, self._space = name, namespace(name)
+        self._node, self._watch, self._services = node, watch, services
+        self._said, self._tell = said, tell
+        self.controls = Controls(services, name, said)
+        self._twists = node.create_publisher(Twist, f'{self._space}/cmd_vel', 10)
+        self._pushes: Any = None
+        self.steering = Steering(self._twists.publish, fastest)
+        self.graph = Graph()
+        self._topics: dict[str, Topic] = {}
+        self._kept: dict[str, dict[str, Any]] = {}
+        self._joints: dict[str, float] = {}
+        self._names: dict[str, list[str]] = {}
+        self._urdf = str(node.get_parameter('urdf').value)
+        self._readied: asyncio.Task | None = None
+        self._stale = True
+        self._sources: tuple[str, ...] = ()
+
+    # -- what there is ----------------------------------------------------------------------
+
+    def ready(self) -> None:
+        """Begin to read parameters and shape, if that has not begun or there is more to read."""
+        sources = (self.graph.beside(self.name, self.graph.simulations),
+                   *sorted(name for name, _ in self.graph.topics
+                           if name in shape_facts.descriptions(self._space)))
+        if self._stale or sources != self._sources:
+            self._stale, self._sources = False, sources
+            if self._readied is not None:
+                self._readied.cancel()
+            self._readied = asyncio.get_running_loop().create_task(self._ready())
+
+    async def _ready(self) -> None:
+        try:
+            await self.controls.read()
+            self._keep({'type': 'controls', 'node': self.name,
+                        'controls': list(self.controls.known.values())})
+            known = await shape_facts.ask(
+                self._watch, self._services, self.graph, self.name,
+                str(self.controls.value('robot') or ''), self._urdf)
+            doubts: list[str] = []
+            shape = await asyncio.to_thread(shape_source.find, known, doubts.append)
+            for doubt in doubts[:5]:
+                self._node.get_logger().warning(doubt)
+            self._keep({**shape.message(), 'doubts': doubts[:5]})
+        except CallError as error:
+            self._said(str(error))
+            self._stale = True
+
+    def messages(self) -> list[dict[str, Any]]:
+        """Return all that a page must know that comes only now."""
+        return list(self._kept.values())
+
+    def _keep(self, message: dict[str, Any]) -> None:
+        self._kept[message['type']] = message
+        self._tell(message)
+
+    # -- what goes on -----------------------------------------------------------------------
+
+    def listen(self, graph: Graph, wanted: bool) -> None:
+        """Listen to what is on the graph now, or to nothing if no page is open."""
+        self.graph = graph
+        space, floats = self._space, 'std_msgs/msg/Float64MultiArray'
+        joints = [topic for topic in (f'{space}/joint_states',)
+                  if self._watch.count_publishers(topic)]
+        # One topic with all joints costs their publisher less than one for each leg.
+        joints = joints or [name for name, kind in graph.topics if kind.endswith('/JointState')
+                            and name.startswith(f'{space}/') and name.endswith('/joint_states')
+                            and name.removeprefix(f'{space}/').count('/') == 1]
+        topics = {**{name: (JointState, None, 1) for name in joints},
+                  f'{self.name}/gait': (String, latched(), 1),
+                  '/diagnostics': (DiagnosticArray, None, 20),
+                  '/parameter_events': (ParameterEvent, None, 100)}
+        optional = {f'{self.name}/phase': Float64MultiArray, f'{self.name}/cells':
+                    Float64MultiArray, f'{space}/foot_contacts': Float64MultiArray}
+        topics.update({name: (kind, None, 1) for name, kind in optional.items()
+                       if (name, floats) in graph.topics})
+        if (f'{space}/odom', 'nav_msgs/msg/Odometry') in graph.topics:
+            topics[f'{space}/odom'] = (Odometry, None, 1)
+        topics = topics if wanted else {}
+        for name in set(self._topics) - set(topics):
+            self._topics.pop(name).close()
+        for name, (kind, quality, depth) in topics.items():
+            if name not in self._topics:
+                self._topics[name] = Topic(self._watch, kind, name, quality, depth)
+
+    def _newest(self, name: str) -> Any:
+        topic = self._topics.get(name)
+        return topic.newest() if topic else None
+
+    def frame(self) -> dict[str, Any]:
+        """Return what is new since the last frame, nothing else."""
+        found: dict[str, Any] = {}
+        fresh = False
+        for name in [name for name in self._topics if name.endswith('/joint_states')]:
+            if (joints := self._newest(name)) is not None:
+                self._joints.update(zip(joints.name, joints.position, strict=False))
+                found['time'] = joints.header.stamp.sec + 1e-9 * joints.header.stamp.nanosec
+                fresh = True
+        if fresh:
+            self._told_names('joints', list(self._joints))
+            found['angles'] = _short(self._joints.values())
+        for key, name in (('phases', f'{self.name}/phase'), ('cells', f'{self.name}/cells'),
+                          ('forces', f'{self._space}/foot_contacts')):
+            if (message := self._newest(name)) is not None:
+                dimensions = message.layout.dim
+                if dimensions:
+                    self._told_names(key, dimensions[0].label.split(',')
+                                     if key != 'cells' else
+                                     [f'{dimension.label}:{dimension.size}'
+                                      for dimension in dimensions])
+                found[key] = _short(message.data)
+        if (moved := self._newest(f'{self._space}/odom')) is not None:
+            place, turn = moved.pose.pose.position, moved.pose.pose.orientation
+            speed = moved.twist.twist
+            found['base'] = _short((place.x, place.y, place.z, turn.w, turn.x, turn.y, turn.z))
+            found['speed'] = _short((speed.linear.x, speed.linear.y, speed.angular.z))
+        if self.steering.asked != (0.0, 0.0):
+            found['steered'] = _short(self.steering.asked)
+        return found
+
+    def _told_names(self, key: str, names: list[str]) -> None:
+        """Tell the pages what the numbers under a key are, if that is new."""
+        if self._names.get(key) != names:
+            self._names[key] = names
+            self._keep({'type': 'names', **self._names})
+
+    def news(self) -> None:
+        """Tell the pages of the gait, changed parameters and health."""
+        if (gait := self._newest(f'{self.name}/gait')) is not None:
+            self._keep({'type': 'gait', 'gait': gait.data})
+        if events := self._topics.get('/parameter_events'):
+            for event, _ in events.take():
+                # One of the same name has started anew.
+                self._stale |= event.node == self.name and bool(event.new_parameters)
+                if values := self.controls.hear(event):
+                    self._tell({'type': 'values', 'values': values})
+        if health := self._topics.get('/diagnostics'):
+            owners = (f'{self.name}: ',
+                      f'{self.graph.beside(self.name, self.graph.simulations) or "-"}: ')
+            for message, _ in health.take():
+                for status in message.status:
+                    if status.name.startswith(owners):
+                        self._keep_health(status)
+
+    def _keep_health(self, status: Any) -> None:
+        level = status.level if isinstance(status.level, int) else status.level[0]
+        parts = {**self._kept.get('health', {}).get('parts', {}), status.name: {
+            'level': LEVELS.get(level, 'stale'), 'text': status.message,
+            'values': {value.key: value.value for value in status.values}}}
+        self._keep({'type': 'health', 'parts': parts})
+
+    # -- what is done -----------------------------------------------------------------------
+
+    def push(self, message: Wrench) -> None:
+        """Push the robot.
+
+        Raises:
+            CallError: it is not simulated.
+
+        """
+        simulation = self.graph.beside(self.name, self.graph.simulations)
+        if not simulation:
+            raise CallError(f'there is no simulated robot beside {self.name}')
+        if self._pushes is None:
+            self._pushes = self._node.create_publisher(Wrench, f'{simulation}/push', 10)
+        end = time.monotonic() + 1.0
+        while not self._pushes.get_subscription_count() and time.monotonic() < end:
+            time.sleep(0.01)
+        self._pushes.publish(message)
+
+    def close(self) -> None:
+        """Let go of all of it."""
+        self.listen(self.graph, wanted=False)
+        self._node.destroy_publisher(self._twists)
+        if self._pushes is not None:
+            self._node.destroy_publisher(self._pushes)
+        self._services.forget(self.name)
+        if self._readied is not None:
+            self._readied.cancel()
+
+
+def _short(values: Any) -> list[float | None]:
+    """Round what a page is sent; what is not finite is nothing."""
+    return [round(value, DIGITS) if math.isfinite(value) else None for value in values]

@@ -1,0 +1,70 @@
+"""What the graph tells of a robot's shape."""
+
+import asyncio
+from typing import Any
+
+from rcl_interfaces.srv import GetParameters
+from rclpy.node import Node
+from rclpy.parameter import parameter_value_to_python
+from sensor_msgs.msg import JointState
+from std_msgs.msg import String
+
+from cpg_ros.panel.graph import Graph, namespace
+from cpg_ros.panel.service_calls import Services
+from cpg_ros.panel.shape_source import Known, is_known
+from cpg_ros.panel.topics import Topic, latched
+
+#: How long a topic may be silent before nothing is expected of it, s.
+PATIENCE = 1.0
+
+
+def descriptions(space: str) -> tuple[str, str]:
+    """Return the topics on which ROS users have a robot's URDF, that of the namespace first."""
+    return f'{space}/robot_description', '/robot_description'
+
+
+async def ask(watch: Node, services: Services, graph: Graph, generator: str, robot: str,
+              urdf: str) -> Known:
+    """Ask the graph.
+
+    Args:
+        watch: a node that is not spun.
+        services: of others.
+        graph: what is on it.
+        generator: full name of the node that moves the robot.
+        robot: its robot file.
+        urdf: file that the user names, '' for none.
+
+    Raises:
+        CallError: the simulation does not answer.
+
+    """
+    space, description, model = namespace(generator), '', ''
+    for topic in descriptions(space):
+        if not (urdf or description) and (topic, 'std_msgs/msg/String') in graph.topics:
+            description = getattr(await _once(watch, String, topic), 'data', '')
+    simulation = graph.beside(generator, graph.simulations)
+    if simulation:
+        answer = await services.call(GetParameters, f'{simulation}/get_parameters',
+                                     GetParameters.Request(names=['model']))
+        model = parameter_value_to_python(answer.values[0]) if answer.values else ''
+    legs = {}
+    for topic, kind in () if is_known(robot) else sorted(graph.topics):
+        leg = topic.removeprefix(f'{space}/').removesuffix('/joint_states')
+        if kind == 'sensor_msgs/msg/JointState' and '/' not in leg and leg != 'joint_states':
+            message = await _once(watch, JointState, topic)
+            legs[leg] = list(message.name) if message else []
+    return Known(urdf, description, model or '', robot, legs)
+
+
+async def _once(watch: Node, kind: type, name: str) -> Any:
+    """Return a topic's next or latched message, None if it is silent."""
+    topic = Topic(watch, kind, name, latched() if kind is String else None)
+    try:
+        for _ in range(round(PATIENCE / 0.02)):
+            if (message := topic.newest()) is not None:
+                return message
+            await asyncio.sleep(0.02)
+        return None
+    finally:
+        topic.close()

@@ -1,0 +1,144 @@
+"""Which shape a robot gets: the best that can be had of it here."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from cpg_ros.errors import CpgError
+from cpg_ros.files.shared_resources import share
+from cpg_ros.panel import stick_figure, urdf_shape
+from cpg_ros.panel.body_shape import Shape
+from cpg_ros.robots.robot import Robot
+from cpg_ros.robots.robot_file import find_robot
+from cpg_ros.robots.urdf import load_urdf
+
+#: Robot files of this package -> the model or the URDF that goes with each.
+SHIPPED = {'unitree_go2': 'go2', 'quadruped': 'quadruped.urdf'}
+
+
+@dataclass(frozen=True)
+class Known:
+    """What the graph and the user say of a robot.
+
+    Attributes:
+        urdf: file that the user names, '' for none.
+        description: text on ``robot_description``, '' for none.
+        model: of the simulation, '' where none runs.
+        robot: robot file of the generator, a name or a path that may be another machine's.
+        legs: leg -> joints, as their topics name them.
+
+    """
+
+    urdf: str = ''
+    description: str = ''
+    model: str = ''
+    robot: str = ''
+    legs: dict[str, list[str]] = field(default_factory=dict)
+
+
+def is_known(robot: str) -> bool:
+    """Tell whether a robot file can be read here."""
+    try:
+        find_robot(robot)
+    except (CpgError, OSError):
+        return False
+    return True
+
+
+def find(known: Known, said: Callable[[str], None]) -> Shape:
+    """Return the first of: the user's URDF, the description, the model, a stick figure.
+
+    Args:
+        known: of the robot.
+        said: is told why a better one could not be had.
+
+    """
+    robot: Robot | None = None
+    try:
+        robot = find_robot(known.robot)
+    except (CpgError, OSError) as error:
+        said(f'the robot file is not known here: {error}')
+    for make in (_from_urdf, _from_description, _from_model):
+        try:
+            shape = make(known, robot, said)
+        except (CpgError, OSError) as error:
+            said(str(error))
+            continue
+        if shape is not None:
+            _with_limits(shape, robot)
+            _with_feet(shape, known, robot)
+            return shape
+    return _sticks(known, robot)
+
+
+def _from_urdf(known: Known, _: Robot | None, said: Callable[[str], None]) -> Shape | None:
+    return urdf_shape.from_file(Path(known.urdf).expanduser(), said) if known.urdf else None
+
+
+def _from_description(known: Known, _: Robot | None, said: Callable[[str], None]
+                      ) -> Shape | None:
+    if not known.description:
+        return None
+    return urdf_shape.from_text(known.description, 'robot_description', said)
+
+
+def _from_model(known: Known, robot: Robot | None, said: Callable[[str], None]) -> Shape | None:
+    model = known.model or SHIPPED.get(known.robot, '')
+    if not model or robot is None:
+        return None
+    if model.endswith('.urdf') and not known.model:
+        return urdf_shape.from_file(share() / 'urdf' / model, said)
+    from cpg_ros.panel.model_shape import from_model
+    return from_model(model, robot)
+
+
+def _with_limits(shape: Shape, robot: Robot | None) -> None:
+    """Take the robot file's limits: the generator keeps to them."""
+    for joint in robot.joints if robot else ():
+        shape.limits[joint.name] = joint.lower, joint.upper
+
+
+def _with_feet(shape: Shape, known: Known, robot: Robot | None) -> None:
+    legs = ({leg: [joint.name for joint in joints] for leg, joints in robot.legs.items()}
+            if robot else known.legs)
+    index = {link.joint: k for k, link in enumerate(shape.links) if link.joint}
+    for leg, joints in legs.items():
+        ends = [index[joint] for joint in joints if joint in index]
+        if not ends or leg in shape.feet:
+            continue
+        end = max(ends)
+        # What is fixed to the last joint's link is the foot.
+        place = shape.links[end].place * 0.0
+        tips = [link for link in shape.links if link.parent == end and not link.joint]
+        if tips:
+            place = tips[-1].place
+        elif shape.links[end].vertices:
+            corners = shape.links[end].vertices[-1].reshape(-1, 3)
+            place = corners.mean(axis=0)
+        shape.feet[leg] = end, place
+
+
+def _sticks(known: Known, robot: Robot | None) -> Shape:
+    if robot is None:
+        legs, name, limits = known.legs, known.robot or 'a robot', {}
+        # Of legs that are called as those of the shipped networks: lh rh lf rf, left right.
+        places = {leg: ({'h': -1.0, 'f': 1.0}.get(leg[1:], 0.0), -1.0 if leg[:1] == 'r' else 1.0)
+                  for leg in legs}
+    else:
+        legs = {leg: [joint.name for joint in joints] for leg, joints in robot.legs.items()}
+        name = robot.name
+        limits = {joint.name: (joint.lower, joint.upper) for joint in robot.joints}
+        places = {leg: ({'fore': 1.0, 'hind': -1.0}.get(robot.girdles.get(leg, ''), 0.0),
+                        -1.0 if robot.sides.get(leg) == 'right' else 1.0) for leg in legs}
+    return stick_figure.draw(name, legs, places, limits)
+
+
+def check(urdf: str) -> None:
+    """See that a URDF that the user names can be read.
+
+    Raises:
+        UrdfError: it cannot.
+
+    """
+    if urdf:
+        load_urdf(Path(urdf).expanduser())

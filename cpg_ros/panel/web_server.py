@@ -1,0 +1,116 @@
+"""The page's files and its socket, on one port."""
+
+import asyncio
+import logging
+from collections.abc import Awaitable, Callable
+from http import HTTPStatus
+from pathlib import Path
+from urllib.parse import urlsplit
+
+from websockets.asyncio.server import Server, ServerConnection, serve
+from websockets.datastructures import Headers
+from websockets.exceptions import ConnectionClosed
+from websockets.http11 import Request, Response
+
+from cpg_ros.panel.door import Door
+from cpg_ros.panel.pages import Page, Pages
+
+FILES = Path(__file__).parent / 'page'
+TYPES = {'.html': 'text/html', '.css': 'text/css', '.js': 'text/javascript',
+         '.svg': 'image/svg+xml'}
+#: Pages at once, connections that have not said what they want, and a request's size, bytes.
+MOST, WAITING, LONGEST = 16, 64, 4096
+#: Where recordings are fetched.
+BAGS = '/bags/'
+#: What the browser lets the page do: nothing that is not from here.
+POLICY = ("default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data:; "
+          "connect-src 'self' ws: wss:; base-uri 'none'; form-action 'none'; "
+          "frame-ancestors 'none'")
+#: What clients do wrong is theirs: the library would fill the log with it.
+_LOG = logging.getLogger('cpg_ros.panel.socket')
+_LOG.addHandler(logging.NullHandler())
+_LOG.propagate = False
+
+
+class WebServer:
+    """Serves files to whom the door lets in, and tells of pages that come, ask and go."""
+
+    def __init__(self, door: Door, pages: Pages, bag: Callable[[str], bytes],
+                 come: Callable[[Page], None],
+                 asked: Callable[[Page, str | bytes], Awaitable[None]],
+                 gone: Callable[[Page], None]) -> None:
+        self._door, self._pages, self._bag = door, pages, bag
+        self._come, self._asked, self._gone = come, asked, gone
+        self._files = {'/' if file.name == 'index.html' else f'/{file.name}':
+                       (file.read_bytes(), TYPES[file.suffix])
+                       for file in FILES.iterdir() if file.suffix in TYPES}
+
+    async def start(self, host: str, port: int) -> tuple[Server, int]:
+        """Begin to serve; return the server and its port.
+
+        Raises:
+            OSError: the address cannot be had.
+
+        """
+        server = await serve(self._page, host, port, process_request=self._answer,
+                             compression=None, max_size=LONGEST, max_queue=8,
+                             write_limit=65536, open_timeout=5.0, ping_interval=10.0,
+                             ping_timeout=20.0, close_timeout=1.0, server_header=None,
+                             logger=_LOG)
+        return server, next(iter(server.sockets)).getsockname()[1]
+
+    async def _answer(self, connection: ServerConnection, request: Request) -> Response | None:
+        path = urlsplit(request.path).path
+        hosts, origins = (request.headers.get_all(name) for name in ('Host', 'Origin'))
+        refused = self._door.refuses(request.path, hosts[0] if len(hosts) == 1 else '',
+                                     origins[0] if origins else '')
+        # The page's files tell nothing: with them it can say that a token is wanted.
+        if path in self._files and (not refused or 'token' in refused):
+            body, kind = self._files[path]
+            return _response(HTTPStatus.OK, body, f'{kind}; charset=utf-8')
+        if refused:
+            return _text(HTTPStatus.FORBIDDEN, refused)
+        if path == '/socket':
+            if len(self._pages.open) >= MOST:
+                return _text(HTTPStatus.SERVICE_UNAVAILABLE, f'{MOST} pages are open already')
+            return None
+        if path.startswith(BAGS) and path.endswith('.zip'):
+            try:
+                bag = path.removeprefix(BAGS).removesuffix('.zip')
+                return _response(HTTPStatus.OK, await asyncio.to_thread(self._bag, bag),
+                                 'application/zip')
+            except (ValueError, OSError) as error:
+                return _text(HTTPStatus.NOT_FOUND, str(error))
+        return _text(HTTPStatus.NOT_FOUND, 'there is nothing here')
+
+    async def _page(self, connection: ServerConnection) -> None:
+        page = Page(connection)
+        self._pages.open.add(page)
+        # One request may wait for another node; a stop must not wait for that.
+        under_way: set[asyncio.Task] = set()
+        try:
+            self._come(page)
+            async for message in connection:
+                if not page.may_ask():
+                    await connection.close(1008, 'too many requests')
+                    break
+                task = asyncio.ensure_future(self._asked(page, message))
+                under_way.add(task)
+                task.add_done_callback(under_way.discard)
+        except ConnectionClosed:
+            pass
+        finally:
+            self._pages.open.discard(page)
+            self._gone(page)
+
+
+def _text(status: HTTPStatus, text: str) -> Response:
+    return _response(status, f'{text}\n'.encode(errors='replace'), 'text/plain; charset=utf-8')
+
+
+def _response(status: HTTPStatus, body: bytes, kind: str) -> Response:
+    headers = {'Content-Type': kind, 'Content-Length': str(len(body)),
+               'Content-Security-Policy': POLICY, 'X-Content-Type-Options': 'nosniff',
+               'Referrer-Policy': 'no-referrer', 'Cache-Control': 'no-cache',
+               'Connection': 'close'}
+    return Response(status.value, status.phrase, Headers(headers), body)

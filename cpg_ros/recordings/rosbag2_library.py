@@ -1,0 +1,105 @@
+"""Bags through ROS's own ``rosbag2_py``, where the library `rosbags` is not installed.
+
+What is offered is what `rosbags_library` offers, so that nothing else knows which one reads.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import rosbag2_py
+from rclpy.serialization import deserialize_message
+from sensor_msgs.msg import JointState
+
+STORAGES = {'.mcap': 'mcap', '.db3': 'sqlite3'}
+
+
+class ReaderError(Exception):
+    """The bag cannot be read."""
+
+
+class SerdeError(Exception):
+    """The bytes are no message."""
+
+
+@dataclass(frozen=True)
+class Connection:
+    """A topic of a bag, its type and how many messages it has."""
+
+    topic: str
+    msgtype: str
+    msgcount: int
+
+
+def deserialize(message: bytes) -> Any:
+    """Return a JointState out of its bytes.
+
+    Raises:
+        SerdeError: they are none.
+
+    """
+    try:
+        return deserialize_message(message, JointState)
+    except Exception as error:  # what the middleware raises has no common kind
+        raise SerdeError(str(error)) from error
+
+
+class Reader:
+    """A bag: its folder, or one of its storage files.
+
+    Attributes:
+        path: of the bag.
+        connections: its topics.
+
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = Path(path)
+        self.connections: list[Connection] = []
+        self._storage = rosbag2_py.StorageOptions(
+            uri=str(path), storage_id=STORAGES.get(self.path.suffix, ''))
+        self._kind = rosbag2_py.SequentialReader
+
+    def __enter__(self) -> 'Reader':
+        self.open()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def open(self) -> None:
+        """Read what topics there are.
+
+        Raises:
+            ReaderError: the bag is damaged.
+
+        """
+        try:
+            if (self.path / 'metadata.yaml').exists():
+                said = rosbag2_py.Info().read_metadata(str(self.path), '')
+                if said.compression_mode.lower() not in ('', 'none'):
+                    self._kind = rosbag2_py.SequentialCompressionReader
+            found = self._opened().get_metadata().topics_with_message_count
+        except RuntimeError as error:
+            raise ReaderError(str(error)) from error
+        self.connections = [Connection(one.topic_metadata.name, one.topic_metadata.type,
+                                       one.message_count) for one in found]
+
+    def close(self) -> None:
+        """Every pass over the messages opens the bag anew: there is nothing to close."""
+
+    def _opened(self) -> Any:
+        reader = self._kind()
+        reader.open(self._storage, rosbag2_py.ConverterOptions('cdr', 'cdr'))
+        return reader
+
+    def messages(self, connections: Sequence[Connection]
+                 ) -> Iterator[tuple[Connection, int, bytes]]:
+        """Yield connection, receive time (ns) and bytes of each message, in order of time."""
+        known = {one.topic: one for one in connections}
+        reader = self._opened()
+        reader.set_filter(rosbag2_py.StorageFilter(topics=list(known)))
+        while reader.has_next():
+            topic, message, received = reader.read_next()
+            yield known[topic], received, message

@@ -1,0 +1,46 @@
+"""Gains of joints where nobody says them: those of a Unitree Go2, for a robot of another mass.
+
+Of robots of one shape, lengths go with the cube root of the mass m. To bend as far under its
+weight a larger one needs kp ~ m length, and to be damped as well kd ~ m length^1.5.
+"""
+
+from typing import Any
+
+import numpy as np
+
+#: Gains of the Go2's joints, N m / rad and N m s / rad, and the mass on each of its legs, kg.
+KP, KD, BORNE = 60.0, 2.0, 15.206 / 4.0
+#: Inertia of a motor whose file gives none: times kp timestep^2, below which control oscillates.
+STEADY = 2.0
+
+
+def usual_gains(mass: float, legs: int) -> tuple[float, float]:
+    """Return kp in N m / rad and kd in N m s / rad for a robot, in two digits.
+
+    Args:
+        mass: of all of it, kg.
+        legs: that bear it.
+
+    """
+    larger = mass / legs / BORNE
+    return float(f'{KP * larger**(4.0 / 3.0):.2g}'), float(f'{KD * larger**1.5:.2g}')
+
+
+def set_gains(model: Any, kp: float | None, kd: float | None, legs: int) -> None:
+    """Let the actuators of a ``mujoco.MjModel`` hold angles with these gains.
+
+    Args:
+        model: its actuators are those of joints.
+        kp: N m / rad; None takes that of ``usual_gains``.
+        kd: N m s / rad; the same.
+        legs: of the robot.
+
+    """
+    usual = usual_gains(float(model.body_mass.sum()), legs)
+    stiff, damped = usual[0] if kp is None else kp, usual[1] if kd is None else kd
+    model.actuator_gainprm[:, 0] = stiff
+    model.actuator_biasprm[:, 1:3] = -stiff, -damped
+    driven = model.jnt_dofadr[model.actuator_trnid[:, 0]]
+    armature = model.dof_armature[driven]
+    model.dof_armature[driven] = np.where(
+        armature > 0.0, armature, STEADY * stiff * model.opt.timestep**2)

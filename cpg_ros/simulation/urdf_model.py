@@ -1,0 +1,251 @@
+"""URDF files as ROS has them, made ones that MuJoCo takes; every change is told.
+
+A URDF may name meshes by package, in formats that MuJoCo does not read, and have links without
+mass or with inertias that no body has. Links that joints move need both; frames that hang on
+fixed joints become part of the link above.
+"""
+
+from collections.abc import Callable, Collection, Mapping
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+from xml.parsers import expat
+
+import numpy as np
+
+from cpg_ros.robots.urdf import UrdfError
+from cpg_ros.simulation.inertia import LEAST, LIGHTEST, ball, possible
+from cpg_ros.simulation.mesh_files import find_mesh, hull, trouble
+
+#: Where an inertia has its numbers.
+_KEYS = ('ixx', 'ixy', 'ixz', 'iyy', 'iyz', 'izz')
+#: Mass and moment of inertia of a frame that has none, kg and kg m^2: as good as nothing.
+FRAME = 1e-6, 1e-9
+#: Masses up to this are none, kg; CAD programs write rounding errors.
+NOTHING = 1e-9
+#: Of a robot whose file gives no link a mass, kg/m^3.
+HOLLOW = 500.0
+#: Joints that hold a link still or let it move freely.
+HELD, FREE = 'fixed', 'floating'
+
+Say = Callable[[str], None]
+
+
+def read_urdf(path: Path, driven: Collection[str], visual: bool, say: Say) -> Any:
+    """Return a URDF as a ``mujoco.MjSpec`` whose joints are those that are driven.
+
+    Args:
+        path: the file.
+        driven: names of joints; others that could move are held at 0.
+        visual: keep meshes that are there for pictures only.
+        say: takes what had to be changed, a line for each thing.
+
+    Raises:
+        UrdfError: it is no XML.
+        ValueError: MuJoCo's reason why it cannot be used.
+
+    """
+    import mujoco
+    robot = _parsed(path)
+    extension = robot.find('mujoco/compiler')
+    meshes = _Meshes(path, '' if extension is None else extension.get('meshdir', ''))
+    for link in robot.findall('link'):
+        if not visual:
+            for part in link.findall('visual'):
+                link.remove(part)
+        meshes.prepare(link)
+    for change in meshes.changes:
+        say(change)
+    _hold(robot, driven, say)
+    weightless = not _weigh(robot, say)
+    for tag in robot.findall('mujoco'):
+        robot.remove(tag)
+    ElementTree.SubElement(ElementTree.SubElement(robot, 'mujoco'), 'compiler', {
+        'strippath': 'false', 'discardvisual': 'false', 'fusestatic': 'true'})
+    spec = mujoco.MjSpec.from_string(ElementTree.tostring(robot, encoding='unicode'),
+                                     assets=meshes.assets)
+    if weightless:
+        for geom in spec.geoms:
+            geom.density = HOLLOW
+    return spec
+
+
+def part_touching(spec: Any, stand: Mapping[str, float]) -> None:
+    """Let links never collide with each other that do so with all joints at 0 or in the stand.
+
+    Convex hulls of neighbours overlap, and would be pressed apart.
+
+    Args:
+        spec: a ``mujoco.MjSpec``, which is compiled for this.
+        stand: joint -> angle, rad.
+
+    """
+    import mujoco
+    model = spec.compile()
+    data = mujoco.MjData(model)
+    pairs = set()
+    for angles in ({}, stand):
+        for name, angle in angles.items():
+            data.qpos[model.jnt_qposadr[model.joint(name).id]] = angle
+        mujoco.mj_forward(model, data)
+        for geoms in data.contact.geom[:data.ncon]:
+            first, second = sorted(int(model.geom_bodyid[geom]) for geom in geoms)
+            if first and first != second:
+                pairs.add((model.body(first).name, model.body(second).name))
+    for pair in sorted(pairs):
+        spec.add_exclude(bodyname1=pair[0], bodyname2=pair[1])
+
+
+def _parsed(path: Path) -> ElementTree.Element:
+    """Parse without namespaces: prefixes that are declared nowhere are usual in URDF files."""
+    builder, parser = ElementTree.TreeBuilder(), expat.ParserCreate()
+    parser.StartElementHandler = builder.start
+    parser.EndElementHandler = builder.end
+    try:
+        parser.Parse(path.read_bytes(), True)
+        return builder.close()
+    except expat.ExpatError as error:
+        raise UrdfError(f'XML parse error: line {error.lineno}: '
+                        f'{expat.ErrorString(error.code)}') from error
+
+
+class _Meshes:
+    """Looks for meshes, and does something about those that are of no use.
+
+    Attributes:
+        assets: files that exist in memory only, by name.
+
+    """
+
+    def __init__(self, path: Path, folder: str) -> None:
+        self._path, self._folder = path, folder
+        self.assets: dict[str, bytes] = {}
+        self._known: dict[tuple[str, str], tuple[str, str]] = {}
+        self._changes: dict[str, dict[str, list[str]]] = {}
+
+    def prepare(self, link: ElementTree.Element) -> None:
+        """Put files that MuJoCo reads in place of a link's meshes, or take these away."""
+        for kind in ('visual', 'collision'):
+            for part in link.findall(kind):
+                mesh = part.find('geometry/mesh')
+                if mesh is None:
+                    continue
+                asked = mesh.get('filename', '')
+                if (asked, kind) not in self._known:
+                    self._known[asked, kind] = self._usable(asked, kind)
+                name, said = self._known[asked, kind]
+                if said:
+                    meshes = self._changes.setdefault(said, {})
+                    meshes.setdefault(Path(asked).name, []).append(link.get('name', ''))
+                if name:
+                    mesh.set('filename', name)
+                else:
+                    link.remove(part)
+
+    @property
+    def changes(self) -> list[str]:
+        """What was done, a line for each kind of change, with meshes and their links."""
+        return [f'{said}: ' + ', '.join(f'{mesh} ({" ".join(links)})'
+                                        for mesh, links in meshes.items())
+                for said, meshes in self._changes.items()]
+
+    def _usable(self, reference: str, kind: str) -> tuple[str, str]:
+        """Return a name for MuJoCo, '' where there is none, and what to say of it."""
+        path = find_mesh(reference, self._path, self._folder)
+        lost = 'nothing can touch' if kind == 'collision' else 'pictures go without'
+        if path is None:
+            return '', f'meshes are not found, {lost} them'
+        why = trouble(path)
+        if not why:
+            return str(path.resolve()), ''
+        if kind == 'collision':
+            try:
+                name = f'{len(self.assets)}_{path.stem}.obj'
+                self.assets[name] = hull(path)
+                return name, f'{why}, convex hulls take the place of meshes'
+            except UrdfError as error:
+                why = str(error).removeprefix(f'{path.name}: ')
+        return '', f'{why}, {lost} meshes'
+
+
+def _hold(robot: ElementTree.Element, driven: Collection[str], say: Say) -> None:
+    """Fix joints that nothing drives."""
+    held = []
+    for joint in robot.findall('joint'):
+        if joint.get('name') not in driven and joint.get('type') not in (HELD, FREE):
+            joint.set('type', HELD)
+            held.append(joint.get('name', ''))
+    if held:
+        say(f'joints that the robot file does not drive are held at 0: {", ".join(held)}')
+
+
+def _weigh(robot: ElementTree.Element, say: Say) -> float:
+    """Give each link a mass and an inertia that a body can have; return the mass that it had."""
+    moved = {child.get('link') for joint in robot.findall('joint')
+             if joint.get('type') != HELD and (child := joint.find('child')) is not None}
+    links = {link.get('name', ''): link for link in robot.findall('link')}
+    masses = {name: _mass(link) for name, link in links.items()}
+    total = sum(masses.values())
+    if not total:
+        say(f'no link has a mass: they get those of their collision shapes at {HOLLOW:g} kg/m^3')
+    for name, mass in masses.items():
+        link, inertial = links[name], links[name].find('inertial')
+        if mass and inertial is not None:
+            made, wrong = possible(_inertia(inertial), mass)
+            if wrong:
+                numbers = ', '.join(f'{key} {value:.3g}' for key, value in
+                                    zip(_KEYS, made[np.triu_indices(3)], strict=True))
+                say(f"link '{name}': its inertia {wrong}; it gets {numbers} kg m^2")
+            _write(inertial, mass, made)
+            continue
+        # As the format has it, no <inertial> means none; MuJoCo would take the shapes'.
+        if inertial is not None:
+            link.remove(inertial)
+        if not total and link.find('collision') is not None:
+            continue
+        mass, moment = FRAME
+        if name in moved and not _carries(robot, name, masses):
+            mass = max(LEAST * total, LIGHTEST)
+            moment = ball(mass)
+            say(f"link '{name}': has no mass, but a joint moves it; it gets {mass:.3g} kg")
+        _write(ElementTree.SubElement(link, 'inertial'), mass, moment * np.eye(3))
+    return total
+
+
+def _carries(robot: ElementTree.Element, name: str, masses: dict[str, float]) -> bool:
+    """Whether a link has others with mass fixed to it."""
+    below = [child.get('link', '') for joint in robot.findall('joint')
+             if joint.get('type') == HELD and (parent := joint.find('parent')) is not None
+             and parent.get('link') == name and (child := joint.find('child')) is not None]
+    return any(masses.get(one, 0.0) > 0.0 or _carries(robot, one, masses) for one in below)
+
+
+def _mass(link: ElementTree.Element) -> float:
+    """Return a link's mass in kg, 0 where it is nothing."""
+    given = link.find('inertial/mass')
+    mass = 0.0 if given is None else _number(given.get('value', '0'))
+    return mass if mass > NOTHING else 0.0
+
+
+def _inertia(inertial: ElementTree.Element) -> np.ndarray:
+    given = inertial.find('inertia')
+    xx, xy, xz, yy, yz, zz = (0.0 if given is None else _number(given.get(key, '0'))
+                              for key in _KEYS)
+    return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+
+
+def _number(text: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        return 0.0
+
+
+def _write(inertial: ElementTree.Element, mass: float, matrix: np.ndarray) -> None:
+    for tag in ('mass', 'inertia'):
+        for part in inertial.findall(tag):
+            inertial.remove(part)
+    ElementTree.SubElement(inertial, 'mass', value=repr(float(mass)))
+    ElementTree.SubElement(inertial, 'inertia', {
+        key: repr(float(value)) for key, value in
+        zip(_KEYS, matrix[np.triu_indices(3)], strict=True)})

@@ -1,0 +1,128 @@
+"""What is published on a graph, recorded into a bag as ``ros2 bag record`` does it."""
+
+import shutil
+from collections import Counter
+from collections.abc import Sequence
+from functools import partial
+from pathlib import Path
+
+from ament_index_python.packages import PackageNotFoundError, get_package_share_directory
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rosbags.interfaces import Connection
+from rosbags.rosbag2 import StoragePlugin, Writer
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+
+from cpg_ros.errors import CpgError
+from cpg_ros.tools.graph_topics import message_class
+from cpg_ros.tools.running_node import Unanswered
+
+#: Messages that may wait for the disk.
+DEPTH = 5000
+#: Topics that come with every node and that nobody asked for.
+USUAL = ('/rosout', '/parameter_events')
+
+
+class BagError(CpgError):
+    """A bag cannot be written; one line."""
+
+
+class Recorder:
+    """Writes what is published into a bag, raw.
+
+    Attributes:
+        counts: topic -> messages written.
+        passed_over: topic -> why it is not recorded.
+
+    """
+
+    def __init__(self, node: Node, path: Path, wanted: Sequence[str]) -> None:
+        """Open the bag; it has its name only when it is whole.
+
+        Args:
+            node: ours.
+            path: of the bag, a folder that is not there yet.
+            wanted: topics; all that there are and that appear, if empty.
+
+        Raises:
+            BagError: something is there already, or the folder cannot be written to.
+
+        """
+        if path.exists():
+            raise BagError(f'{path}: there is something already')
+        self._node, self._path = node, path
+        self._beside = path.with_name(f'.{path.name}.unfinished')
+        self._wanted = [node.resolve_topic_name(one) for one in wanted]
+        self._store = get_typestore(Stores.ROS2_JAZZY)
+        self.counts: Counter[str] = Counter()
+        self.passed_over: dict[str, str] = {}
+        try:
+            shutil.rmtree(self._beside, ignore_errors=True)
+            self._writer = Writer(self._beside, version=9, storage_plugin=StoragePlugin.MCAP)
+            self._writer.open()
+        except OSError as error:
+            raise BagError(f'{path}: {error.strerror}') from error
+
+    def look(self) -> list[str]:
+        """Listen to what is new on the graph; return the topics."""
+        new = []
+        for topic, kinds in self._node.get_topic_names_and_types():
+            if topic in self.counts or topic in self.passed_over or (
+                    topic not in self._wanted if self._wanted else topic in USUAL):
+                continue
+            offered = self._node.get_publishers_info_by_topic(topic)
+            if not offered:
+                continue
+            try:
+                self._listen(topic, kinds[0], [one.qos_profile for one in offered])
+            except (Unanswered, BagError) as error:
+                self.passed_over[topic] = str(error)
+                continue
+            new.append(topic)
+        return new
+
+    def _listen(self, topic: str, kind: str, offered: Sequence[QoSProfile]) -> None:
+        message = message_class(kind)
+        if kind not in self._store.types:
+            self._store.register(_definitions(kind))
+        connection = self._writer.add_connection(topic, kind, typestore=self._store)
+        self.counts[topic] = 0
+        # What every publisher offers: a reliable listener hears no best-effort one.
+        kept = all(one.durability == DurabilityPolicy.TRANSIENT_LOCAL for one in offered)
+        sure = all(one.reliability == ReliabilityPolicy.RELIABLE for one in offered)
+        profile = QoSProfile(
+            depth=DEPTH,
+            durability=DurabilityPolicy.TRANSIENT_LOCAL if kept else DurabilityPolicy.VOLATILE,
+            reliability=ReliabilityPolicy.RELIABLE if sure else ReliabilityPolicy.BEST_EFFORT)
+        self._node.create_subscription(message, topic, partial(self._write, topic, connection),
+                                       profile, raw=True)
+
+    def _write(self, topic: str, connection: Connection, message: bytes) -> None:
+        self._writer.write(connection, self._node.get_clock().now().nanoseconds, message)
+        self.counts[topic] += 1
+
+    def close(self) -> None:
+        """Finish the bag, and give it its name.
+
+        Raises:
+            BagError: the disk is full, or the like.
+
+        """
+        try:
+            self._writer.close()
+            if sum(self.counts.values()):
+                self._beside.rename(self._path)
+            else:
+                shutil.rmtree(self._beside)
+        except OSError as error:
+            raise BagError(f'{self._path}: {error.strerror}') from error
+
+
+def _definitions(kind: str) -> dict:
+    """Return the fields of a message that the library does not know, from its package."""
+    package, _, name = kind.partition('/msg/')
+    try:
+        text = (Path(get_package_share_directory(package)) / 'msg' / f'{name}.msg').read_text()
+    except (PackageNotFoundError, OSError):
+        raise BagError(f'the fields of {kind} are not known here') from None
+    return get_types_from_msg(text, kind)

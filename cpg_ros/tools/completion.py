@@ -1,0 +1,87 @@
+"""What a shell completes the words of ``cpg`` with: also what a running node and graph offer.
+
+The library argcomplete does it, where it is installed; it comes with colcon.
+"""
+
+from argparse import ArgumentParser, Namespace
+from collections.abc import Callable
+from importlib.util import find_spec
+from typing import TYPE_CHECKING, Any
+
+from cpg_ros.errors import CpgError
+
+if TYPE_CHECKING:
+    from rclpy.node import Node
+
+#: How long a node may take to answer, s: somebody waits for the word.
+PATIENCE = 3.0
+
+
+class NoCompletion(CpgError):
+    """The library is not installed."""
+
+
+def complete(parser: ArgumentParser) -> None:
+    """Print completions and end, if a shell asks for them."""
+    if find_spec('argcomplete') is not None:
+        import argcomplete
+        argcomplete.autocomplete(parser)
+
+
+def shell_code() -> str:
+    """Return what bash or zsh evaluates.
+
+    Raises:
+        NoCompletion: the library is not installed.
+
+    """
+    if find_spec('argcomplete') is None:
+        raise NoCompletion('completion needs argcomplete: pip install argcomplete')
+    from argcomplete.shell_integration import shellcode
+    return str(shellcode(['cpg']))
+
+
+def _asked(ask: Callable[['Node'], list[Any]]) -> list[Any]:
+    import rclpy
+    from rclpy.utilities import try_shutdown
+    rclpy.init(args=[])
+    try:
+        return ask(rclpy.create_node('cpg_completion', enable_rosout=False))
+    except CpgError:
+        # Nobody answers: there is nothing to complete with.
+        return []
+    finally:
+        try_shutdown()
+
+
+def _descriptors(chosen: Namespace) -> list[Any]:
+    from cpg_ros.tools.running_node import RunningNode
+    return _asked(lambda node: RunningNode(node, chosen.node, PATIENCE).parameters())
+
+
+def _choices(chosen: Namespace, name: str) -> list[str]:
+    # A descriptor says what a text may be: 'one of: walk, trot, and those of ...'.
+    return [word for one in _descriptors(chosen) if one.name == name
+            for word in one.additional_constraints.removeprefix('one of: ').split(', ')
+            if word and ' ' not in word]
+
+
+def parameters(parsed_args: Namespace, **_: Any) -> list[str]:
+    """Return the names of the node's parameters."""
+    return [one.name for one in _descriptors(parsed_args)]
+
+
+def gaits(parsed_args: Namespace, **_: Any) -> list[str]:
+    """Return the gaits that the node can be asked for."""
+    return _choices(parsed_args, 'gait')
+
+
+def values(parsed_args: Namespace, **_: Any) -> list[str]:
+    """Return what the parameter can be, where that is one of a few words."""
+    return _choices(parsed_args, parsed_args.parameter)
+
+
+def topics(parsed_args: Namespace, **_: Any) -> list[str]:
+    """Return the graph's topics."""
+    from cpg_ros.tools.graph_topics import topics as graph_topics
+    return _asked(lambda node: list(graph_topics(node)))

@@ -1,0 +1,25 @@
+"""The check sum of Unitree's low-level commands: CRC-32/MPEG-2 of the words of a C struct.
+
+Unitree's own code (``crc32_core``) runs over 32-bit words from their highest bit, polynomial
+0x04c11db7, start 0xffffffff, nothing reflected. zlib computes the same polynomial reflected, so
+the bytes of every word are turned round, their bits too, and the result back.
+"""
+
+import zlib
+
+#: Every byte with its bits the other way round.
+_MIRRORED = bytes(int(f'{byte:08b}'[::-1], 2) for byte in range(256))
+
+
+def crc32(words: bytes) -> int:
+    """Return the check sum of little-endian 32-bit words.
+
+    Args:
+        words: their bytes, a whole number of words.
+
+    """
+    turned = bytearray(len(words))
+    for k in range(4):
+        turned[k::4] = words[3 - k::4]
+    reflected = zlib.crc32(turned.translate(_MIRRORED)) ^ 0xffffffff
+    return int.from_bytes(reflected.to_bytes(4, 'little').translate(_MIRRORED), 'big')

@@ -1,0 +1,115 @@
+"""What ``unitree_go/msg/LowState`` says, read from its bytes (little-endian CDR)."""
+
+import numpy as np
+
+#: Of the message with CDR's header of 4 bytes.
+SIZE = 1180
+_HEADER = 4
+_LITTLE_ENDIAN = 1
+#: Bits of the wireless remote's bytes 2 and 3, as unitree_sdk2py.utils.joystick reads them.
+BUTTONS = {name: 1 << k for k, name in enumerate((
+    'R1', 'L1', 'start', 'select', 'R2', 'L2', 'F1', 'F2',
+    'A', 'B', 'X', 'Y', 'up', 'right', 'down', 'left'))}
+#: From the angle of a motor on: CDR packs the mode of the first one more closely.
+_MOTOR = np.dtype({
+    'names': ['q', 'dq', 'ddq', 'torque', 'temperature', 'lost', 'next_mode'],
+    'formats': ['<f4', '<f4', '<f4', '<f4', 'i1', '<u4', 'u1'],
+    'offsets': [0, 4, 8, 12, 28, 32, 44], 'itemsize': 48})
+_FIELDS = np.dtype({
+    'names': ['quaternion', 'gyroscope', 'accelerometer', 'imu_temperature', 'first_mode',
+              'motors', 'soc', 'current', 'cycle', 'cells', 'feet', 'tick', 'remote', 'ntc',
+              'voltage'],
+    'formats': ['4<f4', '3<f4', '3<f4', 'i1', 'u1', (_MOTOR, 19), 'u1', '<i4', '<u2', '15<u2',
+                '4<i2', '<u4', '<u2', '2i1', '<f4'],
+    'offsets': [24, 40, 52, 76, 77, 80, 1039, 1040, 1044, 1050, 1080, 1096, 1102, 1148, 1152],
+    'itemsize': SIZE - _HEADER})
+
+
+class LowState:
+    """The robot's state, of which ``read`` takes the newest; arrays are views of one buffer.
+
+    Attributes:
+        q: angles, rad, shape (joints,), joints in the order of Unitree's motors.
+        dq: speeds, rad/s.
+        torque: estimated, N m.
+        temperature: of the motors, deg C.
+        lost: packets that each motor has lost so far.
+        quaternion: orientation, w x y z.
+        gyroscope: rad/s.
+        accelerometer: m/s^2.
+        feet: what the feet feel, in the units of the robot, in the order FR FL RR RL.
+
+    """
+
+    def __init__(self, joints: int = 12) -> None:
+        """Be ready; everything is zero.
+
+        Args:
+            joints: how many of the motors the robot has, at most 19.
+
+        """
+        self._buffer = bytearray(SIZE)
+        self._all = np.ndarray((), _FIELDS, self._buffer, _HEADER)
+        motors = self._all['motors'][:joints]
+        self.q, self.dq, self.torque, self.temperature, self.lost = (
+            motors[name] for name in ('q', 'dq', 'torque', 'temperature', 'lost'))
+        self._modes = motors['next_mode'][:-1]
+        self.quaternion, self.gyroscope, self.accelerometer, self.feet = (
+            self._all[name] for name in ('quaternion', 'gyroscope', 'accelerometer', 'feet'))
+
+    def read(self, message: bytes) -> bool:
+        """Take a message over; return whether it is one of these."""
+        if len(message) < SIZE or message[1] != _LITTLE_ENDIAN:
+            return False
+        self._buffer[:] = message[:SIZE]
+        return True
+
+    def _number(self, name: str) -> float:
+        return self._all[name].item()
+
+    @property
+    def modes(self) -> tuple[int, ...]:
+        """Control modes of the joints' motors."""
+        return int(self._number('first_mode')), *self._modes.tolist()
+
+    @property
+    def tick(self) -> int:
+        """The robot's own counter; simulators leave it at 0."""
+        return int(self._number('tick'))
+
+    @property
+    def buttons(self) -> int:
+        """Buttons of the wireless remote that are pressed, the sum of values of BUTTONS."""
+        return int(self._number('remote'))
+
+    @property
+    def charge(self) -> float:
+        """Of the battery, from 0 to 1."""
+        return self._number('soc') / 100.0
+
+    @property
+    def current(self) -> float:
+        """Into the battery, A."""
+        return self._number('current') / 1000.0
+
+    @property
+    def voltage(self) -> float:
+        """Of the battery, V."""
+        return self._number('voltage')
+
+    @property
+    def cells(self) -> list[float]:
+        """Voltages of the battery's cells that are there, V."""
+        return [value / 1000.0 for value in self._all['cells'].tolist() if value]
+
+    @property
+    def imu_temperature(self) -> int:
+        """Of the IMU, deg C."""
+        return int(self._number('imu_temperature'))
+
+    @property
+    def tilt_cosine(self) -> float:
+        """Cosine of the angle between the body's and the world's vertical; nan without an IMU."""
+        w, x, y, z = self.quaternion.tolist()
+        norm = w * w + x * x + y * y + z * z
+        return 1.0 - 2.0 * (x * x + y * y) / norm if 0.9 < norm < 1.1 else float('nan')

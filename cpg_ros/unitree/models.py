@@ -1,0 +1,59 @@
+"""Unitree's four-legged robots: the order of their motors, what these bear, how they lie."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from cpg_ros.errors import InputError
+
+PARTS = ('hip', 'thigh', 'calf')
+#: Joints in the order of Unitree's motors.
+JOINTS = tuple(f'{leg}_{part}_joint' for leg in ('FR', 'FL', 'RR', 'RL') for part in PARTS)
+
+
+@dataclass(frozen=True)
+class Model:
+    """One kind of robot; columns are hip, thigh and calf.
+
+    Attributes:
+        torque: what the joints bear, N m.
+        most_kp: largest proportional gain, N m / rad.
+        most_kd: largest damping gain, N m s / rad.
+        lying: how it lies on its belly, rad (the first pose of Unitree's own examples).
+
+    """
+
+    torque: tuple[float, float, float]
+    most_kp: float
+    most_kd: float
+    lying: tuple[float, float, float] = (0.0, 1.36, -2.65)
+
+
+#: Torques as in Unitree's own models of the robots (unitree_ros, unitree_mujoco).
+MODELS = {'go2': Model((23.7, 23.7, 45.43), 150.0, 8.0),
+          'go1': Model((23.7, 23.7, 35.55), 150.0, 8.0),
+          'b2': Model((200.0, 200.0, 320.0), 1000.0, 20.0)}
+
+
+def each(values: list[float], what: str, most: float) -> np.ndarray:
+    """Return a number for each of the joints.
+
+    Args:
+        values: one for all, three for hip, thigh and calf, or one for each of JOINTS.
+        what: they are called.
+        most: largest that is allowed; from 0 on.
+
+    Returns:
+        Shape (12,).
+
+    Raises:
+        InputError: there are not 1, 3 or 12 of them, or one is out of range.
+
+    """
+    if len(values) not in (1, len(PARTS), len(JOINTS)):
+        raise InputError(f'{what} has {len(values)} numbers: one for all joints, three for '
+                         f'{", ".join(PARTS)}, or {len(JOINTS)}, for {", ".join(JOINTS)}')
+    for value in values:
+        if not 0.0 <= value <= most:
+            raise InputError(f'{what}: {value:g} is not from 0 to {most:g}')
+    return np.resize(np.array(values, dtype=float), len(JOINTS))

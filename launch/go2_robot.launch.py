@@ -1,0 +1,73 @@
+"""A Unitree robot walks: ros2 launch cpg_ros go2_robot.launch.py gait:=walk.
+
+Read docs/how_to/unitree.md first. The generator, and the bridge that leads the robot by Unitree's
+messages; optionally a recording. simulator:=true is for Unitree's simulator on this computer.
+"""
+
+from launch.actions import ExecuteProcess, OpaqueFunction, SetEnvironmentVariable, Shutdown
+from launch.substitutions import LaunchConfiguration
+
+from cpg_ros.nodes.launch_arguments import declared, started, value
+from launch import LaunchDescription
+
+BOTH = {
+    'robot': ('unitree_go2', str, 'robot file, or a shipped name'),
+    'command': ('forward_position', str, 'what moves the robot: joint_states, joint_trajectory or '
+                'forward_position'),
+}
+GENERATOR = {
+    'network': ('delayed', str, 'delayed or quadruped'),
+    'gait': ('trot', str, 'gait to start with'),
+    'frequency': ('', float, "strides per second [Hz]; empty for the gait's usual one"),
+    'cmd_vel': ('false', bool, 'walk as cmd_vel (geometry_msgs/Twist) asks'),
+}
+BRIDGE = {
+    'model': ('go2', str, 'what its motors bear: go2, go1 or b2'),
+    'torque_factor': ('1.0', float, 'share of what the motors bear that commands may ask for'),
+    'state_timeout': ('0.02', float, 'longest time without a fresh state before it damps [s]'),
+    'dry_run': ('false', bool, 'compute and log everything, and send nothing'),
+    'autostart': ('true', bool, 'start when launched; else when ~/start is called'),
+}
+OTHERS = {
+    'simulator': ('false', bool, "Unitree's simulator in place of a robot: domain 1, and no "
+                  'motion modes to release'),
+    'domain': ('', int, 'of ROS; empty for 0, or 1 with simulator'),
+    'record': ('', str, 'bag to record what is commanded and measured into; empty for none'),
+}
+#: Commands of the bridge -> of the generator.
+COMMANDS = {'joint_states': 'none'}
+#: What a bag gets.
+RECORDED = ('joint_states', 'imu', 'foot_contacts', 'battery', 'cpg_generator/gait',
+            'cpg_generator/phase', 'unitree_bridge/state')
+#: Ctrl-C makes the robot sit down and rest, s, before it may be hurried.
+SITTING = '8'
+
+
+def nodes(context):
+    """Return generator and bridge, and what sets their network."""
+    simulator = value(context, 'simulator', bool)
+    given = LaunchConfiguration('domain').perform(context)
+    domain = value(context, 'domain', int) if given else int(simulator)
+    command = LaunchConfiguration('command').perform(context)
+    generator = {name: one for name, one in {**BOTH, **GENERATOR}.items() if name != 'command'}
+    found = [
+        SetEnvironmentVariable('ROS_DOMAIN_ID', str(domain)),
+        # LOCALHOST, which ROS's users often set, finds no participant of Unitree.
+        SetEnvironmentVariable('ROS_AUTOMATIC_DISCOVERY_RANGE', 'SUBNET'),
+        started(context, 'unitree_bridge', 'unitree_bridge', {**BOTH, **BRIDGE}, {
+            'motion_switcher': not simulator}, on_exit=Shutdown(), sigterm_timeout=SITTING),
+        # Its end makes the robot sit down; the bridge must be there to do it.
+        started(context, 'generator', 'cpg_generator', generator, {
+            'rate': 500.0, 'combined_topic': '', 'command': COMMANDS.get(command, command)})]
+    if bag := LaunchConfiguration('record').perform(context):
+        space = LaunchConfiguration('namespace').perform(context).strip('/')
+        found.append(ExecuteProcess(cmd=[
+            'ros2', 'bag', 'record', '-o', bag,
+            *(f'/{space}/{topic}'.replace('//', '/') for topic in RECORDED)], output='screen'))
+    return found
+
+
+def generate_launch_description():
+    """Generator and bridge, optionally in a namespace."""
+    return LaunchDescription([*declared({**BOTH, **GENERATOR, **BRIDGE, **OTHERS}),
+                              OpaqueFunction(function=nodes)])

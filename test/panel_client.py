@@ -1,0 +1,76 @@
+"""A page without a browser: what the panel sends, and what a page may send it."""
+
+import json
+import re
+import threading
+
+from graph import EXECUTABLE, Process, until
+from websockets.sync.client import connect
+
+PANEL = EXECUTABLE.with_name('panel')
+
+
+def start_panel(domain, *ros_args, port='0'):
+    """Start the panel on a free port; return the process and the address of its page."""
+    process = Process('-p', f'port:={port}', *ros_args, domain=domain, executable=PANEL)
+    process.wait_for('in a browser: http')
+    return process, re.search(r'http://\S+', process.log)[0]
+
+
+class Client:
+    """An open page.
+
+    Attributes:
+        last: type of message -> the newest one.
+        frames: how many have come.
+        said: lines that were shown.
+
+    """
+
+    def __init__(self, address, **options):
+        base, _, query = address.partition('?')
+        self._socket = connect(base.replace('http', 'ws', 1) + 'socket'
+                               + (f'?{query}' if query else ''), max_size=None,
+                               compression=None, **options)
+        self.last, self.frames, self.said, self.frame = {}, 0, [], {}
+        self.closed = ''
+        threading.Thread(target=self._read, daemon=True).start()
+
+    def _read(self):
+        try:
+            for text in self._socket:
+                message = json.loads(text)
+                self.last[message['type']] = message
+                if message['type'] == 'frame':
+                    self.frame.update(message)
+                    self.frames += 1
+                elif message['type'] == 'said':
+                    self.said.append(message['text'])
+                elif message['type'] == 'values':
+                    for one in self.last['controls']['controls']:
+                        one['value'] = message['values'].get(one['name'], one['value'])
+        finally:
+            self.closed = str(self._socket.close_code)
+
+    def send(self, **request):
+        """Ask for something."""
+        self._socket.send(json.dumps(request))
+
+    def send_raw(self, data):
+        """Send whatever."""
+        self._socket.send(data)
+
+    def value(self, name):
+        """Return a parameter's value as the page has it, None before it has."""
+        return next((one['value'] for one in self.last.get('controls', {}).get('controls', ())
+                     if one['name'] == name), None)
+
+    def ready(self):
+        """Wait until everything has come."""
+        until(lambda: {'controls', 'shape', 'names', 'gait'} <= set(self.last) and self.frames,
+              'a whole page')
+        return self
+
+    def end(self):
+        """Close the page."""
+        self._socket.close()

@@ -1,0 +1,215 @@
+"""A Unitree Go2 for tests: LowState out, LowCmd in, joints and body in MuJoCo.
+
+Written apart from cpg_ros.unitree: bytes by struct, the check sum by a table.
+"""
+
+import json
+import math
+import struct
+import threading
+import time
+from collections import deque
+
+import numpy as np
+import rclpy
+from rclpy.qos import QoSProfile, ReliabilityPolicy
+
+from cpg_ros.robots.robot_file import find_robot
+from cpg_ros.simulation.body import Body
+
+DT = 0.002
+#: CDR of LowCmd and of LowState, without the header of four bytes.
+COMMAND = struct.Struct('<4B4IH Bx5f3I' + 'B3x5f3I' * 19 + '4B40B12B2BBxII')
+STATE = struct.Struct('<4B4IHxx 13fb Bxx7fb3xI2I' + 'B3x7fb3xI2I' * 19
+                      + '4BiH4b15H4h4hI40BBxxxf2bxx2f4H2I')
+#: The C struct of LowCmd, as Unitree's own packs it.
+C_STRUCT = struct.Struct('<4B4IH2x' + 'B3x5f3I' * 20 + '4B40B12B2BBx2I')
+LYING = (0.0, 1.36, -2.65)
+
+
+def _table():
+    for byte in range(256):
+        value = byte << 24
+        for _ in range(8):
+            value = (value << 1 ^ 0x04c11db7 if value & 0x80000000 else value << 1) & 0xffffffff
+        yield value
+
+
+TABLE = tuple(_table())
+
+
+def mpeg2(data: bytes) -> int:
+    """CRC-32/MPEG-2 of bytes."""
+    value, table = 0xffffffff, TABLE
+    for byte in data:
+        value = (value << 8) & 0xffffffff ^ table[value >> 24 ^ byte]
+    return value
+
+
+def check_sum(data: bytes) -> int:
+    """The same of a C struct's little-endian words, from the highest byte of each on."""
+    return mpeg2(struct.pack(f'>{len(data) // 4}I', *struct.unpack(f'<{len(data) // 4}I', data)))
+
+
+class StandIn(threading.Thread):
+    """The robot, in real time; its attributes may be set from another thread.
+
+    Attributes:
+        commands: of each: time s, largest kp, largest torque by what the joint bears, largest
+            change of torque against the command before on the same state in N m, kd's largest.
+        wrong: how many had a wrong check sum.
+        mute: publishes no state.
+        frozen: publishes the last state again and again.
+        cut: as if the network's cable were out.
+        lean: rad by which the IMU says that the body leans.
+        heat: of one motor, deg C.
+        buttons: of the remote, byte 2 and 3.
+        mode: of its own motion service; '' for none.
+        asked: numbers of what its services were asked for.
+
+    """
+
+    def __init__(self, domain: int, services: bool = False, lying: bool = True) -> None:
+        super().__init__(daemon=True)
+        from unitree_api.msg import Request, Response
+        from unitree_go.msg import LowCmd, LowState
+        self.robot = find_robot('unitree_go2')
+        self.body = Body('go2', self.robot, kp=60.0, kd=2.0, timestep=DT)
+        self.limit = np.tile([23.7, 23.7, 45.43], 4)
+        self.context = rclpy.Context()
+        rclpy.init(context=self.context, domain_id=domain)
+        self.node = rclpy.create_node('go2', context=self.context, enable_rosout=False,
+                                      start_parameter_services=False)
+        self._states = self.node.create_publisher(LowState, '/lowstate', QoSProfile(depth=1))
+        self._commands = self.node.create_subscription(
+            LowCmd, '/lowcmd', lambda _: None, QoSProfile(
+                depth=100, reliability=ReliabilityPolicy.BEST_EFFORT), raw=True)
+        self._kind, self._services = LowCmd, {}
+        if services:
+            for name in ('motion_switcher', 'sport'):
+                self._services[name] = (
+                    self.node.create_subscription(Request, f'/api/{name}/request',
+                                                  lambda _: None, 10),
+                    self.node.create_publisher(Response, f'/api/{name}/response', 10))
+        self.commands: deque = deque(maxlen=1_000_000)
+        self.arrivals: deque = deque(maxlen=1_000_000)
+        self.wrong = 0
+        self.mute = self.frozen = self.cut = False
+        self.lean, self.heat, self.buttons = 0.0, 30, 0
+        self.mode, self.asked = 'normal' if services else '', []
+        self.ticks = 0
+        self._ending = threading.Event()
+        self._before = np.zeros((4, 12))
+        self._sent = b''
+        self.q, self.kp, self.kd = self.body.stand.copy(), np.zeros(12), np.zeros(12)
+        if lying:
+            self._drive(np.tile(LYING, 4), np.full(12, 60.0), np.full(12, 2.0))
+            for _ in range(1000):
+                self.body.step()
+        self._drive(self.q, self.kp, self.kd)
+
+    def _drive(self, q, kp, kd):
+        """Drive the joints, torque = kp (q - angle) - kd speed, within what they bear."""
+        model = self.body.model
+        model.actuator_gainprm[:, 0] = kp
+        model.actuator_biasprm[:, 1], model.actuator_biasprm[:, 2] = -kp, -kd
+        self.body.command(q)
+
+    def run(self):
+        due = time.monotonic()
+        while not self._ending.is_set():
+            due += DT
+            if (wait := due - time.monotonic()) > 0:
+                time.sleep(wait)
+            elif wait < -0.05:
+                due = time.monotonic()
+            self._take()
+            self.body.step()
+            self.ticks += 1
+            if not (self.mute or self.cut):
+                if not self.frozen or not self._sent:
+                    self._sent = self._state()
+                self._states.publish(self._sent)
+            self._serve()
+
+    def _take(self):
+        handle = self._commands.handle
+        with handle:
+            while (found := handle.take_message(self._kind, True)) is not None:
+                if not self.cut:
+                    self._obey(found[0])
+
+    def _obey(self, message):
+        fields = COMMAND.unpack(message[4:4 + COMMAND.size])
+        now = time.monotonic()
+        if check_sum(C_STRUCT.pack(*fields)[:808]) != fields[-1]:
+            self.wrong += 1
+            return
+        motors = np.array(fields[9:9 + 12 * 9]).reshape(12, 9)
+        q, dq, tau, kp, kd = motors[:, 1:6].T
+        angle, speed = self.body.position, self.body.velocity
+        assert not dq.any() and not tau.any()
+        torque = kp * (q - angle) - kd * speed
+        old_q, _, old_kp, old_kd = self._before
+        step = np.abs(torque - (old_kp * (old_q - angle) - old_kd * speed))
+        self.commands.append((now, kp.max(), (np.abs(torque) / self.limit).max(), step.max(),
+                              kd.max()))
+        self.arrivals.append((now, q[0]))
+        self._before = np.array([q, dq, kp, kd])
+        self.q, self.kp, self.kd = q, kp, kd
+        self._drive(q, kp, kd)
+
+    def _state(self):
+        body = self.body
+        w, x, y, z = body.quaternion.tolist()
+        if self.lean:
+            w, x, y, z = math.cos(self.lean / 2), math.sin(self.lean / 2), 0.0, 0.0
+        up = (2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y))
+        words = [0xfe, 0xef, 0xff, 0, 1, 2, 3, 4, 5, w, x, y, z, *body.twist[3:].tolist(),
+                 *(9.81 * one for one in up), 0.0, 0.0, 0.0, 40]
+        rows = np.zeros((20, 8))
+        rows[:12, 0], rows[:12, 1] = body.position, body.velocity
+        rows[:12, 3] = body.torque
+        for k, row in enumerate(rows.tolist()):
+            words += [int(k < 12), *row[:7], self.heat if k == 4 else 30, 0, 0, 0]
+        forces = dict(zip(self.robot.legs, body.feet.tolist(), strict=True))
+        feet = [int(forces[leg]) for leg in ('rf', 'lf', 'rh', 'lh')]
+        words += [1, 2, 3, 87, -1500, 17, 25, 25, 26, 26, *([3700] * 8), *([0] * 7), *feet,
+                  *feet, self.ticks & 0xffffffff, 0, 0, self.buttons & 0xff, self.buttons >> 8,
+                  *([0] * 36), 0, 0.0, 30, 31, 29.6, 1.5, 0, 0, 0, 0, 0, 0]
+        return b'\0\1\0\0' + STATE.pack(*words)
+
+    def _serve(self):
+        from unitree_api.msg import Request, Response
+        for name, (requests, responses) in self._services.items():
+            handle = requests.handle
+            with handle:
+                while (found := handle.take_message(Request, False)) is not None:
+                    request = found[0]
+                    number = request.header.identity.api_id
+                    self.asked.append((name, number))
+                    answer = Response()
+                    answer.header.identity = request.header.identity
+                    if number == 1001:
+                        answer.data = json.dumps({'form': '0', 'name': self.mode})
+                    elif number == 1003:
+                        self.mode = ''
+                    responses.publish(answer)
+
+    # -- what tests look at ---------------------------------------------------------------
+
+    def since(self, time_from):
+        """Commands since a time: rows of ``commands``."""
+        rows = [row for row in list(self.commands) if row[0] >= time_from]
+        return np.array(rows).reshape(-1, 5)
+
+    @property
+    def damped(self):
+        """Whether the joints are only braked."""
+        return not self.kp.any() and bool(self.kd.any())
+
+    def end(self):
+        self._ending.set()
+        self.join()
+        self.node.destroy_node()
+        rclpy.shutdown(context=self.context)

@@ -1,0 +1,227 @@
+"""The panel's page in a real browser: Chromium without a screen."""
+
+import re
+import shutil
+
+import pytest
+
+pytest.importorskip('websockets')
+pytest.importorskip('playwright', reason='playwright is not installed')
+
+from geometry_msgs.msg import Twist
+from graph import Process, Watcher, until
+from panel_client import start_panel
+from playwright.sync_api import sync_playwright
+
+CHROMIUM = shutil.which('chromium') or shutil.which('chromium-browser') or shutil.which(
+    'google-chrome')
+if CHROMIUM is None:
+    pytest.skip('there is no Chromium on this machine', allow_module_level=True)
+FLAGS = ['--headless', '--no-sandbox', '--disable-gpu', '--use-angle=swiftshader',
+         '--enable-unsafe-swiftshader', '--disable-quic', '--no-first-run',
+         '--disable-background-networking', '--disable-component-update', '--disable-sync']
+
+
+@pytest.fixture(scope='module')
+def rig():
+    """A steered generator, the address of its page, a watcher, and what cmd_vel says."""
+    generator = Process('-p', 'robot:=unitree_go2', '-p', 'cmd_vel:=true', '-p', 'rate:=100.0',
+                        '-p', 'transition:=0.2', '-p', 'ramp:=0.2')
+    panel, address = start_panel(generator.domain)
+    generator.wait_for('publishing')
+    watcher = Watcher(generator.domain)
+    twists = []
+    watcher.node.create_subscription(
+        Twist, '/cmd_vel', lambda m: twists.append((m.linear.x, m.angular.z)), 100)
+    yield generator, address, watcher, twists
+    watcher.end()
+    panel.end()
+    generator.end()
+
+
+@pytest.fixture(scope='module')
+def browser():
+    """A browser that looks at nothing but this machine."""
+    with sync_playwright() as running:
+        started = running.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
+        yield started
+        started.close()
+
+
+@pytest.fixture
+def open_page(rig, browser):
+    """Open pages of which all that went wrong is looked at in the end."""
+    opened, wrong = [], []
+
+    def open_one(more='', **options):
+        context = browser.new_context(viewport={'width': 900, 'height': 500}, **options)
+        page = context.new_page()
+        page.on('pageerror', lambda error: wrong.append(str(error)))
+        page.on('requestfailed', lambda request: wrong.append(request.url))
+        page.on('request', lambda request: request.url.startswith(rig[1]) or wrong.append(
+            request.url))
+        page.on('console', lambda message: message.type == 'error' and wrong.append(message.text))
+        page.goto(rig[1] + more)
+        opened.append(context)
+        until(lambda: page.evaluate('panel.frames > 0 && !!panel.body') and
+              page.locator('#gaits button').count(), 'a page with a robot')
+        return page
+
+    yield open_one
+    for context in opened:
+        context.close()
+    assert not wrong
+
+
+def test_it_shows_the_robot_and_all_that_is_known_of_it(rig, open_page):
+    page = open_page()
+    assert page.locator('#source').inner_text() == "shape: model 'go2'"
+    assert page.locator('#gaits button').all_inner_texts()[:2] == ['walk1', 'trot2']
+    assert page.locator('#gaits button.on').get_attribute('data-gait') == 'trot'
+    assert page.evaluate('panel.scene.gl.getError()') == 0
+    # Something is drawn: there are more colours than of a sky and a floor.
+    colours = page.evaluate('''() => { panel.scene.draw({}); const gl = panel.scene.gl;
+        const all = new Uint8Array(4 * gl.drawingBufferWidth * gl.drawingBufferHeight);
+        gl.readPixels(0, 0, gl.drawingBufferWidth, gl.drawingBufferHeight, gl.RGBA,
+            gl.UNSIGNED_BYTE, all);
+        return new Set(new Uint32Array(all.buffer)).size; }''')
+    assert colours > 300
+    sliders = page.locator('input[type=range][data-parameter]')
+    assert {'rate', 'amplitude', 'delayed.tau'} <= set(sliders.evaluate_all(
+        'all => all.map(one => one.dataset.parameter)'))
+    # Feet of a robot of which nobody says where it is stand on the floor.
+    heights = page.evaluate('Object.keys(panel.body.shape.feet).map(k => panel.body.foot(k)[2])')
+    assert min(heights) == pytest.approx(0.02, abs=1e-3)
+
+
+def test_every_page_follows_clicks_and_keys(rig, open_page):
+    one, other = open_page(), open_page()
+    gaits = rig[2].gaits
+    one.locator('#gaits button[data-gait=walk]').click()
+    until(lambda: gaits[-1] == 'walk', 'walk')
+    other.keyboard.press('2')
+    until(lambda: gaits[-1] == 'trot', 'trot')
+    for page in (one, other):
+        until(lambda: page.locator('#now').inner_text() == 'trot' and page.locator(  # noqa: B023
+            '#gaits button.on').get_attribute('data-gait') == 'trot', 'the page shows it')
+
+
+def test_a_slider_that_is_dragged_ends_at_its_last_value(rig, open_page):
+    page = open_page()
+    slider = page.locator('input[type=range][data-parameter=frequency]')
+    slider.scroll_into_view_if_needed()
+    box = slider.bounding_box()
+    y = box['y'] + box['height'] / 2
+    page.mouse.move(box['x'] + 0.2 * box['width'], y)
+    page.mouse.down()
+    for k in range(30):
+        page.mouse.move(box['x'] + (0.2 + 0.002 * k) * box['width'], y)
+    page.mouse.up()
+    wanted = float(slider.input_value())
+    until(lambda: rig[2].get('frequency') == [pytest.approx(wanted)], 'the last value')
+    assert 2.0 < wanted < 3.0
+
+
+def test_a_refusal_appears_with_its_reason_and_the_control_goes_back(rig, open_page):
+    page = open_page()
+    field = page.locator('input[type=number][data-parameter="delayed.tau"]')
+    before = field.input_value()
+    field.fill('0.1')
+    field.press('Enter')
+    shown = page.locator('#said p.refused')
+    shown.wait_for()
+    assert "below the trot's critical delay" in shown.inner_text()
+    until(lambda: field.input_value() == before, 'the value that is in force')
+
+
+def steered(rig, page, way='ArrowUp'):
+    rig[3].clear()
+    until(lambda: not page.evaluate('document.querySelector("#pad").matches(".off")'), 'a pad')
+    page.keyboard.down(way)
+    until(lambda: rig[3] and rig[3][-1] != (0.0, 0.0), 'cmd_vel')
+    return rig[3][-1]
+
+
+@pytest.mark.parametrize('how', ['key', 'hidden', 'space', 'closed', 'frozen'])
+def test_the_robot_stops_when_the_page_lets_go(rig, open_page, how):
+    page = open_page()
+    assert steered(rig, page) == (0.5, 0.0)
+    if how == 'key':
+        page.keyboard.up('ArrowUp')
+    elif how == 'hidden':
+        # As a browser does when another tab comes to the front.
+        page.evaluate('''() => { Object.defineProperty(document, 'hidden', { get: () => true });
+            document.dispatchEvent(new Event('visibilitychange')); }''')
+    elif how == 'space':
+        page.keyboard.press(' ')
+        page.locator('#said p.told', has_text='ramping down').wait_for()
+        page.locator('#enable').click()
+    elif how == 'closed':
+        page.close()
+    else:
+        page.evaluate('''() => { const end = Date.now() + 1500; while (Date.now() < end); }''')
+    until(lambda: rig[3][-1] == (0.0, 0.0), 'the stop')
+
+
+def test_the_pad_steers_with_a_finger(rig, open_page):
+    page = open_page()
+    pad = page.locator('#pad')
+    until(lambda: 'off' not in (pad.get_attribute('class') or ''), 'a pad')
+    pad.scroll_into_view_if_needed()
+    box = pad.bounding_box()
+    x, y = box['x'] + box['width'] / 2, box['y'] + box['height'] / 2
+    rig[3].clear()
+    page.mouse.move(x, y)
+    page.mouse.down()
+    page.mouse.move(x - 0.2 * box['width'], y - 0.2 * box['height'])
+    until(lambda: rig[3] and rig[3][-1][0] == pytest.approx(0.25, abs=0.02)
+          and rig[3][-1][1] == pytest.approx(0.3, abs=0.02), 'half ahead, half to the left')
+    page.mouse.up()
+    until(lambda: rig[3][-1] == (0.0, 0.0), 'the stop')
+
+
+def test_the_address_carries_the_view(open_page):
+    page = open_page()
+    page.evaluate('panel.scene.camera.azimuth = 120')
+    page.locator('#theme').click()
+    page.locator('#portrait').select_option('cell 3')
+    address = page.evaluate('location.hash')
+    other = open_page(address)
+    until(lambda: other.locator('#portrait').input_value() == 'cell 3', 'the portrait')
+    assert other.evaluate('panel.scene.camera.azimuth') == 120
+    assert other.evaluate('document.documentElement.dataset.theme') == 'dark'
+
+
+@pytest.mark.parametrize('scheme', ['light', 'dark'])
+def test_light_and_dark_are_as_the_system_has_them(open_page, scheme):
+    page = open_page(color_scheme=scheme)
+    back = page.evaluate('getComputedStyle(document.body).backgroundColor')
+    red = int(re.search(r'\d+', back)[0])
+    assert (red > 200) == (scheme == 'light')
+
+
+def test_it_fits_a_phone(open_page):
+    page = open_page(device_scale_factor=2)
+    page.set_viewport_size({'width': 375, 'height': 700})
+    assert page.evaluate('document.documentElement.scrollWidth') <= 375
+    widths = page.locator('section, figure, canvas').evaluate_all(
+        'all => all.map(one => one.getBoundingClientRect().right)')
+    assert max(widths) <= 375
+
+
+def test_it_comes_back_after_the_panel_was_gone(rig, browser):
+    domain = rig[0].domain
+    panel, address = start_panel(domain, '-r', '__node:=second_panel')
+    port = re.search(r':(\d+)/', address)[1]
+    second = browser.new_page()
+    second.goto(address)
+    until(lambda: second.evaluate('panel.frames > 0'), 'frames')
+    panel.end()
+    until(lambda: 'gone' in second.locator('#link-state').inner_text(), 'the page says so')
+    panel, _ = start_panel(domain, '-r', '__node:=second_panel', port=port)
+    try:
+        seen = second.evaluate('panel.frames')
+        until(lambda: second.evaluate('panel.frames') > seen + 5, 'frames again')
+    finally:
+        second.close()
+        panel.end()

@@ -1,0 +1,162 @@
+"""The shapes that the panel draws: where their links are, and what they are made of."""
+
+import struct
+
+import numpy as np
+import pytest
+
+pytest.importorskip('websockets')
+
+from cpg_ros.files.shared_resources import share
+from cpg_ros.panel import body_shape as solids
+from cpg_ros.panel import mesh_files, shape_source, stick_figure, urdf_shape
+from cpg_ros.robots.robot_file import find_robot
+
+
+def worlds(shape, angles):
+    """Frames of all links, (4, 4), with the base at the origin, as a page works them out."""
+    found = []
+    for link in shape.links:
+        own, turn = np.eye(4), np.eye(4)
+        own[:3, :3], own[:3, 3] = link.pose, link.place
+        x, y, z = link.axis
+        cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+        angle = angles.get(link.joint, link.zero) - link.zero
+        turn[:3, :3] = (np.eye(3) + np.sin(angle) * cross
+                        + (1 - np.cos(angle)) * cross @ cross) if link.joint else np.eye(3)
+        above = np.eye(4) if link.parent < 0 else found[link.parent]
+        found.append(above @ own @ turn)
+    return found
+
+
+@pytest.mark.parametrize(('robot', 'model'), [('unitree_go2', 'go2'), ('unitree_go2', 'aliengo'),
+                                              ('quadruped', '')])
+def test_links_are_where_mujoco_has_them(robot, model):
+    mujoco = pytest.importorskip('mujoco')
+    robot_file = find_robot(robot)
+    said = []
+    shape = shape_source.find(shape_source.Known(robot=robot, model=model), said.append)
+    assert not said
+    from cpg_ros.simulation.robot_model import load
+    physics = load(model or str(share() / 'urdf' / 'quadruped.urdf'), robot_file)
+    data = mujoco.MjData(physics)
+    random = np.random.default_rng(1)
+    angles = {joint.name: random.uniform(joint.lower, joint.upper) for joint in robot_file.joints}
+    data.qpos[:7] = 0, 0, 0, 1, 0, 0, 0
+    for name, angle in angles.items():
+        data.qpos[physics.joint(name).qposadr[0]] = angle
+    mujoco.mj_kinematics(physics, data)
+    found = worlds(shape, angles)
+    for name in angles:
+        body = physics.joint(name).bodyid[0]
+        k = next(k for k, link in enumerate(shape.links) if link.joint == name)
+        # MuJoCo merges links that are fixed to one another; a joint's own it never moves.
+        np.testing.assert_allclose(found[k][:3, 3], data.xpos[body], atol=1e-6)
+        np.testing.assert_allclose(found[k][:3, :3].ravel(), data.xmat[body], atol=1e-6)
+    assert set(shape.feet) == set(robot_file.legs)
+
+
+def volume(triangles):
+    return abs(np.einsum('ij,ij->i', triangles[:, 0],
+                         np.cross(triangles[:, 1], triangles[:, 2])).sum()) / 6.0
+
+
+def test_solids():
+    for made, low, high in ((solids.cylinder(0.5, 1.0), [-0.5, -0.5, -1], [0.5, 0.5, 1]),
+                            (solids.capsule(0.5, 1.0), [-0.5, -0.5, -1.5], [0.5, 0.5, 1.5]),
+                            (solids.box(np.array([1.0, 2.0, 3.0])), [-1, -2, -3], [1, 2, 3])):
+        np.testing.assert_allclose(made.min((0, 1)), low, atol=1e-9)
+        np.testing.assert_allclose(made.max((0, 1)), high, atol=1e-9)
+    # A 16-sided prism: its area is n/2 sin(2 pi / n) r^2.
+    assert volume(solids.cylinder(1.0, 0.5)) == pytest.approx(8 * np.sin(np.pi / 8), rel=1e-9)
+    stick = solids.along(np.array([1.0, 0.0, 0.0]), np.array([1.0, 2.0, 0.0]), 0.1)
+    np.testing.assert_allclose(stick.min((0, 1)), [0.9, -0.1, -0.1], atol=0.01)
+    np.testing.assert_allclose(stick.max((0, 1)), [1.1, 2.1, 0.1], atol=0.01)
+
+
+TETRAHEDRON = np.array([[[0, 0, 0], [0, 1, 0], [1, 0, 0]], [[0, 0, 0], [1, 0, 0], [0, 0, 1]],
+                        [[0, 0, 0], [0, 0, 1], [0, 1, 0]], [[1, 0, 0], [0, 1, 0], [0, 0, 1]]],
+                       float)
+
+
+def binary_stl(triangles):
+    rows = b''.join(struct.pack('<12fH', 0, 0, 0, *one.ravel(), 0) for one in triangles)
+    return bytes(80) + struct.pack('<I', len(triangles)) + rows
+
+
+def text_stl(triangles):
+    lines = [f'vertex {x} {y} {z}' for one in triangles for x, y, z in one]
+    return ('solid s\n' + '\n'.join(lines) + '\nendsolid s').encode()
+
+
+OBJ = b'v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1/1 2/2 4/3\nf -4//1 -1//1 -2//1\nf 2 3 4\n'
+
+
+@pytest.mark.parametrize(('name', 'data'), [
+    ('a.stl', binary_stl(TETRAHEDRON)), ('a.STL', text_stl(TETRAHEDRON)), ('a.obj', OBJ)])
+def test_mesh_files(tmp_path, name, data):
+    (tmp_path / name).write_bytes(data)
+    found = mesh_files.read(tmp_path / name)
+    np.testing.assert_allclose(found, TETRAHEDRON)
+    assert volume(found) == pytest.approx(1 / 6)
+
+
+@pytest.mark.parametrize(('name', 'data', 'said'), [
+    ('a.dae', b'', 'neither .stl nor .obj'), ('a.obj', b'f 1 2 3', 'a.obj'),
+    ('a.obj', b'v 1 x 3', 'a.obj'), ('a.stl', text_stl(TETRAHEDRON * np.nan), 'not finite'),
+    ('a.obj', None, 'No such file')])
+def test_meshes_that_cannot_be_read(tmp_path, name, data, said):
+    if data is not None:
+        (tmp_path / name).write_bytes(data)
+    with pytest.raises(mesh_files.MeshError, match=said):
+        mesh_files.read(tmp_path / name)
+
+
+def test_vertices_that_lie_close_together_become_one():
+    fine = np.concatenate([TETRAHEDRON, TETRAHEDRON * 1e-3])
+    left = mesh_files.coarse(fine, 0.01)
+    assert len(left) == 4 and volume(left) == pytest.approx(1 / 6, rel=0.02)
+
+
+URDF = '''<robot name="one"><link name="base"><visual><geometry><mesh filename="{mesh}"
+  scale="0.5 0.5 0.5"/></geometry></visual><visual><geometry><mesh filename="package://no/x.stl"/>
+  </geometry></visual></link><link name="arm"/><joint name="shoulder" type="revolute"><parent
+  link="base"/><child link="arm"/><limit lower="-1" upper="2" velocity="3"/></joint></robot>'''
+
+
+def test_a_urdf_with_meshes_of_which_one_is_missing(tmp_path):
+    (tmp_path / 'part.stl').write_bytes(binary_stl(TETRAHEDRON))
+    path = tmp_path / 'one.urdf'
+    path.write_text(URDF.format(mesh='part.stl'))
+    said = []
+    shape = urdf_shape.from_file(path, said.append)
+    assert len(said) == 1 and 'not installed here' in said[0]
+    (drawn,) = shape.links[0].vertices
+    assert volume(drawn) == pytest.approx(1 / 48)
+    assert shape.limits == {'shoulder': (-1.0, 2.0)}
+
+
+def test_the_users_urdf_comes_first_and_what_is_wrong_with_it_is_said(tmp_path):
+    (tmp_path / 'bad.urdf').write_text('<sdf/>')
+    said = []
+    shape = shape_source.find(shape_source.Known(urdf=str(tmp_path / 'bad.urdf'), robot='goat'),
+                              said.append)
+    assert 'this is no URDF' in said[0] and shape.source == "stick figure of 'goat'"
+    text = (share() / 'urdf' / 'quadruped.urdf').read_text()
+    shape = shape_source.find(shape_source.Known(description=text, robot='goat'), said.append)
+    assert shape.source == 'robot_description' and shape.feet == {}
+
+
+def test_a_stick_figure_of_what_topics_alone_tell():
+    shape = shape_source.find(shape_source.Known(
+        robot='/another/machine.yaml', legs={'lh': ['a', 'b', 'c'], 'rf': ['d', 'e']}), str)
+    standing = worlds(shape, {})
+    heights = []
+    for leg, ahead, left in (('lh', -1, 1), ('rf', 1, -1)):
+        link, place = shape.feet[leg]
+        foot = standing[link] @ [*place, 1.0]
+        assert np.sign(foot[:2]).tolist() == [ahead, left]
+        heights.append(foot[2])
+    np.testing.assert_allclose(heights, -stick_figure.LEG)
+    message = shape.message()
+    assert message['type'] == 'shape' and len(message['links']) == 6

@@ -1,0 +1,153 @@
+"""The bridge beside a stand-in robot and a real generator, as processes on a real ROS graph."""
+
+import importlib.util
+import os
+import signal
+import time
+
+import numpy as np
+import pytest
+from graph import Process, until
+from sensor_msgs.msg import BatteryState, Imu
+from std_msgs.msg import Float64MultiArray
+from std_srvs.srv import Trigger
+from unitree_faults import BRIDGE, FAULTS, Walk, inflict, mend
+
+for name, how in (('unitree_go', "'make unitree' has not been run"),
+                  ('mujoco', 'the extra [sim] is not installed')):
+    if importlib.util.find_spec(name) is None:
+        pytest.skip(how, allow_module_level=True)
+
+#: A loaded machine stalls processes for longer than a robot could be left alone.
+PATIENT = 'state_timeout:=0.2', 'target_timeout:=0.3'
+
+
+@pytest.fixture(scope='module')
+def walk():
+    walk = Walk(*PATIENT)
+    yield walk
+    walk.end()
+
+
+def test_from_lying_in_its_own_mode_to_walking_and_back():
+    walk = Walk(*PATIENT, services=True)
+    try:
+        heard = {kind: [] for kind in (Imu, BatteryState, Float64MultiArray)}
+        for kind, topic in ((Imu, 'imu'), (BatteryState, 'battery'),
+                            (Float64MultiArray, 'foot_contacts')):
+            walk.watcher.node.create_subscription(kind, topic, heard[kind].append, 100)
+        walk.wait_for('rising')
+        assert walk.robot.asked == [('motion_switcher', 1001), ('sport', 1005),
+                                    ('motion_switcher', 1003), ('motion_switcher', 1001)]
+        walk.walking()
+        time.sleep(2.0)
+        assert [phase for _, phase in walk.phases] == ['idle', 'rising', 'standing', 'following']
+        assert walk.robot.body.base[2] > 0.2 and walk.robot.body.base[0] > 0.3
+        assert not walk.robot.wrong
+        # What is measured is published as robot_sim does.
+        names, sample = walk.watcher.names, walk.watcher.samples[-1]
+        assert names == list(walk.robot.robot.order)
+        assert np.abs(np.array(sample[1]) - walk.robot.body.position).max() < 0.3
+        assert heard[Imu][-1].orientation.w == pytest.approx(
+            walk.robot.body.quaternion[0], abs=0.1)
+        assert 50 < sum(heard[Float64MultiArray][-1].data) < 400
+        until(lambda: heard[BatteryState], 'the battery')
+        assert heard[BatteryState][0].percentage == pytest.approx(0.87)
+        assert heard[BatteryState][0].voltage == pytest.approx(29.6)
+        walk.bridge.signal(signal.SIGINT)
+        assert walk.bridge.wait() == 0, walk.bridge.log
+        assert [phase for _, phase in walk.phases][-2:] == ['sitting', 'damping']
+        assert walk.robot.damped and walk.robot.body.base[2] < 0.16
+        assert np.abs(walk.robot.body.velocity).max() < 0.5
+    finally:
+        walk.end()
+
+
+@pytest.mark.parametrize('fault', FAULTS, ids=lambda fault: fault.__name__)
+def test_what_happens_on_a_fault(walk, fault):
+    walk.walking()
+    try:
+        _, sat, torque, step = inflict(walk, fault)
+        assert bool(sat) == (FAULTS[fault][1] is not None)
+        assert torque < 1.2 and step < 15.0
+    finally:
+        mend(walk)
+
+
+@pytest.mark.parametrize('how', ['service', 'button'])
+def test_stop_is_at_once(walk, how):
+    walk.walking()
+    if how == 'service':
+        assert walk.watcher.call(Trigger, '/unitree_bridge/stop', Trigger.Request()).success
+    else:
+        walk.robot.buttons = 1 << 9
+    walk.wait_for('damping')
+    walk.robot.buttons = 0
+    assert 'sitting' not in [phase for _, phase in walk.phases[-2:]]
+    assert walk.robot.damped
+
+
+def alone(*parameters, environment=None, domain=None):
+    return Process(*(word for name in parameters for word in ('-p', name)), executable=BRIDGE,
+                   environment=environment, domain=domain)
+
+
+def test_another_bridge_on_the_computer_is_refused(walk):
+    process = alone(domain=walk.domain)
+    assert process.wait() == 1
+    assert 'another bridge on this computer' in process.log and len(process.lines) == 1
+
+
+def test_another_publisher_is_refused_and_sits_it_down(walk):
+    from unitree_go.msg import LowCmd
+    walk.walking()
+    rival = walk.watcher.node.create_publisher(LowCmd, '/lowcmd', 1)
+    walk.wait_for('sitting').wait_for('damping')
+    assert 'the robot is commanded by /watcher, too' in walk.bridge.log
+    answer = walk.watcher.call(Trigger, '/unitree_bridge/start', Trigger.Request())
+    assert answer.success
+    walk.bridge.wait_for('not started: the robot is commanded by /watcher')
+    walk.watcher.node.destroy_publisher(rival)
+    assert walk.robot.damped
+
+
+def test_a_dry_run_sends_nothing(walk):
+    walk.wait_for('damping')
+    sent = walk.watcher.node.count_publishers('/lowcmd')
+    process = alone('dry_run:=true', *PATIENT, 'own_publishers:=2', 'command:=forward_position',
+                    domain=walk.domain)
+    try:
+        process.wait_for('standing: it has risen')
+        process.wait_for('dry run: following, the largest torque would be')
+        assert walk.watcher.node.count_publishers('/lowcmd') == sent
+        assert 'ReleaseMode are not sent' in process.log
+    finally:
+        process.end()
+
+
+def test_without_a_robot_it_says_what_to_look_at():
+    process = alone()
+    try:
+        process.wait_for('not started: no LowState for 10 s: is the cable in')
+    finally:
+        process.end()
+    assert process.wait() == 0
+
+
+@pytest.mark.parametrize(('parameter', 'words'), [
+    ('kp:=[200.0]', 'kp: 200 is not from 0 to 150'), ('robot:=goat', "no joint 'FR_hip_joint'"),
+    ('kp:=high', "parameter kp must be a list of doubles, not 'high'"),
+    ('model:=spot', "model 'spot' is not one of go2, go1, b2")])
+def test_what_cannot_be_used_is_refused_in_one_line(parameter, words):
+    process = alone(parameter)
+    assert process.wait() == 1
+    assert words in process.log and len(process.lines) == 1
+
+
+def test_without_the_messages_one_line_says_how_to_get_them(tmp_path):
+    (tmp_path / 'unitree_go').mkdir()
+    (tmp_path / 'unitree_go' / '__init__.py').write_text("raise ImportError('not here')\n")
+    path = os.pathsep.join([str(tmp_path), os.environ.get('PYTHONPATH', '')])
+    process = alone(environment={'PYTHONPATH': path})
+    assert process.wait() == 1
+    assert "'make unitree' builds them" in process.log and len(process.lines) == 1

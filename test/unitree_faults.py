@@ -1,0 +1,193 @@
+"""A stand-in robot, a bridge and a walking generator; and the faults of the table in docs."""
+
+import contextlib
+import math
+import signal
+import socket
+import time
+
+import numpy as np
+from graph import EXECUTABLE, Process, Watcher, free_domain, until
+from rclpy.qos import DurabilityPolicy, QoSProfile
+from stand_in import StandIn
+from std_msgs.msg import Float64MultiArray, String
+from std_srvs.srv import Trigger
+
+from cpg_ros.nodes.unitree.watchdog_link import address
+from cpg_ros.unitree.vigil import Vigil
+
+BRIDGE = EXECUTABLE.with_name('unitree_bridge')
+COMMANDS = 'forward_position_controller/commands'
+
+
+class Walk:
+    """All three of them, with what has been seen of the bridge's phases."""
+
+    def __init__(self, *parameters, services=False):
+        self.domain = free_domain()
+        self.robot = StandIn(self.domain, services=services)
+        self._parameters = [word for name in (
+            'command:=forward_position', f'motion_switcher:={str(services).lower()}', *parameters)
+            for word in ('-p', name)]
+        self.phases = []
+        self.robot.start()
+        self.watcher = Watcher(self.domain, '/unitree_bridge')
+        self.watcher.node.create_subscription(
+            String, '/unitree_bridge/state',
+            lambda message: self.phases.append((time.monotonic(), message.data)),
+            QoSProfile(depth=10, durability=DurabilityPolicy.TRANSIENT_LOCAL))
+        self.other = self.watcher.node.create_publisher(Float64MultiArray, COMMANDS, 10)
+        self.bridge = self.generator = None
+        self.start_generator()
+        self.start_bridge()
+
+    def start_bridge(self):
+        self.bridge = Process(*self._parameters, domain=self.domain, executable=BRIDGE)
+
+    def start_generator(self):
+        self.generator = Process(*(word for name in (
+            'robot:=unitree_go2', 'rate:=500.0', "combined_topic:=''", 'gait:=trot',
+            'command:=forward_position', 'exclusive:=false') for word in ('-p', name)),
+            domain=self.domain)
+
+    @property
+    def phase(self):
+        return self.phases[-1][1] if self.phases else ''
+
+    def wait_for(self, phase):
+        before, lines = len(self.phases), len(self.bridge.lines)
+        until(lambda: self.phase == phase or not self.bridge.alive or
+              any(one == 'damping' for _, one in self.phases[before:])
+              or 'not started' in '\n'.join(self.bridge.lines[lines:]), phase)
+        assert self.phase == phase, self.bridge.log
+        return self
+
+    def walking(self):
+        """Walk, whatever was before."""
+        if not self.generator.alive:
+            self.start_generator()
+            self.generator.wait_for('publishing')
+        if self.phase == 'damping':
+            answer = self.watcher.call(Trigger, '/unitree_bridge/start', Trigger.Request())
+            assert answer.success, answer.message
+        self.wait_for('following')
+        time.sleep(1.2)
+        assert self.phase == 'following', self.bridge.log
+        return self
+
+    def publish(self, angles, seconds):
+        """Publish targets beside the generator for some time."""
+        end = time.monotonic() + seconds
+        while time.monotonic() < end:
+            self.other.publish(Float64MultiArray(data=[float(angle) for angle in angles]))
+            time.sleep(0.005)
+
+    def damped_after(self, instant):
+        """Seconds from an instant until the first command that damps for good."""
+        def for_good():
+            # A watchdog that a busy machine made look up damps for a tick or two.
+            last = [row[1] for row in list(self.robot.commands)[-25:]]
+            return self.robot.commands[-1][0] > instant and not any(last)
+
+        until(for_good, 'damping')
+        rows = self.robot.since(instant)
+        return rows[np.flatnonzero(rows[:, 1] > 0.0).max(initial=-1) + 1, 0] - instant
+
+    def end(self):
+        for one in (self.generator, self.bridge):
+            one.signal(signal.SIGCONT) if one.alive else None
+        self.bridge.end()
+        # A bridge that has never driven leaves the watchdog of the one before at work.
+        with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as line, contextlib.suppress(
+                ConnectionRefusedError):
+            line.sendto(Vigil.END, address('watchdog', self.domain, '/lowcmd'))
+        for one in (self.generator, self.watcher, self.robot):
+            one.end()
+
+
+def generator_killed(walk):
+    walk.generator.signal(signal.SIGKILL)
+    return time.monotonic()
+
+
+def generator_stopped(walk):
+    walk.generator.signal(signal.SIGSTOP)
+    return time.monotonic()
+
+
+def generator_restarted(walk):
+    began = generator_killed(walk)
+    walk.generator.wait()
+    walk.start_generator()
+    return began
+
+
+def nan_target(walk):
+    began = time.monotonic()
+    walk.publish([math.nan] * 12, 0.004)
+    return began
+
+
+def target_leaps(walk):
+    began = generator_stopped(walk)
+    walk.publish(walk.robot.q + 1.0, 0.3)
+    return began
+
+
+def state_frozen(walk):
+    walk.robot.frozen = True
+    return time.monotonic()
+
+
+def tilt(walk):
+    walk.robot.lean = 1.0
+    return time.monotonic()
+
+
+def bridge_killed(walk):
+    walk.bridge.signal(signal.SIGKILL)
+    return time.monotonic()
+
+
+def network_cut(walk):
+    walk.robot.cut = True
+    time.sleep(1.0)
+    walk.robot.cut = False
+    return time.monotonic()
+
+
+#: What is done -> within how many s it must damp; and when it must begin to sit, if it does.
+FAULTS = {generator_killed: (1.6 + 0.1, 0.1), generator_stopped: (1.6 + 0.1, 0.1),
+          generator_restarted: (1.6 + 0.1, 0.1), nan_target: (0.02, None),
+          target_leaps: (1.6 + 0.1, 0.1), state_frozen: (0.04, None), tilt: (0.02, None),
+          bridge_killed: (0.02, None), network_cut: (0.02, None)}
+
+
+def mend(walk):
+    """Undo a fault."""
+    walk.robot.frozen, walk.robot.lean = False, 0.0
+    if walk.generator.alive:
+        walk.generator.signal(signal.SIGCONT)
+    if not walk.bridge.alive:
+        walk.bridge._process.wait()
+        walk.phases.clear()
+        walk.start_bridge()
+
+
+def inflict(walk, fault):
+    """Let a fault happen; return seconds until it damped, and what was seen meanwhile.
+
+    Largest torque commanded by what the joint bears, and largest step of it in N m between two
+    commands that both hold the joints.
+    """
+    seen = len(walk.phases)
+    instant = fault(walk)
+    damped = walk.damped_after(instant)
+    rows = walk.robot.since(instant - 1.0)
+    held = (rows[1:, 1] > 0.0) & (rows[:-1, 1] > 0.0)
+    if fault is generator_restarted:
+        walk.generator.wait_for('publishing')
+        time.sleep(0.5)
+    assert walk.robot.damped and not walk.robot.wrong
+    sat = [at - instant for at, phase in walk.phases[seen:] if phase == 'sitting']
+    return damped, sat, rows[:, 2].max(), rows[1:, 3][held].max(initial=0.0)

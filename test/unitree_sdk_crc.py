@@ -1,0 +1,38 @@
+"""Our check sum and Unitree's library: run by Python 3.10 with cyclonedds 0.10.
+
+usage: python unitree_sdk_crc.py FOLDER COUNT    Prints JSON: how many commands, how many differ.
+"""
+
+import ctypes
+import json
+import struct
+import sys
+from pathlib import Path
+
+folder, count = Path(sys.argv[1]), int(sys.argv[2])
+sys.path.insert(0, str(folder / 'unitree_sdk2_python'))
+sys.path.append(str(Path(__file__).resolve().parent.parent))
+
+import numpy as np  # noqa: E402
+from unitree_sdk2py.idl.unitree_go.msg.dds_ import LowCmd_  # noqa: E402
+from unitree_sdk2py.utils.crc import CRC  # noqa: E402
+
+from cpg_ros.unitree.low_cmd import LowCmd  # noqa: E402
+
+theirs, ours = CRC(), LowCmd()
+rng, wrong, whole = np.random.default_rng(1), 0, 0
+core = theirs.crc_lib.crc32_core
+for k in range(count):
+    for part in (ours.q, ours.dq, ours.tau, ours.kp, ours.kd):
+        part[:] = rng.normal(0.0, 30.0, 12)
+    sealed = ours.sealed()
+    if k % 50 == 0:
+        # Their own reader of the message, their own packing of the struct.
+        message = LowCmd_.deserialize(sealed)
+        wrong += theirs.Crc(message) != message.crc
+        whole += 1
+    body = sealed[4:]
+    words = body[:22] + b'\0\0' + body[22:24] + b'\0\0' + body[24:804]
+    wrong += core((ctypes.c_uint32 * 202).from_buffer_copy(words), 202) != struct.unpack(
+        '<I', body[804:])[0]
+print(json.dumps({'commands': count, 'read by their own reader': whole, 'wrong': wrong}))

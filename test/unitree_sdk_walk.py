@@ -1,0 +1,113 @@
+"""The generator and the bridge walk Unitree's simulated Go2, in a network namespace of its own.
+
+usage: unshare --net python unitree_sdk_walk.py FOLDER [SECONDS_A_GAIT SECONDS_A_SWITCH]
+Prints JSON: what the robot saw.
+"""
+
+import json
+import math
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
+
+folder = Path(sys.argv[1]).resolve()
+GAIT, SWITCH = map(float, sys.argv[2:4] or ('10', '3'))
+os.environ.update(ROS_AUTOMATIC_DISCOVERY_RANGE='SUBNET', ROS_DOMAIN_ID='1')
+for words in ('link set lo up', 'link set lo multicast on', 'route add 224.0.0.0/4 dev lo'):
+    subprocess.run(['ip', *words.split()], check=True)
+
+from graph import EXECUTABLE, Process, Watcher, until  # noqa: E402
+from rclpy.qos import DurabilityPolicy, QoSProfile  # noqa: E402
+from std_msgs.msg import String  # noqa: E402
+
+GAITS = ('trot', 'walk', 'pace', 'bound', 'jump', 'pronk')
+SUBNET = {'ROS_AUTOMATIC_DISCOVERY_RANGE': 'SUBNET', 'ROS_PYTHON_CHECK_FIELDS': '0'}
+
+
+def switches():
+    """All 30 switches as one way from the first gait back to it (Hierholzer's)."""
+    left = {gait: [one for one in GAITS if one != gait] for gait in GAITS}
+    open_, way = [GAITS[0]], []
+    while open_:
+        if left[open_[-1]]:
+            open_.append(left[open_[-1]].pop())
+        else:
+            way.append(open_.pop())
+    return way[-2::-1]
+
+
+def process(name, *parameters):
+    return Process(*(word for one in parameters for word in ('-p', one)), domain=1,
+                   executable=EXECUTABLE.with_name(name), environment=SUBNET)
+
+
+clean = {key: value for key, value in os.environ.items() if key in ('HOME', 'PATH')}
+robot = subprocess.Popen([folder / 'venv/bin/python', Path(__file__).with_name(
+    'unitree_sdk_robot.py'), folder, '1', 'lo'], stdin=subprocess.PIPE, stdout=subprocess.PIPE,
+    text=True, env=clean)
+seen = []
+
+
+def read():
+    for line in robot.stdout:
+        if line.startswith('{'):
+            seen.append(json.loads(line))
+
+
+threading.Thread(target=read, daemon=True).start()
+generator = process('generator', 'robot:=unitree_go2', 'rate:=500.0', "combined_topic:=''",
+                    'command:=forward_position', f'gait:={GAITS[0]}')
+bridge = process('unitree_bridge', 'command:=forward_position', 'motion_switcher:=false',
+                 'state_timeout:=0.2')
+watcher = Watcher(1)
+states = []
+watcher.node.create_subscription(
+    String, '/unitree_bridge/state', lambda message: states.append(message.data),
+    QoSProfile(depth=10, durability=DurabilityPolicy.TRANSIENT_LOCAL))
+result = {'gaits': {}}
+try:
+    until(lambda: 'following' in states or 'damping' in states, 'following')
+    time.sleep(2.0)
+    for gait in GAITS:
+        answer, = watcher.set(gait=gait)
+        assert answer.successful, answer.reason
+        time.sleep(2.0)
+        first = len(seen)
+        time.sleep(GAIT)
+        rows = seen[first:]
+        result['gaits'][gait] = {
+            'distance': round(math.dist(*([row['x'], row['y']] for row in (rows[0], rows[-1]))),
+                              2),
+            'most lean': max(row['lean'] for row in rows),
+            'least height': min(row['height'] for row in rows)}
+    watcher.set(gait=GAITS[0])
+    time.sleep(3.0)
+    done = 0
+    for gait in switches():
+        done += watcher.set(gait=gait)[0].successful
+        time.sleep(SWITCH)
+        if states[-1] != 'following':
+            break
+    result['switches'] = done
+    result['state at the end'] = states[-1]
+    bridge.signal(signal.SIGINT)
+    bridge.wait()
+    time.sleep(1.5)
+finally:
+    for one in (generator, bridge, watcher):
+        one.end()
+    robot.stdin.close()
+    robot.terminate()
+walking = seen[3:]
+result |= {'states': states, 'last': seen[-1], 'wrong': seen[-1]['wrong'],
+           'commands': seen[-1]['commands'],
+           'states a second': [f(row['rates']['states'] for row in walking) for f in (min, max)],
+           'commands a second': [f(row['rates']['commands'] for row in walking)
+                                 for f in (min, max)],
+           'largest torque': max(row['torque'] for row in seen), 'fallen': seen[-1]['fallen'],
+           'log': bridge.log.splitlines()[-6:]}
+print(json.dumps(result))
