@@ -9,9 +9,9 @@ import numpy as np
 
 from cpg_ros.feedback.estimate import Senses
 from cpg_ros.recordings.bag_storage import opened
-from cpg_ros.recordings.cdr import JOINT_STATE, STORE
+from cpg_ros.recordings.cdr import JOINT_STATE
 from cpg_ros.recordings.recording import RecordingError
-from cpg_ros.recordings.rosbags_library import SerdeError
+from cpg_ros.recordings.rosbags_library import STORE, SerdeError
 from cpg_ros.robots.robot import Robot
 
 #: What is read: key -> type of its topic.
