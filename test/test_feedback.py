@@ -242,7 +242,6 @@ def test_strides_lengthen_while_speed_is_missing():
     assert speed.longer(0.1, way, GAINS) == pytest.approx(
         0.1 * GAINS.speed_share + 0.02 * GAINS.speed_rate)
     assert speed.longer(9.0, way, GAINS) == GAINS.speed_most
-    assert speed.gather(0.0, -0.1, GAINS, DT) == 0.0
     for _ in range(100):
         way = speed.gather(way, 1e3, GAINS, DT)
     assert speed.longer(0.0, way, GAINS) <= GAINS.speed_most
@@ -369,7 +368,7 @@ def test_wishes_switches_and_dull_senses_reach_the_runs(loop, expected):
         ran = loop.run(wishes, 5.0, GAINS, noise=noise)
         assert ran.upright.all()
         late = slice(1500, None)
-        assert 0.05 < ran.velocity[0, late, 1].mean() < 0.2
+        assert 0.02 < ran.velocity[0, late, 1].mean() < 0.12
         assert ran.turning[1, late, 2].mean() == pytest.approx(0.3, abs=0.1)
         # Strides a second: those of the walk at the end.
         assert (np.diff(ran.phase[2, -500:]) % 1.0).sum() == pytest.approx(

@@ -32,7 +32,7 @@ class Gains(NamedTuple):
         turn_most: largest one, rad/s.
         speed_share, speed_rate: stride per m/s of missing speed, and per m of missing way.
         speed_most: most that strides are changed for it.
-        sidestep_share: of the wanted way, more than 1 as placement yields to what is missing.
+        sidestep_share: of the wanted way.
         sidestep_most: most that a foot is carried sideways, m.
         touchdown_gain: share of a landing's error that phases are changed by.
         tegotae_gain: rad/s for the whole weight on a leg.
@@ -88,7 +88,7 @@ class Gains(NamedTuple):
     speed_rate: float = 0.3
     speed_most: float = 0.3
 
-    sidestep_share: float = 1.4
+    sidestep_share: float = 1.0
     sidestep_most: float = 0.08
 
     touchdown_gain: float = 0.5

@@ -7,7 +7,7 @@ from cpg_ros.integration.jit import jit
 def landing(wanted, stance, gains):
     """Return where a foot is to land, m to the left of where the gait has it.
 
-    Half of the way that the body is to go over the foot, and a share more.
+    Half of the way that the body is to go over the foot.
 
     Args:
         wanted: speed to the left, m/s.

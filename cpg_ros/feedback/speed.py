@@ -12,10 +12,6 @@ def longer(missing, way, gains):
 
 @jit
 def gather(way, missing, gains, dt):
-    """Return the integral of the missing speed, m, no larger than the law can use.
-
-    It is not negative: feet that slip make a robot seem faster than it is, and strides that are
-    shortened for that would make it slower than without feedback.
-    """
+    """Return the integral of the missing speed, m, no larger than the law can use."""
     most = gains.speed_most / max(gains.speed_rate, 1e-9)
-    return min(max(way + dt * missing, 0.0), most)
+    return min(max(way + dt * missing, -most), most)
