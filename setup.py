@@ -42,5 +42,6 @@ setup(
         'check_robot = cpg_ros.tools.executables:check_robot',
         'optimize = cpg_ros.tools.executables:optimize',
         'reproduce = cpg_ros.tools.executables:reproduce',
-        'tune = cpg_ros.tools.executables:tune']},
+        'tune = cpg_ros.tools.executables:tune',
+        'calibrate = cpg_ros.tools.executables:calibrate']},
 )

@@ -2,7 +2,7 @@
 
 import importlib.util
 import math
-from dataclasses import fields, replace
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,13 +11,28 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from cpg_ros.errors import InputError
-from cpg_ros.feedback import heading, pace, placement, posture, slope, speed
+from cpg_ros.feedback import (
+    heading,
+    pace,
+    placement,
+    posture,
+    reflexes,
+    sidestep,
+    slope,
+    speed,
+)
 from cpg_ros.feedback.efference_copy import BINS, SIGNALS, EfferenceCopy, fold
-from cpg_ros.feedback.estimate import GRAVITY, BodyState, Senses
+from cpg_ros.feedback.estimate import BodyState, Senses
 from cpg_ros.feedback.feedback import Feedback, close
 from cpg_ros.feedback.gains import Gains
-from cpg_ros.feedback.kinematics import Geometry, displace, forward, inverse, jacobian
-from cpg_ros.feedback.reflexes import Reflexes
+from cpg_ros.feedback.kinematics import (
+    GRAVITY,
+    Geometry,
+    displace,
+    forward,
+    inverse,
+    jacobian,
+)
 from cpg_ros.motion.pattern import Pattern
 from cpg_ros.motion.steering import Drive
 
@@ -25,9 +40,10 @@ if any(importlib.util.find_spec(name) is None for name in ('mujoco', 'gym_quadru
     pytest.skip('the extra [sim] is not installed', allow_module_level=True)
 
 from cpg_ros.simulation.body import Body
-from cpg_ros.simulation.closed_loop import ClosedLoop, Scenario
+from cpg_ros.simulation.closed_loop import ClosedLoop
 from cpg_ros.simulation.efference_measurement import measure_efference
 from cpg_ros.simulation.proprioception import Proprioception
+from cpg_ros.simulation.scenario import Noise, Scenario
 from cpg_ros.simulation.terrain import Terrain, heights
 
 GAINS = Gains()
@@ -154,92 +170,96 @@ def test_a_foot_that_slips_is_not_believed(loop):
 
 # -- laws ---------------------------------------------------------------------------------------
 
-FEET = np.array([[[-0.2, 0.14, -0.3], [-0.2, -0.14, -0.3], [0.2, 0.14, -0.3], [0.2, -0.14, -0.3]]])
+#: Feet of the legs lh, rh, lf, rf, m.
+FEET = ((-0.2, 0.14), (-0.2, -0.14), (0.2, 0.14), (0.2, -0.14))
 
 
 def test_posture_draws_in_the_high_side_and_stretches_the_low_one():
-    none = np.zeros((1, 2))
-    rolled = posture.in_stance(FEET, np.array([[0.1, 0.0]]), none, GAINS)[0]
+    rolled = [posture.in_stance(x, y, 0.1, 0.0, 0.0, 0.0, GAINS) for x, y in FEET]
     assert (np.sign(rolled) == [1, -1, 1, -1]).all()
-    nodding = posture.in_stance(FEET, none, np.array([[0.0, 1.0]]), GAINS)[0]
+    nodding = [posture.in_stance(x, y, 0.0, 0.0, 0.0, 1.0, GAINS) for x, y in FEET]
     assert (np.sign(nodding) == [1, 1, -1, -1]).all()
-    far = posture.in_stance(FEET, np.array([[9.0, -9.0]]), none, GAINS)
+    far = [posture.in_stance(x, y, 9.0, -9.0, 0.0, 0.0, GAINS) for x, y in FEET]
     assert np.abs(far).max() == GAINS.posture_most
 
 
 def test_a_swing_foot_stays_level():
     """Heights over ground of a body that leans are those of one that does not."""
-    lean = np.array([[0.02, -0.03]])
-    moved = FEET[0, :, 2] + posture.in_swing(FEET, lean, GAINS)[0]
-    height = -0.02 * -FEET[0, :, 1] + 0.03 * FEET[0, :, 0] + moved
-    assert height == pytest.approx(-0.3, abs=1e-12)
+    for x, y in FEET:
+        moved = posture.in_swing(x, y, 0.02, -0.03, GAINS)
+        assert 0.02 * y + 0.03 * x + moved == pytest.approx(0.0, abs=1e-12)
 
 
 def test_a_body_that_goes_too_fast_steps_further():
-    none = np.zeros((1, 2))
-    assert (placement.step(np.array([[0.3, -0.2]]), none, GAINS)[0]
-            == pytest.approx([GAINS.step * 0.3, -GAINS.step * 0.2]))
-    assert placement.step(none, np.array([[0.0, 1.0]]), GAINS)[0, 0] > 0.0
-    assert np.abs(placement.step(np.array([[9.0, -9.0]]), none, GAINS)).max() == GAINS.step_most
+    assert placement.step(0.3, 0.0, GAINS.step, 0.0, GAINS) == pytest.approx(GAINS.step * 0.3)
+    assert placement.step(-9.0, 0.0, GAINS.step, 0.0, GAINS) == -GAINS.step_most
+    assert placement.step(0.0, 1.0, 0.0, GAINS.step_pitch_rate, GAINS) > 0.0
 
 
 def test_feet_in_the_air_go_to_their_steps_and_those_on_the_ground_yield():
-    swinging, way = np.array([[True, False, False, True]]), np.zeros((1, 4, 2))
+    swung = stood = 0.0
     for _ in range(100):
-        way = placement.advance(way, swinging, np.array([[0.05, 0.03]]), np.array([0.2]),
-                                GAINS, DT)
-    assert way[0, 0] == pytest.approx([0.05, 0.03], abs=1e-3)
-    assert way[0, 1, 0] == 0.0 and -0.2 * 0.2 < way[0, 1, 1] < 0.0
+        swung = placement.swing(swung, 0.05, GAINS, DT)
+        stood = placement.stand(stood, 0.1, GAINS, DT)
+    assert swung == pytest.approx(0.05, abs=1e-3)
+    assert -0.1 * 0.2 < stood < 0.0
+
+
+def test_a_sidestep_begins_as_far_on_one_side_as_it_ends_on_the_other():
+    way = first = sidestep.landing(0.2, 0.4, GAINS)
+    for _ in range(200):
+        way = sidestep.carry(way, 0.2, GAINS, DT)
+    assert first > 0.0 and way == pytest.approx(-first)
 
 
 def test_pace_quickens_both_ways_up_to_its_most():
-    velocities = np.array([[0.0, v] for v in (-5.0, -0.4, 0.0, 0.1, 0.4, 5.0)])
     most = 1.0 + GAINS.pace_most
-    found = pace.hurry(velocities, GAINS)
-    assert (found == found[::-1]).all() or found[0] == found[-1] == most
-    assert (found[2:4] == 1.0).all() and 1.0 < found[4] < most
+    found = [pace.hurry(0.0, v, GAINS) for v in (-5.0, -0.4, 0.0, 0.1, 0.4, 5.0)]
+    assert found == pytest.approx(found[::-1], abs=1e-12) or found[0] == found[-1] == most
+    assert found[2] == found[3] == 1.0 < found[4] < most
 
 
 def test_feet_stand_under_the_body_on_a_slope():
-    ground = np.zeros((1, 2))
-    uphill = np.array([[0.0, -0.2]])
+    ground = 0.0
     for _ in range(2000):
-        ground = slope.follow(ground, uphill, GAINS, DT)
-    assert ground[0] == pytest.approx([0.0, -0.2], abs=1e-3)
-    assert slope.shift(ground, GAINS)[0] == pytest.approx(
-        [-0.7 * 0.3 * math.tan(0.2), 0.0], abs=1e-3)
-    assert slope.shift(np.array([[1.5, 0.0]]), GAINS)[0, 1] == -GAINS.slope_most
+        ground = slope.follow(ground, -0.2, GAINS, DT)
+    assert ground == pytest.approx(-0.2, abs=1e-3)
+    assert slope.shift(ground, GAINS) == pytest.approx(
+        -GAINS.slope_share * GAINS.slope_height * math.tan(0.2), abs=1e-3)
+    assert slope.shift(1.5, GAINS) == GAINS.slope_most
 
 
 def test_heading_turns_back_by_the_shorter_way():
-    found = heading.turn(np.array([0.0, 3.1, 0.0]), np.array([0.1, -3.1, -2.0]), GAINS)
+    found = [heading.turn(wanted, yaw, GAINS) for wanted, yaw in
+             ((0.0, 0.1), (3.1, -3.1), (0.0, -2.0))]
     assert found == pytest.approx([-0.3, -3.0 * (2 * math.pi - 6.2), GAINS.turn_most])
 
 
 def test_strides_lengthen_while_speed_is_missing():
-    way = np.zeros(1)
+    way = 0.0
     for _ in range(100):
-        way = speed.gather(way, np.array([0.1]), GAINS, DT)
-    assert speed.longer(np.array([0.1]), way, GAINS) == pytest.approx(0.05 + 0.3 * 0.02)
-    assert speed.longer(np.array([9.0]), way, GAINS) == GAINS.speed_most
+        way = speed.gather(way, 0.1, GAINS, DT)
+    assert speed.longer(0.1, way, GAINS) == pytest.approx(
+        0.1 * GAINS.speed_share + 0.02 * GAINS.speed_rate)
+    assert speed.longer(9.0, way, GAINS) == GAINS.speed_most
     for _ in range(100):
-        way = speed.gather(way, np.array([1e3]), GAINS, DT)
-    assert speed.longer(np.zeros(1), way, GAINS) <= GAINS.speed_most
+        way = speed.gather(way, 1e3, GAINS, DT)
+    assert speed.longer(0.0, way, GAINS) <= GAINS.speed_most
 
 
-def reflex(reflexes, contact, swinging, progress, height=-0.3, steps=100):
+def reflex(built, contact, swinging, progress, height=-0.3, steps=100):
     for _ in range(steps):
-        found = reflexes.advance(np.full((1, 4), contact), np.full((1, 4), swinging),
-                                 np.full((1, 4), progress), np.full((1, 4), height), GAINS, DT)
-    return float(found[0, 0])
+        found = reflexes.advance(built, contact, swinging, progress, height, GAINS, DT)
+    return found
 
 
 def test_reflexes_lift_reach_hold_and_fade():
-    assert reflex(Reflexes(1, 4), True, True, 0.4) == pytest.approx(GAINS.lift)
-    assert reflex(Reflexes(1, 4), False, True, 0.4) == 0.0
-    assert reflex(Reflexes(1, 4), False, False, 0.5, steps=50) == pytest.approx(-0.03)
-    assert reflex(Reflexes(1, 4), False, False, 0.5, steps=500) == -GAINS.reach_most
-    landed = Reflexes(1, 4)
+    assert reflex(np.zeros(5), True, True, 0.4) == pytest.approx(GAINS.lift)
+    assert reflex(np.zeros(5), False, True, 0.4) == 0.0
+    assert reflex(np.zeros(5), False, False, 0.5, steps=50) == pytest.approx(
+        -0.1 * GAINS.reach_rate)
+    assert reflex(np.zeros(5), False, False, 0.5, steps=500) == -GAINS.reach_most
+    landed = np.zeros(5)
     reflex(landed, True, True, 0.8, height=-0.27, steps=1)
     assert reflex(landed, True, True, 0.9, height=-0.30, steps=1) == pytest.approx(0.03)
     assert abs(reflex(landed, True, False, 0.5, steps=1000)) < 1e-6
@@ -272,8 +292,9 @@ def patterns(loop, expected, gains, steps=1500):
     pattern = Pattern(made, drive=Drive(4))
     pattern.steer(*made.steer(0.4, 0.0))
     if gains is not None:
-        close(pattern, Feedback(made, loop.geometry, expected, gains), Proprioception(body), 0.4,
-              dt=DT)
+        feedback = Feedback(loop.geometry, gains)
+        feedback.learn(made, expected)
+        close(pattern, feedback, Proprioception(body), np.array([[0.4, 0.0]]), np.zeros(1), DT)
     told, spun, held = np.empty((steps, 12)), np.empty((steps, 12)), np.zeros(steps, dtype=bool)
     for k, (row, rate) in enumerate(zip(told, spun, strict=True)):
         before = pattern.held
@@ -286,7 +307,8 @@ def patterns(loop, expected, gains, steps=1500):
 
 
 def test_with_all_laws_off_the_pattern_is_the_same_bit_for_bit(loop, expected):
-    off = Gains(**{field.name: False for field in fields(Gains) if field.type is bool})
+    off = GAINS._replace(**dict.fromkeys(
+        [name for name, value in GAINS._asdict().items() if value is True], False))
     for one, other in zip(patterns(loop, None, None), patterns(loop, expected, off), strict=True):
         assert (one == other).all()
 
@@ -334,3 +356,20 @@ def test_ground_is_flat_at_the_start_and_as_high_as_it_says(kind):
     rows, columns = ground.shape
     # 1.5 of 9.5 m lie behind the start.
     assert ground[rows // 2, round(columns * 1.5 / 9.5)] == 0.0
+
+
+def test_wishes_switches_and_dull_senses_reach_the_runs(loop, expected):
+    """To the left while it walks, turning, and another gait; then once more with dull senses."""
+    loop = ClosedLoop('go2', program('trot'), program('walk'))
+    wishes = [Scenario(speed=0.3, commands=((1.5, 0.3, 0.1, 0.0),)),
+              Scenario(speed=0.3, commands=((1.5, 0.3, 0.0, 0.3),)),
+              Scenario(speed=0.3, switches=((1.5, 'walk'),))]
+    for noise in (None, Noise(0.01, 0.1, 0.05, math.radians(0.5), 0.02)):
+        ran = loop.run(wishes, 5.0, GAINS, noise=noise)
+        assert ran.upright.all()
+        late = slice(1500, None)
+        assert 0.02 < ran.velocity[0, late, 1].mean() < 0.12
+        assert ran.turning[1, late, 2].mean() == pytest.approx(0.3, abs=0.1)
+        # Strides a second: those of the walk at the end.
+        assert (np.diff(ran.phase[2, -500:]) % 1.0).sum() == pytest.approx(
+            program('walk').frequency, rel=0.3)

@@ -3,4 +3,4 @@
 Imports ``motion``, ``gaits``, ``robots`` and what is below; knows nothing of ROS.
 """
 
-__all__ = ['robot_template', 'urdf_match']
+__all__ = ['leg_shapes', 'robot_template', 'urdf_match']

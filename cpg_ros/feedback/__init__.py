@@ -1,9 +1,10 @@
 """What a robot feels, brought back to its pattern: kinematics, estimate, laws, efference copy.
 
 Imports ``motion``, ``robots`` and what is below; knows nothing of ROS. All of it works on many
-robots at a time: arrays have a leading axis of runs, which is 1 for a robot alone. So far it
-closes loops in process, in ``simulation``; no node uses it.
+robots at a time: arrays have a leading axis of runs, which is 1 for a robot alone.
 """
 
-__all__ = ['efference_copy', 'estimate', 'feedback', 'gains', 'heading', 'kinematics', 'pace',
-           'placement', 'posture', 'reflexes', 'slope', 'speed', 'timetable']
+__all__ = ['efference_copy', 'estimate', 'feedback', 'foot_force', 'gains', 'gait_tables',
+           'heading', 'kinematics', 'pace', 'placement', 'plausibility', 'posture',
+           'precompile', 'reflexes', 'sidestep', 'slope', 'speed', 'tegotae', 'tick',
+           'timetable', 'touchdown', 'watch']

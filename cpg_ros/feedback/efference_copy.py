@@ -1,6 +1,6 @@
 """Efference copy: what the body does by itself in a gait, by stride phase and speed.
 
-Only what differs from it is fed back.
+Only what differs from it is fed back. The term is von Holst and Mittelstaedt's (1950).
 """
 
 from dataclasses import dataclass
@@ -8,10 +8,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from cpg_ros.errors import InputError
+from cpg_ros.integration.jit import jit
+from cpg_ros.robots import body_keys
+from cpg_ros.robots.body_keys import EfferenceTable
 
-#: Bins of a stride; the signals are the velocity forward and to the left in m/s, the rates of
-#: roll and pitch in rad/s, and roll and pitch in rad.
-BINS, SIGNALS = 64, 6
+#: Bins of a stride, and how many signals there are; see ``body_keys.SIGNALS``.
+BINS, SIGNALS = body_keys.BINS, len(body_keys.SIGNALS)
+#: Most speeds of a table.
+SPEEDS = 8
 
 
 @dataclass(frozen=True)
@@ -19,7 +23,7 @@ class EfferenceCopy:
     """Expected motion of the base.
 
     Attributes:
-        speeds: at which it was measured, m/s, rising, shape (speeds,).
+        speeds: at which it was measured, m/s, rising, shape (speeds,), at most SPEEDS.
         table: shape (speeds, BINS, SIGNALS).
 
     """
@@ -34,6 +38,18 @@ class EfferenceCopy:
         table[:, :, 0] = [[-10.0], [10.0]]
         return cls(np.array([-10.0, 10.0]), table)
 
+    @classmethod
+    def of(cls, table: EfferenceTable) -> 'EfferenceCopy':
+        """Take a robot file's table."""
+        return cls(np.array(table.speeds),
+                   np.stack([table.rows[key] for key in body_keys.SIGNALS], axis=-1))
+
+    def as_table(self) -> EfferenceTable:
+        """Return it as a robot file has it."""
+        return EfferenceTable(tuple(self.speeds.tolist()), {
+            key: tuple(tuple(row) for row in self.table[:, :, k].tolist())
+            for k, key in enumerate(body_keys.SIGNALS)})
+
     def __call__(self, phase: np.ndarray, speed: np.ndarray) -> np.ndarray:
         """Return what is expected, shape (runs, SIGNALS).
 
@@ -42,17 +58,29 @@ class EfferenceCopy:
             speed: wanted, m/s, shape (runs,).
 
         """
-        rows = np.interp(speed, self.speeds, np.arange(self.speeds.size))
-        low = np.minimum(rows.astype(int), max(self.speeds.size - 2, 0))
-        high = np.minimum(low + 1, self.speeds.size - 1)
-        up = (rows - low)[:, None]
-        # A bin's mean stands for its middle.
-        place = (phase * BINS - 0.5) % BINS
-        one = place.astype(int) % BINS
-        two, on = (one + 1) % BINS, (place - np.floor(place))[:, None]
-        table = self.table
-        return ((1.0 - up) * ((1.0 - on) * table[low, one] + on * table[low, two])
-                + up * ((1.0 - on) * table[high, one] + on * table[high, two]))
+        out = np.zeros((len(phase), SIGNALS))
+        for row, one, fast in zip(out, phase, speed, strict=True):
+            expect(self.speeds, self.table, one, fast, 1.0, row)
+        return out
+
+
+@jit
+def expect(speeds, table, phase, speed, share, out):
+    """Add a share of what is expected to out, shape (SIGNALS,); see EfferenceCopy."""
+    low = 0
+    while low + 2 < speeds.shape[0] and speed > speeds[low + 1]:
+        low += 1
+    high = min(low + 1, speeds.shape[0] - 1)
+    gap = speeds[high] - speeds[low]
+    up = min(max((speed - speeds[low]) / gap, 0.0), 1.0) if gap > 0.0 else 0.0
+    # A bin's mean stands for its middle.
+    place = (phase * BINS - 0.5) % BINS
+    one = int(place) % BINS
+    two, on = (one + 1) % BINS, place - int(place)
+    for k in range(SIGNALS):
+        below = table[low, one, k] + on * (table[low, two, k] - table[low, one, k])
+        above = table[high, one, k] + on * (table[high, two, k] - table[high, one, k])
+        out[k] += share * (below + up * (above - below))
 
 
 def fold(phases: np.ndarray, signals: np.ndarray) -> np.ndarray:

@@ -1,23 +1,23 @@
 """The numbers of all feedback laws, each law on or off by itself."""
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 
-@dataclass(frozen=True)
-class Gains:
+class Gains(NamedTuple):
     """Which laws are on, and their gains; SI units, found on a simulated Go2.
 
     Attributes:
-        posture, placement, pace, reflexes, slope, heading, speed: whether the law is on.
+        posture, placement, pace, reflexes, slope, heading, speed, sidestep: whether the law is on.
+        touchdown, tegotae: the same of two laws of the phase, see their files.
         roll, roll_rate: metres a foot is drawn in per metre to the left and rad, or rad/s.
         pitch, pitch_rate: the same of pitch, by metres to the front.
         posture_most: most that posture moves a foot in stance, m.
-        step: s, by which a velocity error is turned into a longer step.
+        step, step_left: s, by which a velocity error forward or sideways makes a longer step.
         step_pitch_rate, step_roll_rate: m per rad/s, forward and sideways.
         step_filter: time constant, s.
         step_most: most that a foot is placed elsewhere, m.
         step_decay: rate at which that is given up in stance, 1/s.
-        give: share of the sideways velocity that feet in stance yield to.
+        give, give_left: shares of the velocity error that feet in stance yield to.
         pace_from: velocity error at which strides get faster, m/s.
         pace_gain: share of the frequency per m/s above that.
         pace_most: largest share.
@@ -32,6 +32,10 @@ class Gains:
         turn_most: largest one, rad/s.
         speed_share, speed_rate: stride per m/s of missing speed, and per m of missing way.
         speed_most: most that strides are changed for it.
+        sidestep_share: of the wanted way.
+        sidestep_most: most that a foot is carried sideways, m.
+        touchdown_gain: share of a landing's error that phases are changed by.
+        tegotae_gain: rad/s for the whole weight on a leg.
         smooth: time constant of every displacement, s.
 
     """
@@ -43,24 +47,29 @@ class Gains:
     slope: bool = True
     heading: bool = True
     speed: bool = True
+    sidestep: bool = True
+    touchdown: bool = False
+    tegotae: bool = False
 
-    roll: float = 1.29
-    roll_rate: float = 0.109
+    roll: float = 1.6
+    roll_rate: float = 0.14
     pitch: float = 1.10
     pitch_rate: float = 0.062
     posture_most: float = 0.08
 
     step: float = 0.16
-    step_pitch_rate: float = 0.045
-    step_roll_rate: float = 0.01
+    step_left: float = 0.16
+    step_pitch_rate: float = 0.02
+    step_roll_rate: float = 0.0
     step_filter: float = 0.032
     step_most: float = 0.17
     step_decay: float = 3.1
-    give: float = 0.55
+    give: float = 0.3
+    give_left: float = 0.8
 
-    pace_from: float = 0.25
-    pace_gain: float = 2.4
-    pace_most: float = 0.6
+    pace_from: float = 0.12
+    pace_gain: float = 4.0
+    pace_most: float = 0.8
 
     lift: float = 0.06
     reach_rate: float = 0.3
@@ -78,5 +87,11 @@ class Gains:
     speed_share: float = 0.5
     speed_rate: float = 0.3
     speed_most: float = 0.3
+
+    sidestep_share: float = 1.0
+    sidestep_most: float = 0.08
+
+    touchdown_gain: float = 0.5
+    tegotae_gain: float = 4.0
 
     smooth: float = 0.008

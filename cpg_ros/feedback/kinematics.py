@@ -1,11 +1,21 @@
-"""Legs of a hip that abducts and two joints that pitch: forward, Jacobian, inverse.
+"""Legs of a hip that abducts and two joints that pitch: forward, Jacobian, inverse, compiled.
 
 Frames are the base's: x forward, y left, z up. A leg of two joints has no way sideways.
 """
 
+import math
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
+
+from cpg_ros.errors import InputError
+from cpg_ros.integration.jit import entry, jit, sources_digest
+from cpg_ros.robots.body_keys import BodyGeometry
+from cpg_ros.robots.robot import Robot
+
+#: Of free fall, m/s^2.
+GRAVITY = 9.81
 
 
 @dataclass(frozen=True)
@@ -15,7 +25,8 @@ class Geometry:
     Attributes:
         columns: index of each leg's hip, thigh and calf among the joints, shape (legs, 3); of a
             leg without a hip joint the first is any, and its turn 0.
-        turns: 1 or -1 by the sense of each joint about x, y and y, shape (legs, 3).
+        turns: 1 or -1 by the sense of each joint about x, y and y, shape (legs, 3); 0 of legs
+            whose geometry is not known.
         hips: a point on the axis of each hip, m, shape (legs, 3).
         thighs: from there to the thigh joint, m, shape (legs, 3).
         uppers: from thigh to calf joint in their plane as z + i x, m, complex, shape (legs,).
@@ -36,40 +47,181 @@ class Geometry:
     radius: float
     weight: float
 
+    @cached_property
+    def rows(self) -> np.ndarray:
+        """A row for each leg as the kernels take it, shape (legs, 14)."""
+        return np.column_stack([self.turns, self.hips, self.thighs, self.uppers.real,
+                                self.uppers.imag, self.lowers.real, self.lowers.imag, self.bends])
 
-def _planar(geometry: Geometry, angles: np.ndarray) -> tuple[np.ndarray, ...]:
-    """Return hip angle about x, and upper and lower link in the leg's plane as z + i x."""
-    turned = angles[..., geometry.columns] * geometry.turns
-    thigh = turned[..., 1]
-    return (turned[..., 0], geometry.uppers * np.exp(1j * thigh),
-            geometry.lowers * np.exp(1j * (thigh + turned[..., 2])))
+
+def geometry_of(robot: Robot, body: BodyGeometry | None = None) -> Geometry:
+    """Return the geometry of a robot's legs: its file's, or another one.
+
+    Legs that the file does not have stay where they are.
+
+    Raises:
+        InputError: there is none.
+
+    """
+    body = body or robot.geometry
+    if body is None:
+        raise InputError(f"robot file '{robot.name}' has no geometry of the legs (part geometry: "
+                         'check_robot --make writes it, and tune)')
+    joints = {joint.name: k for k, joint in enumerate(robot.joints)}
+    offsets = robot.column('offset')
+    count = len(robot.legs)
+    columns, turns = np.zeros((count, 3), dtype=np.int64), np.zeros((count, 3))
+    hips, thighs, bends = np.zeros((count, 3)), np.zeros((count, 3)), np.ones(count)
+    uppers, lowers = np.full((2, count), -0.1 + 0.0j)
+    for k, name in enumerate(robot.legs):
+        if name not in body.legs:
+            continue
+        leg = body.legs[name]
+        own = [joints[joint] for joint in leg.joints]
+        columns[k], turns[k, -len(own):] = own if len(own) == 3 else [own[0], *own], leg.turns
+        hips[k], thighs[k] = leg.hip, leg.thigh
+        # What the links themselves are off sideways belongs to the leg's plane.
+        thighs[k, 1] += leg.calf[1] + leg.foot[1]
+        uppers[k], lowers[k] = (complex(link[2], link[0]) for link in (leg.calf, leg.foot))
+        bend = turns[k, 2] * offsets[own[-1]] + np.angle(lowers[k] / uppers[k])
+        bends[k] = 1.0 if np.sin(bend) >= 0.0 else -1.0
+    return Geometry(columns, turns, hips, thighs, uppers, lowers, bends, body.foot_radius,
+                    GRAVITY * body.mass)
+
+
+@jit
+def foot_of(leg, hip, thigh, calf):
+    """Return where a leg's foot is, x, y and z in m; joints in rad."""
+    hip, thigh, calf = leg[0] * hip, leg[1] * thigh, leg[1] * thigh + leg[2] * calf
+    ct, st, cc, sc = math.cos(thigh), math.sin(thigh), math.cos(calf), math.sin(calf)
+    y, z = leg[7], leg[8] + leg[9] * ct - leg[10] * st + leg[11] * cc - leg[12] * sc
+    ch, sh = math.cos(hip), math.sin(hip)
+    return (leg[3] + leg[6] + leg[9] * st + leg[10] * ct + leg[11] * sc + leg[12] * cc,
+            leg[4] + y * ch - z * sh, leg[5] + y * sh + z * ch)
+
+
+@jit
+def slopes_of(leg, hip, thigh, calf, out):
+    """Fill the derivatives of a leg's foot by its joints, m/rad, shape (3, 3)."""
+    hip, thigh, calf = leg[0] * hip, leg[1] * thigh, leg[1] * thigh + leg[2] * calf
+    ct, st, cc, sc = math.cos(thigh), math.sin(thigh), math.cos(calf), math.sin(calf)
+    lower_z, lower_x = leg[11] * cc - leg[12] * sc, leg[11] * sc + leg[12] * cc
+    whole_z, whole_x = leg[9] * ct - leg[10] * st + lower_z, leg[9] * st + leg[10] * ct + lower_x
+    y, z = leg[7], leg[8] + whole_z
+    ch, sh = math.cos(hip), math.sin(hip)
+    out[0, 0] = 0.0
+    out[1, 0] = leg[0] * (-y * sh - z * ch)
+    out[2, 0] = leg[0] * (y * ch - z * sh)
+    # A positive turn about y takes z + i x on by i times itself.
+    out[0, 1], out[1, 1], out[2, 1] = (leg[1] * whole_z, leg[1] * sh * whole_x,
+                                       -leg[1] * ch * whole_x)
+    out[0, 2], out[1, 2], out[2, 2] = (leg[2] * lower_z, leg[2] * sh * lower_x,
+                                       -leg[2] * ch * lower_x)
+
+
+@jit
+def wrapped(angle):
+    """Return an angle from -pi to pi."""
+    return (angle + math.pi) % (2.0 * math.pi) - math.pi
+
+
+@jit
+def joints_of(leg, x, y, z):
+    """Return hip, thigh and calf, rad, with a leg's foot there; see inverse."""
+    x, y, z = x - leg[3], y - leg[4], z - leg[5]
+    side, hip = leg[7], 0.0
+    if leg[0] != 0.0:
+        down = -math.sqrt(max(y * y + z * z - side * side, 1e-6))
+        hip, z = math.atan2(z, y) - math.atan2(down, side), down
+    z, x = z - leg[8], x - leg[6]
+    a2 = leg[9] * leg[9] + leg[10] * leg[10]
+    b2 = leg[11] * leg[11] + leg[12] * leg[12]
+    cosine = (z * z + x * x - a2 - b2) / (2.0 * math.sqrt(a2 * b2))
+    # The calf's angle from a straight leg on, of links that may be cranked.
+    cranked = math.atan2(leg[12], leg[11]) - math.atan2(leg[10], leg[9])
+    calf = leg[13] * math.acos(min(max(cosine, -1.0), 1.0)) - cranked
+    cc, sc = math.cos(calf), math.sin(calf)
+    straight = math.atan2(leg[10] + leg[11] * sc + leg[12] * cc,
+                          leg[9] + leg[11] * cc - leg[12] * sc)
+    thigh = math.atan2(x, z) - straight
+    # Turns are their own inverses; a missing hip stays 0.
+    return wrapped(hip) * leg[0], wrapped(thigh) * leg[1], wrapped(calf) * leg[2]
+
+
+@jit
+def move_foot(leg, columns, angles, foot, way):
+    """Move a foot at a place by a way, m, shapes (3,): changes its leg's of all angles, rad.
+
+    No way changes no bit of them, nor does any of a leg whose geometry is not known; limits are
+    the caller's business.
+    """
+    if leg[1] == 0.0 or (way[0] == 0.0 and way[1] == 0.0 and way[2] == 0.0):
+        return
+    now = joints_of(leg, foot[0], foot[1], foot[2])
+    then = joints_of(leg, foot[0] + way[0], foot[1] + way[1], foot[2] + way[2])
+    if leg[0] != 0.0:
+        angles[columns[0]] += wrapped(then[0] - now[0])
+    angles[columns[1]] += wrapped(then[1] - now[1])
+    angles[columns[2]] += wrapped(then[2] - now[2])
+
+
+def _cached(digest):
+    """Build the cached entry points; see sources_digest for why they are closures."""
+
+    @entry
+    def feet(rows, columns, angles, out):
+        digest  # noqa: B018
+        for k in range(angles.shape[0]):
+            for leg in range(rows.shape[0]):
+                out[k, leg] = foot_of(rows[leg], angles[k, columns[leg, 0]],
+                                      angles[k, columns[leg, 1]], angles[k, columns[leg, 2]])
+
+    @entry
+    def slopes(rows, columns, angles, out):
+        digest  # noqa: B018
+        for k in range(angles.shape[0]):
+            for leg in range(rows.shape[0]):
+                slopes_of(rows[leg], angles[k, columns[leg, 0]], angles[k, columns[leg, 1]],
+                          angles[k, columns[leg, 2]], out[k, leg])
+
+    @entry
+    def joints(rows, places, out):
+        digest  # noqa: B018
+        for k in range(places.shape[0]):
+            for leg in range(rows.shape[0]):
+                out[k, leg] = joints_of(rows[leg], places[k, leg, 0], places[k, leg, 1],
+                                        places[k, leg, 2])
+
+    @entry
+    def moved(rows, columns, places, ways, angles):
+        digest  # noqa: B018
+        for k in range(places.shape[0]):
+            for leg in range(rows.shape[0]):
+                move_foot(rows[leg], columns[leg], angles[k], places[k, leg], ways[k, leg])
+
+    return feet, slopes, joints, moved
+
+
+_feet, _slopes, _joints, _moved = _cached(sources_digest())
+
+
+def _flat(values: np.ndarray, last: int) -> np.ndarray:
+    """Make one of all leading axes, `last` are not."""
+    return np.ascontiguousarray(values, dtype=float).reshape(-1, *values.shape[-last:])
 
 
 def forward(geometry: Geometry, angles: np.ndarray) -> np.ndarray:
     """Return where the feet are, m, shape (..., legs, 3); angles in rad, shape (..., joints)."""
-    hip, upper, lower = _planar(geometry, angles)
-    leg = upper + lower
-    y, z = geometry.thighs[:, 1], geometry.thighs[:, 2] + leg.real
-    cosine, sine = np.cos(hip), np.sin(hip)
-    return geometry.hips + np.stack([geometry.thighs[:, 0] + leg.imag, y * cosine - z * sine,
-                                     y * sine + z * cosine], axis=-1)
+    out = np.empty((*angles.shape[:-1], len(geometry.hips), 3))
+    _feet(geometry.rows, geometry.columns, _flat(angles, 1), out.reshape(-1, *out.shape[-2:]))
+    return out
 
 
 def jacobian(geometry: Geometry, angles: np.ndarray) -> np.ndarray:
     """Return the feet's derivatives by hip, thigh and calf, m/rad, shape (..., legs, 3, 3)."""
-    hip, upper, lower = _planar(geometry, angles)
-    y, z = geometry.thighs[:, 1], geometry.thighs[:, 2] + (upper + lower).real
-    cosine, sine = np.cos(hip), np.sin(hip)
-    found = np.zeros((*hip.shape, 3, 3))
-    found[..., 1, 0] = -y * sine - z * cosine
-    found[..., 2, 0] = y * cosine - z * sine
-    for joint, link in ((1, upper + lower), (2, lower)):
-        # A positive turn about y takes z + i x on by i times itself.
-        found[..., 0, joint] = link.real
-        found[..., 1, joint] = sine * link.imag
-        found[..., 2, joint] = -cosine * link.imag
-    found *= geometry.turns[:, None, :]
-    return found
+    out = np.empty((*angles.shape[:-1], len(geometry.hips), 3, 3))
+    _slopes(geometry.rows, geometry.columns, _flat(angles, 1), out.reshape(-1, *out.shape[-3:]))
+    return out
 
 
 def inverse(geometry: Geometry, feet: np.ndarray) -> np.ndarray:
@@ -78,20 +230,9 @@ def inverse(geometry: Geometry, feet: np.ndarray) -> np.ndarray:
     A place out of reach is taken to the nearest on its line to the thigh joint. The feet, in m,
     have shape (..., legs, 3).
     """
-    place = feet - geometry.hips
-    y, hanging = geometry.thighs[:, 1], geometry.thighs[:, 2]
-    abducts = geometry.turns[:, 0] != 0.0
-    down = -np.sqrt(np.maximum(place[..., 1]**2 + place[..., 2]**2 - y * y, 1e-6))
-    hip = np.where(abducts, np.arctan2(place[..., 2], place[..., 1]) - np.arctan2(down, y), 0.0)
-    goal = np.where(abducts, down, place[..., 2]) - hanging + 1j * (
-        place[..., 0] - geometry.thighs[:, 0])
-    a, b = np.abs(geometry.uppers), np.abs(geometry.lowers)
-    cosine = np.clip((np.abs(goal)**2 - a * a - b * b) / (2.0 * a * b), -1.0, 1.0)
-    calf = geometry.bends * np.arccos(cosine) - np.angle(geometry.lowers / geometry.uppers)
-    thigh = np.angle(goal / (geometry.uppers + geometry.lowers * np.exp(1j * calf)))
-    found = np.stack([hip, thigh, calf], axis=-1)
-    # Turns are their own inverses; a missing hip stays 0.
-    return ((found + np.pi) % (2.0 * np.pi) - np.pi) * geometry.turns
+    out = np.empty(feet.shape)
+    _joints(geometry.rows, _flat(feet, 2), out.reshape(-1, *out.shape[-2:]))
+    return out
 
 
 def displace(geometry: Geometry, angles: np.ndarray, feet: np.ndarray, way: np.ndarray
@@ -107,11 +248,6 @@ def displace(geometry: Geometry, angles: np.ndarray, feet: np.ndarray, way: np.n
         way: by which they are to be moved, m, shape (..., legs, 3).
 
     """
-    change = inverse(geometry, feet + way) - inverse(geometry, feet)
-    change = (change + np.pi) % (2.0 * np.pi) - np.pi
-    change[~np.any(way, axis=-1)] = 0.0
-    found = angles.copy()
-    for joint in range(3):
-        moved = geometry.turns[:, joint] != 0.0
-        found[..., geometry.columns[moved, joint]] += change[..., moved, joint]
+    found = np.array(angles, dtype=float)
+    _moved(geometry.rows, geometry.columns, _flat(feet, 2), _flat(way, 2), _flat(found, 1))
     return found

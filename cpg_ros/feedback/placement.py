@@ -2,40 +2,32 @@
 
 import math
 
-import numpy as np
-
-from cpg_ros.feedback.gains import Gains
+from cpg_ros.integration.jit import jit
 
 
-def step(velocity: np.ndarray, turning: np.ndarray, gains: Gains) -> np.ndarray:
-    """Return how much further to put feet down, forward and to the left, m, shape (runs, 2).
+@jit
+def step(velocity, turning, gain, rate_gain, gains):
+    """Return how much further to put feet down, m, forward or to the left.
 
     Args:
-        velocity: beyond what is expected, forward and to the left, m/s, shape (runs, 2).
-        turning: of roll and pitch beyond what is expected, rad/s, shape (runs, 2).
+        velocity: that way beyond what is expected, m/s.
+        turning: of pitch or roll beyond what is expected, rad/s.
+        gain: of the first.
+        rate_gain: of the second.
         gains: of the law.
 
     """
-    far = gains.step * velocity
-    far[:, 0] += gains.step_pitch_rate * turning[:, 1]
-    far[:, 1] += gains.step_roll_rate * turning[:, 0]
-    return np.clip(far, -gains.step_most, gains.step_most)
+    return min(max(gain * velocity + rate_gain * turning, -gains.step_most), gains.step_most)
 
 
-def advance(way: np.ndarray, swinging: np.ndarray, wanted: np.ndarray, sideways: np.ndarray,
-            gains: Gains, dt: float) -> np.ndarray:
-    """Move feet in the air to their steps, and let those on the ground go back, yielding.
+@jit
+def swing(way, wanted, gains, dt):
+    """Move a foot in the air towards its step; ways in m, dt in s."""
+    return way + (1.0 - math.exp(-dt / gains.step_filter)) * (wanted - way)
 
-    Args:
-        way: by which feet are displaced, m, shape (runs, legs, 2).
-        swinging: shape (runs, legs).
-        wanted: as of step, shape (runs, 2).
-        sideways: velocity to the left beyond what is expected, m/s, shape (runs,).
-        gains: of the law.
-        dt: s.
 
-    """
-    swung = way + (1.0 - math.exp(-dt / gains.step_filter)) * (wanted[:, None] - way)
-    stood = way * math.exp(-gains.step_decay * dt)
-    stood[..., 1] -= gains.give * dt * sideways[:, None]
-    return np.clip(np.where(swinging[..., None], swung, stood), -gains.step_most, gains.step_most)
+@jit
+def stand(way, giving, gains, dt):
+    """Let a foot on the ground go back, and give way at a speed in m/s."""
+    found = way * math.exp(-gains.step_decay * dt) - dt * giving
+    return min(max(found, -gains.step_most), gains.step_most)

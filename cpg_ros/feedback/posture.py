@@ -1,28 +1,28 @@
 """Posture: legs of the low side push, and a foot in the air stays level to gravity."""
 
-import numpy as np
-
-from cpg_ros.feedback.gains import Gains
+from cpg_ros.integration.jit import jit
 
 
-def in_stance(feet: np.ndarray, lean: np.ndarray, turning: np.ndarray, gains: Gains
-              ) -> np.ndarray:
-    """Return how far to draw feet in, m, shape (runs, legs).
+@jit
+def in_stance(x, y, roll, pitch, roll_rate, pitch_rate, gains):
+    """Return how far to draw a foot in, m.
 
     Args:
-        feet: where they are, m, shape (runs, legs, 3).
-        lean: roll and pitch beyond what is expected, rad, shape (runs, 2).
-        turning: their rates, the same way, rad/s.
+        x: where it is, forward of the base, m.
+        y: to the left of it, m.
+        roll: beyond what is expected, rad.
+        pitch: the same.
+        roll_rate: the same, rad/s.
+        pitch_rate: the same.
         gains: of the law.
 
     """
-    roll = gains.roll * lean[:, 0] + gains.roll_rate * turning[:, 0]
-    pitch = gains.pitch * lean[:, 1] + gains.pitch_rate * turning[:, 1]
-    drawn = roll[:, None] * feet[..., 1] - pitch[:, None] * feet[..., 0]
-    return np.clip(drawn, -gains.posture_most, gains.posture_most)
+    drawn = ((gains.roll * roll + gains.roll_rate * roll_rate) * y
+             - (gains.pitch * pitch + gains.pitch_rate * pitch_rate) * x)
+    return min(max(drawn, -gains.posture_most), gains.posture_most)
 
 
-def in_swing(feet: np.ndarray, lean: np.ndarray, gains: Gains) -> np.ndarray:
-    """Return how far to draw feet in so that their heights are those of a level body, m."""
-    level = lean[:, 1, None] * feet[..., 0] - lean[:, 0, None] * feet[..., 1]
-    return np.clip(level, -gains.posture_most, gains.posture_most)
+@jit
+def in_swing(x, y, roll, pitch, gains):
+    """Return how far to draw a foot in so that its height is that of a level body, m."""
+    return min(max(pitch * x - roll * y, -gains.posture_most), gains.posture_most)

@@ -1,56 +1,51 @@
 """Reflexes: over what a foot hits, down to what it misses, and no further where it has landed."""
 
-import numpy as np
+import math
 
-from cpg_ros.feedback.gains import Gains
+from cpg_ros.integration.jit import jit
 
 #: Shares of the swing in which a foot may stumble, and from which on it may land early; before,
 #: it may still be on its way off the ground.
 STUMBLE, EARLY = 0.2, 0.65
 #: Share of the stance from which on a foot that has no ground reaches for it.
 MISSED = 0.1
+#: Time in which a foot is lifted over what it hits, s.
+LIFTING = 0.01
+#: What a foot's reflexes have built up: the lift over an obstacle, the reach for the ground and
+#: the height held after an early landing, m; the height at which it landed, m; whether it has.
+LIFT, REACH, HELD, HEIGHT, LANDED = range(5)
 
 
-class Reflexes:
-    """Displacements that reflexes have built up.
+@jit
+def advance(built, contact, swinging, progress, height, gains, dt):
+    """Return how far to draw a foot in, m.
 
-    Attributes:
-        lift: over an obstacle, m, shape (runs, legs).
-        reach: for the ground, m, not negative.
-        held: above the plan after an early landing, m.
+    Args:
+        built: by its reflexes, shape (5,), changed in place.
+        contact: whether the foot is on the ground.
+        swinging: whether it is meant to be in the air.
+        progress: share of that swing, or else of its stance, that is over.
+        height: of the foot that is planned, base's frame, m.
+        gains: of the law.
+        dt: s.
 
     """
-
-    def __init__(self, runs: int, legs: int) -> None:
-        self.lift, self.reach, self.held = np.zeros((3, runs, legs))
-        self._landed = np.zeros((runs, legs), dtype=bool)
-        self._height = np.zeros((runs, legs))
-
-    def advance(self, contact: np.ndarray, swinging: np.ndarray, progress: np.ndarray,
-                height: np.ndarray, gains: Gains, dt: float) -> np.ndarray:
-        """Return how far to draw feet in, m, shape (runs, legs).
-
-        Args:
-            contact: whether each foot is on the ground, shape (runs, legs).
-            swinging: whether it is meant to be in the air.
-            progress: share of that swing, or else of its stance, that is over.
-            height: of the foot that is planned, base's frame, m.
-            gains: of the law.
-            dt: s.
-
-        """
-        fade = np.exp(-gains.reflex_rate * dt)
-        stumbled = swinging & contact & (progress > STUMBLE) & (progress < EARLY)
-        self.lift = np.where(stumbled, np.minimum(self.lift + 10.0 * gains.lift * dt / 0.1,
-                                                  gains.lift),
-                             np.where(swinging & (progress < EARLY), self.lift, fade * self.lift))
-        lost = ~swinging & ~contact & (progress > MISSED)
-        self.reach = np.where(lost, np.minimum(self.reach + gains.reach_rate * dt,
-                                               gains.reach_most),
-                              np.where(swinging, fade * self.reach, self.reach))
-        early = swinging & contact & (progress >= EARLY)
-        self._height = np.where(self._landed | ~early, self._height, height + self.held)
-        self._landed = (self._landed | early) & swinging & (progress >= EARLY)
-        self.held = np.where(self._landed, np.clip(self._height - height, 0.0, gains.lift),
-                             fade * self.held)
-        return self.lift + self.held - self.reach
+    fade = math.exp(-gains.reflex_rate * dt)
+    if swinging and contact and STUMBLE < progress < EARLY:
+        built[LIFT] = min(built[LIFT] + gains.lift * dt / LIFTING, gains.lift)
+    elif not (swinging and progress < EARLY):
+        built[LIFT] *= fade
+    if not (swinging or contact) and progress > MISSED:
+        built[REACH] = min(built[REACH] + gains.reach_rate * dt, gains.reach_most)
+    elif swinging:
+        built[REACH] *= fade
+    late = swinging and progress >= EARLY
+    if late and contact and not built[LANDED]:
+        built[HEIGHT], built[LANDED] = height + built[HELD], 1.0
+    elif not late:
+        built[LANDED] = 0.0
+    if built[LANDED]:
+        built[HELD] = min(max(built[HEIGHT] - height, 0.0), gains.lift)
+    else:
+        built[HELD] *= fade
+    return built[LIFT] + built[HELD] - built[REACH]

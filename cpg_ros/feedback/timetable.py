@@ -33,11 +33,6 @@ class Timetable:
         self.swinging = np.stack([one for one, _ in columns], axis=1)
         self.progress = np.stack([one for _, one in columns], axis=1)
 
-    def __call__(self, phase: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return swinging and progress at phases in cycles, shape (runs,) -> (runs, legs)."""
-        row = (phase * POINTS).astype(int) % POINTS
-        return self.swinging[row], self.progress[row]
-
 
 def _periodic(values: np.ndarray, phase: np.ndarray) -> np.ndarray:
     grid = np.arange(values.size + 1) / values.size
@@ -45,9 +40,11 @@ def _periodic(values: np.ndarray, phase: np.ndarray) -> np.ndarray:
 
 
 def _swing(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Find the swing from the foot furthest back to the foot furthest ahead."""
+    """Find the swing from the foot furthest back to the foot furthest ahead, if it moves."""
     lift, land = int(x.argmin()), int(x.argmax())
     swing = (land - lift) % x.size
+    if np.ptp(x) < 1e-9:
+        return np.zeros(x.size, dtype=bool), np.zeros(x.size)
     since = (np.arange(x.size) - lift) % x.size
     swinging = since < swing
     return swinging, np.where(swinging, since / swing, (since - swing) / (x.size - swing))

@@ -47,7 +47,7 @@ def sources_digest(key: str = '') -> int:
     """
     digest = hashlib.sha256(key.encode())
     package = Path(__file__).resolve().parent.parent
-    for folder in ('networks', 'integration', 'dynamics', 'motion'):
+    for folder in ('networks', 'integration', 'dynamics', 'motion', 'feedback'):
         for source in sorted((package / folder).rglob('*.py')):
             digest.update(source.read_bytes())
     return int.from_bytes(digest.digest()[:7], 'big')

@@ -122,6 +122,14 @@ class Pattern:
         return self._tracks[-1].program
 
     @property
+    def fading(self) -> tuple[Program, Program, float]:
+        """The program that fades out, the newest in force, and the share of that."""
+        if len(self._tracks) == 1:
+            return self._tracks[0].program, self._tracks[0].program, 0.0
+        older, newest = self._tracks[-2:]
+        return older.program, newest.program, smoothstep(newest.progress)[0]
+
+    @property
     def phases(self) -> np.ndarray:
         """Phase of each leg in cycles, shape (legs,); 0 is where its cell peaks."""
         return self._tracks[-1].legs

@@ -89,6 +89,15 @@ class Program:
         speed = self._steering.speed
         return speed[0], speed[-1]
 
+    @property
+    def own_speed(self) -> float:
+        """Speed forward at full strides as far as it has been measured, m/s, or else 0."""
+        steering = self.motion.steering
+        if steering is None:
+            return 0.0
+        # Measured at the gait's own frequency.
+        return steering.speed[-1] * self.frequency / (self.motion.frequency or self.frequency)
+
     def steer(self, speed: float, turn: float) -> tuple[np.ndarray, float]:
         """Return each leg's stride, shape (legs,), and the pace for a wanted motion.
 

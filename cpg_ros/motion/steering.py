@@ -18,6 +18,8 @@ class Drive:
         stride: factor of each leg's stride, shape (legs,); 1 is the gait as it is.
         rate: its derivative, 1/s.
         pace: factor of the stride frequency.
+        trim: added to the strides that are asked for, shape (legs,), such as by feedback; None
+            for nothing.
 
     """
 
@@ -26,6 +28,7 @@ class Drive:
         self._now, self._rate = np.ones(legs + 1), np.zeros(legs + 1)
         self._asked = (np.ones(legs + 1), False)
         self.stride, self.rate = self._now[:legs], self._rate[:legs]
+        self.trim: np.ndarray | None = None
 
     @property
     def pace(self) -> float:
@@ -46,6 +49,8 @@ class Drive:
         if at_once:
             self._now[:], self._rate[:] = target, 0.0
             return
+        if self.trim is not None:
+            target = np.append(np.clip(target[:-1] + self.trim, -1.0, 1.0), target[-1])
         decay = math.exp(-dt / TIME_CONSTANT)
         gap = self._now - target
         pull = self._rate + gap / TIME_CONSTANT

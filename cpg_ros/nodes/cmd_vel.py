@@ -19,17 +19,22 @@ from cpg_ros.motion.plan import Program
 LOOK = 0.02
 #: Time between two warnings of a kind, s.
 QUIET = 5.0
+#: Fastest way to the side, m/s, which takes feedback.
+ASIDE = 0.2
 
 
 class CmdVel:
     """Steers a pattern by the newest command; other threads may change the gait meanwhile."""
 
     def __init__(self, node: Node, pattern: Pattern, program: Program, enabled: bool,
-                 timeout: Callable[[], float], ramp: Callable[[], float]) -> None:
+                 timeout: Callable[[], float], ramp: Callable[[], float],
+                 closed: Callable[[], bool]) -> None:
         self._program, self._enabled = program, enabled
         self._deciding = threading.Lock()
         self._node, self._pattern, self._timeout, self._ramp = node, pattern, timeout, ramp
-        self._asked, self._when, self._stale = (0.0, 0.0), -math.inf, True
+        self._closed = closed
+        # Speeds forward and to the left, m/s, and yaw rate, rad/s.
+        self._asked, self._when, self._stale = (0.0, 0.0, 0.0), -math.inf, True
         self._up = False
         self._log = node.get_logger()
         node.create_subscription(
@@ -43,14 +48,25 @@ class CmdVel:
     @property
     def walking(self) -> bool:
         """Tell whether a fresh command asks for motion."""
-        return self._enabled and not self._stale and self._asked != (0.0, 0.0)
+        return self._enabled and not self._stale and self._asked != (0.0, 0.0, 0.0)
+
+    @property
+    def motion(self) -> tuple[float, float, float]:
+        """Speeds forward and to the left, m/s, and yaw rate, rad/s, that are walked now."""
+        if not self.walking:
+            return 0.0, 0.0, 0.0
+        speed, aside, turn = self._asked
+        slowest, fastest = self._program.speeds
+        return min(max(speed, slowest), fastest), aside, turn
 
     @property
     def state(self) -> str:
         """What is asked for, for diagnostics."""
         if self._stale:
             return 'none'
-        return f'{self._asked[0]:.3g} m/s, {self._asked[1]:.3g} rad/s'
+        speed, aside, turn = self._asked
+        return f'{speed:.3g} m/s, {turn:.3g} rad/s' + (f', {aside:.3g} m/s to the left'
+                                                       if aside else '')
 
     def _now(self) -> float:
         clock: Any = self._node.get_clock()
@@ -63,12 +79,17 @@ class CmdVel:
                               f'{turn} rad/s are not all finite',
                               throttle_duration_sec=QUIET)
             return
-        if aside:
-            self._log.warning(f'cmd_vel asks for {aside:g} m/s to the left: this robot walks '
-                              'forward, backward and in curves only',
+        if aside and not self._closed():
+            self._log.warning(f'cmd_vel asks for {aside:g} m/s to the left: without feedback this '
+                              'robot walks forward, backward and in curves only',
                               throttle_duration_sec=QUIET)
+            aside = 0.0
+        elif abs(aside) > ASIDE:
+            self._log.warning(f'cmd_vel asks for {aside:g} m/s to the left: the range is '
+                              f'{-ASIDE:g} to {ASIDE:g} m/s', throttle_duration_sec=QUIET)
+            aside = math.copysign(ASIDE, aside)
         with self._deciding:
-            self._asked, self._when, self._stale = (speed, turn), self._now(), False
+            self._asked, self._when, self._stale = (speed, aside, turn), self._now(), False
             self._act()
 
     def _look(self) -> None:
@@ -97,7 +118,7 @@ class CmdVel:
     def _act(self) -> None:
         walking = self.walking
         if walking:
-            speed, turn = self._asked
+            speed, _, turn = self._asked
             slowest, fastest = self._program.speeds
             if not slowest <= speed <= fastest:
                 self._log.warning(f"cmd_vel asks for {speed:g} m/s: the {self._program.name}'s "

@@ -10,6 +10,7 @@ from rclpy.node import Node
 from cpg_ros.motion.pattern import Pattern
 from cpg_ros.nodes.cmd_vel import CmdVel
 from cpg_ros.nodes.deadline_thread import Ticker
+from cpg_ros.nodes.feedback_switch import FeedbackSwitch
 from cpg_ros.nodes.rivals import Rivals
 
 
@@ -20,7 +21,8 @@ class Diagnostics:
     """
 
     def __init__(self, node: Node, pattern: Pattern, ticker: Ticker, rivals: Rivals,
-                 cmd_vel: CmdVel | None) -> None:
+                 cmd_vel: CmdVel | None, feedback: FeedbackSwitch) -> None:
+        self._feedback = feedback
         self._node, self._pattern, self._ticker = node, pattern, ticker
         self._rivals, self._cmd_vel = rivals, cmd_vel
         self._publisher = node.create_publisher(DiagnosticArray, '/diagnostics', 10)
@@ -53,7 +55,9 @@ class Diagnostics:
             level, text = DiagnosticStatus.WARN, f'nothing is published: {self._why_silent()}'
         elif 100 * new['dropped ticks'] > new['ticks']:
             level, text = DiagnosticStatus.WARN, f'{new["dropped ticks"]} ticks dropped'
-        elif new['ticks held by limits']:
+        elif self._feedback.out:
+            level, text = DiagnosticStatus.WARN, f'no feedback: {self._feedback.out}'
+        elif new['ticks held by limits'] and not self._feedback.active:
             level, text = DiagnosticStatus.WARN, 'a joint limit held the pattern back'
         elif 100 * new['late ticks'] > new['ticks']:
             level, text = DiagnosticStatus.WARN, f'{new["late ticks"]} late ticks'
@@ -71,6 +75,7 @@ class Diagnostics:
         }
         if self._cmd_vel:
             values['cmd_vel'] = self._cmd_vel.state
+        values |= self._feedback.state(1e-9 * self._node.get_clock().now().nanoseconds)
         status = DiagnosticStatus(
             level=level, name=f'{self._node.get_fully_qualified_name()}: pattern', message=text,
             hardware_id=self._pattern.robot.name,

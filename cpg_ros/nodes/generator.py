@@ -19,10 +19,12 @@ from cpg_ros.motion.steering import Drive
 from cpg_ros.networks.network import Network, Preset
 from cpg_ros.networks.preset_files import PresetError, read_presets
 from cpg_ros.networks.registry import NetworkError, find_network
+from cpg_ros.nodes import feedback_parameters
 from cpg_ros.nodes.cells_publisher import Cells
 from cpg_ros.nodes.cmd_vel import CmdVel
 from cpg_ros.nodes.deadline_thread import Ticker
 from cpg_ros.nodes.diagnostics import Diagnostics
+from cpg_ros.nodes.feedback_switch import FeedbackSwitch, uncalibrated
 from cpg_ros.nodes.generator_parameters import (
     COMMANDS,
     NETWORK,
@@ -37,6 +39,7 @@ from cpg_ros.nodes.node_base import StartedNode, StartError, asked_for_help, run
 from cpg_ros.nodes.parameter_spec import as_doubles
 from cpg_ros.nodes.real_time import SPECS, NoSuchCore, RealTime
 from cpg_ros.nodes.rivals import Rivals
+from cpg_ros.nodes.senses_input import CONTACTS
 from cpg_ros.robots.robot import Robot
 from cpg_ros.robots.robot_file import RobotError, find_robot
 
@@ -79,6 +82,10 @@ class Generator(StartedNode):
             raise StartError(f"robot file '{robot.name}' is for the network "
                              f"{' or '.join(robot.networks)}, not '{network.name}'")
         self._planner = Planner(network, presets, robot, self._value('cmd_vel'))
+        self._declare('feedback', feedback_parameters.switch(not uncalibrated(robot)))
+        for name, spec in feedback_parameters.SPECS.items():
+            self._declare(name, spec)
+        self._one_of('feedback.contacts', CONTACTS)
         self._given_groups()
         for name, spec in self._planner.specs(self._value('gait')).items():
             self._declare(name, spec)
@@ -89,16 +96,20 @@ class Generator(StartedNode):
         self._planner.prepare()
 
         steered, autostart = self._value('cmd_vel'), self._value('autostart')
+        # Feedback closes speed and heading by the strides.
+        driven = steered or self._value('feedback')
         self.pattern = Pattern(program, self._value('ramp'), autostart and not steered,
-                               Drive(len(robot.legs)) if steered else None)
+                               Drive(len(robot.legs)) if driven else None)
         self._cmd_vel = CmdVel(self, self.pattern, program, autostart,
                                lambda: self._value('cmd_vel_timeout'),
-                               lambda: self._value('ramp')) if steered else None
+                               lambda: self._value('ramp'),
+                               lambda: self._feedback.active) if steered else None
         try:
             self._outputs = Outputs(self, robot, self._value('combined_topic'),
                                     self._value('command'))
         except ValueError as error:
             raise StartError(str(error)) from error
+        self._feedback = self._switched()
         self._cells = Cells(self, network)
         self._measured = self._measured_pose(robot)
         self._gait = self.create_publisher(
@@ -114,7 +125,7 @@ class Generator(StartedNode):
                              self.pattern.resume, self._claim_real_time)
         self._rivals = Rivals(self, self._outputs.topics)
         self._diagnostics = Diagnostics(self, self.pattern, self.ticker, self._rivals,
-                                        self._cmd_vel)
+                                        self._cmd_vel, self._feedback)
         self.add_on_set_parameters_callback(self._judge)
         self.add_post_set_parameters_callback(self._apply)
         self._warn_of_unknown()
@@ -164,7 +175,8 @@ class Generator(StartedNode):
                 self._planner.plan(self._values(parameters))
             except Refused as error:
                 return SetParametersResult(successful=False, reason=str(error))
-        return SetParametersResult(successful=True)
+        reason = self._feedback.judge(parameters)
+        return SetParametersResult(successful=not reason, reason=reason)
 
     def _apply(self, parameters: list[Parameter]) -> None:
         """Act on a batch that has been accepted and stored."""
@@ -173,10 +185,13 @@ class Generator(StartedNode):
                 self.ticker.rate = parameter.value
         if any(p.name in self._planner.names for p in parameters):
             program = self._planner.plan(self._values())
+            self._feedback.learn(program)
             self.pattern.apply(program, self._value('transition'))
             if self._cmd_vel:
                 self._cmd_vel.follow(program)
             self._announce()
+        if any(p.name.startswith('feedback') for p in parameters):
+            self._feedback.apply()
 
     def _announce(self) -> None:
         program = self._planner.plan(self._values())
@@ -191,6 +206,29 @@ class Generator(StartedNode):
                 f'({enough:.3g} is enough): the watchdog may have to put it back again and again')
 
     # -- the robot ------------------------------------------------------------------------
+
+    def _switched(self) -> FeedbackSwitch:
+        """Return the feedback, on if it is wanted; without what it needs, off if not asked for.
+
+        Raises:
+            StartError: it is asked for, and cannot be.
+
+        """
+        switch = FeedbackSwitch(self, self.pattern, self._motion, self._outputs.topics)
+        obstacle = switch.obstacle()
+        if obstacle and self._value('feedback'):
+            if 'feedback' in self._parameter_overrides:
+                raise StartError(f'no feedback: {obstacle}')
+            self.get_logger().info(f'no feedback: {obstacle}')
+            self.set_parameters([Parameter('feedback', value=False)])
+        switch.apply()
+        return switch
+
+    def _motion(self) -> tuple[float, float, float]:
+        """Return the speeds forward and to the left, m/s, and the yaw rate, rad/s, wanted."""
+        if self._cmd_vel:
+            return self._cmd_vel.motion
+        return self.pattern.program.own_speed, 0.0, 0.0
 
     def _measured_pose(self, robot: Robot) -> MeasuredPose | None:
         topic = self._value('measured_topic')
@@ -241,6 +279,7 @@ class Generator(StartedNode):
             self.get_logger().info(f'real time: {", ".join(granted)}')
 
     def _tick(self, dt: float, stamp: int) -> None:
+        self._feedback.sense(dt, stamp)
         self.pattern.advance(dt)
         self._outputs.publish(stamp, dt, self.pattern.position, self.pattern.velocity,
                               self.pattern.phases)
@@ -249,6 +288,7 @@ class Generator(StartedNode):
     def _restart(self) -> None:
         self.get_logger().warning('simulated time jumped back: starting again from the stand')
         self.pattern.restart(self._value('ramp'), self.pattern.enabled)
+        self._feedback.restart()
 
     def begin(self) -> None:
         """Start publishing, or wait for being enabled."""
@@ -295,9 +335,11 @@ def compile_kernels(network: str) -> None:
 
 def main(args: list[str] | None = None) -> int:
     """Run the node until SIGINT or SIGTERM; return the exit code."""
-    known = {'network': NETWORK, **specs(find_network(NETWORK.default))}
+    known = {'network': NETWORK, **specs(find_network(NETWORK.default)),
+             'feedback': feedback_parameters.switch(False), **feedback_parameters.TOPICS}
     code = asked_for_help('generator', 'Publishes the joint states of a gait; the parameters of '
-                          'the networks are listed by ros2 param describe.', known, args)
+                          "the networks and the feedback's gains are listed by ros2 param "
+                          'describe.', known, args)
     return run(Generator, NAME, args) if code is None else code
 
 

@@ -24,12 +24,16 @@ from cpg_ros.nodes.lockstep import Lockstep
 from cpg_ros.nodes.node_base import StartedNode, StartError, asked_for_help, run
 from cpg_ros.nodes.parameter_spec import Spec
 from cpg_ros.nodes.sensor_publishers import Measurements
+from cpg_ros.robots.robot import Robot
 from cpg_ros.robots.robot_file import RobotError, find_robot
 from cpg_ros.simulation.body import Body
 from cpg_ros.simulation.camera import without_opengl
+from cpg_ros.simulation.inertial_unit import Dullness, InertialUnit
 from cpg_ros.simulation.robot_model import SimulationError
 from cpg_ros.simulation.run_recorder import Diary, summary
 from cpg_ros.simulation.soft_start import Approach
+from cpg_ros.simulation.terrain import KINDS as GROUNDS
+from cpg_ros.simulation.terrain import Terrain, add_ground, lay, set_friction
 
 NAME = 'robot_sim'
 #: How long the force of one message on ~/push acts, s of simulated time.
@@ -40,6 +44,10 @@ SLOWEST = 1e-3
 BOUNCE = 1.0
 #: From the stand to commands that are elsewhere, s of simulated time.
 APPROACH = 1.0
+
+#: Kinds of ground, and the friction of the last one.
+TERRAINS = ('flat', *GROUNDS, 'slippery')
+SLIPPERY = 0.3
 
 SPECS = {
     'robot': Spec('unitree_go2', 'robot file, or the name of a shipped one',
@@ -63,6 +71,20 @@ SPECS = {
     'film': Spec('', 'film to leave (.gif or .mp4) of the last minute; empty for none'),
     'footfalls': Spec('', 'footfall diagram to leave (.png, .svg or .pdf) of the last minute; '
                       'empty for none'),
+    'terrain': Spec('flat', 'ground', constraints='one of: ' + ', '.join(TERRAINS)),
+    'terrain_size': Spec(0.05, 'height of what the ground is rough with, or of a step [m]; of a '
+                         'ramp its angle up [degrees], negative for down', -45.0, 45.0),
+    'terrain_seed': Spec(0, 'of what is random in it', 0, 2**31 - 1),
+    'friction': Spec(1.0, 'between feet and ground; slippery ground has at most '
+                     f'{SLIPPERY:g}', 0.01, 10.0),
+    'payload': Spec(0.0, 'on the base [kg]', 0.0, 1e3),
+    'gyroscope_noise': Spec(0.0, 'of the topic imu, standard deviation [rad/s]', 0.0, 10.0),
+    'gyroscope_bias': Spec(0.0, 'of each axis [rad/s]', -10.0, 10.0),
+    'accelerometer_noise': Spec(0.0, 'of the topic imu, standard deviation [m/s^2]', 0.0, 100.0),
+    'accelerometer_bias': Spec(0.0, 'of each axis [m/s^2]', -100.0, 100.0),
+    'orientation_bias': Spec(0.0, 'of roll and pitch [rad]', -0.5, 0.5),
+    'imu_delay': Spec(0.0, 'between a measurement, whose time is in the stamp, and its message '
+                      '[s]', 0.0, 1.0),
     'duration': Spec(0.0, 'simulated time after which it ends [s]; 0 for no end', 0.0, 1e6)}
 
 
@@ -94,13 +116,15 @@ class RobotSim(StartedNode):
                            for name in map(self._value, ('film', 'footfalls')))
         try:
             robot = find_robot(self._value('robot'))
-            self._body = Body(self._value('model'), robot, self._value('kp') or None,
-                              self._value('kd') or None, timestep,
-                              say=lambda line: self.get_logger().warning(line))
+            self._one_of('terrain', TERRAINS)
+            terrain = None
+            if self._value('terrain') in GROUNDS:
+                terrain = Terrain(*map(self._value, ('terrain', 'terrain_size', 'terrain_seed')))
+            self._body = self._on_its_ground(robot, timestep, terrain)
             if film is not None and (missing := without_opengl()):
                 self.get_logger().warning(f'no film this time: {missing}')
                 film = None
-            self._diary = Diary(self._body, self._rate, film, footfalls)
+            self._diary = Diary(self._body, self._rate, film, footfalls, terrain)
         except (RobotError, SimulationError) as error:
             raise StartError(str(error)) from error
 
@@ -108,7 +132,10 @@ class RobotSim(StartedNode):
                                   self._body.stand)
         self._approach = Approach(round(APPROACH / timestep), self._body.stand,
                                   robot.leg_of_joint[robot.places])
-        self._measurements = Measurements(self, self._body)
+        self._measurements = Measurements(self, self._body, InertialUnit(
+            self._body, 1.0 / self._rate, Dullness(
+                *map(self._value, ('gyroscope_noise', 'gyroscope_bias', 'accelerometer_noise',
+                                   'accelerometer_bias', 'orientation_bias', 'imu_delay')))))
         self._requests: deque = deque()
         self._last = round(self._value('duration') * self._rate)
         self._now, self._began, self._since = 0, 0.0, 0
@@ -135,6 +162,21 @@ class RobotSim(StartedNode):
         self._steady = RosClock(clock_type=ClockType.STEADY_TIME)
         self._timer = self.create_timer(1.0, self._health, clock=self._steady)
         self._warn_of_unknown()
+
+    def _on_its_ground(self, robot: Robot, timestep: float, terrain: Terrain | None) -> Body:
+        """Return the body; errors as of Body."""
+        body = Body(self._value('model'), robot, self._value('kp') or None,
+                    self._value('kd') or None, timestep, add_ground if terrain else None,
+                    lambda line: self.get_logger().warning(line))
+        if terrain is not None:
+            lay(body.model, terrain)
+        friction = self._value('friction')
+        if self._value('terrain') == 'slippery':
+            friction = min(friction, SLIPPERY)
+        if friction != 1.0:
+            set_friction(body.model, friction)
+        body.load(self._value('payload'))
+        return body
 
     # -- what others ask ------------------------------------------------------------------
 

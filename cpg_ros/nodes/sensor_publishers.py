@@ -7,18 +7,21 @@ import numpy as np
 from geometry_msgs.msg import TransformStamped
 from nav_msgs.msg import Odometry
 from rclpy.node import Node
+from sensor_msgs.msg import Imu
 
 from cpg_ros.nodes.joint_publishers import joint_state, labelled
 from cpg_ros.nodes.message_block import MessageBlock, Template
 from cpg_ros.simulation.body import Body
+from cpg_ros.simulation.inertial_unit import InertialUnit
 from cpg_ros.simulation.robot_model import legs
 
 
 class Measurements:
-    """``joint_states``, ``odom``, ``foot_contacts`` and, where tf2 is, ``/tf`` of one body."""
+    """``joint_states``, ``odom``, ``foot_contacts``, ``imu`` and, where tf2 is, ``/tf``."""
 
-    def __init__(self, node: Node, body: Body) -> None:
-        self._body = body
+    def __init__(self, node: Node, body: Body, unit: InertialUnit) -> None:
+        """Publish what a body does, and what an inertial unit on it shows."""
+        self._body, self._unit = body, unit
         names, feet = list(body.robot.order), legs(body.robot)
         n = len(names)
         sizes = n, n, n, len(feet), 3, 4, 6
@@ -44,9 +47,20 @@ class Measurements:
                     *_each(transform.transform.translation, 'xyz', base),
                     *_each(transform.transform.rotation, 'wxyz', quaternion)])))
         self._block = MessageBlock(node, int(edges[-1]), messages)
+        imu = Imu()
+        imu.header.frame_id = 'base'
+        self._imu = MessageBlock(node, 10, [('imu', Template(imu, [imu.header.stamp], numbers=[
+            *_each(imu.orientation, 'xyzw', np.arange(4)),
+            *_each(imu.angular_velocity, 'xyz', np.arange(4, 7)),
+            *_each(imu.linear_acceleration, 'xyz', np.arange(7, 10))]))])
 
     def publish(self, stamp: int) -> None:
         """Publish what the body does now; stamp in ns."""
+        # First of all what feedback needs.
+        arrived = self._unit.measure(stamp)
+        if arrived is not None:
+            self._imu.values[:] = arrived[1]
+            self._imu.publish(arrived[0])
         body, values = self._body, self._block.values
         for part, given in zip(self._parts, (
                 body.position, body.velocity, body.torque, body.feet, body.base, body.quaternion,

@@ -3,4 +3,4 @@
 Imports ``networks`` and ``files``; knows nothing of ROS.
 """
 
-__all__ = ['robot', 'robot_file', 'urdf']
+__all__ = ['body_keys', 'robot', 'robot_file', 'urdf', 'urdf_links']

@@ -14,6 +14,7 @@ import numpy as np
 
 from cpg_ros.errors import InputError
 from cpg_ros.networks.registry import NETWORKS
+from cpg_ros.robots.body_keys import BodyGeometry, EfferenceTable
 
 #: Harmonics of a Morris-Lecar cell that joints follow, if the file does not say.
 HARMONICS = 3
@@ -92,12 +93,14 @@ class Motion:
         frequency: strides per second that it was made for, Hz; None if it does not matter.
         joints: name -> what the gait makes of that joint.
         steering: None if it has not been measured.
+        efference: what the base does by itself, None if it has not been measured.
 
     """
 
     frequency: float | None = None
     joints: dict[str, JointMotion] = field(default_factory=dict)
     steering: Steering | None = None
+    efference: EfferenceTable | None = None
 
 
 @dataclass(frozen=True)
@@ -114,6 +117,7 @@ class Robot:
         motions: gait or preset -> its motion.
         sides: leg -> left or right, as the file or else a network says.
         girdles: leg -> fore or hind, the same.
+        geometry: of its legs, None if the file does not have it.
 
     """
 
@@ -126,6 +130,7 @@ class Robot:
     motions: dict[str, Motion] = field(default_factory=dict)
     sides: dict[str, str] = field(default_factory=dict)
     girdles: dict[str, str] = field(default_factory=dict)
+    geometry: BodyGeometry | None = None
 
     def __post_init__(self) -> None:
         for key in ('sides', 'girdles'):

@@ -16,6 +16,12 @@ from cpg_ros.files.atomic_write import write_atomically
 from cpg_ros.files.shared_resources import share
 from cpg_ros.files.yaml_reader import Reader, shown
 from cpg_ros.networks.registry import NETWORKS, NetworkError, find_network, reference
+from cpg_ros.robots.body_keys import (
+    efference_tree,
+    geometry_tree,
+    read_efference,
+    read_geometry,
+)
 from cpg_ros.robots.robot import (
     HARMONICS,
     WEIGHTS,
@@ -115,7 +121,8 @@ class _Reader(Reader):
 
     def motion(self, tree: Any, where: str, joints: Mapping[str, Joint]) -> Motion:
         """Return what a gait makes of the robot with these joints."""
-        tree = self.keys(tree, where, set(), {'frequency', 'joints', 'steering'})
+        tree = self.keys(tree, where, set(),
+                         {'frequency', 'joints', 'steering', 'efference'})
         frequency = None
         if 'frequency' in tree:
             frequency = self.number(tree['frequency'], f'{where}.frequency')
@@ -141,7 +148,10 @@ class _Reader(Reader):
         steering = None
         if 'steering' in tree:
             steering = self.steering(tree['steering'], f'{where}.steering', frequency)
-        return Motion(frequency, moved, steering)
+        efference = None
+        if 'efference' in tree:
+            efference = read_efference(self, tree['efference'], f'{where}.efference')
+        return Motion(frequency, moved, steering, efference)
 
     def steering(self, tree: Any, where: str, fastest: float | None) -> Steering:
         if fastest is None:
@@ -176,7 +186,7 @@ def load_robot(path: str | Path) -> Robot:
     path = Path(path)
     reader = _Reader(path, 'robot file', RobotError, LARGEST)
     tree = reader.keys(reader.tree(), 'file', {'network', 'legs'},
-                       {'joint_order', 'assignment', 'harmonics', 'gaits'})
+                       {'joint_order', 'assignment', 'harmonics', 'geometry', 'gaits'})
     networks = reader.networks(tree['network'])
     first = NETWORKS[networks[0]]
     assignment = reader.text(tree.get('assignment', next(iter(first.legs))), 'assignment')
@@ -226,6 +236,10 @@ def load_robot(path: str | Path) -> Robot:
         for name, place in seen.items():
             if name not in order:
                 raise reader.fail('joint_order', f"joint '{name}' of {place} is missing")
+    geometry = None
+    if 'geometry' in tree:
+        geometry = read_geometry(reader, tree['geometry'], {
+            leg: [joint.name for joint in joints] for leg, joints in legs.items()})
     motions = {}
     if 'gaits' in tree:
         known = {name for network in networks for name in NETWORKS[network].presets()}
@@ -233,7 +247,7 @@ def load_robot(path: str | Path) -> Robot:
         motions = {name: reader.motion(entry, f'gaits.{name}', joints_by_name) for name, entry
                    in reader.keys(tree['gaits'], 'gaits', set(), known).items()}
     robot = Robot(path.stem, networks, assignment, harmonics, legs, tuple(order), motions, sides,
-                  girdles)
+                  girdles, geometry)
     if any(motion.steering for motion in motions.values()):
         for leg in legs:
             if leg not in robot.sides:
@@ -274,6 +288,8 @@ def write_robot(path: str | Path, robot: Robot, comment: str = '') -> None:
             if leg in said and not any(leg in getattr(NETWORKS[name], f'{key}s')
                                        for name in robot.networks):
                 tree['legs'][leg][key] = said[leg]
+    if robot.geometry is not None:
+        tree['geometry'] = geometry_tree(robot.geometry)
     if robot.motions:
         tree['gaits'] = {name: _motion_tree(motion) for name, motion in robot.motions.items()}
     lines = ''.join(f'# {line}\n' for line in comment.splitlines())
@@ -292,4 +308,6 @@ def _motion_tree(motion: Motion) -> dict[str, Any]:
             for name, joint in motion.joints.items()}
     if motion.steering is not None:
         tree['steering'] = {key: list(values) for key, values in vars(motion.steering).items()}
+    if motion.efference is not None:
+        tree['efference'] = efference_tree(motion.efference)
     return tree

@@ -64,12 +64,13 @@ class Body:
         self._feet = np.zeros(count)
         self._position, self._velocity, self._torque = np.zeros((3, n))
         self._turn, self._twist = np.zeros(9), np.zeros(6)
+        self._height: float | None = None
         self.reset()
 
     def reset(self) -> None:
         """Put the body upright at the origin, still, in its stand.
 
-        Its lowest point just touches the floor.
+        Its lowest point just touches the floor, as it was when the body was made.
 
         Raises:
             SimulationError: nothing of it could.
@@ -80,8 +81,10 @@ class Body:
         self._pushed = 0
         data.qpos[self._angles] = self.stand
         self._pose[:] = 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0
-        mujoco.mj_kinematics(self.model, data)
-        self._pose[2] = -self._clearance()
+        if self._height is None:
+            mujoco.mj_kinematics(self.model, data)
+            self._height = -self._clearance()
+        self._pose[2] = self._height
         self.command(self.stand)
         mujoco.mj_forward(self.model, data)
 
@@ -103,6 +106,15 @@ class Body:
     def command(self, angles: np.ndarray) -> None:
         """Let the joints be driven to these angles, rad, shape (joints,), from now on."""
         self._control[:] = angles
+
+    def load(self, mass: float) -> None:
+        """Put a mass in kg on the base, where its own is."""
+        model, own = self.model, float(self.model.body_mass[self._base])
+        if mass:
+            model.body_mass[self._base] += mass
+            model.body_inertia[self._base] *= (own + mass) / own
+            engine().mj_setConst(model, self.data)
+            self.reset()
 
     def push(self, force: np.ndarray, duration: float) -> None:
         """Push the base at its centre of mass with a force (N, x y z, world) for some seconds."""
@@ -178,8 +190,7 @@ class Body:
     @property
     def twist(self) -> np.ndarray:
         """Velocity in m/s (x y z), then angular velocity in rad/s, both in the base's frame."""
-        matrix = self._matrix()
-        np.matmul(self._rates[:3], matrix, out=self._twist[:3])
+        np.matmul(self._rates[:3], self.axes, out=self._twist[:3])
         self._twist[3:] = self._rates[3:]
         return self._twist
 
@@ -194,7 +205,8 @@ class Body:
         _, x, y, _ = self.quaternion
         return 1.0 - 2.0 * (x * x + y * y) < math.cos(FALLEN) or self._trunk[0] > 0.0
 
-    def _matrix(self) -> np.ndarray:
-        """Turn vectors of the base's frame into those of the world's."""
+    @property
+    def axes(self) -> np.ndarray:
+        """What turns vectors of the base's frame into those of the world's, shape (3, 3)."""
         engine().mju_quat2Mat(self._turn, self.quaternion)
         return self._turn.reshape(3, 3)

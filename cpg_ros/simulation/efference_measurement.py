@@ -1,34 +1,68 @@
 """A gait's efference copy, measured: what its body does on flat ground with nothing fed back."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 
-from cpg_ros.feedback.efference_copy import EfferenceCopy, fold
-from cpg_ros.simulation.closed_loop import ClosedLoop, Scenario
+from cpg_ros.feedback.efference_copy import SPEEDS, EfferenceCopy, fold
+from cpg_ros.motion.plan import plan
+from cpg_ros.networks.registry import NETWORKS
+from cpg_ros.robots.robot import Robot
+from cpg_ros.simulation.closed_loop import ClosedLoop
+from cpg_ros.simulation.leg_geometry import read_geometry
+from cpg_ros.simulation.scenario import Scenario
 
 #: Length of a run, and what of it says nothing about the gait itself, s.
 DURATION, BEGINNING = 10.0, 3.0
 
 
-def measure_efference(loop: ClosedLoop, speeds: Sequence[float] = (0.1, 0.2, 0.3, 0.4)
-                      ) -> EfferenceCopy:
+def measure_efference(loop: ClosedLoop, speeds: Sequence[float] | None = None) -> EfferenceCopy:
     """Measure what a gait makes the body do at several wanted speeds.
 
     Args:
-        loop: bodies.
-        speeds: to be asked for, m/s; a gait that cannot be steered has but its own.
+        loop: bodies, whose first gait it is.
+        speeds: to be asked for, m/s, or else as many as a table takes, from 0 to the fastest; a
+            gait that cannot be steered has but its own.
 
     """
-    asked = speeds if loop.program.motion.steering is not None else speeds[:1]
+    asked: Sequence[float] | np.ndarray = [0.0]
+    if loop.program.motion.steering is not None:
+        asked = np.linspace(0.0, loop.program.speeds[1], SPEEDS) if speeds is None else speeds
+    ran = loop.run([Scenario(speed=speed) for speed in asked], DURATION)
     first = round(BEGINNING / loop.timestep)
-    found, tables = [], []
-    for speed in asked:
-        ran = loop.run([Scenario()], DURATION, speed)
-        signals = np.concatenate([ran.velocity[0, first:, :2], ran.turning[0, first:, :2],
-                                  ran.lean[0, first:, :2]], axis=1)
-        table = fold(ran.phase[0, first:], signals)
-        tables.append(table)
-        found.append(float(table[:, 0].mean()))
+    tables = []
+    for velocity, turning, lean, phase in zip(ran.velocity, ran.turning, ran.lean, ran.phase,
+                                              strict=True):
+        signals = np.concatenate([velocity[:, :2], turning[:, :2], lean[:, :2]], axis=1)
+        tables.append(fold(phase[first:], signals[first:]))
+    found = np.array([table[:, 0].mean() for table in tables])
     rising = np.argsort(found)
-    return EfferenceCopy(np.array(found)[rising], np.array(tables)[rising])
+    return EfferenceCopy(found[rising], np.array(tables)[rising])
+
+
+def calibrated(robot: Robot, model: str, gaits: Sequence[str],
+               update: Callable[[str], None] = lambda gait: None) -> Robot:
+    """Return a robot with the geometry of a model, and with efference copies measured on it.
+
+    Args:
+        robot: whose first network is used.
+        model: as of ``robot_model.load``.
+        gaits: that are measured; others keep theirs.
+        update: called with each gait when it has been measured.
+
+    Raises:
+        SimulationError: the model cannot be used.
+        Refused: a gait cannot be run.
+        InputError: a robot did not go through all phases of a stride.
+
+    """
+    presets, motions = NETWORKS[robot.networks[0]].presets(), dict(robot.motions)
+    for gait in gaits:
+        preset, motion = presets[gait], robot.motion(gait, gait)
+        program = plan(robot, gait, preset, preset.network, motion.frequency or 0.0)
+        loop = ClosedLoop(model, program)
+        motions[gait] = replace(motion, efference=measure_efference(loop).as_table())
+        robot = replace(robot, geometry=read_geometry(loop.body, loop.parts))
+        update(gait)
+    return replace(robot, motions=motions)

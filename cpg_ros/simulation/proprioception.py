@@ -1,38 +1,84 @@
-"""What bodies feel, from the true state of the physics: no noise, no delay."""
+"""What bodies feel, from the true state of the physics, and what dulls it."""
+
+import math
 
 import numpy as np
 
-from cpg_ros.feedback.estimate import GRAVITY, Senses
+from cpg_ros.feedback.estimate import Senses
+from cpg_ros.feedback.kinematics import GRAVITY
+from cpg_ros.integration.jit import entry, sources_digest
 from cpg_ros.simulation.body import Body
+from cpg_ros.simulation.scenario import Noise
 
 
-def felt(angles: np.ndarray, rates: np.ndarray, loads: np.ndarray, quaternions: np.ndarray,
-         moving: np.ndarray, before: np.ndarray, dt: float) -> tuple[Senses, np.ndarray]:
-    """Return what is felt, and the true velocities in the bodies' own frames, m/s, (runs, 3).
+def _cached(digest):
+    """Build the cached entry point; see sources_digest for why it is a closure."""
+
+    @entry
+    def feel(quaternions, moving, before, dt, lean, turning, push, velocity):
+        """Fill what the base feels and its true velocity; see felt."""
+        digest  # noqa: B018
+        for k in range(len(quaternions)):
+            w, x, y, z = quaternions[k]
+            lean[k, 0] = math.atan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y))
+            lean[k, 1] = math.asin(min(max(2.0 * (w * y - z * x), -1.0), 1.0))
+            lean[k, 2] = math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
+            axes = ((1 - 2 * (y * y + z * z), 2 * (x * y + w * z), 2 * (x * z - w * y)),
+                    (2 * (x * y - w * z), 1 - 2 * (x * x + z * z), 2 * (y * z + w * x)),
+                    (2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)))
+            faster = ((moving[k, 0] - before[k, 0]) / dt, (moving[k, 1] - before[k, 1]) / dt,
+                      (moving[k, 2] - before[k, 2]) / dt + GRAVITY)
+            for axis in range(3):
+                turning[k, axis] = moving[k, 3 + axis]
+                push[k, axis] = velocity[k, axis] = 0.0
+                for world in range(3):
+                    push[k, axis] += axes[axis][world] * faster[world]
+                    velocity[k, axis] += axes[axis][world] * moving[k, world]
+
+    return feel
+
+
+_feel = _cached(sources_digest())
+
+
+def felt(senses: Senses, quaternions: np.ndarray, moving: np.ndarray, before: np.ndarray,
+         dt: float, velocity: np.ndarray) -> None:
+    """Fill in what the base feels, and its true velocity in its own frame, m/s, (runs, 3).
 
     Args:
-        angles: of the joints leg by leg, rad, shape (runs, joints).
-        rates: rad/s, the same.
-        loads: of the feet, N, shape (runs, legs).
+        senses: lean, turning and push are filled.
         quaternions: of the bases, w x y z, shape (runs, 4).
         moving: velocity in the world's frame, m/s, then angular velocity in the base's, rad/s,
             shape (runs, 6).
         before: the same dt before.
         dt: s.
+        velocity: filled.
 
     """
-    w, x, y, z = quaternions.T
-    lean = np.stack([np.arctan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y)),
-                     np.arcsin(np.clip(2.0 * (w * y - z * x), -1.0, 1.0)),
-                     np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))], axis=1)
-    axes = np.stack([1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y),
-                     2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x),
-                     2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-                    axis=1).reshape(-1, 3, 3)
-    faster = (moving[:, :3] - before[:, :3]) / dt
-    faster[:, 2] += GRAVITY
-    push, velocity = (np.einsum('rij,ri->rj', axes, one) for one in (faster, moving[:, :3]))
-    return Senses(angles, rates, loads, lean, moving[:, 3:], push), velocity
+    _feel(quaternions, moving, before, dt, senses.lean, senses.turning, senses.push, velocity)
+
+
+class Dulled:
+    """Senses with noise, as some sensors have it, and delay."""
+
+    def __init__(self, noise: Noise, runs: int, legs: int, dt: float) -> None:
+        self._noise, self._rng = noise, np.random.default_rng(noise.seed)
+        self._later = round(noise.delay / dt)
+        self._waiting: list[Senses] = []
+        self._factor = 1.0 + noise.force_bias * self._rng.uniform(-1.0, 1.0, (runs, legs))
+        self._lean = noise.lean_bias * self._rng.choice([-1.0, 1.0], (runs, 2))
+
+    def __call__(self, true: Senses) -> Senses:
+        """Return what is noticed now."""
+        rng, noise = self._rng, self._noise
+        loads = true.loads * (self._factor + noise.force_noise * rng.normal(
+            size=true.loads.shape))
+        lean = true.lean.copy()
+        lean[:, :2] += self._lean
+        turning = true.turning + noise.turning_noise * rng.normal(size=true.turning.shape)
+        self._waiting.append(Senses(true.angles.copy(), true.rates.copy(), loads, lean, turning,
+                                    true.push.copy()))
+        return self._waiting[0] if len(self._waiting) <= self._later else self._waiting.pop(0)
 
 
 class Proprioception:
@@ -41,16 +87,15 @@ class Proprioception:
     def __init__(self, body: Body) -> None:
         self._body = body
         self._order = np.argsort(body.robot.places)
-        self._before = self._moving()
-
-    def _moving(self) -> np.ndarray:
-        body = self._body
-        return body.rates[None].copy()
+        self._senses = Senses.blank(1, len(body.robot.legs), len(self._order))
+        self._before, self._velocity = body.rates[None].copy(), np.zeros((1, 3))
 
     def __call__(self) -> Senses:
-        """Return what is felt now, of one run."""
-        body, before = self._body, self._before
-        self._before = self._moving()
-        return felt(body.position[None, self._order], body.velocity[None, self._order],
-                    body.feet[None].copy(), body.quaternion[None].copy(), self._before, before,
-                    body.model.opt.timestep)[0]
+        """Return what is felt now, of one run; overwritten by the next call."""
+        body, senses = self._body, self._senses
+        senses.angles[0], senses.rates[0] = body.position[self._order], body.velocity[self._order]
+        senses.loads[0] = body.feet
+        felt(senses, body.quaternion[None], body.rates[None], self._before,
+             body.model.opt.timestep, self._velocity)
+        self._before[0] = body.rates
+        return senses

@@ -10,6 +10,7 @@ import numpy as np
 from cpg_ros.networks.network import footfall_order
 from cpg_ros.simulation.body import Body
 from cpg_ros.simulation.robot_model import SimulationError, legs, load
+from cpg_ros.simulation.terrain import Terrain, add_ground, lay
 
 #: How much of the end of a run is kept, s: a longer film or diagram nobody looks at.
 KEPT = 60.0
@@ -21,7 +22,7 @@ class Diary:
     """Looks at a body after each of its periods."""
 
     def __init__(self, body: Body, rate: float, film: Path | None = None,
-                 footfalls: Path | None = None) -> None:
+                 footfalls: Path | None = None, terrain: Terrain | None = None) -> None:
         """Keep what the files need; one that is None is not made.
 
         Args:
@@ -29,12 +30,14 @@ class Diary:
             rate: of the periods, Hz.
             film: .gif or .mp4.
             footfalls: .png, .svg or .pdf.
+            terrain: that the body is on; None for the flat floor.
 
         Raises:
             SimulationError: a file can be told now not to come about.
 
         """
         self._body, self._film, self._footfalls = body, film, footfalls
+        self._terrain = terrain
         self._fps = min(FRAMES, rate)
         self._frames = _Every(rate, FRAMES)
         self._samples = _Every(rate, SAMPLES)
@@ -87,7 +90,10 @@ class Diary:
             written.append(self._footfalls)
         if self._film is not None and self._poses:
             from cpg_ros.simulation.camera import shoot
-            model = load(name, self._body.robot, visual=True)
+            terrain = self._terrain
+            model = load(name, self._body.robot, visual=True, add=add_ground if terrain else None)
+            if terrain is not None:
+                lay(model, terrain)
             shoot(self._film, model, self._poses, self._fps, enough=enough)
             written.append(self._film)
         return written

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from cpg_ros.simulation.robot_model import engine
+from cpg_ros.simulation.robot_model import SimulationError, engine
 
 #: Extent of the ground in front of the robot, behind it and to either side, and grid, m.
 AHEAD, BEHIND, ASIDE, GRID = 8.0, 1.5, 3.0, 0.05
@@ -14,6 +14,12 @@ AHEAD, BEHIND, ASIDE, GRID = 8.0, 1.5, 3.0, 0.05
 PLACE = 0.5
 #: Highest ground of a height field, m; much more makes prisms so slender that feet catch in them.
 HIGHEST = 0.2
+#: Ground that is not flat, see Terrain.
+KINDS = ('height_field', 'boxes', 'stairs', 'ramp', 'course')
+#: Length of a tread of stairs, m.
+TREAD = 0.35
+#: A floor under a height field catches who leaves it; feet do not reach through to it, m.
+UNDER = -0.01
 #: Half sizes of the slabs of a ramp, m, and where that is which is not in use.
 SLAB, AWAY = (6.0, 6.0, 0.5), -50.0
 
@@ -23,10 +29,14 @@ class Terrain:
     """A kind of ground.
 
     Attributes:
-        kind: 'height_field', 'boxes' or 'ramp'.
-        size: largest height, m, at most HIGHEST; of a ramp its angle up, degrees.
+        kind: one of KINDS; a course has a height field, a ramp up and down, and boxes.
+        size: largest height, m, from 0 to HIGHEST, or that of a step; of a ramp its angle up,
+            degrees.
         seed: of what is random.
         across: of a ramp: whether it rises to the left instead of ahead.
+
+    Raises:
+        SimulationError: there is no such kind, or it is too high.
 
     """
 
@@ -34,6 +44,15 @@ class Terrain:
     size: float
     seed: int = 0
     across: bool = False
+
+    def __post_init__(self) -> None:
+        if self.kind not in KINDS:
+            raise SimulationError(f"terrain '{self.kind}' is not one of {', '.join(KINDS)}")
+        low, high = (-45.0, 45.0) if self.kind == 'ramp' else (0.0, HIGHEST)
+        if not low <= self.size <= high:
+            raise SimulationError(f"the size {self.size:g} of the terrain '{self.kind}' is not "
+                                  f'from {low:g} to {high:g}'
+                                  + (' degrees' if self.kind == 'ramp' else ' m'))
 
 
 def grid() -> tuple[np.ndarray, np.ndarray]:
@@ -51,7 +70,8 @@ def heights(terrain: Terrain) -> np.ndarray:
     """
     y, x = grid()
     rng = np.random.default_rng(terrain.seed)
-    found = {'height_field': _rough, 'boxes': _boxes}[terrain.kind](terrain, x, y, rng)
+    found = {'height_field': _rough, 'boxes': _boxes, 'stairs': _stairs,
+             'course': _course}[terrain.kind](terrain, x, y, rng)
     # None of it where the robot stands at the start.
     away = np.maximum(np.abs(x)[None, :], np.abs(y)[:, None])
     return found * np.clip((away - PLACE) / (0.2 * PLACE), 0.0, 1.0)
@@ -75,10 +95,30 @@ def _boxes(terrain: Terrain, x: np.ndarray, y: np.ndarray, rng: np.random.Genera
     return tops[np.ix_(*cells)]
 
 
+def _stairs(terrain: Terrain, x: np.ndarray, y: np.ndarray, _: np.random.Generator
+            ) -> np.ndarray:
+    """Steps up as far as HIGHEST, and down again, and so on."""
+    steps = max(1, int(HIGHEST / max(terrain.size, 1e-9)))
+    tread = np.maximum(np.floor((x - PLACE) / TREAD) + 1.0, 0.0) % (2 * steps)
+    return np.tile(terrain.size * np.minimum(tread, 2 * steps - tread), (y.size, 1))
+
+
+def _course(terrain: Terrain, x: np.ndarray, y: np.ndarray, rng: np.random.Generator
+            ) -> np.ndarray:
+    """A height field up to 3 m, a ramp of 15 degrees up and down, boxes from 5.5 m on."""
+    slope = math.tan(math.radians(15.0))
+    ramp = np.clip(slope * np.minimum(x - 3.0, 5.3 - x), 0.0, HIGHEST)
+    return np.where(x < 2.8, _rough(terrain, x, y, rng),
+                    np.where(x > 5.5, _boxes(terrain, x, y, rng), np.tile(ramp, (y.size, 1))))
+
+
 def add_ground(spec: Any) -> None:
     """Add a height field 'ground' and slabs 'start' and 'ramp' to a model, out of the way."""
+    far: dict[str, Any]
     kinds, far = engine().mjtGeom, {'friction': [1.0, 0.02, 0.01], 'contype': 1,
                                     'conaffinity': 0x7FFFFFFF}
+    if any(material.name == 'checks' for material in spec.materials):
+        far['material'] = 'checks'
     rows, columns = (side.size for side in grid())
     spec.add_hfield(name='ground', nrow=rows, ncol=columns, userdata=np.zeros(rows * columns),
                     size=[0.5 * (AHEAD + BEHIND), ASIDE, HIGHEST, 0.05])
@@ -110,5 +150,12 @@ def lay(model: Any, terrain: Terrain) -> None:
         place[ramp] = np.array([PLACE, 0.0, 0.0]) - edge
         place[model.geom('start').id] = PLACE - SLAB[0], 0.0, -SLAB[2]
         return
+    place[floor, 2] = UNDER
     model.hfield_data[:] = heights(terrain).ravel() / HIGHEST
     place[model.geom('ground').id, 2] = 0.0
+
+
+def set_friction(model: Any, friction: float) -> None:
+    """Let nothing slide with more than this friction, and the ground with just as much."""
+    ground, sliding = model.geom_bodyid == 0, model.geom_friction[:, 0]
+    sliding[:] = np.where(ground, friction, np.minimum(sliding, friction))

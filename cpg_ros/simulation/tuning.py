@@ -19,6 +19,7 @@ from cpg_ros.motion.plan import OutOfLimits, Program, Refused, gait_of, plan
 from cpg_ros.networks.registry import NETWORKS
 from cpg_ros.robots.robot import Motion, Robot, Steering
 from cpg_ros.simulation.batch import Batch, Scenario, targets
+from cpg_ros.simulation.efference_measurement import calibrated
 from cpg_ros.simulation.foot_path import Feet
 from cpg_ros.simulation.gait_design import AIMS, LENGTH, Aim, Design
 from cpg_ros.simulation.robot_model import SimulationError
@@ -278,7 +279,9 @@ def tune(robot: Robot, model: str, gaits: Sequence[str], evaluations: int, seed:
             found.append(one)
     if not found:
         raise SimulationError('; '.join(missing))
-    return replace(robot, motions=motions), found, missing
+    # What feedback wants to know, too.
+    measured = [one.gait for one in found]
+    return calibrated(replace(robot, motions=motions), model, measured), found, missing
 
 
 def _search() -> ModuleType:

@@ -4,6 +4,6 @@ Imports every room; nothing imports it.
 """
 
 __all__ = ['analysis_plot', 'analysis_report', 'analyze', 'arguments', 'bag_playing',
-           'bag_recording', 'check_robot', 'completion', 'cpg', 'demo', 'executables',
-           'gait_diagram', 'graph_topics', 'inversion', 'optimize', 'reproduce',
+           'bag_recording', 'calibrate', 'check_robot', 'completion', 'cpg', 'demo', 'demo_course',
+           'executables', 'gait_diagram', 'graph_topics', 'inversion', 'optimize', 'reproduce',
            'reproduction_report', 'running_node', 'tune']

@@ -7,9 +7,11 @@ gait. ``check_robot --urdf my.urdf --make my_robot.yaml`` writes a first robot f
 import sys
 from argparse import Namespace, RawDescriptionHelpFormatter
 from collections.abc import Sequence
+from dataclasses import replace
 from math import isfinite
 from pathlib import Path
 
+from cpg_ros.checks.leg_shapes import geometry_from
 from cpg_ros.checks.robot_template import robot_from
 from cpg_ros.checks.urdf_match import RobotCheck, checked
 from cpg_ros.errors import CpgError, InputError
@@ -18,6 +20,7 @@ from cpg_ros.networks.registry import NETWORKS
 from cpg_ros.robots.robot import Robot
 from cpg_ros.robots.robot_file import find_robot, write_robot
 from cpg_ros.robots.urdf import UrdfJoint, load_urdf
+from cpg_ros.robots.urdf_links import load_links
 from cpg_ros.tools.arguments import Parser, number, say
 
 DESCRIPTION = '''\
@@ -80,6 +83,8 @@ def _made(chosen: Namespace, urdf: dict[str, UrdfJoint]) -> Robot:
     if chosen.make.exists():
         raise InputError(f'--make: {chosen.make} is there already')
     robot, says = robot_from(urdf, chosen.make.stem)
+    geometry, said = geometry_from(robot, urdf, load_links(chosen.urdf))
+    robot, says = replace(robot, geometry=geometry), f'{says}\n{said}'
     write_robot(chosen.make, robot, COMMENT.format(urdf=chosen.urdf.name, says=says))
     print(f'check_robot: wrote {chosen.make}, check what it takes each joint for:\n{says}',
           file=sys.stderr)

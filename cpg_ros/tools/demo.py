@@ -27,6 +27,7 @@ from rclpy.utilities import try_shutdown
 from std_msgs.msg import String
 
 from cpg_ros.errors import CpgError
+from cpg_ros.tools import demo_course
 from cpg_ros.tools.arguments import Parser, say
 
 TOUR = ('trot', 'walk', 'pace', 'bound', 'jump', 'pronk', 'trot')
@@ -244,6 +245,8 @@ def parser() -> Parser:
                   'Enter to switch, q to end.')
     made.add_argument('--gaits', nargs='+', default=list(TOUR), metavar='GAIT',
                       help=f'tour of gaits (default: {" ".join(TOUR)})')
+    made.add_argument('--course', action='store_true', help='walk over rough ground, a ramp and '
+                      'blocks instead, and be pushed on the way, with feedback')
     made.add_argument('--every', type=float, default=6.0, metavar='S',
                       help='seconds of simulated time for each (default: 6)')
     made.add_argument('--out', type=Path, default=Path('out'), metavar='DIR',
@@ -270,6 +273,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         body += ['-p', f'film:={film}']
     generator = ['generator', '-p', 'robot:=unitree_go2', '-p', f'gait:={chosen.gaits[0]}',
                  '-p', f'rate:={RATE}.0', '-p', 'combined_topic:=""', '-p', 'use_sim_time:=true']
+    if chosen.course:
+        body, generator = [*body, *demo_course.GROUND], [*generator, *demo_course.GENERATOR]
     port = free_port()
     page = not chosen.no_panel and find_spec('websockets')
     interruption = Interruption()
@@ -287,8 +292,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
             wait_for(operator, interruption)
             if page:
                 say(f'watch and drive it in a browser: http://127.0.0.1:{port}/')
-            say('the robot walks; type a gait and Enter to switch, q to end')
-            guide(operator, chosen.gaits, chosen.every, interruption)
+            if chosen.course:
+                demo_course.Runner(operator).run(interruption.look)
+            else:
+                say('the robot walks; type a gait and Enter to switch, q to end')
+                guide(operator, chosen.gaits, chosen.every, interruption)
     except KeyboardInterrupt:
         pass
     except DemoError as error:

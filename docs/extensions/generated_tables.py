@@ -20,7 +20,7 @@ from sphinx.util.docutils import SphinxDirective
 import cpg_ros
 from cpg_ros.dynamics.orbit import solve_preset
 from cpg_ros.networks.registry import SHIPPED
-from cpg_ros.nodes import generator_parameters, inversion_node, robot_sim
+from cpg_ros.nodes import feedback_parameters, generator_parameters, inversion_node, robot_sim
 from cpg_ros.nodes.parameter_spec import Spec
 from cpg_ros.nodes.unitree import parameters as unitree_parameters
 from cpg_ros.panel import panel_node
@@ -74,6 +74,10 @@ def parameters(what: str) -> str:
                                            for name, one in FIXED[what].items()}))
     if what == 'panel':
         return table(HEAD, parameter_rows(panel_node.SPECS))
+    if what == 'feedback':
+        return table(HEAD, parameter_rows(feedback_parameters.TOPICS))
+    if what == 'feedback_gains':
+        return table(HEAD, parameter_rows(feedback_parameters.GAINS))
     if what == 'inversion':
         free = [code('free'), 'string[]', 'not set', '',
                 "parameters to fit; not set: the network's usual ones"]
@@ -88,7 +92,9 @@ def parameters(what: str) -> str:
                            **generator_parameters.specs(usual), **frequency})
     exclusive = parameter_rows({'exclusive': generator_parameters.exclusive('none')})[0]
     exclusive[2] = '`true` with `command`, else `false`'
-    return table(HEAD, [*rows, exclusive])
+    feedback = parameter_rows({'feedback': feedback_parameters.switch(False)})[0]
+    feedback[2] = '`true` with a calibrated robot file, else `false`'
+    return table(HEAD, [*rows, exclusive, feedback])
 
 
 def presets(name: str) -> str:

@@ -1,0 +1,128 @@
+"""An efference copy from a recording: a robot that walks steadily, nothing fed back."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from cpg_ros.calibration.walk_recording import WalkRecording
+from cpg_ros.errors import InputError
+from cpg_ros.feedback.efference_copy import EfferenceCopy, fold
+from cpg_ros.feedback.estimate import BodyState, Senses
+from cpg_ros.feedback.kinematics import geometry_of
+from cpg_ros.feedback.timetable import POINTS, Timetable
+from cpg_ros.gaits.stride import find_stride
+from cpg_ros.motion.plan import plan
+from cpg_ros.networks.registry import NETWORKS
+from cpg_ros.robots.robot import Robot
+
+#: Joints are where the pattern has them this much later, s, if a bag does not tell: what a servo
+#: with a damping of a thirtieth of its stiffness, and some load, gives.
+LAG = 0.045
+#: Rows of a table whose speeds are nearer than this, m/s, are the same.
+SAME = 0.02
+
+
+@dataclass(frozen=True)
+class Calibrated:
+    """What a recording gave.
+
+    Attributes:
+        source: the bag.
+        gait: that was walked.
+        speed: forward, m/s.
+        cycles: strides that were averaged.
+        copy: of one speed.
+
+    """
+
+    source: str
+    gait: str
+    speed: float
+    cycles: int
+    copy: EfferenceCopy
+
+
+def efference_from(recording: WalkRecording, robot: Robot, gait: str | None = None) -> Calibrated:
+    """Work out what a gait makes the body do.
+
+    Args:
+        recording: of one gait at one speed on flat ground.
+        robot: that walked.
+        gait: which it was; None lets the legs' phases tell.
+
+    Raises:
+        InputError: the robot has no geometry, no gait can be told, or the robot does not know it.
+        NoSteadyGait: there is none in the recording.
+        Refused: the gait cannot be run.
+
+    """
+    network, geometry = NETWORKS[robot.networks[0]], geometry_of(robot)
+    stride = find_stride(recording, {leg: tuple(joint.name for joint in joints)
+                                     for leg, joints in robot.legs.items()}, network)
+    gait = gait or stride.gait
+    if gait not in network.presets():
+        raise InputError(f'{recording.source}: no gait can be told from the legs (nearest: '
+                         f'{stride.nearest}): name it (--gait)')
+    preset, motion = network.presets()[gait], robot.motion(gait, gait)
+    program = plan(robot, gait, preset, preset.network, motion.frequency or 0.0)
+    columns = [recording.joints.index(name) for name in stride.joints]
+
+    times, felt, estimate = recording.times, recording.senses, BodyState(geometry)
+    velocity = np.empty((len(times), 2))
+    for k, row in enumerate(velocity):
+        now = Senses(*(getattr(felt, key)[k:k + 1] for key in Senses.__dataclass_fields__))
+        estimate.update(now, times[k] - times[k - 1] if k else 1e-3)
+        row[:] = estimate.velocity[0, :2]
+    inside = (times >= stride.begin) & (times <= stride.end)
+    if recording.phase is not None:
+        phases = recording.phase[inside]
+    else:
+        phases = stride.warp(times[inside]) + LAG * stride.frequency + _shift(
+            stride.theta, stride.mean.T, Timetable(program, geometry), columns)
+    signals = np.concatenate([velocity, felt.turning[:, :2], felt.lean[:, :2]], axis=1)[inside]
+    table = fold(phases, signals)
+    speed = float(table[:, 0].mean())
+    return Calibrated(recording.source, gait, speed, stride.cycles,
+                      EfferenceCopy(np.array([speed]), table[None]))
+
+
+def _shift(theta: np.ndarray, mean: np.ndarray, table: Timetable, columns: Sequence[int]) -> float:
+    """Return by how many cycles the pattern's phase is ahead of the recording's.
+
+    The pattern's joints are those in place and a share, any, of what full strides add.
+
+    Args:
+        theta: phases of the recording, cycles, shape (m,).
+        mean: angles there, rad, shape (m, joints).
+        table: of the pattern.
+        columns: these joints among the pattern's.
+
+    """
+    still = table.in_place[:, columns]
+    parts = [part - part.mean(axis=0) for part in (still, table.angles[:, columns] - still)]
+    wanted = mean - mean.mean(axis=0)
+    left = np.empty(POINTS)
+    for k in range(POINTS):
+        place = np.round(theta * POINTS).astype(int) + k
+        rows = np.stack([part[place % POINTS].ravel() for part in parts], axis=1)
+        weights, *_ = np.linalg.lstsq(rows, wanted.ravel(), rcond=None)
+        left[k] = np.square(rows @ weights - wanted.ravel()).sum() if weights[0] > 0.0 else np.inf
+    return float(left.argmin()) / POINTS
+
+
+def with_efference(robot: Robot, found: Sequence[Calibrated]) -> Robot:
+    """Return a robot that has these copies, beside those of its other speeds."""
+    motions = dict(robot.motions)
+    for one in found:
+        motion = motions.get(one.gait, robot.motion(one.gait, one.gait))
+        speeds, table = one.copy.speeds, one.copy.table
+        if motion.efference is not None:
+            known = EfferenceCopy.of(motion.efference)
+            other = np.abs(known.speeds - one.speed) > SAME
+            speeds = np.append(known.speeds[other], speeds)
+            table = np.concatenate([known.table[other], table])
+        rising = np.argsort(speeds)
+        motions[one.gait] = replace(motion, efference=EfferenceCopy(
+            speeds[rising], table[rising]).as_table())
+    return replace(robot, motions=motions)

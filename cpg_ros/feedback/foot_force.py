@@ -1,0 +1,70 @@
+"""How much of the ground's force a leg's motors bear, where feet have no sensors."""
+
+import math
+
+import numpy as np
+
+from cpg_ros.feedback.kinematics import slopes_of
+from cpg_ros.integration.jit import entry, jit, sources_digest
+
+#: A leg whose joints hardly move its foot says nothing: least determinant, m^3.
+SINGULAR = 1e-6
+
+
+@jit
+def _cross(a, b):
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+
+
+@jit
+def load_of(leg, columns, angles, efforts, up, slopes):
+    """Return the upward force on a foot, N, of a leg without mass.
+
+    Args:
+        leg: a row of the geometry.
+        columns: index of hip, thigh and calf among the joints.
+        angles: of all joints, rad.
+        efforts: of all joints, N m.
+        up: the vertical in the base's frame.
+        slopes: scratch, shape (3, 3).
+
+    """
+    hip, thigh, calf = columns[0], columns[1], columns[2]
+    slopes_of(leg, angles[hip], angles[thigh], angles[calf], slopes)
+    effort = (efforts[hip], efforts[thigh], efforts[calf])
+    if leg[0] == 0.0:
+        # Nothing holds it sideways: no force there.
+        slopes[1, 0], effort = 1.0, (0.0, effort[1], effort[2])
+    # By virtual work the efforts are -J^T F; J^-T has the cross products of J's rows as rows.
+    forward, left, upward = (_cross(slopes[1], slopes[2]), _cross(slopes[2], slopes[0]),
+                             _cross(slopes[0], slopes[1]))
+    volume = slopes[0, 0] * forward[0] + slopes[0, 1] * forward[1] + slopes[0, 2] * forward[2]
+    if abs(volume) < SINGULAR:
+        return 0.0
+    load = 0.0
+    for k in range(3):
+        load -= effort[k] * (up[0] * forward[k] + up[1] * left[k] + up[2] * upward[k]) / volume
+    return load
+
+
+def _cached(digest):
+    """Build the cached entry point; see sources_digest for why it is a closure."""
+
+    @entry
+    def loads_of(rows, columns, angles, efforts, roll, pitch, out):
+        """Fill out, N, shape (legs,), with the upward forces on the feet of one robot.
+
+        Rows and columns are the geometry's; angles in rad, efforts in N m, shape (joints,); roll
+        and pitch in rad.
+        """
+        digest  # noqa: B018
+        up = (-math.sin(pitch), math.sin(roll) * math.cos(pitch),
+              math.cos(roll) * math.cos(pitch))
+        slopes = np.empty((3, 3))
+        for leg in range(len(out)):
+            out[leg] = load_of(rows[leg], columns[leg], angles, efforts, up, slopes)
+
+    return loads_of
+
+
+loads_of = _cached(sources_digest())

@@ -1,0 +1,71 @@
+"""What the feedback knows of each gait it may meet, in arrays that are filled once."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from cpg_ros.errors import InputError
+from cpg_ros.feedback.efference_copy import BINS, SIGNALS, SPEEDS, EfferenceCopy
+from cpg_ros.feedback.timetable import POINTS, Timetable
+from cpg_ros.motion.plan import Program
+
+#: Gaits known at the same time, and most rows of a steering table.
+SLOTS, ROWS = 8, 32
+
+
+class GaitTables(NamedTuple):
+    """Tables of several gaits; the first axis is the gait's slot.
+
+    Attributes:
+        swinging: whether each leg is meant to, shape (SLOTS, POINTS, legs).
+        progress: share of that swing, or else of its stance, that is over, the same.
+        duty: share of the stride that each leg stands, shape (SLOTS, legs).
+        speeds: of the efference copies, m/s, shape (SLOTS, SPEEDS).
+        expected: efference copies, shape (SLOTS, SPEEDS, BINS, SIGNALS).
+        steered: whether strides can be changed, shape (SLOTS,).
+        at: speeds of the steering tables, m/s, shape (SLOTS, ROWS).
+        turn: rad/s of yaw for each unit by which right strides exceed left ones, the same.
+
+    """
+
+    swinging: np.ndarray
+    progress: np.ndarray
+    duty: np.ndarray
+    speeds: np.ndarray
+    expected: np.ndarray
+    steered: np.ndarray
+    at: np.ndarray
+    turn: np.ndarray
+
+    @classmethod
+    def empty(cls, legs: int) -> 'GaitTables':
+        """Nothing known of any gait."""
+        return cls(np.zeros((SLOTS, POINTS, legs), dtype=bool), np.zeros((SLOTS, POINTS, legs)),
+                   np.ones((SLOTS, legs)), np.zeros((SLOTS, SPEEDS)),
+                   np.zeros((SLOTS, SPEEDS, BINS, SIGNALS)), np.zeros(SLOTS, dtype=bool),
+                   np.zeros((SLOTS, ROWS)), np.ones((SLOTS, ROWS)))
+
+    def fill(self, slot: int, timetable: Timetable, expected: EfferenceCopy, program: Program
+             ) -> None:
+        """Take in a gait.
+
+        Raises:
+            InputError: its tables have more rows than there is room for.
+
+        """
+        self.swinging[slot], self.progress[slot] = timetable.swinging, timetable.progress
+        self.duty[slot] = 1.0 - timetable.swinging.mean(axis=0)
+        self.speeds[slot] = _filled(expected.speeds, SPEEDS, 'an efference copy')
+        self.expected[slot] = _filled(expected.table, SPEEDS, 'an efference copy')
+        steering = program.motion.steering
+        self.steered[slot] = steering is not None
+        if steering is not None:
+            self.at[slot] = _filled(np.array(steering.speed), ROWS, 'a steering table')
+            self.turn[slot] = _filled(np.array(steering.turn), ROWS, 'a steering table')
+
+
+def _filled(rows: np.ndarray, size: int, what: str) -> np.ndarray:
+    """Repeat the last row up to a size."""
+    if not 1 <= len(rows) <= size:
+        raise InputError(f'{what} has {len(rows)} speeds: feedback takes 1 to {size}')
+    return np.concatenate([rows, np.repeat(rows[-1:], size - len(rows), axis=0)])

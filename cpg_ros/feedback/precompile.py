@@ -1,0 +1,32 @@
+"""Make every kernel of the feedback ready, compiling those not yet on disk."""
+
+import numpy as np
+
+from cpg_ros.feedback.estimate import Senses
+from cpg_ros.feedback.feedback import Feedback
+from cpg_ros.feedback.foot_force import loads_of
+from cpg_ros.feedback.kinematics import GRAVITY, Geometry
+from cpg_ros.feedback.plausibility import (
+    IMU,
+    IMU_MEMORY,
+    agreement,
+    judge_imu,
+    judge_joints,
+    judge_loads,
+)
+
+
+def precompile(geometry: Geometry, joints: int) -> None:
+    """Run each kernel once, on the types that a generator uses; joints is their number."""
+    feedback, legs = Feedback(geometry, joints=joints), len(geometry.hips)
+    senses, some, load = Senses.blank(1, legs, joints), np.zeros(joints), np.zeros(legs)
+    values, three, one = np.zeros(IMU), np.zeros(3), np.zeros(1)
+    values[3], values[27] = 1.0, GRAVITY
+    judge_imu(values, 0.1, np.zeros(IMU_MEMORY), senses.lean[0], senses.turning[0], three)
+    judge_joints(some, some, some, some, some, some)
+    judge_loads(load, geometry.weight, 0.1, one)
+    judge_loads(load[:1], geometry.weight, 0.1, one)
+    loads_of(geometry.rows, geometry.columns, some, some, 0.0, 0.0, load)
+    agreement(load, 1.0, np.zeros(legs, dtype=bool), 0.1, 1.0)
+    feedback.advance(senses, some[None], one, np.zeros((1, 2), dtype=np.int64), one.copy(),
+                     np.zeros((1, 2)), one.copy(), 0.002, 0.0)

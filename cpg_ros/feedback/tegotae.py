@@ -1,0 +1,26 @@
+"""Tegotae: a leg that bears load stays in its stance, one that does not goes on.
+
+Owaki, Kano, Nagasawa, Tero and Ishiguro, "Simple robot suggests physical interlimb communication
+is essential for quadruped walking", J. R. Soc. Interface 10 (2013) 20120669: each leg's phase goes
+by d phi / dt = omega - sigma N cos phi, sin phi < 0 in stance. Legs whose phases are locked share
+their mean.
+"""
+
+import math
+
+from cpg_ros.integration.jit import jit
+
+
+@jit
+def rate(load, swinging, progress, gains):
+    """Return what a leg adds to the rate of its phase, rad/s.
+
+    Args:
+        load: on the foot, share of the weight.
+        swinging: whether it is meant to be in the air.
+        progress: share of that swing, or else of its stance, that is over.
+        gains: of the law.
+
+    """
+    angle = math.pi * progress if swinging else math.pi * (1.0 + progress)
+    return -gains.tegotae_gain * load * math.cos(angle)

@@ -1,0 +1,223 @@
+"""One tick of the feedback, compiled: all laws together, run by run and leg by leg."""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from cpg_ros.feedback import (
+    heading,
+    pace,
+    placement,
+    posture,
+    reflexes,
+    sidestep,
+    slope,
+    speed,
+    tegotae,
+    touchdown,
+)
+from cpg_ros.feedback.efference_copy import SIGNALS, expect
+from cpg_ros.feedback.estimate import update
+from cpg_ros.feedback.kinematics import foot_of, move_foot
+from cpg_ros.feedback.timetable import POINTS
+from cpg_ros.integration.jit import entry, jit, sources_digest
+from cpg_ros.motion.steering import TIME_CONSTANT
+
+#: Joints are where they are told to be a little later: corrections come ahead by this, cycles.
+LEAD = 0.04
+
+
+class Memory(NamedTuple):
+    """What the feedback keeps from tick to tick, of each run.
+
+    Attributes:
+        velocity: of the base in its own frame, m/s, shape (runs, 3).
+        contact: whether each foot is on the ground, shape (runs, legs).
+        way: by which each foot is moved now, m, shape (runs, legs, 3).
+        stepped: of that, by placement, shape (runs, legs, 2).
+        carried: of that, by the sidestep, shape (runs, legs).
+        built: by reflexes, see reflexes, shape (runs, legs, 5).
+        ground: low-passed roll and pitch, rad, shape (runs, 2).
+        missed: integral of the missing speed, m, shape (runs,).
+        stride: to be added to each leg's stride, shape (runs, legs).
+        hurry: factor of the stride frequency, shape (runs,).
+        phase: of the first leg at the last tick, cycles, shape (runs,).
+        owed: by the touchdown reset to the phase, cycles, shape (runs,).
+        asked: wanted speed forward and to the left as it is approached, m/s, and its rates,
+            m/s^2, shape (runs, 2, 2).
+        landed, seen, scratch, own: for passing on within a tick.
+
+    """
+
+    velocity: np.ndarray
+    contact: np.ndarray
+    way: np.ndarray
+    stepped: np.ndarray
+    carried: np.ndarray
+    built: np.ndarray
+    ground: np.ndarray
+    missed: np.ndarray
+    stride: np.ndarray
+    hurry: np.ndarray
+    phase: np.ndarray
+    owed: np.ndarray
+    asked: np.ndarray
+    landed: np.ndarray
+    seen: np.ndarray
+    scratch: np.ndarray
+    own: np.ndarray
+
+    @classmethod
+    def empty(cls, runs: int, legs: int) -> 'Memory':
+        """Remember nothing."""
+        return cls(np.zeros((runs, 3)), np.zeros((runs, legs), dtype=bool),
+                   np.zeros((runs, legs, 3)), np.zeros((runs, legs, 2)), np.zeros((runs, legs)),
+                   np.zeros((runs, legs, 5)), np.zeros((runs, 2)), np.zeros(runs),
+                   np.zeros((runs, legs)), np.ones(runs), np.zeros(runs), np.zeros(runs),
+                   np.zeros((runs, 2, 2)), np.zeros(legs, dtype=bool),
+                   np.zeros((legs, 4)), np.zeros((5, 3)), np.zeros(SIGNALS))
+
+
+@jit
+def _approach(asked, wanted, dt):
+    """Let each wish, a value and its rate, go to what is wanted as strides do; see Drive."""
+    decay = math.exp(-dt / TIME_CONSTANT)
+    for k in range(len(wanted)):
+        gap, rate = asked[k, 0] - wanted[k], asked[k, 1]
+        pull = rate + gap / TIME_CONSTANT
+        asked[k, 0] = wanted[k] + (gap + pull * dt) * decay
+        asked[k, 1] = (rate - pull * dt / TIME_CONSTANT) * decay
+
+
+@jit
+def _steer(tables, slot, sides, gains, memory, run, missing, wanted, course, yaw, dt, share):
+    """Work out what is added to strides."""
+    stride = memory.stride[run]
+    stride[:] = 0.0
+    if not tables.steered[slot]:
+        return
+    longer = uneven = 0.0
+    if gains.speed:
+        memory.missed[run] = speed.gather(memory.missed[run], missing, gains, share * dt)
+        longer = share * speed.longer(missing, memory.missed[run], gains)
+    if gains.heading:
+        at, turn, k = tables.at[slot], tables.turn[slot], 0
+        while k + 2 < at.shape[0] and wanted > at[k + 1]:
+            k += 1
+        gap = at[k + 1] - at[k]
+        up = min(max((wanted - at[k]) / gap, 0.0), 1.0) if gap > 0.0 else 0.0
+        rate = turn[k] + up * (turn[k + 1] - turn[k])
+        uneven = share * heading.turn(course, yaw, gains) / rate
+    for leg in range(stride.shape[0]):
+        stride[leg] = longer + uneven * sides[leg]
+
+
+def _cached(digest):
+    """Build the cached entry point; see sources_digest for why it is a closure."""
+
+    @entry
+    def tick(rows, columns, radius, weight, gains, tables, sides, memory, angles, rates, loads,
+             lean, turning, push, planned, phases, gaits, mix, wanted, course, dt, share, out):
+        """Correct planned angles; arguments as of Feedback.advance, out is filled."""
+        digest  # noqa: B018
+        quick = 1.0 - math.exp(-dt / gains.smooth)
+        own, foot = memory.own, memory.scratch[0]
+        for run in range(planned.shape[0]):
+            memory.landed[:] = memory.contact[run]
+            update(rows, columns, radius, weight, angles[run], rates[run], loads[run], lean[run],
+                   turning[run], push[run], dt, memory.velocity[run], memory.contact[run],
+                   memory.seen, memory.scratch)
+            old, new = gaits[run, 0], gaits[run, 1]
+            slot = new if mix[run] > 0.5 else old
+            _approach(memory.asked[run], wanted[run], dt)
+            phase = phases[run]
+            forward, left = memory.asked[run, 0, 0], memory.asked[run, 1, 0]
+            own[:] = 0.0
+            expect(tables.speeds[old], tables.expected[old], phase, forward, 1.0 - mix[run], own)
+            if mix[run] > 0.0:
+                expect(tables.speeds[new], tables.expected[new], phase, forward, mix[run], own)
+            vx = memory.velocity[run, 0] - own[0]
+            vy = memory.velocity[run, 1] - own[1] - left
+            wx, wy = turning[run, 0] - own[2], turning[run, 1] - own[3]
+            roll, pitch = lean[run, 0] - own[4], lean[run, 1] - own[5]
+
+            ground = memory.ground[run]
+            ground[0] = slope.follow(ground[0], roll, gains, dt)
+            ground[1] = slope.follow(ground[1], pitch, gains, dt)
+            uphill_x = uphill_y = 0.0
+            if gains.slope:
+                uphill_x, uphill_y = slope.shift(ground[1], gains), -slope.shift(ground[0], gains)
+            step_x = placement.step(vx, wy, gains.step, gains.step_pitch_rate, gains)
+            step_y = placement.step(vy, wx, gains.step_left, gains.step_roll_rate, gains)
+            strode = (phase - memory.phase[run] + 0.5) % 1.0 - 0.5
+            memory.phase[run] = phase
+            row = int((phase + LEAD) % 1.0 * POINTS) % POINTS
+            now = int(phase % 1.0 * POINTS) % POINTS
+            out[run] = planned[run]
+            leaning = 0.0
+            for leg in range(rows.shape[0]):
+                hip, thigh, calf = columns[leg, 0], columns[leg, 1], columns[leg, 2]
+                foot[0], foot[1], foot[2] = foot_of(rows[leg], planned[run, hip],
+                                                    planned[run, thigh], planned[run, calf])
+                swinging = tables.swinging[slot, row, leg]
+                x, y, z = uphill_x, uphill_y, 0.0
+                if gains.posture:
+                    if swinging:
+                        z = posture.in_swing(foot[0], foot[1], roll - ground[0],
+                                             pitch - ground[1], gains)
+                    else:
+                        z = posture.in_stance(foot[0], foot[1], roll, pitch, wx, wy, gains)
+                if gains.placement:
+                    stepped = memory.stepped[run, leg]
+                    if swinging:
+                        stepped[0] = placement.swing(stepped[0], step_x, gains, dt)
+                        stepped[1] = placement.swing(stepped[1], step_y, gains, dt)
+                    else:
+                        stepped[0] = placement.stand(stepped[0], gains.give * vx, gains, dt)
+                        stepped[1] = placement.stand(stepped[1], gains.give_left * vy, gains, dt)
+                    x, y = x + stepped[0], y + stepped[1]
+                if gains.sidestep:
+                    carried = memory.carried[run, leg]
+                    if swinging:
+                        stance = tables.duty[slot, leg] * dt / max(strode, 0.1 * dt)
+                        carried = placement.swing(carried, sidestep.landing(left, stance, gains),
+                                                  gains, dt)
+                    else:
+                        carried = sidestep.carry(carried, left, gains, dt)
+                    memory.carried[run, leg] = carried
+                    y += carried
+                if gains.reflexes:
+                    z += reflexes.advance(memory.built[run, leg], memory.contact[run, leg],
+                                          tables.swinging[slot, now, leg],
+                                          tables.progress[slot, now, leg], foot[2], gains, dt)
+                if gains.tegotae:
+                    leaning += tegotae.rate(max(loads[run, leg], 0.0) / weight,
+                                            tables.swinging[slot, now, leg],
+                                            tables.progress[slot, now, leg], gains)
+                if gains.touchdown and memory.contact[run, leg] and not memory.landed[leg]:
+                    memory.owed[run] += touchdown.change(
+                        tables.swinging[slot, now, leg], tables.progress[slot, now, leg],
+                        tables.duty[slot, leg], gains) / rows.shape[0]
+                way = memory.way[run, leg]
+                way[0] += quick * (share * x - way[0])
+                way[1] += quick * (share * y - way[1])
+                way[2] += quick * (share * z - way[2])
+                move_foot(rows[leg], columns[leg], out[run], foot, way)
+            memory.hurry[run] = 1.0
+            if gains.pace:
+                memory.hurry[run] += share * (pace.hurry(vx, vy, gains) - 1.0)
+            frequency = max(strode / dt, 0.1)
+            memory.hurry[run] += share * leaning / (2.0 * math.pi * frequency * rows.shape[0])
+            if gains.touchdown:
+                more = share * touchdown.hurry(memory.owed[run], frequency)
+                memory.owed[run] -= more * strode
+                memory.hurry[run] += more
+            memory.hurry[run] = max(memory.hurry[run], 0.2)
+            _steer(tables, slot, sides, gains, memory, run, -vx, forward, course[run],
+                   lean[run, 2], dt, share)
+
+    return tick
+
+
+tick = _cached(sources_digest())

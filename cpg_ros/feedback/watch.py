@@ -1,0 +1,87 @@
+"""Whether an input of the feedback can be believed, and since when it cannot."""
+
+import math
+
+from cpg_ros.motion.smoothstep import smoothstep
+
+#: An input is out when no message could be believed for this time, s.
+STALE = 0.05
+#: A stamp that is older, or further ahead, than this, s.
+DELAYED = 0.1
+#: From full feedback to none, and from none to full once all inputs have been good for a while, s.
+FADE, GOOD = 0.15, 0.3
+
+
+class Watch:
+    """The age of one input, and what is wrong with its messages.
+
+    Attributes:
+        name: of the input.
+        believed: when its last good message came, s; -inf before the first one.
+        since: when it went out, s; NaN while it is in.
+
+    """
+
+    def __init__(self, name: str) -> None:
+        self.name = name
+        self.restart()
+
+    def restart(self) -> None:
+        """Forget all messages."""
+        self.believed, self.since = -math.inf, math.nan
+        self._changed, self._content, self._wrong = -math.inf, b'', ''
+
+    def gap(self, now: float) -> float:
+        """Time since the last message that could be believed, s, at most 1."""
+        return min(now - self.believed, 1.0)
+
+    def suspect(self, now: float, stamp: float | None, content: bytes, patience: float = 0.0
+                ) -> str:
+        """Say what is wrong with a new message by its time and its repetition, or ''.
+
+        Args:
+            now: s.
+            stamp: of the message, the same clock's, s; None if it has none.
+            content: its numbers as bytes.
+            patience: for how long the same numbers may come again, s.
+
+        """
+        if content != self._content:
+            self._content, self._changed = content, now
+        if stamp is not None and not abs(now - stamp) <= DELAYED:
+            late = now - stamp
+            return (f'stamps {late:.2f} s old' if late > 0.0 else
+                    f'stamps {-late:.2f} s ahead: are the clocks of both computers the same?')
+        return 'the same numbers again and again' if now > self._changed + patience else ''
+
+    def note(self, now: float, wrong: str) -> None:
+        """Take note of a message, and of what is wrong with it, '' for nothing."""
+        if wrong:
+            self._wrong = wrong
+        else:
+            self.believed, self._wrong = now, ''
+
+    def fault(self, now: float) -> str:
+        """Say why the input is out, or ''."""
+        if now - self.believed <= STALE:
+            self.since = math.nan
+            return ''
+        if math.isnan(self.since):
+            self.since = now
+        return self._wrong or ('no message yet' if self.believed == -math.inf else 'no messages')
+
+
+class Fade:
+    """The share of the feedback: smoothly to 0 where an input is out, and back."""
+
+    def __init__(self) -> None:
+        self._way, self._good = 0.0, 0.0
+
+    def advance(self, good: bool, dt: float) -> float:
+        """Return the share dt in s later; good says whether all is well."""
+        self._good = self._good + dt if good else 0.0
+        if self._good >= GOOD or (good and self._way >= 1.0):
+            self._way = min(1.0, self._way + dt / FADE)
+        elif not good:
+            self._way = max(0.0, self._way - dt / FADE)
+        return smoothstep(self._way)[0]

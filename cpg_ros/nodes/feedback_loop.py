@@ -1,0 +1,171 @@
+"""The loop through the robot: from the topics of its sensors to the pattern, at every tick."""
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+
+from cpg_ros.feedback.estimate import TOUCH
+from cpg_ros.feedback.feedback import Feedback
+from cpg_ros.feedback.gains import Gains
+from cpg_ros.feedback.gait_tables import SLOTS
+from cpg_ros.feedback.kinematics import Geometry
+from cpg_ros.feedback.plausibility import agreement
+from cpg_ros.feedback.timetable import POINTS, Timetable
+from cpg_ros.feedback.watch import Fade
+from cpg_ros.motion.pattern import Pattern
+from cpg_ros.motion.plan import Program
+from cpg_ros.nodes.senses_input import SensesInput
+
+#: A heading that is asked for is no further ahead of the robot's than this, rad.
+FURTHEST = 0.5
+#: After a share of 0, displacements are as good as 0 after this time, s.
+DIES_OUT = 0.3
+#: Contacts that go with the gait for less than this, on the mean of a stride, are of another time.
+AGREES = 0.5
+#: Wanted speeds forward and to the left, m/s, and wanted yaw rate, rad/s.
+Motion = Callable[[], tuple[float, float, float]]
+
+
+class FeedbackLoop:
+    """Corrects a pattern by what the robot feels, as long as that can be believed.
+
+    ``sense`` belongs to the thread of the ticks, what else there is to any.
+
+    Attributes:
+        gains: of the laws; may be replaced.
+        wanted: whether the feedback is to be on.
+        faults: what keeps it out, such as 'imu: no messages for 3.2 s'; empty while it is in.
+        waiting: whether an input has never come.
+        share: of all corrections, 0 to 1.
+
+    """
+
+    def __init__(self, pattern: Pattern, geometry: Geometry, motion: Motion) -> None:
+        """Be ready to correct a pattern.
+
+        Args:
+            pattern: to be corrected.
+            geometry: of the robot's legs.
+            motion: what is wanted.
+
+        """
+        self._pattern, self._geometry, self._motion = pattern, geometry, motion
+        self._feedback = Feedback(geometry, joints=len(pattern.robot.joints))
+        self._known: list[tuple[Program, Timetable]] = []
+        self._inputs: SensesInput | None = None
+        self._least = TOUCH * geometry.weight
+        self._gaits, self._mix = np.zeros((1, 2), dtype=np.int64), np.zeros(1)
+        self._phase, self._speeds, self._course = np.zeros(1), np.zeros((1, 2)), np.zeros(1)
+        self.wanted, self.waiting, self.faults = False, True, ''
+        self._trim = np.zeros(len(pattern.robot.legs))
+        self.restart()
+        self.learn(pattern.program)
+
+    @property
+    def gains(self) -> Gains:
+        """Gains of the laws."""
+        return self._feedback.gains
+
+    @gains.setter
+    def gains(self, gains: Gains) -> None:
+        self._feedback.gains = gains
+
+    def restart(self) -> None:
+        """Begin anew, as where simulated time jumps back."""
+        self._fade, self.share, self._spent = Fade(), 0.0, math.inf
+        self._dt, self._agrees, self._out = 0.0, 1.0, math.nan
+        self._feedback.reset()
+        if self._inputs is not None:
+            self._inputs.restart()
+        self._release()
+
+    def learn(self, program: Program) -> None:
+        """Get to know a gait before it is met."""
+        if not any(known is program for known, _ in self._known):
+            self._feedback.learn(program)
+            self._known = [*self._known, (program, Timetable(program, self._geometry))][-SLOTS:]
+
+    def listen(self, inputs: SensesInput) -> None:
+        """Take what the robot feels from these topics."""
+        self._inputs = inputs
+
+    @property
+    def listening(self) -> bool:
+        """Whether there are topics to listen to."""
+        return self._inputs is not None
+
+    def ages(self, now: float) -> dict[str, float]:
+        """Return name -> time since the last message that could be believed, s; inf for none."""
+        return {} if self._inputs is None else {
+            watch.name: now - watch.believed for watch in self._inputs.watches}
+
+    def sense(self, dt: float, now: float) -> None:
+        """Take what has arrived, and have the coming tick of dt corrected by it; s both."""
+        inputs, pattern = self._inputs, self._pattern
+        if inputs is None or (not self.wanted and self._spent > DIES_OUT):
+            if pattern.correct is not None:
+                self._release()
+            return
+        self._dt = dt
+        inputs.take(now, pattern.level > 0.0)
+        self._judge(inputs, now)
+        self.share = self._fade.advance(self.wanted and not self.faults, dt)
+        self._spent = 0.0 if self.share else self._spent + dt
+        if self._spent > DIES_OUT and self.faults:
+            # Nothing is fed back: what was felt before the gap says nothing after it.
+            self._feedback.reset()
+            self._release()
+        else:
+            pattern.correct = self._correct
+
+    def _judge(self, inputs: SensesInput, now: float) -> None:
+        """Find out what keeps the feedback out."""
+        found = [f'{watch.name}: {fault} for {now - watch.since:.1f} s'
+                 for watch in inputs.watches if (fault := watch.fault(now))]
+        self.waiting = any(watch.believed == -math.inf for watch in inputs.watches)
+        pattern = self._pattern
+        program = pattern.program
+        if program.motion.efference is None:
+            found.append(f"the robot file has no efference copy of the gait '{program.name}'")
+        times = next((times for known, times in self._known if known is program), None)
+        if found or times is None or pattern.level < 1.0 or pattern.in_transition:
+            self._agrees = 1.0
+        else:
+            row = int(pattern.phases[0] * POINTS) % POINTS
+            self._agrees = agreement(inputs.senses.loads[0], self._least, times.swinging[row],
+                                     min(self._dt * program.frequency, 1.0), self._agrees)
+            if self._agrees < AGREES:
+                found.append(f'{inputs.feet}: the contacts do not go with the gait')
+        self.faults = '; '.join(found)
+
+    def _correct(self, planned: np.ndarray) -> np.ndarray:
+        pattern, feedback, inputs = self._pattern, self._feedback, self._inputs
+        assert inputs is not None
+        old, new, self._mix[0] = pattern.fading
+        self._gaits[0] = feedback.slot(old), feedback.slot(new)
+        self._phase[0] = pattern.phases[0]
+        forward, left, turn = self._motion()
+        self._speeds[0] = forward, left
+        yaw = float(inputs.senses.lean[0, 2])
+        if self.share and pattern.level:
+            # The heading is kept where no turn is asked for, and otherwise turns on.
+            ahead = (self._course[0] + turn * self._dt - yaw + math.pi) % (2.0 * math.pi) - math.pi
+            self._course[0] = yaw + min(max(ahead, -FURTHEST), FURTHEST)
+        else:
+            self._course[0] = yaw
+        memory = feedback.memory
+        found = feedback.advance(inputs.senses, planned[None], self._phase, self._gaits,
+                                 self._mix, self._speeds, self._course, self._dt,
+                                 self.share * pattern.level)
+        pattern.hurry = float(memory.hurry[0])
+        if pattern.drive is not None:
+            self._trim[:] = memory.stride[0]
+            pattern.drive.trim = self._trim
+        return found[0]
+
+    def _release(self) -> None:
+        """Leave the pattern to itself."""
+        self._pattern.correct, self._pattern.hurry = None, 1.0
+        if self._pattern.drive is not None:
+            self._pattern.drive.trim = None

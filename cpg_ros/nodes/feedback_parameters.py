@@ -1,0 +1,64 @@
+"""The parameters of the feedback: its laws, their gains, and the topics that it listens to."""
+
+import re
+from collections.abc import Callable
+from typing import Any
+
+from cpg_ros.feedback.gains import Gains
+from cpg_ros.nodes.parameter_spec import Spec
+from cpg_ros.nodes.senses_input import CONTACTS
+
+PREFIX = 'feedback.'
+#: A gain may be this many times the default, and up to 1 where that is 0.
+RANGE = 10.0
+
+
+def switch(calibrated: bool) -> Spec:
+    """Return the parameter whose default depends on the robot file."""
+    return Spec(calibrated, 'correct the gait by what the robot feels; needs a calibrated robot '
+                'file and the topics below')
+
+
+#: Topics, read when the feedback is first switched on.
+TOPICS = {
+    f'{PREFIX}imu_topic': Spec('imu', "the robot's sensor_msgs/Imu, with its orientation",
+                               read_only=True),
+    f'{PREFIX}joint_states_topic': Spec('joint_states', 'its measured sensor_msgs/JointState, '
+                                        'with velocities', read_only=True),
+    f'{PREFIX}contacts': Spec('foot_contacts', "where the feet's loads are from: one message "
+                              'with all of them, a geometry_msgs/WrenchStamped of each leg, or '
+                              "the measured joints' efforts", read_only=True,
+                              constraints='one of: ' + ', '.join(CONTACTS)),
+    f'{PREFIX}contacts_topic': Spec('foot_contacts', 'topic of the std_msgs/Float64MultiArray '
+                                    "with the feet's loads [N]; with wrenches, its name below "
+                                    'each leg, as in lh/foot_contacts', read_only=True)}
+
+
+def _texts() -> dict[str, str]:
+    """Return what each gain is, as its class says."""
+    _, _, listed = (Gains.__doc__ or '').partition('Attributes:')
+    texts = {}
+    for names, text in re.findall(r'^ {8}([a-z_, ]+?): (.+?)(?=\n {8}\w|\Z)', listed, re.S | re.M):
+        for name in names.split(', '):
+            texts[name] = ' '.join(text.split()).rstrip('.')
+    return texts
+
+
+def _law(name: str, default: bool) -> Spec:
+    return Spec(default, f'the law {name}')
+
+
+def _gain(name: str, default: float, text: str) -> Spec:
+    return Spec(default, text, 0.0, round(RANGE * default, 6) or 1.0)
+
+
+#: Laws and gains, all of which can be set at any time.
+GAINS = {f'{PREFIX}{name}': _law(name, default) if isinstance(default, bool)
+         else _gain(name, default, _texts().get(name, ''))
+         for name, default in Gains._field_defaults.items()}
+SPECS = {**TOPICS, **GAINS}
+
+
+def gains(value: Callable[[str], Any]) -> Gains:
+    """Return the gains that the parameters have by name."""
+    return Gains(*(value(f'{PREFIX}{name}') for name in Gains._fields))

@@ -1,0 +1,144 @@
+"""Messages taken as bytes, and where their numbers are: decoding whole ones costs far more.
+
+The bytes are CDR: four of encapsulation, then the fields, each aligned to its size.
+"""
+
+import struct
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from rclpy.node import Node
+from rclpy.qos import QoSProfile, ReliabilityPolicy
+from rclpy.serialization import deserialize_message
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Float64MultiArray
+
+from cpg_ros.nodes.unserved import subscribe
+
+#: Bytes of the encapsulation, from behind which everything is aligned.
+HEADER = 4
+
+
+class Newest:
+    """The newest message of a topic, as bytes, once.
+
+    Attributes:
+        topic: resolved.
+
+    """
+
+    def __init__(self, node: Node, kind: type, topic: str) -> None:
+        # Sensor data: best effort goes with every publisher, and only the newest one counts.
+        self._subscription = subscribe(node, kind, topic, QoSProfile(
+            depth=1, reliability=ReliabilityPolicy.BEST_EFFORT))
+        self.topic: str = self._subscription.topic_name
+
+    def take(self) -> bytes | None:
+        """Return it, or None if there is none that is new."""
+        handle: Any = self._subscription.handle
+        with handle:
+            found = handle.take_message(self._subscription.msg_type, True)
+        return None if found is None else found[0]
+
+
+def stamp_of(data: bytes) -> float | None:
+    """Return the stamp of a message that begins with a header, s; None for none."""
+    seconds, nanoseconds = struct.unpack_from('<iI' if data[1] & 1 else '>iI', data, HEADER)
+    return seconds + 1e-9 * nanoseconds if seconds or nanoseconds else None
+
+
+def last_numbers(data: bytes, count: int) -> np.ndarray:
+    """Return the doubles at the end of a message, shape (count,).
+
+    Raises:
+        ValueError: the message is shorter.
+
+    """
+    return np.frombuffer(data, '<f8' if data[1] & 1 else '>f8', count, len(data) - 8 * count)
+
+
+class JointLayout:
+    """Where the joint states of a publisher have what, its names being the same every time.
+
+    Attributes:
+        wrong: why the messages cannot be used, or ''.
+        position, velocity, effort: slices of the bytes, of doubles in the message's own order;
+            None where there are none.
+        places: index of each wanted joint in the message, shape (joints,).
+
+    """
+
+    def __init__(self, data: bytes, wanted: Sequence[str]) -> None:
+        message = deserialize_message(data, JointState)
+        names = list(message.name)
+        missing = [name for name in wanted if names.count(name) != 1]
+        self.wrong = f'no joint {missing[0]}, or more than one' if missing else ''
+        self.places = np.array([] if missing else [names.index(name) for name in wanted], int)
+        self._length = len(data)
+        # What tells that another message has the same layout: names and counts.
+        self._same: list[tuple[slice, bytes]] = [(slice(1, 2), data[1:2])]
+        end = HEADER + 8
+
+        def keep(size: int) -> None:
+            nonlocal end
+            self._same.append((slice(end, end + size), data[end:end + size]))
+            end += size
+
+        def text(value: str) -> None:
+            keep(4 + len(value.encode()) + 1)
+            align(4)
+
+        def align(size: int) -> None:
+            nonlocal end
+            end += (HEADER - end) % size
+
+        text(message.header.frame_id)
+        keep(4)
+        for name in names:
+            text(name)
+        parts: list[slice | None] = []
+        for numbers in (message.position, message.velocity, message.effort):
+            align(4)
+            keep(4)
+            if len(numbers):
+                align(8)
+            whole = len(numbers) == len(names) and len(names) > 0
+            parts.append(slice(end, end + 8 * len(numbers)) if whole else None)
+            end += 8 * len(numbers)
+        self.position, self.velocity, self.effort = parts
+        if not self.wrong:
+            for part, what in ((self.position, 'positions'), (self.velocity, 'velocities')):
+                if part is None:
+                    self.wrong = f'no {what}'
+                    break
+
+    def fits(self, data: bytes) -> bool:
+        """Tell whether another message has the same layout."""
+        return len(data) == self._length and all(data[part] == known
+                                                 for part, known in self._same)
+
+    def numbers(self, data: bytes, part: slice, out: np.ndarray) -> None:
+        """Fill out, shape (joints,), with the wanted joints' numbers."""
+        kind = '<f8' if data[1] & 1 else '>f8'
+        found = np.frombuffer(data, kind, (part.stop - part.start) // 8, part.start)
+        np.take(found, self.places, out=out)
+
+
+def legs_of(data: bytes, legs: Sequence[str]) -> np.ndarray:
+    """Return the index of each leg among the numbers of a Float64MultiArray, shape (legs,).
+
+    Its first dimension's label may name them, with commas in between; otherwise they come in
+    the given order.
+
+    Raises:
+        ValueError: it has not one number a leg.
+
+    """
+    message = deserialize_message(data, Float64MultiArray)
+    if len(message.data) != len(legs):
+        raise ValueError(f'{len(message.data)} numbers for {len(legs)} legs')
+    labels = message.layout.dim[0].label.split(',') if message.layout.dim else []
+    if sorted(labels) == sorted(legs):
+        return np.array([labels.index(leg) for leg in legs])
+    return np.arange(len(legs))

@@ -1,0 +1,179 @@
+"""The topics on which a robot tells what it feels: newest messages, judged, as arrays."""
+
+import math
+from collections.abc import Callable, Sequence
+from functools import partial
+
+import numpy as np
+from geometry_msgs.msg import WrenchStamped
+from rclpy.node import Node
+from sensor_msgs.msg import Imu, JointState
+from std_msgs.msg import Float64MultiArray
+
+from cpg_ros.feedback.estimate import Senses
+from cpg_ros.feedback.foot_force import loads_of
+from cpg_ros.feedback.kinematics import Geometry
+from cpg_ros.feedback.plausibility import (
+    IMU,
+    IMU_MEMORY,
+    VERDICTS,
+    judge_imu,
+    judge_joints,
+    judge_loads,
+)
+from cpg_ros.feedback.watch import Watch
+from cpg_ros.nodes.raw_messages import JointLayout, Newest, last_numbers, legs_of, stamp_of
+from cpg_ros.robots.robot import Robot
+
+#: Where the feet's loads are from.
+CONTACTS = ('foot_contacts', 'wrenches', 'efforts')
+#: All feet in the air may feel nothing for this time, s.
+FLIGHT = 0.3
+#: Numbers of a Wrench.
+WRENCH = 6
+#: Takes a message and the time since the last one, s; returns what is wrong with it, its numbers,
+#: and whether they may well come again.
+Reader = Callable[[bytes, float], tuple[str, bytes, bool]]
+
+
+class _Input:
+    """One topic: its newest message, and the watch over it."""
+
+    def __init__(self, node: Node, kind: type, topic: str) -> None:
+        self.newest, self.watch = Newest(node, kind, topic), Watch(topic)
+
+
+class SensesInput:
+    """What a robot's topics say it feels.
+
+    Attributes:
+        senses: of one run, filled in place with what could be believed last.
+        watches: over the inputs.
+        topics: of the inputs, resolved.
+        feet: what tells of contacts.
+
+    """
+
+    def __init__(self, node: Node, robot: Robot, geometry: Geometry, imu: str, joints: str,
+                 contacts: str, feet: str) -> None:
+        """Subscribe.
+
+        Args:
+            node: that subscribes.
+            robot: whose senses they are.
+            geometry: of its legs.
+            imu: topic of its sensor_msgs/Imu.
+            joints: topic of its measured sensor_msgs/JointState.
+            contacts: one of CONTACTS.
+            feet: topic of the Float64MultiArray, or the name below each leg's of its
+                WrenchStamped.
+
+        """
+        self._geometry, self._legs = geometry, tuple(robot.legs)
+        self._names = [joint.name for joint in robot.joints]
+        self._limits = robot.column('lower'), robot.column('upper'), robot.column('velocity')
+        count = len(self._names)
+        self.senses = Senses.blank(1, len(self._legs), count)
+        self.senses.angles[0], self.senses.push[0, 2] = robot.column('offset'), 9.81
+        self._found, self._rates, self._efforts = np.zeros((3, count))
+        self._loads = np.zeros(len(self._legs))
+        self._contacts, self.feet = contacts, joints if contacts == 'efforts' else feet
+        self._imu, self._joints = _Input(node, Imu, imu), _Input(node, JointState, joints)
+        self._feet: list[_Input] = []
+        self._readers: list[Reader] = []
+        if contacts == 'foot_contacts':
+            self._feet, self._readers = [_Input(node, Float64MultiArray, feet)], [self._read_loads]
+        elif contacts == 'wrenches':
+            self._feet = [_Input(node, WrenchStamped, f'{leg}/{feet}') for leg in self._legs]
+            self._readers = [partial(self._read_wrench, k) for k in range(len(self._legs))]
+        self._layout: JointLayout | None = None
+        self._order: tuple[int, np.ndarray] | None = None
+        self._numbers, self._memory = np.zeros(IMU), np.zeros(IMU_MEMORY)
+        self._heavy = np.zeros((len(self._legs), 1))
+        inputs = [self._imu, self._joints, *self._feet]
+        self.watches: Sequence[Watch] = [one.watch for one in inputs]
+        self.topics: Sequence[str] = [one.newest.topic for one in inputs]
+
+    def restart(self) -> None:
+        """Forget when messages came, as where simulated time jumps back."""
+        for watch in self.watches:
+            watch.restart()
+
+    def take(self, now: float, moving: bool) -> None:
+        """Take what has arrived.
+
+        Args:
+            now: s, on the clock of the messages' stamps.
+            moving: whether the robot is meant to move, so that no measurement stays the same.
+
+        """
+        patience = 0.0 if moving else math.inf
+        self._take(self._imu, now, patience, self._read_imu)
+        self._take(self._joints, now, patience, self._read_joints)
+        for one, read in zip(self._feet, self._readers, strict=True):
+            self._take(one, now, patience, read)
+
+    def _take(self, one: _Input, now: float, patience: float, read: Reader) -> None:
+        data = one.newest.take()
+        if data is None:
+            return
+        gap = one.watch.gap(now)
+        try:
+            wrong, content, at_rest = read(data, gap)
+        except ValueError as error:
+            wrong, content, at_rest = str(error), b'', False
+        stamp = None if one in self._feet and self._contacts == 'foot_contacts' else (
+            stamp_of(data))
+        wrong = one.watch.suspect(now, stamp, content, max(patience, FLIGHT if at_rest else 0.0)
+                                  ) or wrong
+        one.watch.note(now, wrong)
+
+    def _read_imu(self, data: bytes, gap: float) -> tuple[str, bytes, bool]:
+        self._numbers[:] = last_numbers(data, IMU)
+        senses = self.senses
+        verdict = judge_imu(self._numbers, gap, self._memory, senses.lean[0], senses.turning[0],
+                            senses.push[0])
+        return VERDICTS[verdict], data[-8 * IMU:], False
+
+    def _read_joints(self, data: bytes, gap: float) -> tuple[str, bytes, bool]:
+        layout = self._layout
+        if layout is None or not layout.fits(data):
+            layout = self._layout = JointLayout(data, self._names)
+        if layout.wrong or layout.position is None or layout.velocity is None:
+            return layout.wrong, b'', False
+        layout.numbers(data, layout.position, self._found)
+        layout.numbers(data, layout.velocity, self._rates)
+        if self._contacts == 'efforts':
+            if layout.effort is None:
+                return 'no efforts', b'', False
+            layout.numbers(data, layout.effort, self._efforts)
+        verdict = judge_joints(self._found, self._rates, self._efforts, *self._limits)
+        senses = self.senses
+        if not verdict and self._contacts == 'efforts':
+            loads_of(self._geometry.rows, self._geometry.columns, self._found, self._efforts,
+                     *senses.lean[0, :2], self._loads)
+            verdict = judge_loads(self._loads, self._geometry.weight, gap, self._heavy[0])
+        if not verdict:
+            senses.angles[0], senses.rates[0] = self._found, self._rates
+            if self._contacts == 'efforts':
+                senses.loads[0] = self._loads
+        return VERDICTS[verdict], data[layout.position.start:], False
+
+    def _read_loads(self, data: bytes, gap: float) -> tuple[str, bytes, bool]:
+        if self._order is None or self._order[0] != len(data):
+            self._order = len(data), legs_of(data, self._legs)
+        np.take(last_numbers(data, len(self._legs)), self._order[1], out=self._loads)
+        verdict = judge_loads(self._loads, self._geometry.weight, gap, self._heavy[0])
+        if not verdict:
+            self.senses.loads[0] = self._loads
+        return VERDICTS[verdict], data[-8 * len(self._legs):], not self._loads.any()
+
+    def _read_wrench(self, foot: int, data: bytes, gap: float) -> tuple[str, bytes, bool]:
+        x, y, z = last_numbers(data, WRENCH)[:3].tolist()
+        # Its frame turns with the leg: what is borne is as long in all of them.
+        self._loads[foot] = load = math.sqrt(x * x + y * y + z * z)
+        verdict = judge_loads(self._loads[foot:foot + 1], self._geometry.weight, gap,
+                              self._heavy[foot])
+        if not verdict:
+            self.senses.loads[0, foot] = load
+        return VERDICTS[verdict], data[-8 * WRENCH:], not load

@@ -1,0 +1,181 @@
+"""What a robot file says of the robot's body, for feedback: leg geometry and efference tables.
+
+Part ``geometry`` has the lengths and axes of legs that feedback can displace, ``efference`` of a
+gait what the base does by itself in it.
+"""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import asdict, dataclass, field
+from typing import Any
+
+import numpy as np
+
+from cpg_ros.files.yaml_reader import Reader, shown
+
+#: Bins of the stride in an efference table.
+BINS = 64
+#: Its signals: velocities in m/s, rates in rad/s, angles in rad, of the base in its own frame.
+SIGNALS = ('forward', 'left', 'roll_rate', 'pitch_rate', 'roll', 'pitch')
+
+
+@dataclass(frozen=True)
+class LegGeometry:
+    """A leg with all joints at 0, in the frame of the base: x forward, y left, z up, m.
+
+    Attributes:
+        joints: names of hip, thigh and calf, or of the last two.
+        turns: 1 or -1 by the sense of each about x, y and y, or y and y.
+        hip: the hip joint, from the base; of a leg without one that of the thigh.
+        thigh: the thigh joint, from the hip.
+        calf: the calf joint, from the thigh joint.
+        foot: the middle of the foot, from the calf joint.
+
+    """
+
+    joints: tuple[str, ...]
+    turns: tuple[float, ...]
+    hip: tuple[float, ...]
+    thigh: tuple[float, ...]
+    calf: tuple[float, ...]
+    foot: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class BodyGeometry:
+    """What feedback needs to know of a body.
+
+    Attributes:
+        mass: of the robot, kg.
+        foot_radius: m.
+        legs: those that feedback can displace, by name.
+
+    """
+
+    mass: float
+    foot_radius: float
+    legs: dict[str, LegGeometry] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class EfferenceTable:
+    """What the base does by itself in a gait, by speed and by the phase of the first leg.
+
+    Attributes:
+        speeds: m/s, rising.
+        rows: by SIGNALS; of each a row for each speed, of BINS values, the means over parts of
+            the stride.
+
+    """
+
+    speeds: tuple[float, ...]
+    rows: dict[str, tuple[tuple[float, ...], ...]]
+
+
+def leg_of(joints: Sequence[str], axes: np.ndarray, anchors: np.ndarray, foot: np.ndarray
+           ) -> LegGeometry | None:
+    """Return a leg's geometry, None if it is not a hip about x, if any, then two joints about y.
+
+    Args:
+        joints: names down the leg.
+        axes: of the joints with all of them at 0, unit vectors, shape (joints, 3).
+        anchors: points on them, m, the same.
+        foot: the middle of the foot, m, shape (3,).
+
+    """
+    wanted = np.eye(3)[[0, 1, 1][-len(joints):]]
+    if len(joints) not in (2, 3) or np.abs(np.abs(axes) - wanted).max() > 0.01:
+        return None
+    turns = np.sign((axes * wanted).sum(axis=1))
+    hip, thigh, calf = anchors[[0, 0, 1] if len(joints) == 2 else [0, 1, 2]]
+    links = (np.round(one, 6) + 0.0 for one in (hip, thigh - hip, calf - thigh, foot - calf))
+    return LegGeometry(tuple(joints), tuple(turns.tolist()), *(
+        tuple(one.tolist()) for one in links))
+
+
+def read_geometry(reader: Reader, tree: Any, legs: Mapping[str, Iterable[str]]) -> BodyGeometry:
+    """Take the part ``geometry``; legs are those of the file with the names of their joints."""
+    tree = reader.keys(tree, 'geometry', {'mass', 'foot_radius', 'legs'})
+    mass, radius = (reader.number(tree[key], f'geometry.{key}') for key in ('mass', 'foot_radius'))
+    if mass <= 0.0:
+        raise reader.fail('geometry.mass', f'{mass:g} must be positive')
+    if radius < 0.0:
+        raise reader.fail('geometry.foot_radius', f'{radius:g} must not be negative')
+    listed = reader.keys(tree['legs'], 'geometry.legs', set(), set(legs))
+    return BodyGeometry(mass, radius, {leg: _leg(reader, listed[leg], f'geometry.legs.{leg}',
+                                                 set(legs[leg])) for leg in listed})
+
+
+def _leg(reader: Reader, tree: Any, where: str, known: set[str]) -> LegGeometry:
+    places = ('hip', 'thigh', 'calf', 'foot')
+    tree = reader.keys(tree, where, {'joints', 'turns', *places})
+    joints = tuple(reader.text(name, f'{where}.joints[{k}]') for k, name
+                   in enumerate(reader.items(tree['joints'], f'{where}.joints')))
+    if len(joints) not in (2, 3) or len(set(joints)) < len(joints):
+        raise reader.fail(f'{where}.joints', 'takes the names of hip, thigh and calf, or of '
+                          'thigh and calf')
+    for k, name in enumerate(joints):
+        if name not in known:
+            raise reader.fail(f'{where}.joints[{k}]', f"'{name}' is no joint of this leg")
+    turns = _numbers(reader, tree['turns'], f'{where}.turns', len(joints))
+    for k, turn in enumerate(turns):
+        if turn not in (1.0, -1.0):
+            raise reader.fail(f'{where}.turns[{k}]', f'{turn:g} is neither 1 nor -1')
+    found = [_numbers(reader, tree[key], f'{where}.{key}', 3) for key in places]
+    for key, (x, _, z) in zip(places[2:], found[2:], strict=True):
+        if x == z == 0.0:
+            raise reader.fail(f'{where}.{key}', 'has no length in the plane of the leg')
+    return LegGeometry(joints, turns, *found)
+
+
+def _numbers(reader: Reader, value: Any, where: str, count: int) -> tuple[float, ...]:
+    listed = reader.items(value, where)
+    if len(listed) != count:
+        raise reader.fail(where, f'takes {count} numbers, not {len(listed)}')
+    return tuple(reader.number(entry, f'{where}[{k}]') for k, entry in enumerate(listed))
+
+
+def read_efference(reader: Reader, tree: Any, where: str) -> EfferenceTable:
+    """Take the part ``efference`` of a gait, rows of numbers with spaces between them."""
+    tree = reader.keys(tree, where, {'speeds', *SIGNALS})
+    speeds = tuple(reader.number(entry, f'{where}.speeds[{k}]') for k, entry
+                   in enumerate(reader.items(tree['speeds'], f'{where}.speeds')))
+    for k in range(1, len(speeds)):
+        if not speeds[k - 1] < speeds[k]:
+            raise reader.fail(f'{where}.speeds[{k}]', f'{speeds[k]:g} is not above '
+                              f'{speeds[k - 1]:g}')
+    rows = {}
+    for key in SIGNALS:
+        listed = reader.items(tree[key], f'{where}.{key}')
+        if len(listed) != len(speeds):
+            raise reader.fail(f'{where}.{key}', f'has {len(listed)} rows, and speeds has '
+                              f'{len(speeds)} numbers')
+        rows[key] = tuple(_row(reader, row, f'{where}.{key}[{k}]') for k, row
+                          in enumerate(listed))
+    return EfferenceTable(speeds, rows)
+
+
+def _row(reader: Reader, value: Any, where: str) -> tuple[float, ...]:
+    if not isinstance(value, str):
+        raise reader.fail(where, f'must be {BINS} numbers with spaces between them, not '
+                          f'{shown(value)}')
+    words = value.split()
+    if len(words) != BINS:
+        raise reader.fail(where, f'has {len(words)} numbers, not {BINS}')
+    try:
+        return tuple(reader.number(float(word), where) for word in words)
+    except ValueError as error:
+        raise reader.fail(where, f'has something that is no number: {error}') from error
+
+
+def geometry_tree(geometry: BodyGeometry) -> dict[str, Any]:
+    """Return what ``read_geometry`` reads back."""
+    return {'mass': geometry.mass, 'foot_radius': geometry.foot_radius,
+            'legs': {leg: {key: list(value) for key, value in asdict(one).items()}
+                     for leg, one in geometry.legs.items()}}
+
+
+def efference_tree(table: EfferenceTable) -> dict[str, Any]:
+    """Return what ``read_efference`` reads back, to four digits."""
+    return {'speeds': list(table.speeds)} | {
+        key: [' '.join(f'{value:.4g}' for value in row) for row in table.rows[key]]
+        for key in SIGNALS}

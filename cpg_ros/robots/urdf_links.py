@@ -1,0 +1,112 @@
+"""Links of a URDF file: their masses, and the spheres that feet are."""
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from xml.parsers import expat
+
+import numpy as np
+
+from cpg_ros.robots.urdf import UrdfError, UrdfJoint, chain, rotation
+
+
+@dataclass
+class UrdfLink:
+    """A link.
+
+    Attributes:
+        mass: kg, 0 where the file gives none.
+        radius: of its first sphere that collides, m, 0 if it has none.
+        centre: of that sphere in the link's frame, m.
+
+    """
+
+    mass: float = 0.0
+    radius: float = 0.0
+    centre: tuple[float, ...] = (0.0, 0.0, 0.0)
+
+
+class _Links:
+    """Collects links while the file is parsed; what is no number counts as not there."""
+
+    def __init__(self) -> None:
+        self.links: dict[str, UrdfLink] = {}
+        self._open: list[str] = []
+        self._link = UrdfLink()
+        self._origin: tuple[float, ...] = (0.0, 0.0, 0.0)
+
+    def start(self, tag: str, attributes: dict[str, str]) -> None:
+        self._open.append(tag.rpartition(':')[2])
+        place = self._open[1:]
+        if place == ['link']:
+            self._link = self.links[attributes.get('name', '').strip()] = UrdfLink()
+        elif place == ['link', 'inertial', 'mass']:
+            self._link.mass = sum(_numbers(attributes.get('value', '')))
+        elif place == ['link', 'collision']:
+            self._origin = (0.0, 0.0, 0.0)
+        elif place == ['link', 'collision', 'origin']:
+            self._origin = _numbers(attributes.get('xyz', '')) or self._origin
+        elif place == ['link', 'collision', 'geometry', 'sphere'] and not self._link.radius:
+            self._link.radius = sum(_numbers(attributes.get('radius', '')))
+            self._link.centre = self._origin
+
+    def end(self, _: str) -> None:
+        self._open.pop()
+
+
+def _numbers(text: str) -> tuple[float, ...]:
+    try:
+        values = tuple(float(word) for word in text.split())
+    except ValueError:
+        return ()
+    return values if all(map(math.isfinite, values)) else ()
+
+
+def load_links(path: str | Path) -> dict[str, UrdfLink]:
+    """Read the links of a URDF file that ``load_urdf`` has read, by name.
+
+    Raises:
+        UrdfError: the file cannot be read.
+
+    """
+    found = _Links()
+    parser = expat.ParserCreate()
+    parser.StartElementHandler, parser.EndElementHandler = found.start, found.end
+    try:
+        parser.Parse(Path(path).read_bytes(), True)
+    except OSError as error:
+        raise UrdfError(f'URDF {path}: {error.strerror}') from error
+    except expat.ExpatError as error:
+        raise UrdfError(f'URDF {path}: line {error.lineno}: '
+                        f'{expat.ErrorString(error.code)}') from error
+    return found.links
+
+
+def placed(joints: dict[str, UrdfJoint], name: str) -> tuple[np.ndarray, np.ndarray]:
+    """Return where a joint is in the frame of the root, m, (3,), and its frame's axes, (3, 3).
+
+    All joints are at 0.
+    """
+    place, axes = np.zeros(3), np.eye(3)
+    for joint in chain(joints, name):
+        place = place + axes @ joint.xyz
+        axes = axes @ rotation(joint.rpy)
+    return place, axes
+
+
+def foot_below(joints: dict[str, UrdfJoint], links: dict[str, UrdfLink], last: str
+               ) -> tuple[np.ndarray, float]:
+    """Return the middle of the foot below a leg's last joint, m, (3,), and its radius, m.
+
+    It is the furthest sphere of what that joint moves, or else the furthest fixed frame, which
+    has no radius.
+    """
+    begin, axes = placed(joints, last)
+    found = [(begin, axes, joints[last].child)]
+    for place, turned, link in found:
+        found += [(place + turned @ joint.xyz, turned @ rotation(joint.rpy), joint.child)
+                  for joint in joints.values() if joint.parent == link and joint.kind == 'fixed']
+    balls = [(place + turned @ links[link].centre, links[link].radius)
+             for place, turned, link in found if link in links and links[link].radius]
+    return max(balls or [(place, 0.0) for place, _, _ in found],
+               key=lambda one: float(np.linalg.norm(one[0] - begin)))

@@ -1,0 +1,84 @@
+"""What an inertial measurement unit on a simulated base shows, as dull as a real one."""
+
+from collections import deque
+from dataclasses import dataclass
+
+import numpy as np
+
+from cpg_ros.feedback.kinematics import GRAVITY
+from cpg_ros.simulation.body import Body
+
+
+@dataclass(frozen=True)
+class Dullness:
+    """How far a unit is from the truth.
+
+    Attributes:
+        gyroscope_noise, gyroscope_bias: rad/s; noise is a standard deviation, biases are those
+            of all axes.
+        accelerometer_noise, accelerometer_bias: m/s^2.
+        orientation_bias: of roll and of pitch, rad.
+        delay: between a measurement and its message, s.
+        seed: of the noise.
+
+    """
+
+    gyroscope_noise: float = 0.0
+    gyroscope_bias: float = 0.0
+    accelerometer_noise: float = 0.0
+    accelerometer_bias: float = 0.0
+    orientation_bias: float = 0.0
+    delay: float = 0.0
+    seed: int = 0
+
+
+class InertialUnit:
+    """Measures a body period by period."""
+
+    def __init__(self, body: Body, period: float, dullness: Dullness) -> None:
+        """Be ready to measure a body at a period in s."""
+        self._body, self._period, self._dullness = body, period, dullness
+        self._rng = np.random.default_rng(dullness.seed)
+        half = 0.5 * dullness.orientation_bias
+        turned = np.array([1.0, half, half, 0.0])
+        self._turned = turned / np.linalg.norm(turned)
+        self._before = body.rates[:3].copy()
+        self._turn = np.zeros(9)
+        self._late: deque[tuple[int, np.ndarray]] = deque()
+
+    def measure(self, stamp: int) -> tuple[int, np.ndarray] | None:
+        """Measure at a stamp in ns.
+
+        Returns:
+            What arrives now, None if nothing does: its stamp, and orientation (x y z w), angular
+            velocity in rad/s and acceleration in m/s^2, shape (10,).
+
+        """
+        dull, body, found = self._dullness, self._body, np.empty(10)
+        w, x, y, z = _product(body.quaternion, self._turned)
+        found[:4] = x, y, z, w
+        rates = body.rates
+        faster = (rates[:3] - self._before) / self._period
+        faster[2] += GRAVITY
+        self._before[:] = rates[:3]
+        found[4:7] = rates[3:] + dull.gyroscope_bias
+        found[7:] = faster @ body.axes + dull.accelerometer_bias
+        if dull.gyroscope_noise or dull.accelerometer_noise:
+            noise = self._rng.standard_normal(6)
+            found[4:7] += dull.gyroscope_noise * noise[:3]
+            found[7:] += dull.accelerometer_noise * noise[3:]
+        if not dull.delay:
+            return stamp, found
+        self._late.append((stamp, found))
+        arrived = None
+        while self._late and self._late[0][0] <= stamp - 1e9 * dull.delay:
+            arrived = self._late.popleft()
+        return arrived
+
+
+def _product(one: np.ndarray, two: np.ndarray) -> tuple[float, float, float, float]:
+    """Product of quaternions, w x y z."""
+    a, b, c, d = one.tolist()
+    e, f, g, h = two.tolist()
+    return (a * e - b * f - c * g - d * h, a * f + b * e + c * h - d * g,
+            a * g - b * h + c * e + d * f, a * h + b * g - c * f + d * e)

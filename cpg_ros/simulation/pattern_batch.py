@@ -1,0 +1,144 @@
+"""The patterns of many runs: orbits looked up, ramped in, steered, switched, held to limits."""
+
+import math
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from cpg_ros.feedback.timetable import POINTS, Timetable
+from cpg_ros.integration.jit import entry, sources_digest
+from cpg_ros.motion.plan import Program
+from cpg_ros.motion.smoothstep import smoothstep
+from cpg_ros.motion.steering import TIME_CONSTANT
+from cpg_ros.simulation.scenario import Scenario
+
+#: From the stand into the gait, and from one gait into another, s.
+RAMP, TRANSITION = 1.0, 1.0
+
+
+class PatternBatch:
+    """As many patterns as runs, which know the same gaits.
+
+    Attributes:
+        phase: of the first leg, cycles, shape (runs,).
+        gaits: index of the gait that is left and of the one that is entered, shape (runs, 2).
+        mix: share of the second, shape (runs,).
+        level: 0 at the stand, 1 in the full gait.
+        wanted: speed forward and to the left, m/s, shape (runs, 2).
+        course: heading that follows from the turning wanted, rad, shape (runs,).
+        planned: angles before any correction, rad, shape (runs, joints).
+
+    """
+
+    def __init__(self, programs: Mapping[str, Program], tables: Sequence[Timetable],
+                 scenarios: Sequence[Scenario], dt: float) -> None:
+        """Stand; the first program is the one that all runs begin with."""
+        self._programs, self._names, self._dt = list(programs.values()), list(programs), dt
+        robot, runs = self._programs[0].robot, len(scenarios)
+        self._angles = np.stack([one.angles for one in tables])
+        self._still = np.stack([one.in_place for one in tables])
+        self._frequency = np.array([one.frequency for one in self._programs])
+        self._leg, self._offset = robot.leg_of_joint, robot.column('offset')
+        self._lower, self._upper = robot.column('lower'), robot.column('upper')
+        self._reach = robot.column('velocity') * dt
+        legs = len(robot.legs)
+        self.phase = np.array([one.phase for one in scenarios])
+        self.gaits, self._faded = np.zeros((runs, 2), dtype=np.int64), np.ones(runs)
+        self.mix, self.course = np.ones(runs), np.zeros(runs)
+        self.wanted, self._turning = np.zeros((runs, 2)), np.zeros(runs)
+        self.wanted[:, 0] = [one.speed for one in scenarios]
+        # The strides of the legs and the pace, as of motion.steering.Drive.
+        self._asked = np.ones((runs, legs + 1))
+        for run in range(runs):
+            self._ask(run)
+        self._drive, self._rate = self._asked.copy(), np.zeros((runs, legs + 1))
+        self._last = np.tile(self._offset, (runs, 1))
+        self.planned = self._last.copy()
+        self._time = self.level = 0.0
+        self._events: list[tuple[float, int, str, tuple[float, ...]]] = sorted(
+            [(wish[0], run, '', wish[1:]) for run, one in enumerate(scenarios)
+             for wish in one.commands]
+            + [(when, run, name, ()) for run, one in enumerate(scenarios)
+               for when, name in one.switches], reverse=True)
+
+    def _ask(self, run: int) -> None:
+        program = self._programs[self.gaits[run, 1]]
+        self._asked[run] = 1.0
+        if program.motion.steering is not None:
+            self._asked[run, :-1], self._asked[run, -1] = program.steer(
+                self.wanted[run, 0], self._turning[run])
+
+    def advance(self, stride: np.ndarray, hurry: np.ndarray) -> None:
+        """Advance, with strides changed, shape (runs, legs), and clocks hurried, shape (runs,)."""
+        self._time += self._dt
+        while self._events and self._events[-1][0] <= self._time:
+            _, run, name, wish = self._events.pop()
+            if name:
+                self.gaits[run] = self.gaits[run, 1], self._names.index(name)
+                self._faded[run] = 0.0
+            else:
+                self.wanted[run], self._turning[run] = wish[:2], wish[2]
+            self._ask(run)
+        self.level = smoothstep(min(1.0, self._time / RAMP))[0]
+        _advance(self._angles, self._still, self._frequency, self._leg, self._offset, self._asked,
+                 self._drive, self._rate, stride, hurry, self.phase, self.gaits, self._faded,
+                 self.mix, self._turning, self.course, self.level, self._dt, self.planned)
+
+    def confine(self, angles: np.ndarray) -> np.ndarray:
+        """Hold angles to the joints' limits and speeds."""
+        _confine(angles, self._last, self._lower, self._upper, self._reach)
+        return self._last
+
+
+def _cached(digest):
+    """Build the cached entry points; see sources_digest for why they are closures."""
+
+    @entry
+    def advance(angles, still, frequencies, legs, offset, asked, drive, rates, strides, hurries,
+                 phases, gaits, faded, mix, turning, course, level, dt, planned):
+        """Advance each run; arguments as of PatternBatch."""
+        digest  # noqa: B018
+        for run in range(len(phases)):
+            old, new, clock = gaits[run, 0], gaits[run, 1], hurries[run] * dt
+            faded[run] = min(1.0, faded[run] + clock / TRANSITION)
+            s = faded[run]
+            mix[run] = s * s * (3.0 - 2.0 * s)
+            if s == 1.0:
+                old = gaits[run, 0] = new
+            decay = math.exp(-clock / TIME_CONSTANT)
+            for k in range(drive.shape[1]):
+                target = asked[run, k]
+                if k < drive.shape[1] - 1:
+                    target = min(max(target + strides[run, k], -1.0), 1.0)
+                gap, rate = drive[run, k] - target, rates[run, k]
+                pull = rate + gap / TIME_CONSTANT
+                drive[run, k] = target + (gap + pull * clock) * decay
+                rates[run, k] = (rate - pull * clock / TIME_CONSTANT) * decay
+            frequency = frequencies[old] + mix[run] * (frequencies[new] - frequencies[old])
+            phases[run] = (phases[run] + frequency * drive[run, -1] * clock) % 1.0
+            course[run] += turning[run] * dt
+            place = phases[run] * POINTS
+            low = int(place) % POINTS
+            high, on = (low + 1) % POINTS, place - int(place)
+            for joint in range(len(offset)):
+                stride, found = drive[run, legs[joint]], 0.0
+                for gait, share in ((old, 1.0 - mix[run]), (new, mix[run])):
+                    rest = still[gait, low, joint] + on * (still[gait, high, joint]
+                                                           - still[gait, low, joint])
+                    full = angles[gait, low, joint] + on * (angles[gait, high, joint]
+                                                            - angles[gait, low, joint])
+                    found += share * (rest + stride * (full - rest))
+                planned[run, joint] = offset[joint] + level * found
+
+    @entry
+    def confine(angles, last, lower, upper, reach):
+        digest  # noqa: B018
+        for run in range(len(angles)):
+            for k in range(len(lower)):
+                near = min(max(angles[run, k], last[run, k] - reach[k]), last[run, k] + reach[k])
+                last[run, k] = min(max(near, lower[k]), upper[k])
+
+    return advance, confine
+
+
+_advance, _confine = _cached(sources_digest())

