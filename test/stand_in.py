@@ -98,6 +98,7 @@ class StandIn(threading.Thread):
         self.lean, self.heat, self.buttons = 0.0, 30, 0
         self.mode, self.asked = 'normal' if services else '', []
         self.ticks = 0
+        self.position = self.velocity = np.zeros(12)
         self._ending = threading.Event()
         self._before = np.zeros((4, 12))
         self._sent = b''
@@ -125,6 +126,8 @@ class StandIn(threading.Thread):
                 due = time.monotonic()
             self._take()
             self.body.step()
+            # Copies: the body's own arrays are for this thread.
+            self.position, self.velocity = self.body.position.copy(), self.body.velocity.copy()
             self.ticks += 1
             if not (self.mute or self.cut):
                 if not self.frozen or not self._sent:

@@ -47,7 +47,7 @@ def test_from_lying_in_its_own_mode_to_walking_and_back():
         # What is measured is published as robot_sim does.
         names, sample = walk.watcher.names, walk.watcher.samples[-1]
         assert names == list(walk.robot.robot.order)
-        assert np.abs(np.array(sample[1]) - walk.robot.body.position).max() < 0.3
+        assert np.abs(np.array(sample[1]) - walk.robot.position).max() < 0.3
         assert heard[Imu][-1].orientation.w == pytest.approx(
             walk.robot.body.quaternion[0], abs=0.1)
         assert 50 < sum(heard[Float64MultiArray][-1].data) < 400
@@ -58,7 +58,7 @@ def test_from_lying_in_its_own_mode_to_walking_and_back():
         assert walk.bridge.wait() == 0, walk.bridge.log
         assert [phase for _, phase in walk.phases][-2:] == ['sitting', 'damping']
         assert walk.robot.damped and walk.robot.body.base[2] < 0.16
-        assert np.abs(walk.robot.body.velocity).max() < 0.5
+        assert np.abs(walk.robot.velocity).max() < 0.5
     finally:
         walk.end()
 

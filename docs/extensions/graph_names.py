@@ -1,5 +1,6 @@
 """Topics and services of the nodes, asked of the nodes themselves."""
 
+import gc
 import os
 import time
 from collections.abc import Callable, Iterator
@@ -50,6 +51,8 @@ def of(kind: str) -> dict[str, tuple[str, str]]:
                 found[name] = both, type_
         finally:
             rclpy.shutdown()
+            # What a node locks against a second one, it holds until it is gone.
+            gc.collect()
     return found
 
 
