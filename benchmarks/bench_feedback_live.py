@@ -134,6 +134,7 @@ def walked(seconds: float, feedback: bool) -> dict[str, object]:
             return {'cpu_generator_percent': 100.0 * (rhythm.cpu_s() - before[0]) / spent,
                     'cpu_robot_sim_percent': 100.0 * (sim.cpu_s() - before[1]) / spent,
                     'real_time_factor': len(probe.sensed) / spent / RATE,
+                    'commands_per_s': len(probe.told) / spent,
                     'latency_ms': probe.latency_ms(), 'upright': probe.upright}
     finally:
         probe.node.destroy_node()
@@ -162,11 +163,12 @@ def faults(seconds: float) -> dict[str, bool]:
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument('--seconds', type=float, default=15.0)
+    parser.add_argument('--no-faults', action='store_true', help='only walk')
     arguments = parser.parse_args()
     enter_workspace()
     rclpy.init()
     closed, open_ = walked(arguments.seconds, True), walked(arguments.seconds, False)
-    upright = faults(1.0)
+    upright = {} if arguments.no_faults else faults(1.0)
     more = closed['cpu_generator_percent'] - open_['cpu_generator_percent']  # type: ignore
     falls = sum(not one for one in upright.values())
     met = (closed['real_time_factor'] >= TARGETS['real_time_factor']  # type: ignore[operator]

@@ -209,7 +209,9 @@ def test_a_quadruped_is_made_that_stands_and_steps(tmp_path, axis, capsys):
         assert {joint.cell for joint in joints.values()} == {cell}
         hip, thigh, calf = joints['hip'], joints['thigh'], joints['calf']
         assert (hip.offset, hip.weights) == (0.0, (0.0,))
-        assert (hip.lower, hip.upper, hip.velocity) == (-0.8, 0.8, 10.0)
+        assert (hip.lower, hip.upper, hip.velocity) == (-0.8, 0.8, 20.0)
+        # The URDF has a velocity of thigh and calf only where it says so, and none of the hip.
+        assert hip.invented == ('velocity',) and calf.invented == ()
         standing = feet(robot, thigh.offset, calf.offset, axis)
         assert standing[0] == pytest.approx(0.0, abs=1e-9) and standing[1] < -1.2
         # Furthest forward at x = 1, further up while y > 0.

@@ -87,7 +87,8 @@ def test_it_shows_what_the_node_says_of_itself(rig, page):
     until(lambda: 'angles' in page.frame, 'angles')
     assert sorted(joints) == sorted(watcher.names) and len(page.frame['angles']) == 12
     assert page.last['names']['phases'] == ['lh', 'rh', 'lf', 'rf']
-    assert page.last['names']['cells'] == ['x:1', 'cells:8'] and len(page.frame['cells']) == 8
+    assert page.last['names']['cells'] == ['x,dx/dt:2', 'cells:8']
+    assert len(page.frame['cells']) == 16
     until(lambda: 'health' in page.last, 'health')
     (part,) = page.last['health']['parts'].values()
     assert part['values']['gait'] == 'trot'
@@ -305,7 +306,8 @@ def test_robots_in_two_namespaces_and_one_that_comes_later():
         page.ready()
         assert page.last['controls']['node'] == '/b/cpg_generator'
         assert page.last['shape']['source'] == "stick figure of 'biped'"
-        until(lambda: len(page.frame.get('cells', ())) == 8, 'two variables of four cells')
+        until(lambda: len(page.last['names']['cells'][0].split(',')) == 4, 'two variables')
+        until(lambda: len(page.frame.get('cells', ())) == 16, 'them of four cells')
         assert all(math.isfinite(value) for value in page.frame['cells'])
         started[1].end()
         until(lambda: page.last['state']['generators'] == ['/a/cpg_generator'], 'one left')

@@ -80,8 +80,8 @@ try:
         time.sleep(GAIT)
         rows = seen[first:]
         result['gaits'][gait] = {
-            'distance': round(math.dist(*([row['x'], row['y']] for row in (rows[0], rows[-1]))),
-                              2),
+            'distance': round(math.dist(*((one['x'], one['y'])
+                                          for one in (rows[0], rows[-1]))), 2),
             'most lean': max(row['lean'] for row in rows),
             'least height': min(row['height'] for row in rows)}
     watcher.set(gait=GAITS[0])

@@ -24,7 +24,7 @@ BEND = {2: 0.5, 4: 1.4}
 #: How far legs swing and knees bend at first, rad.
 SWING, LIFT = 0.15, 0.15
 #: Angles and speeds where the URDF has no limits, rad and rad/s.
-UNBOUNDED, SPEED = pi, 10.0
+UNBOUNDED, SPEED = pi, 20.0
 #: Share of a joint's range that the stand keeps from either end, and of the room that gaits take.
 MARGIN, USED = 0.1, 0.8
 

@@ -249,6 +249,10 @@ def _notes(robot: Robot, urdf: Mapping[str, UrdfJoint]) -> Iterator[str]:
             if (not joint.flaw or joint.kind == 'prismatic') and joint.name not in driven]
     if idle:
         yield 'moving joints of the URDF that no leg drives: ' + ', '.join(idle)
+    if any(joint.invented for joint in robot.joints):
+        yield 'limits that the URDF does not have are invented: ' + ', '.join(
+            f'{joint.name} ({", ".join(joint.invented)})' for joint in robot.joints
+            if joint.invented)
     unbounded = [name for name in driven if name in urdf and urdf[name].velocity == inf]
     if unbounded:
         yield 'the URDF has no velocity limit of ' + (

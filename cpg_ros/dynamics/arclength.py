@@ -22,6 +22,8 @@ TOLERANCE = 1e-9
 NEWTON = 8
 #: Steps along the curve, in the norm of its product: every unknown counts against its scale.
 FIRST, SHORTEST, LONGEST = 0.02, 1e-6, 0.2
+#: Times that a period has grown from which on steps may grow with it.
+GROWN = 3.0
 #: Least cosine of the angle between the tangents of two neighbours.
 ALIGNED = 0.9
 #: No step may take more than this share of the amplitude, so that none leaps over the rest state.
@@ -248,7 +250,7 @@ def follow(start: Place, low: float, high: float, visit: Callable[[Place], str],
     count, here, step = 0, start, first_step
     while count < most:
         # Towards a homoclinic orbit only the period moves, and may move by ever more.
-        longer = max(1.0, float(here.z[-2] / start.z[-2]))
+        longer = max(1.0, float(here.z[-2] / start.z[-2]) / GROWN)
         step = min(step, longest_step * longer, _room(here))
         if step < SHORTEST:
             return folds, 'lost'

@@ -5,6 +5,7 @@ how it ends: at a Hopf point of the rest state, where its amplitude falls to zer
 more symmetry, near a homoclinic orbit, where its period has no bound, or at the ends asked for.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -12,7 +13,7 @@ import numpy as np
 from cpg_ros.dynamics import arclength
 from cpg_ros.dynamics.arclength import Place
 from cpg_ros.dynamics.branch_end import End, grows_alone, without_period
-from cpg_ros.dynamics.orbit import curve_from_rest, curve_through
+from cpg_ros.dynamics.orbit import curve_beside, curve_through
 from cpg_ros.dynamics.periodic import NoOrbit, Orbit, richer
 from cpg_ros.errors import InputError
 from cpg_ros.networks.network import Network
@@ -197,8 +198,47 @@ def from_hopf(network: Network, symmetry: Symmetry, omega: float,
     # Cell 1 peaks at phase 0.
     vector = vector / vector[0]
     _check_vector(vector, symmetry, network)
-    curve, still, border = curve_from_rest(network, symmetry, along, (period, high - low), rest,
-                                           vector, period)
+    branch = from_disturbance(
+        network, symmetry, along, low, high, lambda theta: np.tile(rest, (theta.size, 1)),
+        lambda theta: np.outer(np.exp(2j * np.pi * theta), vector).real, period,
+        amplitude=amplitude, first_step=first_step, longest_step=longest_step, most=most,
+        longest=longest)
+    return replace(branch, ends=(End('rest', value, period), branch.ends[1]))
+
+
+def from_disturbance(network: Network, symmetry: Symmetry, along: ParameterLine, low: float,
+                     high: float, path: Callable[[np.ndarray], np.ndarray],
+                     disturbance: Callable[[np.ndarray], np.ndarray], period: float, *,
+                     amplitude: float = 0.02, first_step: float = arclength.FIRST,
+                     longest_step: float = arclength.LONGEST, most: int = 200,
+                     longest: float = 20.0) -> Branch:
+    """Follow the orbits that leave a state or another orbit, on whichever side of it they are.
+
+    Args:
+        network: at the place.
+        symmetry: of the orbits that leave.
+        along: the line.
+        low: least value.
+        high: greatest value.
+        path: states of what they leave, shape (m, components), over times in cycles.
+        disturbance: the direction in which they leave it, the same.
+        period: at the place, model time.
+        amplitude: share of the disturbance in the first orbit.
+        first_step: arclength of the first step, as in follow.
+        longest_step: arclength of any step.
+        most: points, at most.
+        longest: period, over that at the place, at which the branch ends.
+
+    Raises:
+        InputError: the network is not on the line or not in the range, or the line breaks the
+            symmetry.
+        NoOrbit: Newton's method finds no such orbit.
+
+    """
+    _check(network, symmetry, along, low, high)
+    value = along.value(network)
+    curve, still, border = curve_beside(network, symmetry, along, (period, high - low), path,
+                                        disturbance, period)
     start = arclength.resolved(curve, still + amplitude * border, border)
     if start is None:
         raise NoOrbit(f'no orbit of amplitude {amplitude:g} was found near {along} {value:g}')
@@ -206,7 +246,7 @@ def from_hopf(network: Network, symmetry: Symmetry, omega: float,
         'first_step': first_step, 'longest_step': longest_step, 'most': most})
     here = _point(start)
     return Branch(along, (here, *points), tuple(1 + k for k in turns),
-                  (End('rest', value, period), end))
+                  (End('start', value, period), end))
 
 
 def _check_vector(vector: np.ndarray, symmetry: Symmetry, network: Network) -> None:

@@ -15,6 +15,8 @@ from cpg_ros.dynamics.orbit import Orbit, way
 ATTRACTS = 1.0 - 1e-7
 #: Gains between none and the bound among which the smallest that is enough is looked for.
 GAINS = 8
+#: How well the sign of the growth is known while it is looked for.
+ROUGHLY = 1e-4
 #: Gains that are tried where no bound is known.
 MOST_GAINS = 40
 
@@ -31,6 +33,7 @@ class Multipliers:
         within: in the gait's symmetry class, without the trivial one.
         transverse: outside of it.
         trivial: the one along the orbit, 1 but for the error of the computation.
+        parts: those transverse again, of each subspace that the flow keeps apart from others.
 
     """
 
@@ -39,6 +42,7 @@ class Multipliers:
     within: np.ndarray
     transverse: np.ndarray
     trivial: complex
+    parts: tuple[np.ndarray, ...] = ()
 
     @property
     def leading_within(self) -> float:
@@ -70,7 +74,9 @@ def multipliers(orbit: Orbit, gain: float = 0.0) -> Multipliers:
 
     """
     rest, trivial = way(orbit.network).floquet.within(orbit)
-    return Multipliers(orbit.period, gain, _sorted(rest), _sorted(_outside(orbit, gain)), trivial)
+    parts = way(orbit.network).floquet.transverse(orbit, gain)
+    return Multipliers(orbit.period, gain, _sorted(rest),
+                       _sorted(np.concatenate([np.zeros(0), *parts])), trivial, parts)
 
 
 def leading_within(orbit: Orbit) -> float:
@@ -82,16 +88,20 @@ def _sorted(values: np.ndarray) -> np.ndarray:
     return values[np.argsort(-np.abs(values), kind='stable')]
 
 
-def _outside(orbit: Orbit, gain: float) -> np.ndarray:
-    """All multipliers transverse to the class."""
-    return np.concatenate([np.zeros(0), *way(orbit.network).floquet.transverse(orbit, gain)])
+def attracts_with(orbit: Orbit, gain: float) -> bool:
+    """Whether all disturbances decay with a symmetry lock of this gain, 1/model time."""
+    return max(leading_within(orbit), _largest_outside(orbit, gain)) < ATTRACTS
+
+
+def _largest_outside(orbit: Orbit, gain: float, exact: float = 1e-10) -> float:
+    return float(way(orbit.network).floquet.largest_transverse(orbit, gain, exact))
 
 
 def smallest_gain(orbit: Orbit) -> float:
     """Return the symmetry gain above which every transverse disturbance decays, 1/model time."""
-    def growth(gain: float) -> float:
+    def growth(gain: float, exact: float = 1e-10) -> float:
         """Logarithm of the leading transverse multiplier."""
-        largest = np.abs(_outside(orbit, gain)).max(initial=0.0)
+        largest = _largest_outside(orbit, gain, exact)
         return float(np.log(largest)) if largest > 0.0 else -np.inf
 
     if not orbit.network.delay:
@@ -100,8 +110,11 @@ def smallest_gain(orbit: Orbit) -> float:
     # With a delay a lock need not help evenly: from one that is enough downward.
     enough = sufficient_gain(orbit, 0.0)
     for gain in enough * np.arange(GAINS - 1, -1, -1) / GAINS:
-        if growth(gain) >= 0.0:
-            return float(brentq(growth, gain, enough, xtol=1e-10))
+        if growth(gain, ROUGHLY) >= -ROUGHLY:
+            if growth(gain) < 0.0:
+                enough = gain
+                continue
+            return float(brentq(growth, gain, enough, xtol=1e-8))
         enough = gain
     return 0.0
 
@@ -117,7 +130,7 @@ def sufficient_gain(orbit: Orbit, rate: float) -> float:
         return bound
     gain = 0.0
     for _ in range(MOST_GAINS):
-        largest = float(np.abs(_outside(orbit, gain)).max(initial=0.0))
+        largest = _largest_outside(orbit, gain)
         growth = np.log(largest) / orbit.period + rate if largest > 0.0 else -np.inf
         if growth <= 1e-9:
             break

@@ -10,7 +10,7 @@ from typing import Any
 
 from cpg_ros.dynamics.continuation import from_hopf
 from cpg_ros.dynamics.equilibrium import NoEquilibrium
-from cpg_ros.dynamics.floquet import Multipliers, multipliers, smallest_gain
+from cpg_ros.dynamics.floquet import Multipliers, attracts_with, multipliers, smallest_gain
 from cpg_ros.dynamics.hopf import first_hopf
 from cpg_ros.dynamics.hopf_search import hopf_points
 from cpg_ros.dynamics.orbit import NoOrbit, Orbit, solve_orbit
@@ -81,7 +81,7 @@ class GaitAssessment:
     @cached_property
     def stable_with_default_gain(self) -> bool:
         """Whether the gait attracts with the gain the generator would choose."""
-        return multipliers(self._orbit, self.default_gain).attracts
+        return attracts_with(self._orbit, self.default_gain)
 
     def as_dict(self) -> dict[str, Any]:
         """Everything in plain types, for JSON."""

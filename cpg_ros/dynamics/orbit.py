@@ -22,7 +22,7 @@ from cpg_ros.networks.network import Network, Preset
 from cpg_ros.networks.parameter_line import ParameterLine
 from cpg_ros.networks.symmetry import Symmetry
 
-__all__ = ['NoOrbit', 'Orbit', 'curve_from_rest', 'curve_through', 'solve_beside',
+__all__ = ['NoOrbit', 'Orbit', 'curve_beside', 'curve_through', 'solve_beside',
            'solve_from_path', 'solve_orbit', 'solve_preset', 'way']
 
 
@@ -113,22 +113,22 @@ def curve_through(orbit: Orbit, line: ParameterLine, scales: tuple[float, float]
     return curve, place
 
 
-def curve_from_rest(network: Network, symmetry: Symmetry, line: ParameterLine,
-                    scales: tuple[float, float], rest: np.ndarray, vector: np.ndarray,
-                    period: float) -> tuple[Any, np.ndarray, np.ndarray]:
-    """Return the curve of the orbits born at a Hopf point, rest on it, and the oscillation.
+def curve_beside(network: Network, symmetry: Symmetry, line: ParameterLine,
+                 scales: tuple[float, float], path: Callable[[np.ndarray], np.ndarray],
+                 disturbance: Callable[[np.ndarray], np.ndarray], period: float
+                 ) -> tuple[Any, np.ndarray, np.ndarray]:
+    """Return the curve of the orbits that leave a state or an orbit, that on it, and how.
 
     Args:
-        network: at the Hopf point.
-        symmetry: of the critical class.
+        network: at the place.
+        symmetry: of the orbits.
         line: of parameters.
         scales: against which periods and values on the line are measured.
-        rest: the equilibrium, shape (components,).
-        vector: critical eigenvector, complex, shape (components,), that of cell 1's first
-            variable 1.
-        period: of the critical oscillation, model time.
+        path: states of what they leave, shape (m, components), over times in cycles.
+        disturbance: the direction in which they leave it, the same.
+        period: of the orbits, model time.
 
     """
-    curve, point, border = way(network).curve.from_rest(network, symmetry, line, scales, rest,
-                                                      vector, period)
+    curve, point, border = way(network).curve.beside(network, symmetry, line, scales, path,
+                                                     disturbance, period)
     return curve, point, border

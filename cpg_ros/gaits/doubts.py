@@ -21,7 +21,7 @@ SWING = 2.0 * np.pi
 CHANGE = 0.1
 #: The first and last of so many parts of a stretch are compared, of so many strides at least, and
 #: of so many samples of each joint.
-PARTS, STRIDES, FEWEST = 3, 2, 16
+PARTS, STRIDES, FEWEST = 3, 1, 16
 #: A leg limps that moves by less than this share of what the others do.
 LIMPS = 0.6
 

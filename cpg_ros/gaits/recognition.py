@@ -5,14 +5,14 @@ Golubitsky 2001, section 2.1). Here its violation is measured, for every g and t
 mean cycle; H and K are what is violated by less than the tolerance and forms a homomorphism.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 
 import numpy as np
 
 from cpg_ros.errors import InputError
-from cpg_ros.gaits.mean_cycle import mean_cycle
+from cpg_ros.gaits.mean_cycle import Cycle, mean_cycle
 from cpg_ros.gaits.period import find_period, holds_two
 from cpg_ros.networks.hk_theorem import symmetries
 from cpg_ros.networks.symmetry import Group, Permutation, Symmetry
@@ -21,6 +21,10 @@ from cpg_ros.networks.symmetry import Group, Permutation, Symmetry
 GRID = 1024
 #: Fewest samples that can be told from noise.
 FEWEST = 8
+#: Largest distance of a symmetry that holds in whatever noise; the distance, in what noise and
+#: tolerance explain, at which a gait is as likely as none; and the largest distance of several in
+#: noise, over the usual.
+MOST, NONE, LARGER = 0.3, 3.0, 1.25
 
 
 @dataclass(frozen=True)
@@ -39,6 +43,8 @@ class Recognised:
             if it fits better with a smaller H.
         second: the best of the named gaits whose symmetry is not part of the nearest one's, or
             None if there is none.
+        noise: what noise alone makes of a distance, by what the mean cycle leaves.
+        confidence: probability that it is the nearest gait, not another nor none of them.
         period: in the unit of the times.
         phases: of the cells against cell 1 in cycles, [0, 1), shape (cells,): the shift of best
             correlation; between different waveforms it is no more than that.
@@ -54,6 +60,8 @@ class Recognised:
     distance: float
     margin: float
     second: str | None
+    noise: float
+    confidence: float
     period: float
     phases: np.ndarray
     h: tuple[str, ...]
@@ -154,7 +162,8 @@ def recognise(t: np.ndarray, signals: np.ndarray, group: Group, gaits: Mapping[s
         gaits: name -> symmetry, of that group. A wave and the same one run backwards count as
             two gaits.
         period: in the unit of t; found if not given.
-        tolerance: largest distance of a symmetry that holds; see Recognised.
+        tolerance: largest distance of a symmetry that holds; see Recognised. What noise makes
+            of a distance comes on top.
 
     Raises:
         InputError: a value is not finite, t does not increase, a channel is constant, or there
@@ -166,8 +175,11 @@ def recognise(t: np.ndarray, signals: np.ndarray, group: Group, gaits: Mapping[s
     _checked(t, signals, group, gaits, period, tolerance)
     if period is None:
         period = find_period(t, signals)
-    cycle = mean_cycle(t, signals, period).coefficients
-    violations = _Violations(cycle, group)
+    whole = mean_cycle(t, signals, period)
+    cycle = whole.coefficients
+    violations, noise = _Violations(cycle, group), _noise(whole, t.size)
+    alone = tolerance
+    tolerance = min(float(np.hypot(alone, LARGER * noise)), max(MOST, alone))
     # Out of all homomorphisms, so that what is found is a group and its shifts are consistent.
     found = max((one for one in symmetries(group) if violations.of(one) <= tolerance),
                 key=lambda one: (len(one.h), -violations.of(one)))
@@ -184,11 +196,25 @@ def recognise(t: np.ndarray, signals: np.ndarray, group: Group, gaits: Mapping[s
               if not set(gait.shifts) <= set(gaits[nearest].shifts)]
     second = min(others, key=apart.__getitem__, default=None)
     phases = [_best_shift(cycle[:, [cell]], cycle[:, :1]) for cell in range(group.cells)]
+    sure = _sure(apart[nearest], [apart[name] for name in others], float(np.hypot(alone, noise)))
     return Recognised(nearest if known else None, nearest, apart[nearest],
                       apart[second] - apart[nearest] if second is not None else np.inf, second,
-                      period, np.array(phases), found.h, found.k,
+                      noise, sure, period, np.array(phases), found.h, found.k,
                       {name: violations.best(element)
                        for name, element in group.elements.items()})
+
+
+def _noise(cycle: Cycle, samples: int) -> float:
+    """Distance that noise makes where a symmetry holds: two cells have it, in every term."""
+    terms, left = 2 * len(cycle.coefficients) - 1, min(cycle.residual, 0.999)**2
+    return float(np.sqrt(2.0 * terms / samples * left / (1.0 - left)))
+
+
+def _sure(nearest: float, others: Sequence[float], scatter: float) -> float:
+    """Probability of the nearest gait, from distances and their scatter; none is one of them."""
+    odds = [np.exp(-0.5 * (other**2 - nearest**2) / scatter**2) for other in others]
+    none = np.exp(min(0.5 * ((nearest / scatter)**2 - NONE**2), 30.0))
+    return float(1.0 / (1.0 + sum(odds) + none))
 
 
 def nearest_gait(phases: np.ndarray, table: Mapping[str, np.ndarray]

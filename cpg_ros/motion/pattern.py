@@ -136,8 +136,8 @@ class Pattern:
 
     @property
     def state(self) -> np.ndarray:
-        """The newest network's state, shape (variables * cells,); overwritten by advance."""
-        return self._tracks[-1].stepper.now[0]
+        """The newest network's state and its rate, shape (2, components), of advance's own."""
+        return self._tracks[-1].stepper.now[:2]
 
     @property
     def level(self) -> float:

@@ -14,14 +14,18 @@ FASTEST = 50.0
 
 
 class Cells:
-    """Publishes the network's state on ``~/cells``: one row for each variable of a cell."""
+    """Publishes the network on ``~/cells``: a row for each variable of a cell, one for each rate.
+
+    Rates are in model time.
+    """
 
     def __init__(self, node: Node, network: type[Network]) -> None:
         self._message = Float64MultiArray()
-        self._view = view_of(self._message, 'data', network.cells * network.variables)
+        rows = [*network.states, *(f'd{name}/dt' for name in network.states)]
+        self._view = view_of(self._message, 'data', network.cells * len(rows))
         self._message.layout.dim = [
-            MultiArrayDimension(label=','.join(network.states), size=network.variables,
-                                stride=network.variables * network.cells),
+            MultiArrayDimension(label=','.join(rows), size=len(rows),
+                                stride=len(rows) * network.cells),
             MultiArrayDimension(label='cells', size=network.cells, stride=network.cells)]
         self._publisher = node.create_publisher(
             Float64MultiArray, '~/cells', QoSProfile(depth=10),
@@ -29,9 +33,15 @@ class Cells:
         self._elapsed = 1.0 / FASTEST
 
     def publish(self, dt: float, state: np.ndarray) -> None:
-        """Publish a state, shape (variables * cells,), if it is time; dt in s since the last."""
+        """Publish a state and its rate, if it is time.
+
+        Args:
+            dt: since the last call, s.
+            state: and its rate, shape (2, variables * cells).
+
+        """
         self._elapsed += dt
         if self._elapsed >= (1.0 - 1e-6) / FASTEST:
             self._elapsed = 0.0
-            self._view[:] = state
+            self._view[:] = state.ravel()
             self._publisher.publish(self._message)

@@ -6,7 +6,7 @@ from rosbags.rosbag2 import Reader, ReaderError
 from rosbags.serde import SerdeError
 from rosbags.typesys import Stores, get_typestore
 
-__all__ = ['Reader', 'ReaderError', 'SerdeError', 'deserialize']
+__all__ = ['STORE', 'Reader', 'ReaderError', 'SerdeError', 'deserialize']
 
 #: The layout of a JointState is the same in all ROS 2 distributions.
 STORE = get_typestore(Stores.ROS2_JAZZY)

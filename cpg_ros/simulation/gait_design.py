@@ -4,7 +4,7 @@ All figures are for a leg of LENGTH from thigh joint to foot in the stand; for o
 go with that length, times and speeds with its square root, as for pendulums.
 """
 
-from dataclasses import astuple, dataclass
+from dataclasses import astuple, dataclass, replace
 
 import numpy as np
 
@@ -12,6 +12,8 @@ from cpg_ros.simulation.foot_path import Path
 
 #: Of a leg in the stand, m.
 LENGTH = 0.2664
+#: Share by which strides of the gentlest start are shorter.
+SHORTER = 0.5
 
 
 @dataclass(frozen=True)
@@ -67,6 +69,16 @@ class Aim:
         """Return the design at a place in the unit cube between low and high."""
         low, high = np.array(astuple(self.low)), np.array(astuple(self.high))
         return Design(*(float(value) for value in low + place * (high - low)))
+
+    def gentler(self, share: float) -> 'Aim':
+        """Return the same with a start that asks less of the joints; a share of 1: least."""
+        start, low = self.start, self.low
+        return replace(self, start=replace(
+            start, frequency=start.frequency + share * (low.frequency - start.frequency),
+            stride=max(low.stride, (1.0 - SHORTER * share) * start.stride),
+            push_fore=(1.0 - share) * start.push_fore, push_hind=(1.0 - share) * start.push_hind,
+            lift=start.lift + share * (low.lift - start.lift),
+            height=start.height + share * (low.height - start.height)))
 
     @property
     def place(self) -> np.ndarray:

@@ -10,6 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
+from cpg_ros.dynamics.bifurcation import bifurcations
 from cpg_ros.dynamics.continuation import Branch, follow, from_hopf
 from cpg_ros.dynamics.floquet import ATTRACTS, multipliers
 from cpg_ros.dynamics.hopf import HopfPoint
@@ -26,6 +27,8 @@ COLOURS = {'pronk': '#805ad5', 'pace': '#2f855a', 'bound': '#b7791f', 'trot': '#
 #: Lines of what attracts by itself, with a symmetry lock, and not at all.
 STYLES: tuple[tuple[Literal['-', '--', ':'], str], ...] = (
     ('-', 'stable'), ('--', 'stable with a lock'), (':', 'unstable'))
+#: Marks of places where an orbit's stability changes other than in a fold.
+CROSSINGS = {'torus': 'o', 'period doubling': '^', 'branch point': 'P'}
 #: Points of a branch at most, how far apart in arclength, how many times the first period the
 #: last may be (beyond, near a homoclinic orbit, branches wind), and how many branches are drawn.
 POINTS, LONGEST, SLOWEST, BRANCHES = 80, 0.2, 5.0, 12
@@ -96,19 +99,28 @@ def _draw_branch(axes: Axes, branch: Branch, kinds: list[int], colour: str) -> N
 
 def _draw_branches(axes: Axes, analysis: Analysis) -> None:
     shown, found = set(), branches(analysis)
+    met: dict[str, str] = {}
     total = sum(len(branch.points) for _, branch in found)
     done = 0
     with progress_bar('stability along the branches', total) as bar:
         for gait, branch in found:
-            kinds = []
+            kinds, spectra = [], []
             for place in branch.points:
-                judged = multipliers(place.orbit)
-                kinds.append(0 if judged.attracts else
-                             1 if judged.leading_within < ATTRACTS else 2)
+                spectra.append(multipliers(place.orbit))
+                kinds.append(0 if spectra[-1].attracts else
+                             1 if spectra[-1].leading_within < ATTRACTS else 2)
                 done += 1
                 bar(done)
             _draw_branch(axes, branch, kinds, _colour(gait))
             shown.add(gait)
+            for one in bifurcations(branch, spectra):
+                axes.plot(one.value, one.point.amplitude, marker=CROSSINGS[one.kind], markersize=6,
+                          color=_colour(gait), markerfacecolor='white')
+                met[one.kind] = CROSSINGS[one.kind]
+            for end, last in zip(branch.ends, (branch.points[0], branch.points[-1]), strict=True):
+                if end.why == 'period':
+                    axes.plot(last.value, last.amplitude, marker='x', color=_colour(gait))
+                    met['period grows'] = 'x'
     for point in _on_line(analysis):
         axes.plot(point.value, 0.0, marker='o', color=_colour(point.gait), markersize=5,
                   clip_on=False)
@@ -124,6 +136,8 @@ def _draw_branches(axes: Axes, analysis: Analysis) -> None:
                 for style, label in STYLES]
     handles += [Line2D([], [], color='black', marker=marker, linestyle='', label=label)
                 for marker, label in (('o', 'Hopf point'), ('s', 'fold'), ('D', 'this set'))]
+    handles += [Line2D([], [], color='black', marker=marker, linestyle='', label=label,
+                       markerfacecolor='white') for label, marker in met.items()]
     axes.legend(handles=handles, fontsize=7, ncols=2, frameon=False)
     axes.set_ylim(bottom=0.0)
     timed = analysis.along.names == (analysis.delay,)

@@ -3,5 +3,5 @@
 Imports ``motion`` and ``robots`` and what is below; knows nothing of ROS.
 """
 
-__all__ = ['crc', 'dangers', 'low_cmd', 'low_state', 'models', 'settings', 'supervisor',
-           'targets', 'vigil']
+__all__ = ['crc', 'dangers', 'low_cmd', 'low_state', 'models', 'participants', 'settings',
+           'supervisor', 'targets', 'vigil']

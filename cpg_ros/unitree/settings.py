@@ -28,7 +28,8 @@ class Settings:
         damping: kd once nothing else holds the joints, N m s / rad.
         rise: time from the measured pose to the stand, s.
         approach: time from the stand to the first targets, s.
-        sit: time from where it is to lying, s.
+        sit: time from the stand to lying, s.
+        fold: time in which legs amid a stride join the others on that way, s.
         target_timeout: longest time without a fresh target, s.
         state_timeout: longest time without a fresh state, s.
         tilt: largest lean of the body, rad.
@@ -53,6 +54,7 @@ class Settings:
     rise: float = 2.0
     approach: float = 1.0
     sit: float = 1.5
+    fold: float = 0.15
     target_timeout: float = 0.1
     state_timeout: float = 0.02
     tilt: float = math.radians(50.0)

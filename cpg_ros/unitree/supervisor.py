@@ -32,6 +32,11 @@ class Phase(Enum):
 DRIVEN = (Phase.RISING, Phase.STANDING, Phase.FOLLOWING, Phase.SITTING)
 
 
+def _between(start: np.ndarray, end: np.ndarray, share: float) -> np.ndarray:
+    """Return the angles on the smooth way from one pose to another, share from 0 to 1 or more."""
+    return start + smoothstep(min(share, 1.0))[0] * (end - start)
+
+
 class Supervisor:
     """Fills a command every period, from what is measured and what is asked for.
 
@@ -159,20 +164,21 @@ class Supervisor:
             self.sit(now, targets.refused or f'no fresh target for {1e3 * timeout:.0f} ms')
 
     def _lead(self, now: float, dt: float) -> None:
-        settings, phase = self._settings, self.phase
+        settings, phase, passed = self._settings, self.phase, now - self._began
         if phase is Phase.FOLLOWING:
             goal, time = self.targets.at(now), settings.approach
+        elif phase is Phase.SITTING:
+            # All legs on one way: a robot that holds its legs as in mid-stride topples.
+            goal = _between(settings.stand, settings.lying, passed / settings.sit)
+            time = settings.fold
         else:
-            goal, time = {Phase.RISING: (settings.stand, settings.rise),
-                          Phase.STANDING: (settings.stand, 0.0),
-                          Phase.SITTING: (settings.lying, settings.sit)}[phase]
-        passed = now - self._began
+            goal, time = settings.stand, settings.rise if phase is Phase.RISING else 0.0
         if passed < time:
-            goal = self._from + smoothstep(passed / time)[0] * (goal - self._from)
+            goal = _between(self._from, goal, passed / time)
         # After a late tick no more than two periods' way.
         way = settings.velocity * min(dt, 2.0 * settings.period)
         self._at = np.minimum(np.maximum(goal, self._at - way), self._at + way)
-        if passed >= time:
+        if passed >= (settings.sit if phase is Phase.SITTING else time):
             self._arrive(now)
         if self.phase in DRIVEN:
             self._drive()

@@ -27,6 +27,8 @@ KINDS: dict[str, tuple[Callable[[], StartedNode], tuple[dict[str, str], ...]]] =
     'inversion': (Inversion, ({},))}
 #: Topics whose names are the same in every namespace.
 ABSOLUTE = ('/diagnostics', '/clock', '/tf', '/lowcmd', '/lowstate')
+#: Of another build of the documentation on this machine, at the same time, there are nodes, too.
+DOMAIN = 180 + os.getpid() % 50
 #: Every node of ROS has these.
 COMMON = ('/rosout', '/parameter_events', 'parameters', 'parameter_types',
           'parameters_atomically', 'get_type_description')
@@ -40,7 +42,7 @@ def of(kind: str) -> dict[str, tuple[str, str]]:
         words = [word for name, value in given.items() for word in ('-p', f'{name}:={value}')]
         # The graph is of no concern here: nobody else is on this domain of this machine.
         os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
-        rclpy.init(args=['--ros-args', *words, '--log-level', 'ERROR'], domain_id=231)
+        rclpy.init(args=['--ros-args', *words, '--log-level', 'ERROR'], domain_id=DOMAIN)
         try:
             for name, (direction, type_) in _settled(make()):
                 before = found.get(name, (direction, type_))[0]

@@ -5,6 +5,7 @@ Unknowns are counted against their scales: states against 1, where cells saturat
 the parameter against what is given.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -23,6 +24,9 @@ from cpg_ros.dynamics.periodic import NoOrbit
 from cpg_ros.networks.network import Network
 from cpg_ros.networks.parameter_line import ParameterLine
 from cpg_ros.networks.symmetry import Symmetry
+
+#: States, shape (m, components), as a function of times in cycles, shape (m,).
+States = Callable[[np.ndarray], np.ndarray]
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,26 +112,24 @@ def through(orbit: FourierOrbit, line: ParameterLine, scales: tuple[float, float
             np.array([*orbit.values.ravel(), orbit.period, line.value(orbit.network)]))
 
 
-def from_rest(network: Network, symmetry: Symmetry, line: ParameterLine,
-              scales: tuple[float, float], rest: np.ndarray, vector: np.ndarray, period: float
-              ) -> tuple[FourierCurve, np.ndarray, np.ndarray]:
-    """The orbits near a Hopf point: their curve, the rest state on it, and the oscillation.
+def beside(network: Network, symmetry: Symmetry, line: ParameterLine,
+           scales: tuple[float, float], path: States, disturbance: States, period: float
+           ) -> tuple[FourierCurve, np.ndarray, np.ndarray]:
+    """The orbits near a state or an orbit: their curve, that on it, and how they leave it.
 
     Args:
-        network: at the Hopf point.
-        symmetry: of the critical class.
+        network: at the place.
+        symmetry: of the orbits.
         line: of parameters.
         scales: as of the curve.
-        rest: the equilibrium, shape (components,).
-        vector: critical eigenvector, complex, shape (components,), that of cell 1's first
-            variable 1.
-        period: of the critical oscillation, model time.
+        path: states of what they leave, shape (m, components), over times in cycles.
+        disturbance: the direction in which, the same.
+        period: of the orbits, model time.
 
     """
     columns = [variable * network.cells + cell for cell in symmetry.first
                for variable in range(network.variables)]
-    turns = np.exp(2j * np.pi * np.arange(NODES) / NODES)
-    wave = np.multiply.outer(vector[columns], turns).real
+    theta = np.arange(NODES) / NODES
     return (FourierCurve(network, symmetry, line, scales),
-            np.concatenate([np.repeat(rest[columns], NODES), [period, line.value(network)]]),
-            np.concatenate([wave.ravel(), [0.0, 0.0]]))
+            np.append(path(theta)[:, columns].T.ravel(), [period, line.value(network)]),
+            np.append(disturbance(theta)[:, columns].T.ravel(), [0.0, 0.0]))

@@ -7,19 +7,24 @@ so that a delayed value always lies at a point; the monodromy matrix takes the v
 history to those a period later (Breda, Maset & Vermiglio 2012).
 """
 
+from collections.abc import Callable
+from contextlib import suppress
 from functools import lru_cache
 
 import numpy as np
+from scipy.sparse.linalg import ArpackError, LinearOperator, eigs
 
 from cpg_ros.dynamics.fourier.orbit import FourierOrbit
 from cpg_ros.dynamics.isotypic_split import split
 from cpg_ros.networks.field import Field
 
 #: Polynomial degree on an element, and how much of a period one holds at most.
-DEGREE, SPAN = 20, 0.3
+DEGREE, SPAN = 20, 0.4
 #: Elements are halved until the trivial multiplier is 1 to this.
 TRIVIAL = 1e-9
 HALVINGS = 4
+#: Up to this size of a matrix all of its eigenvalues take no longer than the largest.
+FEW = 90
 
 
 def _differentiation(degree: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -58,16 +63,19 @@ class Variation:
         _, self.now, self.past = Field(network).linearised(orbit(times),
                                                            orbit(times - network.delay))
         self.inside, self.outside = split(orbit.symmetry)
+        self._vectors: dict[int, np.ndarray] = {}
 
-    def monodromy(self, columns: np.ndarray, gain: float) -> np.ndarray:
-        """Return the matrix that takes a history in a subspace to the one a period later.
+    def period_map(self, columns: np.ndarray, gain: float
+                   ) -> tuple[int, Callable[[np.ndarray], np.ndarray]]:
+        """Return the map that takes histories in a subspace to those a period later.
 
         Args:
             columns: orthonormal, shape (components, d).
             gain: symmetry lock, 1/model time; 0 within the class.
 
         Returns:
-            A matrix of size d (n degree + 1).
+            Length of a history, d (n degree + 1), and a function of k histories, shape
+            (length, k).
 
         """
         d, degree = columns.shape[1], DEGREE
@@ -79,27 +87,46 @@ class Variation:
         s = np.arange(degree)
         system[:, s, :, s, :] -= now.transpose(1, 0, 2, 3)
         inverse = np.linalg.inv(system.reshape(self.count, degree * d, degree * d))
-        # Values at the points of all elements, as linear functions of the first history's.
-        values = np.zeros(((self.n + self.count) * degree + 1, d, size))
-        values[:self.n * degree + 1] = np.eye(size).reshape(-1, d, size)
-        for element in range(self.count):
-            start = (self.n + element) * degree
-            heard = values[element * degree + 1:(element + 1) * degree + 1]
-            right = past[element] @ heard - (
-                DERIVATIVE[1:, 0, None, None] / self.length * values[start])
-            values[start + 1:start + degree + 1] = (
-                inverse[element] @ right.reshape(degree * d, size)).reshape(degree, d, size)
         # Where the last history lies among the elements.
         points = np.append((np.arange(self.n)[:, None] + POINTS[:-1]).ravel(), self.n)
         places = points + self.period / self.length
         elements = np.minimum(places.astype(int), self.n + self.count - 1)
         rows = _interpolation(places - elements)
-        nearby = values[elements[:, None] * degree + np.arange(degree + 1)]
-        return np.einsum('mk,mkds->mds', rows, nearby).reshape(size, size)
+        nearby = elements[:, None] * degree + np.arange(degree + 1)
 
-    def transverse(self, gain: float) -> tuple[np.ndarray, ...]:
-        """Return the multipliers of each subspace transverse to the class, with a lock."""
-        return tuple(np.linalg.eigvals(self.monodromy(columns, gain)) for columns in self.outside)
+        def later(histories: np.ndarray) -> np.ndarray:
+            k = histories.shape[1]
+            # Values at the points of all elements.
+            values = np.empty(((self.n + self.count) * degree + 1, d, k))
+            values[:self.n * degree + 1] = histories.reshape(-1, d, k)
+            for element in range(self.count):
+                start = (self.n + element) * degree
+                heard = values[element * degree + 1:(element + 1) * degree + 1]
+                right = past[element] @ heard - (
+                    DERIVATIVE[1:, 0, None, None] / self.length * values[start])
+                values[start + 1:start + degree + 1] = (
+                    inverse[element] @ right.reshape(degree * d, k)).reshape(degree, d, k)
+            return np.einsum('mk,mkds->mds', rows, values[nearby]).reshape(size, k)
+
+        return size, later
+
+    def multipliers(self, columns: np.ndarray, gain: float) -> np.ndarray:
+        """Return the multipliers in a subspace, as period_map has it."""
+        size, later = self.period_map(columns, gain)
+        return np.linalg.eigvals(later(np.eye(size)))
+
+    def largest(self, which: int, gain: float, exact: float) -> float:
+        """Return the modulus of the largest in a subspace outside, by Arnoldi's method if many."""
+        size, later = self.period_map(self.outside[which], gain)
+        if size > FEW:
+            operator = LinearOperator((size, size), matvec=lambda x: later(x.reshape(-1, 1))[:, 0])
+            # The last gain's answer is a good start.
+            start = self._vectors.get(which, np.random.default_rng(0).standard_normal(size))
+            with suppress(ArpackError):
+                found, vectors = eigs(operator, k=2, ncv=24, tol=exact, v0=start, maxiter=20)
+                self._vectors[which] = vectors.real.sum(axis=1)
+                return float(np.abs(found).max())
+        return float(np.abs(np.linalg.eigvals(later(np.eye(size)))).max())
 
 
 def within(orbit: FourierOrbit) -> tuple[np.ndarray, complex]:
@@ -111,7 +138,15 @@ def within(orbit: FourierOrbit) -> tuple[np.ndarray, complex]:
 
 def transverse(orbit: FourierOrbit, gain: float = 0.0) -> tuple[np.ndarray, ...]:
     """Return the multipliers of each subspace transverse to the class, with a symmetry lock."""
-    return variation(orbit)[0].transverse(gain)
+    equation = variation(orbit)[0]
+    return tuple(equation.multipliers(columns, gain) for columns in equation.outside)
+
+
+def largest_transverse(orbit: FourierOrbit, gain: float = 0.0, exact: float = 1e-10) -> float:
+    """Return the modulus of the largest of them, to a relative error; 0 if there is none."""
+    equation = variation(orbit)[0]
+    return max((equation.largest(which, gain, exact) for which in range(len(equation.outside))),
+               default=0.0)
 
 
 @lru_cache(maxsize=4)
@@ -120,7 +155,7 @@ def variation(orbit: FourierOrbit) -> tuple[Variation, np.ndarray]:
     n = max(1, int(np.ceil(orbit.network.delay / (SPAN * orbit.period))))
     for halving in range(HALVINGS):
         equation = Variation(orbit, n * 2**halving)
-        within = np.linalg.eigvals(equation.monodromy(equation.inside, 0.0))
+        within = equation.multipliers(equation.inside, 0.0)
         if np.abs(within - 1.0).min() <= TRIVIAL:
             break
     return equation, within

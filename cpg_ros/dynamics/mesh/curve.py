@@ -17,6 +17,7 @@ from cpg_ros.dynamics.mesh.newton import (
     bordered,
     completed,
     finer,
+    first_mesh,
     linearised,
     path_of,
     remeshed,
@@ -27,8 +28,8 @@ from cpg_ros.networks.network import Network
 from cpg_ros.networks.parameter_line import ParameterLine
 from cpg_ros.networks.symmetry import Symmetry
 
-#: Intervals of the first mesh at a Hopf point; it is made finer at once if need be.
-INTERVALS = 20
+#: States, shape (m, components), as a function of times in cycles, shape (m,).
+States = Callable[[np.ndarray], np.ndarray]
 
 
 @dataclass(frozen=True, eq=False)
@@ -172,32 +173,28 @@ def through(orbit: MeshOrbit, line: ParameterLine, scales: tuple[float, float]
                              line.value(orbit.network))
 
 
-def from_rest(network: Network, symmetry: Symmetry, line: ParameterLine,
-              scales: tuple[float, float], rest: np.ndarray, vector: np.ndarray, period: float
-              ) -> tuple[MeshCurve, np.ndarray, np.ndarray]:
-    """The orbits near a Hopf point: their curve, the rest state on it, and the oscillation.
+def beside(network: Network, symmetry: Symmetry, line: ParameterLine,
+           scales: tuple[float, float], path: States, disturbance: States, period: float
+           ) -> tuple[MeshCurve, np.ndarray, np.ndarray]:
+    """The orbits near a state or an orbit: their curve, that on it, and how they leave it.
 
     Args:
-        network: at the Hopf point.
-        symmetry: of the critical class.
+        network: at the place.
+        symmetry: of the orbits.
         line: of parameters.
         scales: as of the curve.
-        rest: the equilibrium, shape (components,).
-        vector: critical eigenvector, complex, shape (components,), that of cell 1's first
-            variable 1.
-        period: of the critical oscillation, model time.
+        path: states of what they leave, shape (m, components), over times in cycles.
+        disturbance: the direction in which, the same.
+        period: of the orbits, model time.
 
     """
-    curve = MeshCurve(network, symmetry, line, scales, np.linspace(0.0, 1.0, INTERVALS + 1))
     reduced = Reduced(network, symmetry)
 
-    def wave(places: np.ndarray) -> np.ndarray:
-        turns = np.exp(2j * np.pi * places / symmetry.order)
-        return (turns[:, None] * vector[reduced.kept]).real
+    def on_quotient(states: States) -> States:
+        return lambda places: states(places / symmetry.order)[:, reduced.kept]
 
-    def still(places: np.ndarray) -> np.ndarray:
-        return np.tile(rest[reduced.kept], (places.size, 1))
-
-    return (curve, curve.pack(sampled(still, curve.mesh, 1.0), period / symmetry.order,
+    mesh = first_mesh(reduced, on_quotient(path))
+    curve = MeshCurve(network, symmetry, line, scales, mesh)
+    return (curve, curve.pack(sampled(on_quotient(path), mesh, 1.0), period / symmetry.order,
                               line.value(network)),
-            curve.pack(sampled(wave, curve.mesh, 1.0), 0.0, 0.0))
+            curve.pack(sampled(on_quotient(disturbance), mesh, 1.0), 0.0, 0.0))

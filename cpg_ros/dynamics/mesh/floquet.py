@@ -32,6 +32,11 @@ def transverse(orbit: MeshOrbit, gain: float = 0.0) -> tuple[np.ndarray, ...]:
     return tuple(part * np.exp(-gain * orbit.period) for part in multipliers(orbit)[1])
 
 
+def largest_transverse(orbit: MeshOrbit, gain: float = 0.0, exact: float = 0.0) -> float:
+    """Return the modulus of the largest of them, 0 if there is none; always as exact as can be."""
+    return max((float(np.abs(part).max()) for part in transverse(orbit, gain)), default=0.0)
+
+
 @lru_cache(maxsize=4)
 def multipliers(orbit: MeshOrbit) -> tuple[np.ndarray, tuple[np.ndarray, ...], float]:
     """Return the multipliers within the class, transverse to it, and the trivial one, no lock.
@@ -70,7 +75,8 @@ class Flow:
         symmetry, network = orbit.symmetry, orbit.network
         place = Reduced(network, symmetry).place
         self._jacobians = network.jacobian(orbit.stages[..., place])
-        self._lengths = np.diff(orbit.mesh) * orbit.period / symmetry.order
+        #: Of the intervals, model time.
+        self.lengths = np.diff(orbit.mesh) * orbit.period / symmetry.order
         self._turn = (symmetry.turn
                       + np.arange(network.variables)[:, None] * network.cells).ravel()
 
@@ -84,10 +90,14 @@ class Flow:
             Matrices of the intervals, shape (n, d, d), and x -> x[turn], shape (d, d).
 
         """
-        jacobians = columns.T @ (self._jacobians @ columns)
-        answers = transfer(jacobians, self._lengths, np.zeros((*jacobians.shape[:3], 0)))
-        steps = np.eye(columns.shape[1]) + summed(jacobians, self._lengths, answers)
+        jacobians, answers = self.solved(columns)
+        steps = np.eye(columns.shape[1]) + summed(jacobians, self.lengths, answers)
         return steps, columns.T @ columns[self._turn]
+
+    def solved(self, columns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return Jacobians and flow at the nodes of each interval, shape (n, S, d, d) each."""
+        jacobians = columns.T @ (self._jacobians @ columns)
+        return jacobians, transfer(jacobians, self.lengths, np.zeros((*jacobians.shape[:3], 0)))
 
 
 def _across(along: np.ndarray) -> np.ndarray:

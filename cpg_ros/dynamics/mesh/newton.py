@@ -191,15 +191,18 @@ def collocate(network: Network, symmetry: Symmetry, path: Callable[[np.ndarray],
 
     """
     reduced = Reduced(network, symmetry)
-    coarse = np.linspace(0.0, 1.0, 513)
 
     def guess(places: np.ndarray) -> np.ndarray:
         return path(places / symmetry.order)[:, reduced.kept]
 
-    bend = np.abs(np.diff(reduced.rates(guess(coarse)), axis=0)).max(axis=1)
-    now = sampled(guess, collocation.spread(coarse, np.sqrt(bend + 1e-3 * bend.max() + 1e-12), 30),
-                  period / symmetry.order)
-    return _refined(reduced, now)
+    return _refined(reduced, sampled(guess, first_mesh(reduced, guess), period / symmetry.order))
+
+
+def first_mesh(reduced: Reduced, path: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
+    """Return a mesh of few intervals for a path over the places 0 to 1, by how it bends."""
+    coarse = np.linspace(0.0, 1.0, 513)
+    bend = np.abs(np.diff(reduced.rates(path(coarse)), axis=0)).max(axis=1)
+    return collocation.spread(coarse, np.sqrt(bend + 1e-3 * bend.max() + 1e-12), 30)
 
 
 def predicted(network: Network, near: MeshOrbit) -> MeshOrbit | None:

@@ -32,6 +32,7 @@ from cpg_ros.nodes.unserved import subscribe, taken
 from cpg_ros.robots.robot_file import find_robot
 from cpg_ros.unitree.low_state import BUTTONS
 from cpg_ros.unitree.models import MODELS
+from cpg_ros.unitree.participants import Announcements
 from cpg_ros.unitree.settings import places, settings_of
 from cpg_ros.unitree.supervisor import DRIVEN, Phase, Supervisor
 
@@ -87,6 +88,8 @@ class UnitreeBridge(StartedNode):
                                  f'in domain {domain} already') from error
             self._publisher = self.create_publisher(kinds[0], topic, quality())
             self._watchdog = WatchdogLink(domain, topic, period)
+        self._announcements = Announcements(domain)
+        self._harmful = ''
         self._others = Others(self, topic, int(not self._dry), value('own_publishers'))
         self._states = subscribe(self, kinds[1], '/lowstate', best_effort(), raw=True)
         self._commands = Commands(self, robot, value('command'), period,
@@ -205,7 +208,7 @@ class UnitreeBridge(StartedNode):
         if switch and self._dry:
             self.get_logger().info('dry run: CheckMode, StandDown and ReleaseMode are not sent')
         watchdog = self._watchdog
-        self._start = Start(self, self._others, lambda: self._received > 0,
+        self._start = Start(self, self._others, lambda: self._harmful, lambda: self._received > 0,
                             watchdog.start if watchdog is not None else str, self._rise,
                             switch and not self._dry, self._started)
         self._start.start()
@@ -231,7 +234,11 @@ class UnitreeBridge(StartedNode):
             self.get_logger().error(f'not started: {reason}')
 
     def _look(self) -> None:
-        """See whether somebody else commands the robot."""
+        """See whether somebody else commands the robot, or would crash its software."""
+        if (found := self._announcements.look()) and not self._harmful:
+            self._harmful = found
+            self.get_logger().error(f'{found} is on this network: it crashes the 0.10 of '
+                                    "Unitree's firmware; end it")
         if self._supervisor.phase in DRIVEN and (found := self._others.found()):
             reason = f'the robot is commanded by {found}, too'
             self._requests.append(lambda now: self._supervisor.sit(now, reason))
@@ -294,6 +301,7 @@ class UnitreeBridge(StartedNode):
         self.ticker.end()
         self.ticker.join(timeout=1.0)
         self._give_up('the bridge ends')
+        self._announcements.close()
         if self._watchdog is not None and self.failure is None:
             self._watchdog.end()
 

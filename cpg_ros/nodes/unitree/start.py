@@ -75,14 +75,15 @@ class Service:
 class Start(threading.Thread):
     """Leads through the steps in a thread of its own; each is said, and refused with a reason."""
 
-    def __init__(self, node: Node, others: Others, heard: Callable[[], bool],
-                 watched: Callable[[], str], rise: Callable[[], str], switch: bool,
-                 ended: Callable[[str], None]) -> None:
+    def __init__(self, node: Node, others: Others, harmful: Callable[[], str],
+                 heard: Callable[[], bool], watched: Callable[[], str], rise: Callable[[], str],
+                 switch: bool, ended: Callable[[str], None]) -> None:
         """Be ready to start.
 
         Args:
             node: for the log and the services.
             others: who must not command the robot, too.
+            harmful: what on the network would crash the robot's software, or ''.
             heard: whether a state has come.
             watched: starts the watchdog; returns why not, or ''.
             rise: lets the robot rise; returns why not, or ''.
@@ -91,7 +92,7 @@ class Start(threading.Thread):
 
         """
         super().__init__(name='start', daemon=True)
-        self._node, self._others, self._heard = node, others, heard
+        self._node, self._others, self._harmful, self._heard = node, others, harmful, heard
         self._watched, self._rise, self._switch, self._ended = watched, rise, switch, ended
         self._given_up = threading.Event()
         self._reason = ''
@@ -146,6 +147,9 @@ class Start(threading.Thread):
         self._say('the robot is heard')
 
     def _look_for_others(self) -> None:
+        if found := self._harmful():
+            raise Refused(f"{found} is on this network: it crashes the 0.10 of Unitree's "
+                          'firmware; end it')
         end, told = time.monotonic() + FORGOTTEN, False
         while found := self._others.found():
             if not found.endswith(f'/{BRIDGE}') or ',' in found:

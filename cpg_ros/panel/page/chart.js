@@ -116,6 +116,7 @@ export class Chart {
     context.textBaseline = 'middle';
     for (const [text, shade] of entries) {
       const wide = context.measureText(text).width;
+      if (x + wide + 14 > this.x1) break;
       context.fillStyle = style('--card');
       context.fillRect(x - 2, this.y1 + 1, wide + 20, 14);
       context.fillStyle = shade;

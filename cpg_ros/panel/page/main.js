@@ -33,7 +33,7 @@ dark.addEventListener('change', paint);
 
 // -- its parts --------------------------------------------------------------------------------
 
-let socket = null, state = {}, body = null, frames = 0, counted = 0, fresh = true;
+let socket = null, opened = false, state = {}, body = null, frames = 0, counted = 0, fresh = true;
 const last = {};
 const send = (request) => {
   if (socket?.readyState === WebSocket.OPEN) socket.send(JSON.stringify(request));
@@ -159,7 +159,6 @@ function connect() {
   where.hash = '';
   where.search = token ? `?token=${encodeURIComponent(token)}` : '';
   socket = new WebSocket(where);
-  let opened = false;
   socket.onopen = () => {
     opened = true;
     takes.wanted = false;

@@ -31,12 +31,9 @@ export class Plots {
     const [states, cells] = (names.cells || ['', '']).map((text) => text.split(':'));
     this.cellCount = +cells[1] || 0;
     this.states = states[0].split(',');
-    // A cell's second variable against its first; of cells that have but one, how fast it changes.
-    const [x, y] = this.states, rest = (k) => y ? [`${y}${k + 1}`, this.cellCount + k]
-      : [`d${x}${k + 1}/dt`, -1];
-    this.pairs = Object.fromEntries(Array.from({ length: this.cellCount }, (_, k) =>
-      [`cell ${k + 1}`, [[`${x}${k + 1}`, k], rest(k)]]));
-    this.fill(this.portrait, Object.keys(this.pairs), 'portrait');
+    // A cell's second variable against its first; of cells that have but one, its rate.
+    this.cellNames = Array.from({ length: this.cellCount }, (_, k) => `cell ${k + 1}`);
+    this.fill(this.portrait, this.cellNames, 'portrait');
     this.fill(this.leg, [...new Set(this.legs())], 'leg');
   }
 
@@ -97,21 +94,18 @@ export class Plots {
   }
 
   phase(chart, shown) {
-    const pair = this.pairs?.[this.portrait.value];
-    if (!pair || !shown.at(-1).cells) return chart.say('the generator publishes no ~/cells');
-    const [[x, first], [y, second]] = pair;
-    const xs = shown.map((frame) => frame.cells?.[first]);
-    const ys = second >= 0 ? shown.map((frame) => frame.cells?.[second]) : xs.map((value, k) => {
-      const [from, to] = [Math.max(k - 1, 0), Math.min(k + 1, xs.length - 1)];
-      const passed = shown[to].time - shown[from].time;
-      return passed > 0 ? (xs[to] - xs[from]) / passed : null;
-    });
+    const cell = this.cellNames?.indexOf(this.portrait.value) ?? -1;
+    if (cell < 0 || !shown.at(-1).cells) return chart.say('the generator publishes no ~/cells');
+    const [x, y] = this.states;
+    const [xs, ys] = [cell, this.cellCount + cell].map((k) =>
+      shown.map((frame) => frame.cells?.[k]));
     const span = (values) => {
       const known = values.filter((value) => value != null);
       const low = Math.min(...known), high = Math.max(...known), rim = 0.08 * (high - low) + 1e-3;
       return [low - rim, high + rim];
     };
-    chart.begin([...span(xs), `${x} [1]`], [...span(ys), second < 0 ? `${y} [1/s]` : `${y} [1]`]);
+    const unit = y.startsWith('d') ? '1/model time' : '1';
+    chart.begin([...span(xs), `${x} [1]`], [...span(ys), `${y} [${unit}]`]);
     chart.line(xs, ys, colour(0), 1);
     chart.dot(xs.at(-1), ys.at(-1), colour(1));
   }

@@ -168,7 +168,7 @@ export class Scene {
     const now = performance.now(), passed = now - (this.before ?? now);
     this.before = now;
     if (passed > 0 && passed < 1000) this.pace = 0.8 * (this.pace ?? 33) + 0.2 * passed;
-    if (this.pace > 70) this.share = Math.max(0.3, 0.9 * (this.share ?? 1));
+    if (this.pace > 70) this.share = Math.max(0.5, 0.9 * (this.share ?? 1));
     else if (this.pace < 40) this.share = Math.min(1, 1.01 * (this.share ?? 1));
     return this.share ?? 1;
   }

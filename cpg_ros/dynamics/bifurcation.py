@@ -1,0 +1,145 @@
+"""Where orbits on a branch gain or lose stability other than by a fold.
+
+A multiplier that crosses the unit circle at 1 lets another branch leave (or this one fold), one
+at -1 a branch of twice the period, and a pair a torus (Kuznetsov, *Elements of Applied Bifurcation
+Theory*, chapter 5). Symmetry keeps subspaces apart, so crossings are counted in each by itself:
+what happens in two of them at one place is not mistaken for a pair.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from scipy.optimize import brentq
+
+from cpg_ros.dynamics import arclength
+from cpg_ros.dynamics.arclength import Place
+from cpg_ros.dynamics.continuation import Branch, BranchPoint
+from cpg_ros.dynamics.floquet import Multipliers, multipliers
+from cpg_ros.dynamics.periodic import NoOrbit
+
+#: Share of the way between two points of a branch to which a crossing is located.
+EXACT = 1e-7
+#: A multiplier whose logarithm stays this small is neutral, not crossing.
+NEUTRAL = 1e-6
+#: A multiplier is real where its imaginary part is smaller.
+REAL = 1e-3
+
+
+@dataclass(frozen=True, eq=False)
+class Bifurcation:
+    """A point of a branch where a multiplier crosses the unit circle.
+
+    Attributes:
+        kind: 'torus', 'period doubling' or 'branch point'.
+        point: of the branch.
+        multiplier: that crosses; of a pair the one with positive imaginary part.
+        part: number of the subspace it belongs to: 0 the gait's class, then those transverse.
+
+    """
+
+    kind: str
+    point: BranchPoint
+    multiplier: complex
+    part: int
+
+    @property
+    def value(self) -> float:
+        """Where on the line."""
+        return self.point.value
+
+
+def bifurcations(branch: Branch, judged: Sequence[Multipliers] | None = None
+                 ) -> tuple[Bifurcation, ...]:
+    """Locate all crossings of the unit circle between the points of a branch, in its order.
+
+    Two that lie between the same points in one subspace and take each other back are not seen.
+
+    Args:
+        branch: of orbits.
+        judged: multipliers of its points, where they are known already.
+
+    """
+    spectra = [_parts(one) for one in judged or (multipliers(point.orbit)
+                                                 for point in branch.points)]
+    found: list[Bifurcation] = []
+    for k, part, rank in _crossings(branch, spectra):
+        try:
+            one = _located(branch.points[k], branch.points[k + 1], part, rank)
+        except NoOrbit:
+            # Two curves that cross are hard to tell apart right there.
+            continue
+        if one is not None and not any(
+                one.kind == other.kind and np.isclose(one.value, other.value, 1e-7, 1e-9)
+                and np.isclose(one.point.orbit.period, other.point.orbit.period, 1e-5)
+                for other in found):
+            found.append(one)
+    return tuple(found)
+
+
+def _parts(judged: Multipliers) -> list[np.ndarray]:
+    """Multipliers of each subspace, largest first, that of the gait's class without 1 first."""
+    return [part[np.argsort(-np.abs(part), kind='stable')] for part in
+            (judged.within, *judged.parts)]
+
+
+def _crossings(branch: Branch, spectra: list[list[np.ndarray]]
+               ) -> Iterator[tuple[int, int, int]]:
+    """Number of the point before, of the subspace, and how many there are larger."""
+    for k, (left, right) in enumerate(pairwise(spectra)):
+        for part, (one, other) in enumerate(zip(left, right, strict=True)):
+            before, after = (int((np.abs(some) > 1.0).sum()) for some in (one, other))
+            folds = {k, k + 1} & set(branch.turns)
+            for rank in range(min(before, after), max(before, after)):
+                pair = one[rank], other[rank]
+                # At a fold one multiplier of the class is 1, to rounding.
+                if part == 0 and folds and any(abs(mu - 1.0) < 1e-3 for mu in pair):
+                    continue
+                if max(abs(np.log(np.abs(mu))) for mu in pair) > NEUTRAL:
+                    yield k, part, rank
+
+
+def _between(left: Place, right: Place, share: float) -> Place | None:
+    """The curve's point at a share of the way, in the value or, if that hardly moves, the period.
+
+    Raises:
+        NoOrbit: it cannot be resolved.
+
+    """
+    gaps = [(right.z[which] - left.z[which]) / scale
+            for which, scale in ((-1, 1.0), (-2, left.z[-2]))]
+    which = -1 if abs(gaps[0]) >= 1e-3 * abs(gaps[1]) else -2
+    target = left.z[which] + share * (right.z[which] - left.z[which])
+    near = left if share < 0.5 else right
+    z = near.z + (target - near.z[which]) / near.tangent[which] * near.tangent
+    z[which] = target
+    return arclength.resolved(near.curve, z, arclength.held(z.size, which))
+
+
+def _located(left: BranchPoint, right: BranchPoint, part: int, rank: int) -> Bifurcation | None:
+    """The crossing between two points of a multiplier with so many that are larger."""
+    tried: dict[float, tuple[BranchPoint, complex]] = {}
+
+    def size(share: float) -> float:
+        """Logarithm of the multiplier's modulus."""
+        place = {0.0: left.place, 1.0: right.place}.get(share) or _between(
+            left.place, right.place, share)
+        if place is None:
+            raise NoOrbit('no orbit between two points of a branch')
+        point = BranchPoint(place.value, place.curve.orbit(place.z), place)
+        mu = complex(_parts(multipliers(point.orbit))[part][rank])
+        tried[share] = point, mu
+        return float(np.log(abs(mu)))
+
+    if size(0.0) * size(1.0) >= 0.0:
+        return None
+    share = float(brentq(size, 0.0, 1.0, xtol=EXACT))
+    if share not in tried:
+        size(share)
+    point, mu = tried[share]
+    if abs(mu.imag) > REAL:
+        kind, mu = 'torus', complex(mu.real, abs(mu.imag))
+    else:
+        kind = 'period doubling' if mu.real < 0.0 else 'branch point'
+    return Bifurcation(kind, point, mu, part)

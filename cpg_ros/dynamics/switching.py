@@ -1,0 +1,84 @@
+"""Onto the branch that leaves at a branch point or a period doubling.
+
+The orbits that leave differ from the one at the point by a small share of the disturbance that
+belongs to the multiplier 1 or -1, and have the symmetries that this keeps.
+"""
+
+from fractions import Fraction
+
+import numpy as np
+
+from cpg_ros.dynamics.bifurcation import Bifurcation
+from cpg_ros.dynamics.continuation import Branch, from_disturbance
+from cpg_ros.dynamics.mesh.mode import mode
+from cpg_ros.dynamics.mesh.orbit import MeshOrbit
+from cpg_ros.dynamics.periodic import NoOrbit, richer
+from cpg_ros.errors import InputError
+from cpg_ros.networks.parameter_line import ParameterLine
+from cpg_ros.networks.symmetry import Symmetry
+
+#: Shares of the disturbance that are tried, and points of a cycle at which symmetry is tested.
+AMPLITUDES, POINTS = (0.02, 0.005, 0.06), 96
+#: What a symmetry may miss by, over the disturbance.
+SAME = 1e-3
+
+
+def switched(bifurcation: Bifurcation, along: ParameterLine, low: float, high: float,
+             most: int = 60) -> Branch:
+    """Follow the branch that leaves at a branch point or a period doubling.
+
+    Args:
+        bifurcation: of orbits of a network without delay.
+        along: the line it was found on.
+        low: least value.
+        high: greatest value.
+        most: points at most.
+
+    Raises:
+        InputError: nothing of the kind leaves at a torus, or the network has a delay.
+        NoOrbit: Newton's method finds no orbit beside the point.
+
+    """
+    orbit, doubled = bifurcation.point.orbit, bifurcation.kind == 'period doubling'
+    if bifurcation.kind == 'torus' or not isinstance(orbit, MeshOrbit):
+        raise InputError('only at branch points and period doublings of networks without delay '
+                         'a branch of orbits is followed')
+    cycles = 2 if doubled else 1
+    disturbance = mode(orbit, bifurcation.part, -1.0 if doubled else 1.0)
+    theta = np.arange(POINTS) / POINTS
+    symmetry = kept(orbit.symmetry, disturbance(cycles * theta), doubled)
+    for amplitude in AMPLITUDES:
+        try:
+            found = from_disturbance(
+                orbit.network, symmetry, along, low, high,
+                lambda theta: orbit(cycles * theta * orbit.period),
+                lambda theta: disturbance(cycles * theta), cycles * orbit.period,
+                amplitude=amplitude, most=most)
+        except NoOrbit:
+            continue
+        if not richer(found.points[0].orbit):
+            return found
+    raise NoOrbit(f'no orbit was found beside the {bifurcation.kind} at {along} '
+                  f'{bifurcation.value:g}')
+
+
+def kept(symmetry: Symmetry, disturbance: np.ndarray, doubled: bool) -> Symmetry:
+    """Return the symmetry that an orbit has left once it is disturbed.
+
+    Args:
+        symmetry: of the orbit.
+        disturbance: at even times of a cycle, of two if doubled, shape (points, components).
+        doubled: whether two cycles become one.
+
+    """
+    x = disturbance[:, :symmetry.group.cells]
+    size, shifts = np.abs(disturbance).max(), {}
+    for name, shift in symmetry.shifts:
+        choices = (shift / 2, shift / 2 + Fraction(1, 2)) if doubled else (shift,)
+        image = x[:, list(symmetry.group.elements[name])]
+        for choice in choices:
+            turned = np.roll(x, -round(float(choice) * len(x)), axis=0)
+            if np.abs(image - turned).max() < SAME * size:
+                shifts[name] = choice
+                break
+    return Symmetry.of(symmetry.group, shifts, symmetry.variables)

@@ -1,0 +1,64 @@
+"""Torus, period-doubling and branch points of branches against AUTO-07p and by other routes."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+from cpg_ros.dynamics.bifurcation import bifurcations
+from cpg_ros.dynamics.continuation import follow
+from cpg_ros.dynamics.floquet import multipliers
+from cpg_ros.dynamics.mesh.newton import collocate
+from cpg_ros.dynamics.orbit import solve_preset
+from cpg_ros.dynamics.switching import switched
+from cpg_ros.networks.biped import Biped
+from cpg_ros.networks.parameter_line import ParameterLine
+from cpg_ros.networks.quadruped import Quadruped
+from cpg_ros.networks.registry import PRESETS
+
+
+@cache
+def pace():
+    branch = follow(solve_preset(PRESETS['quadruped']['pace']),
+                    ParameterLine.parse('alpha=beta', Quadruped), 0.05, 0.52)
+    return branch, bifurcations(branch)
+
+
+def test_the_pace_has_two_torus_points():
+    # AUTO-07p's, ntst 60, ncol 4.
+    branch, found = pace()
+    assert [one.value for one in found if one.kind == 'torus'] == pytest.approx(
+        [0.2221317, 0.1417523], abs=1e-6)
+    # A pair each time.
+    counts = [[int((np.abs(multipliers(branch.at(value + gap)[0]).transverse) > 1.0).sum())
+               for gap in (-1e-4, 1e-4)] for value in (0.2221317, 0.1417523)]
+    assert all(one != other and (one - other) % 2 == 0 for one, other in counts)
+
+
+def test_multipliers_at_the_points_lie_on_the_unit_circle():
+    for one in pace()[1]:
+        assert abs(one.multiplier) == pytest.approx(1.0, abs=1e-5)
+        known = multipliers(one.point.orbit)
+        own = np.concatenate([known.within, known.transverse])
+        assert np.abs(own - one.multiplier).min() < 1e-9
+        assert (one.kind == 'torus') == (abs(one.multiplier.imag) > 1e-3)
+
+
+def test_the_hop_doubles_its_period_where_the_walk_ends():
+    line = ParameterLine.parse('w_a', Biped)
+    walk = follow(solve_preset(PRESETS['biped']['walk']), line, -1.0, 0.4)
+    assert walk.ends[0].why == 'symmetry'
+    last = walk.points[0].orbit
+    hop = collocate(last.network, last.network.symmetry('two_legged_hop'),
+                    lambda theta: last(0.5 * theta * last.period), 0.5 * last.period)
+    value = walk.ends[0].value
+    branch = follow(hop, line, value - 0.05, value + 0.05)
+    doubled = [one for one in bifurcations(branch) if one.kind == 'period doubling']
+    # The walk turns back a little beyond.
+    assert min(abs(one.value - value) for one in doubled) < 1e-3
+    # There the walk leaves: left and right, flexor and extensor half a cycle apart.
+    (point,) = (one for one in doubled if abs(one.value - value) < 1e-3)
+    leaving = switched(point, line, -1.0, 0.4, most=4)
+    assert dict(leaving.points[0].orbit.symmetry.shifts) == dict(
+        last.network.symmetry('walk').shifts)
+    assert leaving.points[0].orbit.period == pytest.approx(2.0 * hop.period, rel=1e-3)

@@ -1,0 +1,43 @@
+"""A robot whose generator is gone in mid-stride sits down and does not topple, in MuJoCo."""
+
+import math
+
+import pytest
+
+pytest.importorskip('mujoco', reason='the extra [sim] is not installed')
+
+from go2 import DT, GO2, program
+
+from cpg_ros.motion.pattern import Pattern
+from cpg_ros.simulation.body import Body
+from cpg_ros.unitree.models import MODELS
+from cpg_ros.unitree.settings import settings_of
+from cpg_ros.unitree.supervisor import Phase, Supervisor
+
+
+# Moments of the trot at which a robot that held its legs as they were fell on its back.
+@pytest.mark.parametrize('last', [5.6, 5.9])
+def test_it_does_not_topple(last):
+    body, told = Body('go2', GO2, timestep=DT), []
+    machine = Supervisor(settings_of(GO2, MODELS['go2'], [60.0], [2.0]),
+                         lambda phase, reason: told.append((phase, reason)))
+    pattern, state, model, now = Pattern(program('trot')), machine.state, body.model, 0.0
+    for k in range(round((last + 2.0) / DT)):
+        now += DT
+        state.q[:], state.dq[:] = body.position, body.velocity
+        state.quaternion[:] = body.quaternion
+        machine.heard(now)
+        if k == 5:
+            assert not machine.rise(now)
+        if 2.1 < now < last:
+            pattern.advance(DT)
+            machine.ask(pattern.position[GO2.places].copy(), now)
+        machine.step(now)
+        command = machine.command
+        model.actuator_gainprm[:, 0] = command.kp
+        model.actuator_biasprm[:, 1], model.actuator_biasprm[:, 2] = -command.kp, -command.kd
+        body.command(command.q)
+        body.step()
+    assert [phase for phase, _ in told][-3:] == [Phase.FOLLOWING, Phase.SITTING, Phase.DAMPING]
+    assert 'sat down' in told[-1][1]
+    assert machine.state.tilt_cosine > math.cos(math.radians(10.0)) and body.base[2] < 0.15
