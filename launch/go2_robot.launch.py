@@ -1,13 +1,14 @@
 """A Unitree robot walks: ros2 launch cpg_ros go2_robot.launch.py gait:=walk.
 
 Read docs/how_to/unitree.md first. The generator, and the bridge that leads the robot by Unitree's
-messages; optionally a recording. simulator:=true is for Unitree's simulator on this computer.
+messages; optionally feedback, a page in the browser and a recording. simulator:=true is for
+Unitree's simulator on this computer.
 """
 
 from launch.actions import ExecuteProcess, OpaqueFunction, SetEnvironmentVariable, Shutdown
 from launch.substitutions import LaunchConfiguration
 
-from cpg_ros.nodes.launch_arguments import declared, started, value
+from cpg_ros.nodes.launch_arguments import declared, page, started, value
 from launch import LaunchDescription
 
 BOTH = {
@@ -20,6 +21,8 @@ GENERATOR = {
     'gait': ('trot', str, 'gait to start with'),
     'frequency': ('', float, "strides per second [Hz]; empty for the gait's usual one"),
     'cmd_vel': ('false', bool, 'walk as cmd_vel (geometry_msgs/Twist) asks'),
+    'feedback': ('false', bool, 'correct the gait by IMU, joints and feet; tried in simulation '
+                 'only'),
 }
 BRIDGE = {
     'model': ('go2', str, 'what its motors bear: go2, go1 or b2'),
@@ -58,7 +61,8 @@ def nodes(context):
             'motion_switcher': not simulator}, on_exit=Shutdown(), sigterm_timeout=SITTING),
         # Its end makes the robot sit down; the bridge must be there to do it.
         started(context, 'generator', 'cpg_generator', generator, {
-            'rate': 500.0, 'combined_topic': '', 'command': COMMANDS.get(command, command)})]
+            'rate': 500.0, 'combined_topic': '', 'command': COMMANDS.get(command, command)}),
+        *page(context)]
     if bag := LaunchConfiguration('record').perform(context):
         space = LaunchConfiguration('namespace').perform(context).strip('/')
         found.append(ExecuteProcess(cmd=[

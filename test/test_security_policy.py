@@ -8,7 +8,7 @@ from graph import EXECUTABLE, Process, until
 from lxml import etree
 
 ROOT = Path(__file__).resolve().parents[1]
-POLICY = etree.parse(ROOT / 'security' / 'cpg_ros.policy.xml')
+POLICY = etree.parse(ROOT / 'security' / 'policy.xml')
 
 
 def test_the_policies_are_of_the_schema():
@@ -32,7 +32,9 @@ def allowed(executable, kind, what):
     ('generator', 'cpg_generator', 'publishing', ['cmd_vel:=true', 'robot:=unitree_go2',
                                                   'command:=forward_position']),
     ('robot_sim', 'robot_sim', 'Go2|go2', []),
-    ('inversion', 'cpg_inversion', 'listening|keep', [])])
+    ('inversion', 'cpg_inversion', 'listening', []),
+    ('panel', 'cpg_panel', 'http://', ['port:=0']),
+    ('unitree_bridge', 'unitree_bridge', 'heard|hears|wait|state', ['dry_run:=true'])])
 def test_a_running_node_needs_no_more_than_its_policy(executable, node, sign, words):
     given = [part for word in words for part in ('-p', word)]
     process = Process(*given, executable=EXECUTABLE.with_name(executable))
