@@ -214,7 +214,7 @@ def test_a_sidestep_begins_as_far_on_one_side_as_it_ends_on_the_other():
 
 def test_pace_quickens_both_ways_up_to_its_most():
     most = 1.0 + GAINS.pace_most
-    found = [pace.hurry(0.0, v, GAINS) for v in (-5.0, -0.4, 0.0, 0.1, 0.4, 5.0)]
+    found = [pace.hurry(0.0, v, GAINS) for v in (-5.0, -0.2, 0.0, 0.1, 0.2, 5.0)]
     assert found == pytest.approx(found[::-1], abs=1e-12) or found[0] == found[-1] == most
     assert found[2] == found[3] == 1.0 < found[4] < most
 

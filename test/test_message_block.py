@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from nav_msgs.msg import Odometry
 from rclpy.serialization import deserialize_message, serialize_message
-from sensor_msgs.msg import JointState
+from sensor_msgs.msg import Imu, JointState
 from std_msgs.msg import Float64MultiArray, Header, MultiArrayDimension, MultiArrayLayout
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
@@ -131,9 +131,9 @@ def test_every_output_of_the_generator(robot, command, data):
 
 
 @settings(max_examples=15, deadline=None)
-@given(values=st.lists(finite, min_size=53, max_size=53))
+@given(values=st.lists(finite, min_size=63, max_size=63))
 def test_what_a_simulated_robot_publishes(values):
-    values = np.array(values)
+    values, felt = np.split(np.array(values), [53])
     robot = find_robot('unitree_go2')
     graph = Graph()
     body = SimpleNamespace(robot=robot)
@@ -141,7 +141,8 @@ def test_what_a_simulated_robot_publishes(values):
     for name, part in zip(('position', 'velocity', 'torque', 'feet', 'base', 'quaternion',
                            'twist'), parts, strict=True):
         setattr(body, name, part)
-    Measurements(graph, body).publish(12_000_000_034)
+    unit = SimpleNamespace(measure=lambda stamp: (stamp - 30, felt))
+    Measurements(graph, body, unit).publish(12_000_000_034)
     stamp = Time(sec=12, nanosec=34)
     position, velocity, torque, feet, base, quaternion, twist = (part.tolist() for part in parts)
     same(graph.sent['joint_states'],
@@ -155,6 +156,13 @@ def test_what_a_simulated_robot_publishes(values):
     moving.linear.x, moving.linear.y, moving.linear.z = twist[:3]
     moving.angular.x, moving.angular.y, moving.angular.z = twist[3:]
     same(graph.sent['odom'], odometry)
+    imu = Imu(header=Header(stamp=Time(sec=12, nanosec=4), frame_id='base'))
+    for part, names, numbers in ((imu.orientation, 'xyzw', felt[:4]),
+                                 (imu.angular_velocity, 'xyz', felt[4:7]),
+                                 (imu.linear_acceleration, 'xyz', felt[7:])):
+        for name, number in zip(names, numbers.tolist(), strict=True):
+            setattr(part, name, number)
+    same(graph.sent['imu'], imu)
     label = deserialize_message(graph.sent['foot_contacts'], Float64MultiArray)
     same(graph.sent['foot_contacts'], array_of(label.layout.dim[0].label.split(','), feet))
 

@@ -61,6 +61,7 @@ def robot_tree(shipped, network, **places):
     """A shipped robot's tree for the twin, with what the file says of each leg's place."""
     tree = yaml.safe_load((CONFIG / f'{shipped}.yaml').read_text())
     tree['network'] = str(network)
+    tree.pop('geometry', None)
     tree['legs'] = {LEGS[leg]: {**entry, **{key: words[leg] for key, words in places.items()
                                             if leg in words}}
                     for leg, entry in tree['legs'].items()}

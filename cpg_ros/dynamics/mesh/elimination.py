@@ -38,7 +38,8 @@ def _solved(a, lengths, jacobians, sources, answers):
             for row in range(column + 1, size):
                 if abs(work[row, column]) > abs(work[best, column]):
                     best = row
-            if work[best, column] == 0.0:
+            # The comparison is false for NaN, too.
+            if not abs(work[best, column]) > 0.0:
                 return False
             if best != column:
                 for c in range(column, width):
