@@ -95,7 +95,8 @@ def main() -> None:
                                   period=1.0, network=SimpleNamespace(name='none')))
     still = SimpleNamespace(program=program, robot=robot, faults=0, held=0, recovering=False,
                             standing=True)
-    diagnostics = Diagnostics(node, still, ticker, Rivals(node, ()), None)
+    deaf = SimpleNamespace(out='', active=False, state=lambda now: {})
+    diagnostics = Diagnostics(node, still, ticker, Rivals(node, ()), None, deaf)
     node.create_service(SetBool, '~/enable', lambda request, response: response)
     executor = SingleThreadedExecutor()
     executor.add_node(node)

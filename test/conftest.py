@@ -8,7 +8,8 @@ from graph import EXECUTABLE, Process, Watcher
 
 #: Files whose tests measure against the clock on the wall: beside others they would fail.
 ALONE = ('test_clock', 'test_closed_loop', 'test_demo', 'test_go2_live', 'test_lockstep',
-         'test_robot_sim', 'test_stalls', 'test_stop_paths')
+         'test_robot_sim', 'test_stalls', 'test_stop_paths', 'test_switching', 'test_topics',
+         'test_unitree_live')
 
 
 def pytest_collection_modifyitems(items):

@@ -102,7 +102,8 @@ def test_what_cannot_be_walked_is_said(walker):
     assert faster == pytest.approx(fast, rel=0.01)
     process.wait_for("cmd_vel asks for 3 m/s: the trot's range is -0.2 to 0.4 m/s")
     ask(0.2, aside=0.1, seconds=0.2)
-    process.wait_for('asks for 0.1 m/s to the left: this robot walks forward, backward')
+    process.wait_for('asks for 0.1 m/s to the left: without feedback this robot walks forward, '
+                     'backward')
     until(lambda: still(watcher), 'a stand')
     ask(float('nan'), seconds=0.7)
     process.wait_for('cmd_vel ignored: nan m/s forward')

@@ -169,9 +169,10 @@ def test_an_orbit_that_does_not_attract_is_told():
     assert stability(orbit).flaw.endswith('own symmetry class grows 1.571 times a stride')
 
 
-@pytest.mark.parametrize('change', [{}, {'alpha': -0.6}, {'alpha': 0.9}])
+@pytest.mark.parametrize('change', [{}, {'alpha': -0.6}, {'alpha': -0.3}])
 def test_the_smallest_multipliers_are_right_beside_the_largest(change):
-    # Together they multiply volumes as the divergence along the orbit does (Liouville).
+    # Together they multiply volumes as the divergence along the orbit does (Liouville). Beyond
+    # alpha 0.1 the smallest are below what a float can hold.
     walk = PRESETS['quadruped']['walk']
     along = ParameterLine.parse('alpha', Quadruped)
     value = change.get('alpha', walk.network.alpha)

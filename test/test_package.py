@@ -29,7 +29,7 @@ def test_every_imported_message_package_is_declared():
     declared = {dependency.name for dependency in package.exec_depends}
     text = ''.join(file.read_text() for file in (SOURCE / 'cpg_ros').rglob('*.py'))
     for name in ('sensor_msgs', 'std_msgs', 'std_srvs', 'trajectory_msgs', 'diagnostic_msgs',
-                 'rcl_interfaces', 'builtin_interfaces', 'rclpy', 'ament_index_python',
+                 'rcl_interfaces', 'rclpy', 'ament_index_python',
                  'geometry_msgs', 'nav_msgs', 'rosgraph_msgs'):
         assert (f'from {name}' in text or f'import {name}' in text) == (name in declared), name
 

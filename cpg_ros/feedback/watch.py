@@ -82,6 +82,7 @@ class Fade:
         self._good = self._good + dt if good else 0.0
         if self._good >= GOOD or (good and self._way >= 1.0):
             self._way = min(1.0, self._way + dt / FADE)
-        elif not good:
+        else:
+            # Also where a good message comes between bad ones.
             self._way = max(0.0, self._way - dt / FADE)
         return smoothstep(self._way)[0]

@@ -9,7 +9,7 @@ import numpy as np
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
 from rclpy.qos_overriding_options import QoSOverridingOptions
-from rclpy.serialization import serialize_message
+from rclpy.serialization import deserialize_message, serialize_message
 
 #: What CDR aligns an integer to, and the encapsulation before a message takes, bytes.
 WORD = 4
@@ -58,7 +58,7 @@ class Template:
             setattr(part, name, listed[0] if isinstance(getattr(part, name), float) else listed)
             marks.append((values.tobytes(), (NUMBERS + 2 * np.asarray(sources)[:, None]
                                              + np.arange(2)).ravel()))
-        raw = serialize_message(self.message)
+        raw = _exact(self.message)
         places = []
         for mark, sources in marks:
             at = raw.find(mark)
@@ -67,6 +67,21 @@ class Template:
                                  'this middleware serialises it')
             places.append(at // WORD + np.arange(len(sources)))
         return raw, np.concatenate(places), np.concatenate([sources for _, sources in marks])
+
+
+def _exact(message: Any) -> bytes:
+    """Serialise a message, without the room that rclpy's serialiser may leave at the end.
+
+    What is published typed has none, and strict readers of bags refuse it.
+    """
+    raw: bytes = serialize_message(message)
+    while True:
+        try:
+            if deserialize_message(raw[:-1], type(message)) != message:
+                return raw
+        except Exception:  # too short: what the middleware raises has no common kind
+            return raw
+        raw = raw[:-1]
 
 
 class MessageBlock:

@@ -4,6 +4,7 @@
 ros2 comes with ROS and is not on PyPI.
 """
 
+import signal
 import sys
 import time
 from argparse import REMAINDER, ArgumentTypeError, Namespace, RawDescriptionHelpFormatter
@@ -208,6 +209,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if chosen.action == 'run':
         sys.argv = [chosen.executable, *chosen.arguments]
         return start(chosen.executable)
+    # A shell that starts it in the background would have it deaf to Ctrl-C.
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, signal.default_int_handler)
     import rclpy
     from rclpy.exceptions import NameValidationException
     from rclpy.signals import SignalHandlerOptions
