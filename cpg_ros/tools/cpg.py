@@ -210,8 +210,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         sys.argv = [chosen.executable, *chosen.arguments]
         return start(chosen.executable)
     # A shell that starts it in the background would have it deaf to Ctrl-C.
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, signal.default_int_handler)
+    for one in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(one, signal.default_int_handler)
     import rclpy
     from rclpy.exceptions import NameValidationException
     from rclpy.signals import SignalHandlerOptions
