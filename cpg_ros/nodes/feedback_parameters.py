@@ -13,11 +13,9 @@ PREFIX = 'feedback.'
 RANGE = 10.0
 
 
-def switch(calibrated: bool) -> Spec:
-    """Return the parameter whose default depends on the robot file."""
-    return Spec(calibrated, 'correct the gait by what the robot feels; needs a calibrated robot '
-                'file and the topics below')
-
+#: Off unless asked for: over a graph it has not yet been shown to walk as well as in process.
+SWITCH = Spec(False, 'correct the gait by what the robot feels; needs a calibrated robot file and '
+              'the topics below')
 
 #: Topics, read when the feedback is first switched on.
 TOPICS = {

@@ -24,7 +24,7 @@ from cpg_ros.nodes.cells_publisher import Cells
 from cpg_ros.nodes.cmd_vel import CmdVel
 from cpg_ros.nodes.deadline_thread import Ticker
 from cpg_ros.nodes.diagnostics import Diagnostics
-from cpg_ros.nodes.feedback_switch import FeedbackSwitch, uncalibrated
+from cpg_ros.nodes.feedback_switch import FeedbackSwitch
 from cpg_ros.nodes.generator_parameters import (
     COMMANDS,
     NETWORK,
@@ -82,7 +82,7 @@ class Generator(StartedNode):
             raise StartError(f"robot file '{robot.name}' is for the network "
                              f"{' or '.join(robot.networks)}, not '{network.name}'")
         self._planner = Planner(network, presets, robot, self._value('cmd_vel'))
-        self._declare('feedback', feedback_parameters.switch(not uncalibrated(robot)))
+        self._declare('feedback', feedback_parameters.SWITCH)
         for name, spec in feedback_parameters.SPECS.items():
             self._declare(name, spec)
         self._one_of('feedback.contacts', CONTACTS)
@@ -208,7 +208,7 @@ class Generator(StartedNode):
     # -- the robot ------------------------------------------------------------------------
 
     def _switched(self) -> FeedbackSwitch:
-        """Return the feedback, on if it is wanted; without what it needs, off if not asked for.
+        """Return the feedback, on if it is wanted.
 
         Raises:
             StartError: it is asked for, and cannot be.
@@ -217,10 +217,7 @@ class Generator(StartedNode):
         switch = FeedbackSwitch(self, self.pattern, self._motion, self._outputs.topics)
         obstacle = switch.obstacle()
         if obstacle and self._value('feedback'):
-            if 'feedback' in self._parameter_overrides:
-                raise StartError(f'no feedback: {obstacle}')
-            self.get_logger().info(f'no feedback: {obstacle}')
-            self.set_parameters([Parameter('feedback', value=False)])
+            raise StartError(f'no feedback: {obstacle}')
         switch.apply()
         return switch
 
@@ -336,7 +333,7 @@ def compile_kernels(network: str) -> None:
 def main(args: list[str] | None = None) -> int:
     """Run the node until SIGINT or SIGTERM; return the exit code."""
     known = {'network': NETWORK, **specs(find_network(NETWORK.default)),
-             'feedback': feedback_parameters.switch(False), **feedback_parameters.TOPICS}
+             'feedback': feedback_parameters.SWITCH, **feedback_parameters.TOPICS}
     code = asked_for_help('generator', 'Publishes the joint states of a gait; the parameters of '
                           "the networks and the feedback's gains are listed by ros2 param "
                           'describe.', known, args)

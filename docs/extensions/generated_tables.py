@@ -92,9 +92,8 @@ def parameters(what: str) -> str:
                            **generator_parameters.specs(usual), **frequency})
     exclusive = parameter_rows({'exclusive': generator_parameters.exclusive('none')})[0]
     exclusive[2] = '`true` with `command`, else `false`'
-    feedback = parameter_rows({'feedback': feedback_parameters.switch(False)})[0]
-    feedback[2] = '`true` with a calibrated robot file, else `false`'
-    return table(HEAD, [*rows, exclusive, feedback])
+    feedback = parameter_rows({'feedback': feedback_parameters.SWITCH})
+    return table(HEAD, [*rows, exclusive, *feedback])
 
 
 def presets(name: str) -> str:
