@@ -13,6 +13,7 @@ from graph import free_domain
 from setuptools import find_packages
 
 from cpg_ros.networks.registry import NETWORKS, PRESETS
+from cpg_ros.nodes.feedback_parameters import SWITCH
 from cpg_ros.nodes.generator_parameters import Planner, specs
 from cpg_ros.nodes.inversion_node import Inversion
 from cpg_ros.nodes.unitree.parameters import SPECS as BRIDGE
@@ -36,7 +37,7 @@ def of_generator(network):
     """Parameters of the generator: name -> spec."""
     kind = NETWORKS[network]
     planner = Planner(kind, PRESETS[network], find_robot(kind.usual_robot))
-    return specs(kind) | planner.specs(kind.usual_gait)
+    return specs(kind) | planner.specs(kind.usual_gait) | {'feedback': SWITCH}
 
 
 class Stub:
@@ -243,7 +244,7 @@ def test_go2_speaks_one_command_and_takes_turns(described, given, command, monke
     assert set(to_generator) - {'network', 'use_sim_time'} <= set(known)
     assert to_generator == {'network': 'delayed', 'gait': 'walk', 'robot': 'unitree_go2',
                             'rate': 500.0, 'combined_topic': '', 'cmd_vel': True,
-                            'command': command, 'use_sim_time': True}
+                            'feedback': False, 'command': command, 'use_sim_time': True}
     to_simulation = parameters(found, simulation)
     assert to_simulation == {
         'lockstep': True, 'robot': 'unitree_go2', 'model': 'go2', 'film': '~/films/a.gif',
@@ -286,7 +287,7 @@ def test_go2_robot_is_on_the_robots_network(described, given, domain, switch, co
     generator, bridge = (node_of(found, name) for name in ('generator', 'unitree_bridge'))
     assert parameters(found, generator) == {
         'network': 'delayed', 'gait': 'walk', 'robot': 'unitree_go2', 'rate': 500.0,
-        'combined_topic': '', 'cmd_vel': False, 'command': command}
+        'combined_topic': '', 'cmd_vel': False, 'feedback': False, 'command': command}
     to_bridge = parameters(found, bridge)
     assert to_bridge['motion_switcher'] is switch
     assert to_bridge['command'] == given.get('command', 'forward_position')

@@ -210,7 +210,8 @@ def door(_: str) -> str:
 def room(name: str) -> str:
     """Return the modules of a room."""
     place = importlib.import_module(f'cpg_ros.{name}')
-    listed = [one for one in place.__all__ if name != 'nodes' or one != 'launch_arguments']
+    # What only ROS brings cannot be imported here.
+    listed = [one for one in place.__all__ if one not in ('launch_arguments', 'rosbag2_library')]
     return (place.__doc__ or '') + '\n\n' + '\n\n'.join(
         f'## `{name}.{one}`\n\n' + rst([f'.. automodule:: cpg_ros.{name}.{one}\n   :members:\n'])
         for one in listed)

@@ -21,7 +21,7 @@ def asked_for() -> dict[str, bool]:
 
     def noted(self: Any, tree: Any, where: str, required: set[str],
               optional: set[str] = frozenset()) -> Any:  # type: ignore[assignment]
-        if not (required | optional) & (legs | gaits | names):
+        if not (required | optional) <= (legs | gaits | names):
             place = '.'.join(_plain(where.partition(' (')[0].split('.')))
             for key in required | optional:
                 found[f'{place}.{key}'.removeprefix('file.')] = key in required
