@@ -6,7 +6,6 @@ os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
 import pytest
 from graph import EXECUTABLE, Process, Watcher
 
-
 #: Files whose tests measure against the clock on the wall: beside others they would fail.
 ALONE = ('test_clock', 'test_closed_loop', 'test_demo', 'test_go2_live', 'test_lockstep',
          'test_robot_sim', 'test_stalls', 'test_stop_paths')
