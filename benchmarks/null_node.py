@@ -8,7 +8,6 @@ import gc
 import signal
 import sys
 import threading
-import time
 from array import array
 from types import SimpleNamespace
 
@@ -25,6 +24,7 @@ from std_srvs.srv import SetBool
 from cpg_ros.nodes.deadline_thread import Ticker
 from cpg_ros.nodes.diagnostics import Diagnostics
 from cpg_ros.nodes.rivals import Rivals
+from cpg_ros.nodes.shutdown import ended
 from cpg_ros.robots.robot import Robot
 from cpg_ros.robots.robot_file import find_robot
 
@@ -75,7 +75,7 @@ class TypedOutputs:
             publish(message)
 
 
-def main() -> None:
+def main() -> int:
     rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
     node = Node('null_node')
     rate = node.declare_parameter('rate', 100.0).value
@@ -121,11 +121,11 @@ def main() -> None:
         pass
     ticker.end()
     ticker.join(timeout=0.2)
-    time.sleep(0.05)
     executor.shutdown(timeout_sec=0.1)
     rclpy.shutdown()
     del diagnostics
+    return ended(0, ticker, serving)
 
 
 if __name__ == '__main__':
-    main()
+    sys.exit(main())

@@ -1,5 +1,6 @@
 """Priority, cores and locked memory of the publishing thread, as the system has them."""
 
+import contextlib
 import os
 import re
 import subprocess
@@ -19,9 +20,12 @@ CORE = min(os.sched_getaffinity(0))
 
 def threads(pid):
     """Thread id -> scheduling policy and priority, of the threads of a process."""
-    return {int(one.name): (os.sched_getscheduler(int(one.name)),
-                            os.sched_getparam(int(one.name)).sched_priority)
-            for one in Path(f'/proc/{pid}/task').iterdir()}
+    found = {}
+    for thread in map(int, os.listdir(f'/proc/{pid}/task')):
+        # One may have ended.
+        with contextlib.suppress(ProcessLookupError):
+            found[thread] = os.sched_getscheduler(thread), os.sched_getparam(thread).sched_priority
+    return found
 
 
 @pytest.mark.skipif(not PRIVILEGED, reason='this user may not set a real-time priority')
