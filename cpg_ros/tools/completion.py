@@ -29,7 +29,7 @@ def complete(parser: ArgumentParser) -> None:
 
 
 def shell_code() -> str:
-    """Return what bash or zsh evaluates.
+    """Return what bash evaluates.
 
     Raises:
         NoCompletion: the library is not installed.

@@ -94,7 +94,7 @@ def parser() -> Parser:
     play.add_argument('topics', nargs='*', metavar='TOPIC', help='which (default: all)')
     play.add_argument('--rate', type=rate, default=1.0, metavar='R',
                       help='recorded seconds a second (default: %(default)g)')
-    add(actions, 'completion', 'print what makes bash or zsh complete cpg')
+    add(actions, 'completion', 'print what makes bash complete cpg')
     return made
 
 

@@ -85,7 +85,8 @@ def draw(axes: Axes, orbit: Orbit, title: str) -> None:
         wave = int(orbit.waves[cell - 1])
         middle, half = orbit.levels[wave, 0]
         line = (orbit.waveform(theta + orbit.phases[cell - 1], 0, wave) - middle) / half
-        axes.plot(theta, height + 0.33 * line, color='#1a202c', linewidth=0.9)
+        axes.plot(theta, height + 0.33 * line, color=matplotlib.rcParams['text.color'],
+                  linewidth=0.9)
     axes.set_yticks(range(len(drawn)), [name for name, _, _ in reversed(drawn)])
     axes.set_xlim(0.0, STRIDES)
     axes.set_ylim(-0.55, len(drawn) - 0.45)
