@@ -41,7 +41,8 @@ shell: install/.built
 		echo 'generator, cpg, analyze, inversion ... are on the path (--help); exit leaves this shell'; \
 		exec bash --rcfile <(cat ~/.bashrc 2>/dev/null; echo "PATH=$$PATH"; cpg completion) -i
 
-docs: install/.built
+# The tables of topics are read from running nodes, the bridge among them.
+docs: install/.built unitree
 	@$(ENTER); $(VENV)/bin/sphinx-build -W --keep-going -q -b html docs docs/_build
 	@echo 'built: docs/_build/index.html'
 
@@ -53,7 +54,7 @@ coverage: install/.built
 	@$(ENTER); $(VENV)/bin/pytest test -n auto -m 'not live' --cov=cpg_ros --cov-branch \
 		--cov-report=term --cov-report=html:out/coverage $(ARGS)
 
-test: install/.built docs unitree
+test: install/.built docs
 	@$(VENV)/bin/ruff check .
 	@$(VENV)/bin/mypy
 	@$(VENV)/bin/lint-imports --no-logo
