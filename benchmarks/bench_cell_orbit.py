@@ -1,3 +1,17 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Orbits of the Morris-Lecar gaits: ours against scipy's solve_bvp on the same reduced problem.
 
 What a live change of parameters asks for: every parameter is 2 % off the preset's. Both start from
@@ -6,20 +20,19 @@ unknown; solve_bvp gets the same Jacobian and a tolerance of 1e-9 within 100,000
 gives the derivatives by every parameter; its time includes them and the search for the mesh.
 """
 
+from dataclasses import replace
 import statistics
 import time
 import warnings
-from dataclasses import replace
 
-import numpy as np
 from common import emit, log
-from scipy.integrate import solve_bvp
-
 from cpg_ros.dynamics.floquet import multipliers
 from cpg_ros.dynamics.mesh.newton import Reduced
 from cpg_ros.dynamics.mesh.solve import beside, from_preset
 from cpg_ros.networks.network import Network
 from cpg_ros.networks.registry import PRESETS
+import numpy as np
+from scipy.integrate import solve_bvp
 
 REPEATS = 5
 TOLERANCE = 1e-9

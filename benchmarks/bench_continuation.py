@@ -1,3 +1,17 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Branches of 40 orbits: ours by pseudo-arclength against natural continuation with scipy.
 
 The peers get the values that ours has found, in its order, and start each solve from the orbit
@@ -11,17 +25,16 @@ import statistics
 import time
 import warnings
 
-import numpy as np
 from common import emit, log
-from scipy.integrate import solve_bvp
-from scipy.optimize import root
-
 from cpg_ros.dynamics.continuation import Branch, follow
 from cpg_ros.dynamics.fourier.newton import equations
 from cpg_ros.dynamics.mesh.newton import Reduced
 from cpg_ros.dynamics.orbit import solve_preset
 from cpg_ros.networks.parameter_line import ParameterLine
 from cpg_ros.networks.registry import NETWORKS, PRESETS
+import numpy as np
+from scipy.integrate import solve_bvp
+from scipy.optimize import root
 
 POINTS = 40
 #: solve_bvp gets this many of them; it may take seconds for one.

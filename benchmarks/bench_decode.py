@@ -1,3 +1,17 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Joint states out of bags: ours against the library's own decoder, on the same files.
 
 100,000 messages of 12 joints with positions and velocities, in both storages. Both sides open
@@ -5,20 +19,19 @@ the bag and end with stamps and positions in arrays; the numbers have to be the 
 what a fresh process takes more for reading a bag than for reading its first hundredth.
 """
 
+from functools import partial
 import json
+from pathlib import Path
 import re
 import subprocess
 import sys
 import tempfile
-from functools import partial
-from pathlib import Path
 
-import numpy as np
 from common import by_turns, emit, log
-from rosbags.rosbag2 import Reader, StoragePlugin, Writer
-
 from cpg_ros.recordings.bag_reader import read_bag
 from cpg_ros.recordings.cdr import JOINT_STATE, STORE
+import numpy as np
+from rosbags.rosbag2 import Reader, StoragePlugin, Writer
 
 MESSAGES, STEP = 100_000, 2_000_000
 JOINTS = [f'{leg}_{joint}' for leg in ('lh', 'rh', 'lf', 'rf')
@@ -69,7 +82,7 @@ def raw(path: Path) -> int:
 
 
 def memory(path: Path) -> float:
-    """Return the most memory (MB) a process takes that reads this bag."""
+    """Return the most memory that a process takes to read this bag, MB."""
     script = Path(__file__).resolve()
     done = subprocess.run([sys.executable, script, str(path)], capture_output=True, check=True)
     return float(json.loads(done.stdout))

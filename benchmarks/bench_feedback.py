@@ -1,3 +1,17 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """The simulated Go2 with feedback and, in the same run, without it: pushes, rough ground, slopes.
 
 At 0.4 m/s where a gait can be steered. Pushes of 0.1 s come from 12 directions at 8 phases of the
@@ -5,17 +19,18 @@ stride. Open and closed meet the same; the seed is fresh, and printed.
 """
 
 import argparse
+from concurrent.futures import ProcessPoolExecutor
 import os
 import secrets
 import sys
 import time
-from concurrent.futures import ProcessPoolExecutor
 from typing import Any
 
-from common import ROOT, emit, log
+from common import emit, log, ROOT
+from cpg_ros.simulation.scenario import Noise
 from feedback_figures import (
-    GAITS,
     flat,
+    GAITS,
     ground,
     pushes,
     sideways,
@@ -24,8 +39,6 @@ from feedback_figures import (
     switches,
     wander,
 )
-
-from cpg_ros.simulation.scenario import Noise
 
 ROBOT = ROOT / 'config' / 'unitree_go2.yaml'
 OPEN, CLOSED = (12.0, 16.0, 20.0, 24.0), (24.0, 30.0, 34.0, 38.0, 42.0)

@@ -1,3 +1,17 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """The generator with feedback beside robot_sim at 500 Hz in real time, and without it as well.
 
 The real-time factor, the CPU time of the generator, and the time from an IMU message's
@@ -7,15 +21,15 @@ as large.
 """
 
 import argparse
+from collections import deque
 import sys
 import time
-from collections import deque
 
-import numpy as np
-import rclpy
-from common import ROOT, emit, log
+from common import emit, log, ROOT
 from nav_msgs.msg import Odometry
-from processes import GENERATOR, Process, enter_workspace
+import numpy as np
+from processes import enter_workspace, GENERATOR, Process
+import rclpy
 from rclpy.node import Node
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.serialization import deserialize_message, serialize_message

@@ -1,3 +1,17 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Floquet multipliers of the delayed network's gaits: ours against growth measured in simulation.
 
 The peer is what one does without them: two runs from the orbit, disturbed to either side outside
@@ -7,13 +21,12 @@ strides is the leading transverse multiplier. Ours gives all of them, the trivia
 
 import time
 
-import numpy as np
 from common import by_turns, emit, log
-
 from cpg_ros.dynamics.floquet import multipliers, smallest_gain
 from cpg_ros.dynamics.orbit import solve_preset
 from cpg_ros.integration.simulate import simulate
 from cpg_ros.networks.delayed import PRESETS
+import numpy as np
 
 ROUNDS, STEPS = 20, 400
 TARGETS = {'agreement': 1e-3, 'trivial_error': 1e-6}
@@ -35,7 +48,7 @@ class Disturbed:
 
 
 def by_simulation(orbit, strides: int) -> float:
-    """The leading transverse multiplier, by the growth of a disturbance."""
+    """Return the leading transverse multiplier, by the growth of a disturbance."""
     size = 1e-4 * 3.0**-strides
     runs = simulate(orbit.network, [Disturbed(orbit, side * size) for side in (1.0, -1.0)],
                     strides * orbit.period, orbit.period / STEPS, every=STEPS)

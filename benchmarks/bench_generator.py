@@ -1,3 +1,17 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """The generator at 1 kHz against a node that publishes constants on the same thread and topics.
 
 The null node's messages are typed, the generator's serialised once and filled in place. CPU time
@@ -9,12 +23,11 @@ Order: null, generator, generator, null.
 import argparse
 import time
 
-import numpy as np
 from common import emit, log
-from processes import Listener, enter_workspace, start_node
-
 from cpg_ros.networks.registry import NETWORKS
 from cpg_ros.robots.robot_file import find_robot
+import numpy as np
+from processes import enter_workspace, Listener, start_node
 
 RATE = 1000.0
 SETTLE = 4.0
@@ -98,7 +111,7 @@ def compare(network: str, seconds: float) -> dict[str, object]:
         return max(run[key] for run in runs['generator'])
 
     def jitter(key: str) -> dict[str, dict[str, float]]:
-        """The better of the two runs at each percentile: the machine's own noise aside."""
+        """Return the better of the two runs at each percentile: the machine's own noise aside."""
         return {kind: {level: min(run[key][level] for run in each) for level in each[0][key]}
                 for kind, each in runs.items()}
     figures = {

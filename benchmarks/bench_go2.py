@@ -1,3 +1,17 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """The shipped Go2 in simulation, open loop: how far its gaits go and what they survive.
 
 Beside it, in the same physics and at the same frequency, plain sines through a stand at 0.9 and
@@ -10,11 +24,9 @@ import math
 import sys
 import time
 
-import numpy as np
-from common import ROOT, emit, log
-
+from common import emit, log, ROOT
 from cpg_ros.motion.pattern import Pattern
-from cpg_ros.motion.plan import Program, plan
+from cpg_ros.motion.plan import plan, Program
 from cpg_ros.motion.steering import Drive
 from cpg_ros.networks.registry import PRESETS
 from cpg_ros.robots.robot_file import load_robot
@@ -22,6 +34,7 @@ from cpg_ros.simulation.batch import Batch, Scenario, targets
 from cpg_ros.simulation.body import Body
 from cpg_ros.simulation.pattern_follower import Fallen, Follow, speed
 from cpg_ros.simulation.run_metrics import RunMetrics
+import numpy as np
 
 DT, DURATION = 0.002, 10.0
 GAITS = ('walk', 'trot', 'pace', 'bound', 'jump', 'pronk')

@@ -1,3 +1,17 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """A generator at 500 Hz under thousands of hostile parameter requests, beside its idle self.
 
 Through the real set_parameters and set_parameters_atomically. After every request all parameters
@@ -6,18 +20,17 @@ in another process looks for pauses in what is published, first with nobody aski
 """
 
 import argparse
-import time
 from collections import Counter
+import time
 
-import numpy as np
-import rclpy
 from client import NoAnswer, ParameterClient
 from common import emit, log
-from hostile import effect, requests
-from processes import Listener, enter_workspace, start_node
-from rcl_interfaces.msg import ParameterType
-
 from cpg_ros.networks.delayed import PRESETS
+from hostile import effect, requests
+import numpy as np
+from processes import enter_workspace, Listener, start_node
+from rcl_interfaces.msg import ParameterType
+import rclpy
 
 RATE = 500.0
 SETTLE = 4.0

@@ -1,3 +1,17 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """A fit of two parameters with order-3 readouts of 12 joints, against simulation and differences.
 
 The peer fits the same recording with scipy's least_squares as it is mostly done: jitcdde
@@ -11,26 +25,25 @@ whether the generator can run the result.
 import sys
 import time
 
-import numpy as np
-import symengine
-from common import ROOT, by_turns, emit, log
+from common import by_turns, emit, log, ROOT
 from jitcdde import jitcdde, t, y
+import numpy as np
 from scipy.interpolate import CubicHermiteSpline
 from scipy.optimize import least_squares
+import symengine
 
 sys.path.append(str(ROOT / 'test'))
 
-from made_up import record, weights_of
-
-from cpg_ros.dynamics.orbit import solve_orbit
-from cpg_ros.inversion.fit_data import joints_of
-from cpg_ros.inversion.free_parameters import free_numbers
-from cpg_ros.inversion.invert import TOLERANCE, invert
-from cpg_ros.inversion.least_squares import Problem
-from cpg_ros.inversion.trust_region import descend
-from cpg_ros.motion.readout import TURN, monomials
-from cpg_ros.networks.delayed import PRESETS, Delayed
-from cpg_ros.robots.robot import HARMONICS
+from cpg_ros.dynamics.orbit import solve_orbit  # noqa: E402, I100
+from cpg_ros.inversion.fit_data import joints_of  # noqa: E402
+from cpg_ros.inversion.free_parameters import free_numbers  # noqa: E402
+from cpg_ros.inversion.invert import invert, TOLERANCE  # noqa: E402
+from cpg_ros.inversion.least_squares import Problem  # noqa: E402
+from cpg_ros.inversion.trust_region import descend  # noqa: E402
+from cpg_ros.motion.readout import monomials, TURN  # noqa: E402
+from cpg_ros.networks.delayed import Delayed, PRESETS  # noqa: E402
+from cpg_ros.robots.robot import HARMONICS  # noqa: E402
+from made_up import record, weights_of  # noqa: E402
 
 CELLS = (1, 1, 7, 2, 2, 8, 3, 3, 5, 4, 4, 6)
 TRUTH, GAIT, FREE = PRESETS['trot'].network, PRESETS['trot'].gait, ('c', 'tau')

@@ -1,3 +1,17 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Resident memory of the generator at 1 kHz over minutes, beside a node that only publishes.
 
 In the first half nothing happens, in the second the gait is changed every 5 s through the real
@@ -8,11 +22,11 @@ import argparse
 import itertools
 import time
 
-import numpy as np
-import rclpy
 from client import ParameterClient, text
 from common import emit, log
-from processes import Process, enter_workspace, start_node
+import numpy as np
+from processes import enter_workspace, Process, start_node
+import rclpy
 
 GAITS = ('walk', 'trot', 'pace', 'bound', 'jump', 'pronk')
 EVERY, SWITCH_EVERY, START = 2.0, 5.0, 10.0

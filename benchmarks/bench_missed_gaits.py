@@ -1,3 +1,17 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Gaits that simulation finds and the solver does not: random sets from twelve starts each.
 
 Simulation is the whole network without a lock, for 1500 units of model time; what it does in the
@@ -8,16 +22,15 @@ with its period. The seed is a new one each time, unless it is given: bench_miss
 import sys
 import time
 
-import numpy as np
 from common import emit, log
-
 from cpg_ros.dynamics.orbit import NoOrbit, solve_orbit
 from cpg_ros.dynamics.periodic import added_symmetry
-from cpg_ros.integration.simulate import Trajectory, simulate
+from cpg_ros.integration.simulate import simulate, Trajectory
 from cpg_ros.networks.biped import Biped
 from cpg_ros.networks.network import Network
 from cpg_ros.networks.quadruped import Quadruped
 from cpg_ros.search.settled_cycle import last_cycle
+import numpy as np
 
 SETS, STARTS, SPAN = 40, 12, 1500.0
 #: A cycle has a shift where signals differ by less than this share of their range.

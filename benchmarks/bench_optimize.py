@@ -1,3 +1,17 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """The search for weights: its batched simulation against scipy's solve_ivp, and whole searches.
 
 The sets are those of a first generation for the biped's walk that oscillate in the end, each run
@@ -12,16 +26,15 @@ import math
 import os
 import time
 
-import numpy as np
 from common import by_turns, emit, log
-from numba import njit
-from scipy.integrate import solve_ivp
-
 from cpg_ros.integration.simulate import Trajectory
-from cpg_ros.networks.biped import CELL, CELLS, PARTNERS, PRIMARY, Biped
+from cpg_ros.networks.biped import Biped, CELL, CELLS, PARTNERS, PRIMARY
 from cpg_ros.search.nsga2 import optimise
 from cpg_ros.search.search_space import search_space
-from cpg_ros.search.settled_cycle import COARSER, SPAN, last_cycle, population_run, start_states
+from cpg_ros.search.settled_cycle import COARSER, last_cycle, population_run, SPAN, start_states
+from numba import njit
+import numpy as np
+from scipy.integrate import solve_ivp
 
 GAIT, SETS, ROUNDS = 'walk', 16, 3
 TARGETS = {'speedup_per_network': 20.0, 'search_s': 60.0}

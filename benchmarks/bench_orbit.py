@@ -1,3 +1,17 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """The gaits' orbits by collocation against two ways of finding the same orbit without it.
 
 One is simulation: the symmetry-locked network runs until two successive periods agree. The other
@@ -9,15 +23,14 @@ of the delayed network).
 
 from functools import partial
 
-import numpy as np
 from common import by_turns, emit, log
-from scipy.optimize import brentq, root
-
 from cpg_ros.dynamics.hopf import first_hopf
 from cpg_ros.dynamics.orbit import Orbit, solve_orbit
 from cpg_ros.integration.simulate import simulate
 from cpg_ros.networks.delayed import PRESETS
 from cpg_ros.networks.network import Preset
+import numpy as np
+from scipy.optimize import brentq, root
 
 #: Preset -> period, to eight decimals. The legs' phases differ, the waveforms are two.
 PERIODS = {'trot': 1.27827056, 'pace': 1.27827056, 'bound': 1.27827056, 'pronk': 1.27827056,

@@ -1,3 +1,17 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """What a page costs the robot, and what it gives: the panel beside a generator and robot_sim.
 
 Period: one generator at 1 kHz, by turns alone, with a page open, with the page closed, and with
@@ -18,10 +32,10 @@ import subprocess
 import sys
 import time
 
+from common import emit, log, ROOT
 import numpy as np
+from processes import enter_workspace, Listener, Process, start_node
 import rclpy
-from common import ROOT, emit, log
-from processes import Listener, Process, enter_workspace, start_node
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from std_msgs.msg import String
 from websockets.exceptions import WebSocketException
@@ -32,7 +46,7 @@ SIM = [str(ROOT / 'install/cpg_ros/lib/cpg_ros/robot_sim')]
 TARGETS = {'lost_ticks': 0, 'frames_a_second_min': 20.0, 'real_time_factor_min': 0.99,
            'click_ms_median': 100.0, 'memory_growth_percent': 5.0}
 #: A page: counts frames, prints the count at its end.
-PAGE = '''
+PAGE = """
 import sys, time
 from websockets.sync.client import connect
 frames, first, last = 0, None, None
@@ -47,7 +61,7 @@ try:
 except KeyboardInterrupt:
     pass
 print('frames', frames, (frames - 1) / (last - first) if frames > 1 else 0.0, flush=True)
-'''
+"""
 HOSTILE = ['', '{', '[' * 4000, 'null', '{"do":"set","name":"rate","value":NaN}', '"x"',
            '{"do":"set","name":"gait","value":"gallop"}', '{"do":"exec"}', b'\x00\xff',
            'x' * 70000]

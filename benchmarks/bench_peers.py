@@ -1,3 +1,17 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Points of branches against AUTO-07p and DDE-BIFTOOL, each where it is installed.
 
 AUTO (Debian: auto-07p and gfortran) follows the quadruped's pace along alpha=beta with ntst 60,
@@ -8,15 +22,13 @@ Processor time in all of them, the peer's by its own count. Where one is missing
 """
 
 import os
+from pathlib import Path
 import shutil
 import subprocess
 import tempfile
 import time
-from pathlib import Path
 
-import numpy as np
-from common import ROOT, emit, log
-
+from common import emit, log, ROOT
 from cpg_ros.dynamics.bifurcation import bifurcations
 from cpg_ros.dynamics.continuation import Branch, follow
 from cpg_ros.dynamics.floquet import multipliers
@@ -25,6 +37,7 @@ from cpg_ros.networks.delayed import Delayed
 from cpg_ros.networks.parameter_line import ParameterLine
 from cpg_ros.networks.quadruped import Quadruped
 from cpg_ros.networks.registry import PRESETS
+import numpy as np
 
 #: Preset, ends of the range, and values at which periods are compared.
 RUNS = {'pace': ((-1.0, 0.55), (0.3, 0.4, 0.5)), 'pronk': ((-1.0, 0.345), (0.1, 0.3))}
@@ -38,7 +51,7 @@ def said(command: list[str], folder: Path) -> list[list[str]]:
 
 
 def ours(preset: str, low: float, high: float) -> tuple[Branch, float]:
-    """The branch, and processor time of a point, its multipliers and detection in ms."""
+    """Return the branch, and processor time of a point, its multipliers and detection in ms."""
     orbit, line = solve_preset(PRESETS['quadruped'][preset]), ParameterLine.parse(
         'alpha=beta', Quadruped)
     for _ in range(2):
@@ -87,7 +100,7 @@ def auto() -> dict[str, object]:
 
 
 def dde_biftool() -> dict[str, object]:
-    """The same against DDE-BIFTOOL."""
+    """Return the same against DDE-BIFTOOL."""
     place = os.environ.get('DDE_BIFTOOL', '')
     if not shutil.which('octave-cli'):
         return {'skipped': 'Octave is not installed (Debian: octave)'}

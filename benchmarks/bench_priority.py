@@ -1,3 +1,17 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """The generator's period at 1 kHz with every core loaded: with real-time priority, and without.
 
 Two busy processes a core run all the time. What is judged is how far the instants at which
@@ -10,9 +24,9 @@ import contextlib
 import os
 import sys
 
-import numpy as np
 from common import emit, log
-from processes import Listener, Process, enter_workspace, start_node
+import numpy as np
+from processes import enter_workspace, Listener, Process, start_node
 
 RATE = 1000.0
 #: Left out at first: the connection, and the start.

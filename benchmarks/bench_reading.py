@@ -1,22 +1,35 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """A long table read and its stride found: CPU time and the most memory that either takes.
 
 Twelve joints at 500 Hz; an hour has 1.8 million rows.
 """
 
 import argparse
+from pathlib import Path
 import resource
 import tempfile
 import time
-from pathlib import Path
 
-import numpy as np
 from common import emit, log
-from hostile_recordings import LEGS
-
 from cpg_ros.gaits.leg_names import legs_of
 from cpg_ros.gaits.stride import find_stride
 from cpg_ros.networks.delayed import Delayed
 from cpg_ros.recordings.csv_reader import read_csv
+from hostile_recordings import LEGS
+import numpy as np
 
 RATE, FREQUENCY = 500.0, 1.7
 #: Rows that are written out anew with other times: whole strides.

@@ -1,3 +1,17 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Hostile recordings: whether reading and recognising them ever ends in a traceback, or wrongly.
 
 Of 168 seeded tables each is either refused in one line, or the gait and frequency found are those
@@ -6,18 +20,17 @@ of what is said with 95 %, how much is right.
 """
 
 import argparse
+from pathlib import Path
 import tempfile
 import traceback
-from pathlib import Path
 
 from common import emit, log
-from hostile_recordings import WAYS, spoiled
-
 from cpg_ros.errors import CpgError
 from cpg_ros.gaits.leg_names import legs_of
-from cpg_ros.gaits.stride import Stride, find_stride
+from cpg_ros.gaits.stride import find_stride, Stride
 from cpg_ros.networks.delayed import Delayed
 from cpg_ros.recordings.csv_reader import read_csv
+from hostile_recordings import spoiled, WAYS
 
 FILES, GOAL = 8 * len(WAYS), 0.9
 

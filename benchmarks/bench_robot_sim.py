@@ -1,3 +1,17 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """The simulated robot beside the generator in real time, and bare MuJoCo in the same run.
 
 robot_sim at 500 Hz takes the generator's commands by leg for 20 s: the real-time factor that it
@@ -7,21 +21,21 @@ over MuJoCo's own mj_step with the same model and commands, without ROS.
 """
 
 import argparse
+from pathlib import Path
 import re
 import sys
 import tempfile
 import time
-from pathlib import Path
 
+from common import emit, log, ROOT
 import numpy as np
-from common import ROOT, emit, log
-from processes import GENERATOR, Process, enter_workspace
+from processes import enter_workspace, GENERATOR, Process
 
 SIM = str(ROOT / 'install/cpg_ros/lib/cpg_ros/robot_sim')
 RATE = 500.0
 TARGETS = {'real_time_factor_error': 0.01}
 #: The node with its periods' delays kept: a line on standard output at its end.
-MEASURED = '''
+MEASURED = """
 import sys
 from cpg_ros.nodes import deadline_thread as ticker
 from cpg_ros.nodes.robot_sim import main
@@ -34,15 +48,14 @@ code = main(sys.argv[1:])
 import numpy
 print('late', *numpy.percentile(numpy.array(delays[500:]) * 1e-3, [50, 99, 99.9]), flush=True)
 sys.exit(code)
-'''
+"""
 
 
 def bare(robot: str, seconds: float) -> float:
-    """Steps a second of MuJoCo alone, marching on the spot."""
-    import mujoco
-
+    """Return the steps a second of MuJoCo alone, marching on the spot."""
     from cpg_ros.robots.robot_file import find_robot
     from cpg_ros.simulation.body import Body
+    import mujoco
     body = Body('go2', find_robot(robot))
     offsets, step, data = body.stand, mujoco.mj_step, body.data
     swing = np.tile([0.0, 0.1, -0.2], 4) * np.repeat([1, -1, -1, 1], 3)

@@ -1,3 +1,17 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """How fast a generator at 1 kHz answers a gait switch and a signal, beside the null node.
 
 All ordered pairs of each network's gaits through the real parameter service, half a second apart;
@@ -15,14 +29,13 @@ import statistics
 import sys
 import time
 
-import rclpy
 from client import ParameterClient, text
 from common import emit, log
-from processes import HERE, Process, enter_workspace, start_node
+from cpg_ros.networks.registry import NETWORKS, PRESETS
+from processes import enter_workspace, HERE, Process, start_node
+import rclpy
 from rclpy.executors import SingleThreadedExecutor
 from std_srvs.srv import SetBool
-
-from cpg_ros.networks.registry import NETWORKS, PRESETS
 
 TARGETS = {'answer_ms_max': 100.0, 'stop_ms_max': 50.0, 'end_s_max': 1.0}
 

@@ -1,3 +1,17 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Simulation against jitcdde, at equal error, and against the same method written in C.
 
 Example 1 of Liu & Zhang (the walk) for 20 time units, output every 0.01, at most 1e-6 wrong at
@@ -13,12 +27,11 @@ import subprocess
 import sys
 import tempfile
 
-import numpy as np
-from common import ROOT, by_turns, emit, log
-from peers import END, OUTPUT, START, TAU, A, B, C, D, InC, Jitcdde
-
+from common import by_turns, emit, log, ROOT
 from cpg_ros.integration.simulate import simulate
 from cpg_ros.networks.delayed import Delayed
+import numpy as np
+from peers import A, B, C, D, END, InC, Jitcdde, OUTPUT, START, TAU
 
 ERROR = 1e-6
 NETWORK = Delayed(A, B, C, D, TAU)

@@ -1,3 +1,17 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Whether fits tell the truth: parameters of made-up recordings within their 95 % intervals.
 
 Each recording is 24 strides read off an exact gait by the generator's own readout, with noise of
@@ -8,16 +22,15 @@ starts from other values than the truth. By chance 95 of 100 intervals hold it.
 import sys
 import time
 
+from common import emit, log, ROOT
 import numpy as np
-from common import ROOT, emit, log
 
 sys.path.append(str(ROOT / 'test'))
 
-from made_up import record, weights_of
-
-from cpg_ros.dynamics.orbit import solve_preset
-from cpg_ros.inversion.invert import invert
-from cpg_ros.networks.registry import PRESETS
+from cpg_ros.dynamics.orbit import solve_preset  # noqa: E402, I100
+from cpg_ros.inversion.invert import invert  # noqa: E402
+from cpg_ros.networks.registry import PRESETS  # noqa: E402
+from made_up import record, weights_of  # noqa: E402
 
 SEEDS, GOAL = 100, 0.9
 #: Network, gait, order of the readouts, cells of the joints, and how far off each start is.

@@ -1,18 +1,32 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """The bridge to Unitree's robots beside a stand-in robot at 500 Hz: lateness, age, CPU, memory.
 
 usage: bench_unitree.py [--seconds 600]
 """
 
 import argparse
+from pathlib import Path
 import subprocess
 import sys
 import tempfile
 import time
-from pathlib import Path
 
+from common import emit, log, ROOT
 import numpy as np
-from common import ROOT, emit, log
-from processes import Process, enter_workspace
+from processes import enter_workspace, Process
 
 sys.path.append(str(ROOT / 'test'))
 BRIDGE = [str(ROOT / 'install/cpg_ros/lib/cpg_ros/unitree_bridge')]

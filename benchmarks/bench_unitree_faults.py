@@ -1,3 +1,17 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Every fault of the bridge's table many times against a stand-in robot: when it damps.
 
 usage: bench_unitree_faults.py [--times 20] [--patient]
@@ -6,8 +20,8 @@ usage: bench_unitree_faults.py [--times 20] [--patient]
 import argparse
 import sys
 
+from common import emit, log, ROOT
 import numpy as np
-from common import ROOT, emit, log
 from processes import enter_workspace
 
 sys.path.append(str(ROOT / 'test'))
@@ -21,7 +35,7 @@ def main() -> None:
     parser.add_argument('--patient', action='store_true', help='time limits for a busy machine')
     given = parser.parse_args()
     enter_workspace()
-    from unitree_faults import FAULTS, Walk, inflict, mend
+    from unitree_faults import FAULTS, inflict, mend, Walk
     limits = ('state_timeout:=0.2', 'target_timeout:=0.3') if given.patient else ()
     found = {}
     for fault, (within, sitting) in FAULTS.items():

@@ -1,8 +1,21 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """A client of a node's parameter services that measures how long the answers take."""
 
 import time
 
-import rclpy
 from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue, SetParametersResult
 from rcl_interfaces.srv import (
     GetParameters,
@@ -10,6 +23,7 @@ from rcl_interfaces.srv import (
     SetParameters,
     SetParametersAtomically,
 )
+import rclpy
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.parameter import parameter_value_to_python
 
@@ -69,7 +83,8 @@ class ParameterClient:
             raise NoAnswer(f'{len(values)} values for {len(names)} parameters')
         return dict(zip(names, map(parameter_value_to_python, values), strict=True))
 
-    def set(self, parameters: list[Parameter], atomically: bool) -> list[SetParametersResult]:
+    def set(  # noqa: A003
+            self, parameters: list[Parameter], atomically: bool) -> list[SetParametersResult]:
         """Send a batch; return one result for each parameter, or one for all."""
         if atomically:
             request = SetParametersAtomically.Request(parameters=parameters)

@@ -1,11 +1,25 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """What the benchmarks share: timing by turns, messages on stderr, one JSON line on stdout."""
 
+from collections.abc import Callable
 import json
+from pathlib import Path
 import statistics
 import sys
 import time
-from collections.abc import Callable
-from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
 # Installed, as under `make bench`, or from the sources, when a script is started by itself.

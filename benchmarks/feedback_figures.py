@@ -1,12 +1,24 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """What bench_feedback.py measures of a gait with feedback, or without it: a function a figure."""
 
-import itertools
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+import itertools
+import math
 from pathlib import Path
-
-import numpy as np
 
 from cpg_ros.feedback.efference_copy import EfferenceCopy
 from cpg_ros.feedback.gains import Gains
@@ -18,6 +30,7 @@ from cpg_ros.simulation.closed_loop import ClosedLoop
 from cpg_ros.simulation.efference_measurement import measure_efference
 from cpg_ros.simulation.scenario import Noise, Outcome, Scenario
 from cpg_ros.simulation.terrain import Terrain
+import numpy as np
 
 #: When pushes begin, s, and for how long a robot then has to stay up.
 PUSHED, AFTER = 1.6, 2.5

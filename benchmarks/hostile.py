@@ -1,3 +1,17 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Random requests to a generator's parameter services that no sane client would send.
 
 ``requests`` is seeded and knows nothing of the node but its parameters' names and types;
@@ -6,9 +20,9 @@ Never in a request: ``use_sim_time`` (it stops the clock), and a rate that may b
 of 1 Hz is a fair wish, but it would hide whether publishing pauses).
 """
 
+from collections.abc import Iterator, Mapping, Sequence
 import math
 import random
-from collections.abc import Iterator, Mapping, Sequence
 
 from rcl_interfaces.msg import Parameter, ParameterValue, SetParametersResult
 

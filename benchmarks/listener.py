@@ -1,3 +1,17 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Record when each message of joint_states arrived, was published, and is stamped: one process.
 
 Arguments: seconds, file. SIGINT ends it early. Raw messages, of which only the stamp is read, a
@@ -8,17 +22,17 @@ from the publisher, system clock), `stamp`, and the publisher's `sequence` numbe
 first and the last status on /diagnostics as JSON.
 """
 
+from array import array
 import gc
 import json
 import signal
 import struct
 import sys
 import time
-from array import array
 
+from diagnostic_msgs.msg import DiagnosticArray
 import numpy as np
 import rclpy
-from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.qos import QoSProfile
 from rclpy.signals import SignalHandlerOptions

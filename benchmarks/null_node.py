@@ -1,16 +1,36 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """A node that publishes constants on the generator's topics with the same thread and services.
 
 Its messages are typed, built once and filled in place: what publishing in Python costs at the
 least without serialised messages. Rate and robot are parameters, as in the generator.
 """
 
+from array import array
 import gc
 import signal
 import sys
 import threading
-from array import array
 from types import SimpleNamespace
 
+from cpg_ros.nodes.deadline_thread import Ticker
+from cpg_ros.nodes.diagnostics import Diagnostics
+from cpg_ros.nodes.rivals import Rivals
+from cpg_ros.nodes.shutdown import ended
+from cpg_ros.robots.robot import Robot
+from cpg_ros.robots.robot_file import find_robot
 import numpy as np
 import rclpy
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
@@ -20,13 +40,6 @@ from rclpy.signals import SignalHandlerOptions
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray, MultiArrayDimension
 from std_srvs.srv import SetBool
-
-from cpg_ros.nodes.deadline_thread import Ticker
-from cpg_ros.nodes.diagnostics import Diagnostics
-from cpg_ros.nodes.rivals import Rivals
-from cpg_ros.nodes.shutdown import ended
-from cpg_ros.robots.robot import Robot
-from cpg_ros.robots.robot_file import find_robot
 
 
 def view_of(message: object, field: str, n: int) -> np.ndarray:

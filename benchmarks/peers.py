@@ -1,14 +1,28 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Whom the simulation is compared with: jitcdde, and the same method written in C."""
 
 import ctypes
+from pathlib import Path
 import subprocess
 import time
-from pathlib import Path
 
-import numpy as np
-import symengine
 from common import ROOT
 from jitcdde import jitcdde, t, y
+import numpy as np
+import symengine
 
 A, B, C, D, TAU = -4.5, 1.0, 6.5, -2.0, 0.4
 END, OUTPUT = 20.0, 0.01

@@ -1,3 +1,17 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Draw what bench_feedback.py has printed: survival over impulse, and ground that is crossed.
 
 python bench_feedback.py > feedback.json; python plot_feedback.py feedback.json --out ../docs
@@ -11,7 +25,7 @@ from typing import Any
 import matplotlib
 
 matplotlib.use('Agg')
-import matplotlib.pyplot as plt
+import matplotlib.pyplot as plt  # noqa: E402
 
 LOOKS = {'closed': {'color': '#1f6fb4'}, 'open': {'color': '#c44e35'}}
 GROUNDS = {'height_field_6_cm': 'rough, 6 cm', 'height_field_8_cm': 'rough, 8 cm',

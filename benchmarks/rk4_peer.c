@@ -1,3 +1,17 @@
+// Copyright 2026 cpg_ros maintainers
+//
+// Licensed under the Apache License, Version 2.0 (the "License");
+// you may not use this file except in compliance with the License.
+// You may obtain a copy of the License at
+//
+//     http://www.apache.org/licenses/LICENSE-2.0
+//
+// Unless required by applicable law or agreed to in writing, software
+// distributed under the License is distributed on an "AS IS" BASIS,
+// WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+// See the License for the specific language governing permissions and
+// limitations under the License.
+
 /* The delayed network as one would write it in C: classical Runge-Kutta steps with cubic Hermite
    interpolation of the delayed states, every node kept (that is the dense output). Stages 2 and 3
    share one delayed state, stage 4 and the next step's first stage another.

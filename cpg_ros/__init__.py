@@ -1,3 +1,17 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Central pattern generators of legged locomotion, true to the theory and running on ROS 2.
 
 What is used most is here by name, and loaded when it is first asked for; the rest is in the rooms.
@@ -12,7 +26,7 @@ os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
 # As in typing, which would take longer to load than all of this.
 TYPE_CHECKING = False
 if TYPE_CHECKING:
-    from cpg_ros.dynamics.continuation import follow
+    from cpg_ros.dynamics.continuation import follow  # noqa: I300
     from cpg_ros.dynamics.floquet import multipliers
     from cpg_ros.dynamics.hopf_search import hopf_points
     from cpg_ros.dynamics.orbit import NoOrbit, solve_orbit

@@ -1,11 +1,25 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """The errors of the package: what is wrong with what it was given, in words for whoever gave it.
 
 Whatever else is raised, a ValueError of numpy or one for arrays of a wrong shape, is a mistake in
 the program that calls: nothing here catches it, so that it is never reported as a user's.
 """
 
-import sys
 from importlib.util import find_spec
+import sys
 from types import TracebackType
 
 

@@ -1,7 +1,21 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """How Sphinx builds the documentation: `make docs`, or rosdoc2."""
 
-import sys
 from pathlib import Path
+import sys
 
 HERE = Path(__file__).resolve().parent
 sys.path[:0] = [str(HERE.parent), str(HERE / 'extensions')]
@@ -10,7 +24,7 @@ import cpg_ros  # noqa: E402
 
 project = 'cpg_ros'
 author = 'cpg_ros maintainers'
-copyright = 'cpg_ros maintainers, Apache-2.0'
+project_copyright = 'cpg_ros maintainers, Apache-2.0'
 version = release = cpg_ros.__version__
 
 extensions = ['myst_parser', 'sphinx_design', 'sphinx.ext.autodoc', 'sphinx.ext.napoleon',

@@ -1,3 +1,17 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Draws the documentation's figures with the project's own commands: `make figures`.
 
 Every figure is made twice, on a light and on a dark ground (NAME.png and NAME_dark.png); the site
@@ -6,11 +20,11 @@ shows the one that fits the reader's theme. The pictures of the simulation take 
 
 import argparse
 import os
+from pathlib import Path
 import shutil
 import subprocess
 import sys
 import tempfile
-from pathlib import Path
 
 DOCS = Path(__file__).resolve().parent
 DARK = DOCS / 'static' / 'dark.matplotlibrc'

@@ -1,3 +1,17 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Builds packages of .msg files for ROS 2 as pip installs it: one extension each, without ament.
 
 usage: python interfaces/build.py PACKAGE_FOLDER ...   (PACKAGE_FOLDER/msg/*.msg)
@@ -6,14 +20,14 @@ The generators are those of the wheels; g++ and Python's headers must be there. 
 into the Python that runs it, and only once all of it is made.
 """
 
+from concurrent.futures import ThreadPoolExecutor
 import os
+from pathlib import Path
 import shutil
 import subprocess
 import sys
 import sysconfig
 import tempfile
-from concurrent.futures import ThreadPoolExecutor
-from pathlib import Path
 
 PREFIX = Path(sys.prefix)
 #: The type supports that rmw_fastrtps asks for; it opens their libraries by name.

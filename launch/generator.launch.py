@@ -1,9 +1,22 @@
-"""Start the generator: ros2 launch cpg_ros generator.launch.py network:=biped gait:=skip."""
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 
-from launch.actions import OpaqueFunction
+"""Start the generator: ros2 launch cpg_ros generator.launch.py network:=biped gait:=skip."""
 
 from cpg_ros.nodes.launch_arguments import declared, page, started
 from launch import LaunchDescription
+from launch.actions import OpaqueFunction
 
 ARGUMENTS = {
     'network': ('delayed', str, 'delayed, quadruped, biped, or the path of a Python file with '

@@ -1,3 +1,17 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """A simulated Unitree Go2 walks: ros2 launch cpg_ros go2.launch.py gait:=walk film:=walk.gif.
 
 The generator and the physics take turns, as fast as the clock on the wall or, on a slow machine
@@ -7,11 +21,10 @@ pip install cpg-ros[sim]. Another robot: robot:=$PWD/my_robot.yaml model:=$PWD/m
 
 from pathlib import Path
 
-from launch.actions import OpaqueFunction, Shutdown
-from launch.substitutions import LaunchConfiguration
-
 from cpg_ros.nodes.launch_arguments import declared, page, started
 from launch import LaunchDescription
+from launch.actions import OpaqueFunction, Shutdown
+from launch.substitutions import LaunchConfiguration
 
 BOTH = {
     'robot': ('unitree_go2', str, 'robot file, or a shipped name'),
@@ -66,6 +79,6 @@ def nodes(context):
 
 
 def generate_launch_description():
-    """Generator and robot_sim, optionally in a namespace."""
+    """Return generator and robot_sim, optionally in a namespace."""
     return LaunchDescription([*declared({**BOTH, **GENERATOR, **SIMULATION}),
                               OpaqueFunction(function=nodes)])

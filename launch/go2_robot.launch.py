@@ -1,3 +1,17 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """A Unitree robot walks: ros2 launch cpg_ros go2_robot.launch.py gait:=walk.
 
 Read docs/how_to/unitree.md first. The generator, and the bridge that leads the robot by Unitree's
@@ -5,11 +19,10 @@ messages; optionally feedback, a page in the browser and a recording. simulator:
 Unitree's simulator on this computer.
 """
 
-from launch.actions import ExecuteProcess, OpaqueFunction, SetEnvironmentVariable, Shutdown
-from launch.substitutions import LaunchConfiguration
-
 from cpg_ros.nodes.launch_arguments import declared, page, started, value
 from launch import LaunchDescription
+from launch.actions import ExecuteProcess, OpaqueFunction, SetEnvironmentVariable, Shutdown
+from launch.substitutions import LaunchConfiguration
 
 BOTH = {
     'robot': ('unitree_go2', str, 'robot file, or a shipped name'),
@@ -72,6 +85,6 @@ def nodes(context):
 
 
 def generate_launch_description():
-    """Generator and bridge, optionally in a namespace."""
+    """Return generator and bridge, optionally in a namespace."""
     return LaunchDescription([*declared({**BOTH, **GENERATOR, **BRIDGE, **OTHERS}),
                               OpaqueFunction(function=nodes)])

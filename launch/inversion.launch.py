@@ -1,12 +1,25 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Fit what is on the joint topics: ros2 launch cpg_ros inversion.launch.py out:=fitted.yaml.
 
 Then ``ros2 service call /cpg_inversion/fit std_srvs/srv/Trigger``, or every:=10.
 """
 
-from launch.actions import OpaqueFunction
-
 from cpg_ros.nodes.launch_arguments import declared, page, started
 from launch import LaunchDescription
+from launch.actions import OpaqueFunction
 
 ARGUMENTS = {
     'topics': ('[joint_states]', list[str], 'topics of sensor_msgs/JointState to listen to'),

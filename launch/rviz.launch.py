@@ -1,3 +1,17 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """See what the generator publishes: ros2 launch cpg_ros rviz.launch.py gait:=walk.
 
 All arguments of generator.launch.py, too. Another robot than the generic quadruped needs both
@@ -6,7 +20,10 @@ its robot file and its URDF: robot:=$PWD/my_robot.yaml urdf:=$PWD/my.urdf.
 
 from pathlib import Path
 
-from ament_index_python.packages import PackageNotFoundError, get_package_prefix
+from ament_index_python.packages import get_package_prefix, PackageNotFoundError
+from cpg_ros.nodes.launch_arguments import value
+from cpg_ros.robots.urdf import load_urdf, root
+from launch import LaunchDescription
 from launch.actions import (
     DeclareLaunchArgument,
     IncludeLaunchDescription,
@@ -19,10 +36,6 @@ from launch.launch_description_sources import PythonLaunchDescriptionSource
 from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
 from launch_ros.parameter_descriptions import ParameterValue
-
-from cpg_ros.nodes.launch_arguments import value
-from cpg_ros.robots.urdf import load_urdf, root
-from launch import LaunchDescription
 
 SHARE = Path(__file__).resolve().parent.parent
 ARGUMENTS = {
@@ -72,7 +85,7 @@ def viewers(context):
 
 
 def generate_launch_description():
-    """Generator, robot_state_publisher and rviz2, optionally in a namespace."""
+    """Return generator, robot_state_publisher and rviz2, optionally in a namespace."""
     generator = PythonLaunchDescriptionSource(str(SHARE / 'launch' / 'generator.launch.py'))
     # None of them is of use without the others.
     whole = RegisterEventHandler(OnProcessExit(on_exit=[Shutdown()]))

@@ -1,10 +1,24 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 import os
 
 # As nodes and tools run: before numpy loads.
 os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
 
-import pytest
-from graph import EXECUTABLE, Process, Watcher
+from graph import EXECUTABLE, Process, Watcher  # noqa: E402
+import pytest  # noqa: E402
 
 #: Files whose tests measure against the clock on the wall: beside others they would fail.
 ALONE = ('test_clock', 'test_closed_loop', 'test_demo', 'test_go2_live', 'test_lockstep',

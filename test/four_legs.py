@@ -1,3 +1,17 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """A made-up robot of four legs as a URDF, for the robot file walker.yaml."""
 
 from pathlib import Path
@@ -16,7 +30,7 @@ JOINT = """<joint name="{name}" type="revolute"><parent link="{parent}"/><child 
 
 
 def urdf(path):
-    """A robot of four legs whose base a URDF cannot say to be free."""
+    """Return a robot of four legs whose base a URDF cannot say to be free."""
     parts = [LINK.format(name='base', mass=5.0, z=0.0)]
     for leg, x, y in (('FL', 0.2, 0.1), ('FR', 0.2, -0.1), ('RL', -0.2, 0.1), ('RR', -0.2, -0.1)):
         parent = 'base'

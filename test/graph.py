@@ -1,20 +1,34 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Real processes on a real ROS graph: a generator in a domain of its own, and its watcher."""
 
 import itertools
 import os
+from pathlib import Path
 import re
 import signal
 import subprocess
 import threading
 import time
-from pathlib import Path
 
-import numpy as np
-import rclpy
 from ament_index_python.packages import get_package_prefix
 from diagnostic_msgs.msg import DiagnosticArray
+import numpy as np
 from rcl_interfaces.msg import Parameter as ParameterMessage
 from rcl_interfaces.srv import GetParameters, SetParameters, SetParametersAtomically
+import rclpy
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, QoSProfile
@@ -169,7 +183,7 @@ class Watcher:
         until(future.done, f'an answer of {name}')
         return future.result()
 
-    def set(self, **values):
+    def set(self, **values):  # noqa: A003
         """Set parameters one by one (``delayed_tau`` for delayed.tau); return the results."""
         request = SetParameters.Request(parameters=_messages(values))
         return self.call(SetParameters, f'{self.generator}/set_parameters', request).results

@@ -1,12 +1,25 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Made-up recordings: the generator's own readouts of an exact gait, with noise and dropouts."""
 
 from dataclasses import dataclass
 
-import numpy as np
-
 from cpg_ros.motion.phase_readout import PhaseReadout
 from cpg_ros.motion.readout import WaveReadout
 from cpg_ros.robots.robot import HARMONICS
+import numpy as np
 
 
 @dataclass(frozen=True)
@@ -22,7 +35,7 @@ class MadeUp:
 
 
 def joint_angles(orbit, cells, weights, theta):
-    """The generator's angles at theta in cycles from where cell 1 peaks, (joints, *theta.shape).
+    """Return angles at theta in cycles from where cell 1 peaks, (joints, *theta.shape).
 
     cells from 1; weights (joints, 6), without offsets.
     """

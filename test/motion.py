@@ -1,12 +1,25 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Recordings of motions that are known: quadrupeds of simple waveforms, networks' orbits."""
 
 from dataclasses import dataclass
 from functools import cache
 
-import numpy as np
-
 from cpg_ros.dynamics.orbit import solve_preset
 from cpg_ros.networks.registry import NETWORKS, PRESETS
+import numpy as np
 
 LEGS = ('lh', 'rh', 'lf', 'rf')
 JOINTS = ('hip', 'thigh', 'calf')
@@ -45,7 +58,7 @@ def quadruped(phase, gait='trot', size=1.0):
 
 
 def stamps(rng, duration, rate, jitter=0.2, dropouts=0.01):
-    """Times of samples with jitter (share of an interval) and dropouts, from 0, s."""
+    """Return the times of samples with jitter (share of an interval) and dropouts, from 0, s."""
     n = int(duration * rate)
     t = np.arange(n) / rate + jitter * rng.uniform(-1.0, 1.0, n) / rate
     t = t[rng.random(n) >= dropouts]

@@ -1,12 +1,25 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Signals with a known symmetry, drawn at random, and the gaits' symmetries by name."""
 
 from dataclasses import dataclass
 
-import numpy as np
-from hypothesis import strategies as st
-
 from cpg_ros.networks.hk_theorem import symmetries
-from cpg_ros.networks.symmetry import D2, Z4_Z2, Group, Symmetry
+from cpg_ros.networks.symmetry import D2, Group, Symmetry, Z4_Z2
+from hypothesis import strategies as st
+import numpy as np
 
 Z6 = Group(6, (('w', (1, 2, 3, 4, 5, 0)),))
 GROUPS = (Z4_Z2, D2, Z6)
@@ -59,7 +72,7 @@ class Rhythm:
 
 @st.composite
 def recordings(draw, noise=0.0):
-    """Times, period and a generator of noise: even and uneven, short and long."""
+    """Return times, a period and a generator of noise: even and uneven, short and long."""
     period = 10.0 ** draw(st.floats(-3.0, 3.0))
     cycles = draw(st.floats(2.1, 14.0))
     random = np.random.default_rng(draw(st.integers(0, 2 ** 32)))

@@ -1,22 +1,38 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """A stand-in for ROS's rosbag2_py, which is not on PyPI: the part of its interface that is used.
 
 Names and arguments are those of the Python wrapper in rosbag2's jazzy branch; the library
 `rosbags` reads the storage. Importing this module makes it look as if that were not installed.
 """
 
-import sys
 from pathlib import Path
+import sys
 from types import ModuleType, SimpleNamespace
 
 from rosbags.rosbag2 import Reader
 
 
 class StorageOptions:
+
     def __init__(self, uri, storage_id=''):
         self.uri, self.storage_id = uri, storage_id
 
 
 class StorageFilter:
+
     def __init__(self, topics=()):
         self.topics = topics
 
@@ -24,7 +40,7 @@ class StorageFilter:
 class SequentialReader:
     compressed = False
 
-    def open(self, storage, _):
+    def open(self, storage, _):  # noqa: A003
         try:
             self.reader = Reader(Path(storage.uri))
             self.reader.open()
@@ -57,6 +73,7 @@ class SequentialCompressionReader(SequentialReader):
 
 
 class Info:
+
     def read_metadata(self, uri, _):
         try:
             with Reader(Path(uri)) as reader:

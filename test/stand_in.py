@@ -1,21 +1,34 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """A Unitree Go2 for tests: LowState out, LowCmd in, joints and body in MuJoCo.
 
 Written apart from cpg_ros.unitree: bytes by struct, the check sum by a table.
 """
 
+from collections import deque
 import json
 import math
 import struct
 import threading
 import time
-from collections import deque
-
-import numpy as np
-import rclpy
-from rclpy.qos import QoSProfile, ReliabilityPolicy
 
 from cpg_ros.robots.robot_file import find_robot
 from cpg_ros.simulation.body import Body
+import numpy as np
+import rclpy
+from rclpy.qos import QoSProfile, ReliabilityPolicy
 
 DT = 0.002
 #: CDR of LowCmd and of LowState, without the header of four bytes.
@@ -47,7 +60,7 @@ def mpeg2(data: bytes) -> int:
 
 
 def check_sum(data: bytes) -> int:
-    """The same of a C struct's little-endian words, from the highest byte of each on."""
+    """Return the same of a C struct's little-endian words, from the highest byte of each on."""
     return mpeg2(struct.pack(f'>{len(data) // 4}I', *struct.unpack(f'<{len(data) // 4}I', data)))
 
 

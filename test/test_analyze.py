@@ -1,3 +1,17 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """The executable analyze: what it says, as text, JSON and pictures, and what it refuses."""
 
 import json
@@ -5,11 +19,10 @@ import re
 import subprocess
 import sys
 
-import numpy as np
-import pytest
-
 from cpg_ros.networks.quadruped import Quadruped
 from cpg_ros.tools.analyze import main
+import numpy as np
+import pytest
 
 EXAMPLE_1 = ('--network', 'delayed', '--set', 'a=-4.5', 'b=1', 'c=6.5', 'd=-2', 'tau=0.4')
 #: Keys that the interface promises.

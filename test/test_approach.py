@@ -1,16 +1,29 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """From the stand to commands that are elsewhere already: smooth, and without a fall."""
 
 import importlib.util
 
-import numpy as np
-import pytest
+from cpg_ros.motion.pattern import Pattern
+from cpg_ros.simulation.body import Body
+from cpg_ros.simulation.soft_start import Approach, NEAR
 from go2 import DT, GO2, program
 from hypothesis import given
 from hypothesis import strategies as st
-
-from cpg_ros.motion.pattern import Pattern
-from cpg_ros.simulation.body import Body
-from cpg_ros.simulation.soft_start import NEAR, Approach
+import numpy as np
+import pytest
 
 ANGLES = st.lists(st.floats(-3.0, 3.0), min_size=2, max_size=2).map(np.array)
 

@@ -1,19 +1,32 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Joint states out of bags, against what was written and against the library's own decoder."""
 
 import tracemalloc
 
-import numpy as np
-import pytest
-import yaml
-from bags import JOINT_STATE, JOINTS, LEGS, START, STEP, STORAGES, joint_state, walk, write_bag
+from bags import JOINT_STATE, joint_state, JOINTS, LEGS, START, STEP, STORAGES, walk, write_bag
+from cpg_ros.recordings.bag_reader import read_bag
+from cpg_ros.recordings.cdr import decode, UndecodableError
+from cpg_ros.recordings.recording import RecordingError
 from hypothesis import given, settings
 from hypothesis import strategies as st
+import numpy as np
+import pytest
 from rosbags.rosbag2 import Reader
-from rosbags.typesys import Stores, get_typestore
-
-from cpg_ros.recordings.bag_reader import read_bag
-from cpg_ros.recordings.cdr import UndecodableError, decode
-from cpg_ros.recordings.recording import RecordingError
+from rosbags.typesys import get_typestore, Stores
+import yaml
 
 STORE = get_typestore(Stores.ROS2_JAZZY)
 KINDS = [('sqlite3', 'none'), ('sqlite3', 'file'), ('sqlite3', 'message'),
@@ -37,7 +50,7 @@ def layouts(draw):
 
 @st.composite
 def batches(draw):
-    """Serialised messages whose layouts change midway and come back."""
+    """Return serialised messages whose layouts change midway and come back."""
     kinds = draw(st.lists(layouts(), min_size=1, max_size=12))
     batch = []
     for kind in draw(st.lists(st.integers(0, len(kinds) - 1), max_size=30)):

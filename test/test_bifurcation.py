@@ -1,9 +1,20 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Torus, period-doubling and branch points of branches against AUTO-07p and by other routes."""
 
 from functools import cache
-
-import numpy as np
-import pytest
 
 from cpg_ros.dynamics.bifurcation import bifurcations
 from cpg_ros.dynamics.continuation import follow
@@ -15,6 +26,8 @@ from cpg_ros.networks.biped import Biped
 from cpg_ros.networks.parameter_line import ParameterLine
 from cpg_ros.networks.quadruped import Quadruped
 from cpg_ros.networks.registry import PRESETS
+import numpy as np
+import pytest
 
 
 @cache

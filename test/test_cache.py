@@ -1,24 +1,37 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Kernels on disk: compiled for one network in one process, loaded with others in the next."""
 
 import os
+from pathlib import Path
 import shutil
 import subprocess
 import sys
-from pathlib import Path
-
-import pytest
 
 import cpg_ros
 from cpg_ros.files.shared_resources import share
+import pytest
 
 WARM = 'from cpg_ros.motion.precompile import precompile; precompile({network!r})'
-STEP = '''
+STEP = """
 import numpy as np
 from cpg_ros.integration.stepper import Stepper
 from cpg_ros.networks.biped import Biped
 Stepper(Biped.symmetric(0.229, 0.254, 0.39, -0.681, 0.489), np.zeros(8)).advance(0.1)
-'''
-CHECK = '''
+"""
+CHECK = """
 import numpy as np
 from cpg_ros.integration.stepper import Stepper
 from cpg_ros.networks.registry import PRESETS
@@ -30,7 +43,7 @@ for name in ('biped', 'quadruped', 'biped'):
     assert np.abs(state - start).max() > 1e-4, name
     assert np.allclose(slope, network.rates(state), atol=1e-12), name
 print('agree')
-'''
+"""
 
 
 def test_networks_compiled_apart_keep_their_own_code(tmp_path):

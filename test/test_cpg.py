@@ -1,3 +1,17 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Executable cpg: a running generator asked, changed, recorded and played back."""
 
 import os
@@ -5,12 +19,11 @@ import signal
 import subprocess
 import time
 
+from bags import joint_state, write_bag
+from cpg_ros.recordings.bag_reader import read_bag
+from graph import EXECUTABLE, free_domain, until
 import numpy as np
 import pytest
-from bags import joint_state, write_bag
-from graph import EXECUTABLE, free_domain, until
-
-from cpg_ros.recordings.bag_reader import read_bag
 
 CPG = EXECUTABLE.with_name('cpg')
 

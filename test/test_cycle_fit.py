@@ -1,16 +1,29 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Parameters of the delayed network from one cycle."""
 
 from dataclasses import replace
-
-import numpy as np
-import pytest
-from scipy.optimize import minimize_scalar
 
 from cpg_ros.dynamics.orbit import solve_orbit as solve
 from cpg_ros.dynamics.periodic import NoOrbit
 from cpg_ros.integration.simulate import simulate
 from cpg_ros.inversion.cycle_fit import cycle_samples, fit_cycle
 from cpg_ros.networks.delayed import Delayed
+import numpy as np
+import pytest
+from scipy.optimize import minimize_scalar
 
 TROT = Delayed(-2.0, 1.0, 6.43, -2.0, 0.25)
 WALK = Delayed(-2.0, 1.0, 6.5, -2.0, 0.245)

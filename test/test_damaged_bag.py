@@ -1,3 +1,17 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Bags that are damaged, unfinished or not what was asked for: one clear line, nothing left."""
 
 import gc
@@ -6,16 +20,15 @@ import re
 import sqlite3
 import tempfile
 
-import numpy as np
-import pytest
-import yaml
-from bags import JOINT_STATE, JOINTS, START, STORAGES, joint_state, storage_file, walk, write_bag
-from hypothesis import given, settings
-from hypothesis import strategies as st
-from rosbags.rosbag2 import Reader
-
+from bags import JOINT_STATE, joint_state, JOINTS, START, storage_file, STORAGES, walk, write_bag
 from cpg_ros.recordings.bag_reader import read_bag
 from cpg_ros.recordings.recording import RecordingError
+from hypothesis import given, settings
+from hypothesis import strategies as st
+import numpy as np
+import pytest
+from rosbags.rosbag2 import Reader
+import yaml
 
 #: Storage and compression of the bags that are cut and scratched.
 KINDS = [('sqlite3', 'none'), ('sqlite3', 'file'), ('mcap', 'none'), ('mcap', 'file'),
@@ -248,7 +261,7 @@ def test_metadata_that_counts_messages_the_files_do_not_have(tmp_path):
         database.execute('DELETE FROM messages')
     database.close()
     assert refused(path) == (
-        f"{path}, /joint_states: no message with positions; "
+        f'{path}, /joint_states: no message with positions; '
         "/joint_states: 0 messages, where the bag's metadata counts 30; "
         '/joint_states: no messages')
 

@@ -1,13 +1,21 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Floquet multipliers of the delayed network against growth in simulation and laws near onset."""
 
 from dataclasses import replace
 from functools import cache
-
-import numpy as np
-import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
-from modes import class_of
 
 from cpg_ros.dynamics.equilibrium import equilibrium
 from cpg_ros.dynamics.floquet import multipliers, smallest_gain
@@ -17,7 +25,12 @@ from cpg_ros.dynamics.orbit import solve_orbit, solve_preset
 from cpg_ros.dynamics.periodic import Orbit
 from cpg_ros.dynamics.stability import stability
 from cpg_ros.integration.simulate import simulate
-from cpg_ros.networks.delayed import PRESETS, Delayed
+from cpg_ros.networks.delayed import Delayed, PRESETS
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from modes import class_of
+import numpy as np
+import pytest
 
 EVERY = pytest.mark.parametrize('name', PRESETS)
 STEPS = 400
@@ -47,7 +60,7 @@ class Disturbed:
 
 
 def disturbances(orbit, shape, size, strides, gain):
-    """Derivative of the states by the disturbance, stride after stride, (strides, STEPS, 8)."""
+    """Return how states grow with the disturbance, stride by stride, (strides, STEPS, 8)."""
     runs = simulate(orbit.network, [Disturbed(orbit, shape, s) for s in (size, -size)],
                     strides * orbit.period, orbit.period / STEPS, lock=(gain, orbit.symmetry))
     apart = (runs.x[0] - runs.x[1])[1:] / (2.0 * size)

@@ -1,3 +1,17 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """A network of this file, with a delay and two variables a cell, against its whole linearisation.
 
 Three FitzHugh-Nagumo cells in a ring, each of which hears the one before it a delay ago.
@@ -6,9 +20,6 @@ Three FitzHugh-Nagumo cells in a ring, each of which hears the one before it a d
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import ClassVar
-
-import numpy as np
-import pytest
 
 from cpg_ros.dynamics.equilibrium import equilibria, equilibrium
 from cpg_ros.dynamics.hopf import first_hopf
@@ -19,6 +30,8 @@ from cpg_ros.errors import InputError
 from cpg_ros.networks.network import Network, Range
 from cpg_ros.networks.parameter_line import ParameterLine
 from cpg_ros.networks.symmetry import Group, Symmetry
+import numpy as np
+import pytest
 
 BEFORE = (2, 0, 1)
 Z3 = Group(3, (('omega', (1, 2, 0)),))
@@ -72,7 +85,7 @@ LAG = ParameterLine(('lag',), (1.0,))
 
 
 def rest_by_hand(ring):
-    """The equilibrium, w eliminated: one cubic in v."""
+    """Return the equilibrium, w eliminated: one cubic in v."""
     roots = np.roots([-1.0 / 3.0, 0.0, 1.0 + ring.weight - 1.25, -1.25 * ring.threshold])
     v = roots[np.abs(roots.imag) < 1e-9].real
     return np.stack([v, 1.25 * (v + ring.threshold)], axis=1)

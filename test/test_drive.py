@@ -1,17 +1,30 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Gaits with motions of their own, and steering: what a stride factor does to the joints."""
 
-import numpy as np
-import pytest
-import steered
-from hypothesis import given, settings
-from hypothesis import strategies as st
-
 from cpg_ros.motion.pattern import Pattern
-from cpg_ros.motion.plan import Refused, plan
+from cpg_ros.motion.plan import plan, Refused
 from cpg_ros.motion.steering import Drive
 from cpg_ros.networks.registry import PRESETS
 from cpg_ros.robots.robot import Steering
-from cpg_ros.robots.robot_file import RobotError, load_robot, write_robot
+from cpg_ros.robots.robot_file import load_robot, RobotError, write_robot
+from hypothesis import given, settings
+from hypothesis import strategies as st
+import numpy as np
+import pytest
+import steered
 
 TURN = 2.0 * np.pi
 TABLE = Steering(**{key: tuple(value) for key, value in steered.STEERING.items()})
@@ -195,7 +208,7 @@ def test_motions_survive_writing(robot, tmp_path):
     ('trot.steering.speed', [0.1, 0.1, 0.2], r'speed\[1\]: 0.1 is not above 0.1'),
     ('trot.steering.stride', [0, 0.5, 1.5], r'stride\[2\]: 1.5 is not from -1 to 1'),
     ('trot.steering.turn', [0, 1, 1], r'turn\[0\]: 0 is not from 0.001'),
-    ('trot.steering.frequency', [1, 2, 3], r"frequency\[2\]: 3 is not from 0.01 to the g"),
+    ('trot.steering.frequency', [1, 2, 3], r'frequency\[2\]: 3 is not from 0.01 to the g'),
     ('trot.steering.speed', 0.3, 'speed: must be a list'),
     ('trot.steering.sideways', [0], 'unknown key'),
     ('pace.steering', dict(steered.STEERING), "gaits.pace.steering: needs the gait's 'frequency'"),

@@ -1,15 +1,28 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """What is a user's mistake is reported as one, and nothing else is."""
 
 import inspect
-
-import pytest
-from modules import modules
 
 from cpg_ros.errors import CpgError
 from cpg_ros.motion import plan as planning
 from cpg_ros.networks.registry import PRESETS
 from cpg_ros.robots.robot_file import find_robot
 from cpg_ros.tools import analyze, inversion
+from modules import modules
+import pytest
 
 
 def test_every_error_of_the_package_is_of_the_family():

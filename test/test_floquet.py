@@ -1,10 +1,20 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Floquet multipliers against flows of the whole network; which gaits attract, and in noise."""
 
 from functools import cache
-
-import numpy as np
-import pytest
-from scipy.integrate import solve_ivp
 
 from cpg_ros.dynamics.continuation import follow
 from cpg_ros.dynamics.floquet import multipliers, smallest_gain
@@ -18,6 +28,9 @@ from cpg_ros.networks.network import Preset
 from cpg_ros.networks.parameter_line import ParameterLine
 from cpg_ros.networks.quadruped import Quadruped
 from cpg_ros.networks.registry import PRESETS
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
 
 ALL = [(network, name) for network in ('quadruped', 'biped') for name in PRESETS[network]]
 EVERY = pytest.mark.parametrize(('network', 'name'), ALL)
@@ -30,7 +43,7 @@ def solved(network, name):
 
 
 def on_class(orbit):
-    """The projector on Fix(K): the mean over the permutations that shift by nothing."""
+    """Return the projector on Fix(K): the mean over the permutations that shift by nothing."""
     size, whole = orbit.network.cells, []
     for name in orbit.symmetry.k:
         g = np.eye(size)[list(orbit.symmetry.group.elements[name])]
@@ -48,7 +61,7 @@ def paired(found, wanted):
 
 
 def monodromy(orbit, flow, width=1e-5):
-    """Derivative of the state a period later by that at phase 0, by differences."""
+    """Return the derivative of the state a period later by that at phase 0, by differences."""
     start = orbit(np.array(0.0))
     moved = flow(np.concatenate([start + width * np.eye(start.size),
                                  start - width * np.eye(start.size)]))

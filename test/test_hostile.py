@@ -1,15 +1,28 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Two thousand hostile parameter requests; the benchmark sends more and times them."""
 
-import sys
 from pathlib import Path
-
-import numpy as np
-import pytest
-from graph import off_grid
-from rcl_interfaces.msg import ParameterType
-from rcl_interfaces.srv import SetParameters, SetParametersAtomically
+import sys
 
 from cpg_ros.networks.delayed import PRESETS
+from graph import off_grid
+import numpy as np
+import pytest
+from rcl_interfaces.msg import ParameterType
+from rcl_interfaces.srv import SetParameters, SetParametersAtomically
 
 TYPES = {bool: ParameterType.PARAMETER_BOOL, float: ParameterType.PARAMETER_DOUBLE,
          str: ParameterType.PARAMETER_STRING}

@@ -1,17 +1,25 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Parameters and readouts from mean cycles: found again, honestly, and nonsense refused."""
 
 from dataclasses import replace
 
-import numpy as np
-import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
-from made_up import joint_angles, record, weights_of
-
 from cpg_ros.dynamics.orbit import NoOrbit, solve_orbit, solve_preset
 from cpg_ros.inversion import invert as inversion
 from cpg_ros.inversion.cycle_fit import cycle_samples, fit_cycle
-from cpg_ros.inversion.fit_data import Joints, cells_of
+from cpg_ros.inversion.fit_data import cells_of, Joints
 from cpg_ros.inversion.free_parameters import free_numbers, within_hopf_set
 from cpg_ros.inversion.identifiability import correlation_length
 from cpg_ros.inversion.invert import invert
@@ -21,6 +29,11 @@ from cpg_ros.networks.delayed import Delayed
 from cpg_ros.networks.quadruped import Quadruped
 from cpg_ros.networks.registry import PRESETS
 from cpg_ros.robots.robot import HARMONICS
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from made_up import joint_angles, record, weights_of
+import numpy as np
+import pytest
 
 TROT = PRESETS['delayed']['trot'].network
 CELLS = (1, 1, 7, 2, 3, 4)

@@ -1,22 +1,36 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Round trips over the real graph: recorded to a bag and run again, and fitted live."""
 
 import json
 import os
+from pathlib import Path
 import signal
 import subprocess
 import sys
 import time
-from pathlib import Path
 
+from graph import EXECUTABLE, PATIENCE, Process, until, Watcher
 import numpy as np
 import pytest
-import yaml
-from graph import EXECUTABLE, PATIENCE, Process, Watcher, until
 from rcl_interfaces.srv import SetParametersAtomically
 from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
+import yaml
 
 INVERSION = EXECUTABLE.with_name('inversion')
 RECORDER = Path(__file__).with_name('recorder.py')
@@ -24,7 +38,7 @@ RECORDER = Path(__file__).with_name('recorder.py')
 
 @pytest.fixture
 def ending():
-    """Processes and watchers that are ended with the test."""
+    """Yield processes and watchers that are ended with the test."""
     started = []
     yield started
     for one in reversed(started):
@@ -32,7 +46,7 @@ def ending():
 
 
 def angles_at(times, positions, names, joint, instants):
-    """A joint's angle at instants, by linear interpolation."""
+    """Return a joint's angle at instants, by linear interpolation."""
     return np.interp(instants, times, positions[:, names.index(joint)])
 
 
@@ -40,7 +54,7 @@ def angles_at(times, positions, names, joint, instants):
     ('delayed', 'walk', ('/joint_states',)),
     ('quadruped', 'pace', tuple(f'/{leg}/joint_states' for leg in ('lh', 'rh', 'lf', 'rf')))])
 def test_a_gait_recorded_inverted_and_run_again_is_the_same(ending, tmp_path, network, gait,
-                                                           topics):
+                                                            topics):
     # Generator, recorder process, inversion of the bag, a second generator with the result.
     first = Process('-p', f'network:={network}', '-p', f'gait:={gait}', '-p', 'frequency:=1.7',
                     '-p', 'rate:=200.0')

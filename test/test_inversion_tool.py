@@ -1,21 +1,34 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """The executable inversion on recordings: what it says and writes, and what it refuses."""
 
 import csv
+from dataclasses import replace
 import json
+from pathlib import Path
 import subprocess
 import sys
-from dataclasses import replace
-from pathlib import Path
 
-import numpy as np
-import pytest
-import yaml
-from bags import START, joint_state, storage_file, write_bag
-
+from bags import joint_state, START, storage_file, write_bag
 from cpg_ros.dynamics.orbit import solve_orbit, solve_preset
 from cpg_ros.networks.registry import PRESETS
 from cpg_ros.robots.robot_file import load_robot
 from cpg_ros.tools.inversion import main
+import numpy as np
+import pytest
+import yaml
 
 LEGS = {'lh': 1, 'rh': 2, 'lf': 3, 'rf': 4}
 

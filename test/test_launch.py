@@ -1,23 +1,36 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Launch files: installed, startable, and true to the nodes they start."""
 
 import ast
 import contextlib
-import sys
 from pathlib import Path
+import sys
 from types import ModuleType, SimpleNamespace
 
-import pytest
-import rclpy
 from ament_index_python.packages import get_package_share_directory
-from graph import free_domain
-from setuptools import find_packages
-
 from cpg_ros.networks.registry import NETWORKS, PRESETS
 from cpg_ros.nodes.feedback_parameters import SWITCH
 from cpg_ros.nodes.generator_parameters import Planner, specs
 from cpg_ros.nodes.inversion_node import Inversion
 from cpg_ros.nodes.unitree.parameters import SPECS as BRIDGE
 from cpg_ros.robots.robot_file import find_robot
+from graph import free_domain
+import pytest
+import rclpy
+from setuptools import find_packages
 
 SOURCE = Path(__file__).resolve().parent.parent
 SHARE = Path(get_package_share_directory('cpg_ros'))

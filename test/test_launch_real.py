@@ -1,21 +1,35 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Launch files started by ROS's own launch, where launch_ros is installed."""
 
 import os
+from pathlib import Path
 import signal
 import subprocess
 import sys
-from pathlib import Path
 
-import pytest
 from ament_index_python.packages import get_package_share_directory
-from graph import PATIENCE, free_domain, until
+from graph import free_domain, PATIENCE, until
+import pytest
 
 pytest.importorskip('launch_ros', reason='launch_ros is not on PyPI: install ROS 2')
 pytestmark = pytest.mark.live
 
 SHARE = Path(get_package_share_directory('cpg_ros'))
 #: What ros2 launch does, without ros2cli.
-START = '''
+START = """
 import sys
 from launch import LaunchDescription, LaunchService
 from launch.actions import IncludeLaunchDescription
@@ -26,7 +40,7 @@ service.include_launch_description(LaunchDescription([IncludeLaunchDescription(
     PythonLaunchDescriptionSource(path),
     launch_arguments=[tuple(word.split(':=', 1)) for word in words])]))
 sys.exit(service.run())
-'''
+"""
 
 
 class Launched:

@@ -1,15 +1,28 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """The part geometry of robot files: from a URDF, in a file, and legs that feedback cannot move."""
 
 from dataclasses import replace
 from pathlib import Path
 
+from cpg_ros.feedback.kinematics import displace, forward, geometry_of
+from cpg_ros.robots.robot_file import load_robot, RobotError, write_robot
+from cpg_ros.tools.check_robot import main
+from go2 import FILE, GO2
 import numpy as np
 import pytest
-from go2 import FILE, GO2
-
-from cpg_ros.feedback.kinematics import displace, forward, geometry_of
-from cpg_ros.robots.robot_file import RobotError, load_robot, write_robot
-from cpg_ros.tools.check_robot import main
 
 URDF = Path(__file__).parent.parent / 'urdf' / 'quadruped.urdf'
 

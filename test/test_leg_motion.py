@@ -1,18 +1,31 @@
-"""What legs do besides their phases: on the spot, in a turn, walking or running."""
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 
-import numpy as np
-import pytest
+"""What legs do besides their phases: on the spot, in a turn, walking or running."""
 
 from cpg_ros.gaits.stride import find_stride
 from cpg_ros.networks.biped import Biped
 from cpg_ros.networks.delayed import Delayed
 from cpg_ros.recordings.recording import Recording
+import numpy as np
+import pytest
 
 PHASES = {'lh': 0.0, 'rh': 0.5, 'lf': 0.5, 'rf': 0.0}
 
 
 def stride_of(hip, knee, phases=PHASES, network=Delayed):
-    """The stride of legs whose hip and knee are functions of phase in radians and of the leg."""
+    """Return the stride of legs whose hip and knee are functions of phase (rad) and leg."""
     t, rng = np.arange(2000) / 200.0, np.random.default_rng(3)
     legs = {leg: (f'{leg}_hip', f'{leg}_knee') for leg in phases}
     angles = np.array([joint(2.0 * np.pi * (1.5 * t + phase), leg)

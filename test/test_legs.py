@@ -1,10 +1,23 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Legs guessed from joint names as robots and laboratories use them."""
 
-import pytest
+from cpg_ros.gaits.leg_names import legs_of, LegsError, role_of
 from hypothesis import given
 from hypothesis import strategies as st
-
-from cpg_ros.gaits.leg_names import LegsError, legs_of, role_of
+import pytest
 
 LEGS = ('lf', 'rf', 'lh', 'rh')
 #: How the four legs are called.

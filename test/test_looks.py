@@ -1,18 +1,31 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """What shows the robot: its URDF, RViz, PlotJuggler and Foxglove, true to what is published."""
 
 import json
 import math
+from pathlib import Path
 import re
 import xml.etree.ElementTree as ElementTree
-from pathlib import Path
-
-import numpy as np
-import pytest
-import yaml
 
 from cpg_ros.nodes.joint_publishers import COMMAND_TOPICS
 from cpg_ros.robots.robot_file import find_robot
 from cpg_ros.tools.check_robot import main
+import numpy as np
+import pytest
+import yaml
 
 SOURCE = Path(__file__).resolve().parent.parent
 URDF = SOURCE / 'urdf' / 'quadruped.urdf'
@@ -104,9 +117,9 @@ def test_inertias_are_those_of_real_bodies(tree):
 
 def test_mujoco_takes_the_urdf_and_the_robot_stands(tree):
     mujoco = pytest.importorskip('mujoco')
-    text = URDF.read_text().replace('<link name="base"/>', '''<link name="world"/>
+    text = URDF.read_text().replace('<link name="base"/>', """<link name="world"/>
         <joint name="free" type="floating"><parent link="world"/><child link="base"/></joint>
-        <link name="base"/>''')
+        <link name="base"/>""")
     spec = mujoco.MjSpec.from_string(text)
     spec.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_PLANE, size=[5, 5, 0.1])
     robot = find_robot('quadruped')

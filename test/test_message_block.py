@@ -1,22 +1,35 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """What is published as bytes is, byte for byte, what rclpy makes of the same message."""
 
 from types import SimpleNamespace
 
-import numpy as np
-import pytest
 from builtin_interfaces.msg import Duration, Time
-from hypothesis import given, settings
-from hypothesis import strategies as st
-from nav_msgs.msg import Odometry
-from rclpy.serialization import deserialize_message, serialize_message
-from sensor_msgs.msg import Imu, JointState
-from std_msgs.msg import Float64MultiArray, Header, MultiArrayDimension, MultiArrayLayout
-from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
-
 from cpg_ros.nodes.joint_publishers import Outputs
 from cpg_ros.nodes.message_block import MessageBlock, Template
 from cpg_ros.nodes.sensor_publishers import Measurements
 from cpg_ros.robots.robot_file import find_robot
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from nav_msgs.msg import Odometry
+import numpy as np
+import pytest
+from rclpy.serialization import deserialize_message, serialize_message
+from sensor_msgs.msg import Imu, JointState
+from std_msgs.msg import Float64MultiArray, Header, MultiArrayDimension, MultiArrayLayout
+from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 ROBOTS = [find_robot(name) for name in ('quadruped', 'goat', 'biped', 'unitree_go2')]
 SIZES = {'boolean': 1, 'octet': 1, 'uint8': 1, 'uint16': 2, 'int32': 4, 'uint32': 4, 'double': 8}

@@ -1,12 +1,26 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """What happens where a library is not installed: one line, or nothing at all."""
 
+from pathlib import Path
 import subprocess
 import sys
-from pathlib import Path
 
+from bags import walk, write_bag
 import numpy as np
 import pytest
-from bags import walk, write_bag
 
 
 def run(missing, text):
@@ -36,11 +50,11 @@ def test_what_does_without_it(missing, module):
 
 
 def test_other_errors_are_shown_as_ever():
-    found = run('numba', '''
+    found = run('numba', """
 try:
     import cpg_ros.integration
 except ImportError:
-    1 / 0''')
+    1 / 0""")
     assert found.returncode == 1 and 'ZeroDivisionError' in found.stderr
     assert len(found.stderr.splitlines()) > 1
 
@@ -49,11 +63,11 @@ except ImportError:
 def test_bags_are_read_by_ros_where_rosbags_is_missing(compression, tmp_path):
     messages, angles = walk(60)
     bag = write_bag(tmp_path / 'bag', messages, compression=compression)
-    found = run('nothing', f'''
+    found = run('nothing', f"""
 sys.path.insert(0, {str(Path(__file__).parent)!r})
 import rosbag2_stand_in
 from cpg_ros.recordings.bag_reader import read_bag
-print(*read_bag({str(bag)!r}, progress=False).positions.ravel().tolist())''')
+print(*read_bag({str(bag)!r}, progress=False).positions.ravel().tolist())""")
     assert found.returncode == 0, found.stderr
     assert np.array_equal(np.array(found.stdout.split(), float).reshape(angles.shape), angles)
 
@@ -61,10 +75,10 @@ print(*read_bag({str(bag)!r}, progress=False).positions.ravel().tolist())''')
 def test_a_bag_that_ros_cannot_read_is_one_line(tmp_path):
     (tmp_path / 'bag').mkdir()
     (tmp_path / 'bag' / 'metadata.yaml').write_text('nothing: here\n')
-    found = run('nothing', f'''
+    found = run('nothing', f"""
 sys.path.insert(0, {str(Path(__file__).parent)!r})
 import rosbag2_stand_in
 from cpg_ros.tools.inversion import main
-sys.exit(main(['--bag', {str(tmp_path / 'bag')!r}]))''')
+sys.exit(main(['--bag', {str(tmp_path / 'bag')!r}]))""")
     (line,) = found.stderr.splitlines()
     assert found.returncode and str(tmp_path / 'bag') in line

@@ -1,23 +1,36 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """The Morris-Lecar networks: the papers' equations, their symmetries, and the integrator."""
 
-import math
 from dataclasses import replace
 from itertools import pairwise
+import math
 
-import numpy as np
-import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
-from hypothesis.extra.numpy import arrays
-from numba import njit
-from scipy.integrate import solve_ivp
-from scipy.optimize import brentq
-
-from cpg_ros.integration.jit import OPTIONS, exp
+from cpg_ros.integration.jit import exp, OPTIONS
 from cpg_ros.integration.simulate import simulate
 from cpg_ros.networks.biped import Biped
 from cpg_ros.networks.quadruped import Quadruped
 from cpg_ros.networks.registry import PRESETS
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+from numba import njit
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from scipy.optimize import brentq
 
 KINDS = pytest.mark.parametrize('kind', [Quadruped, Biped])
 START = {Quadruped: np.linspace(0.8, -0.4, 16), Biped: np.linspace(-0.4, 0.8, 8)}
@@ -32,7 +45,7 @@ def share(v, middle, width):
 
 
 def equations(kind, values, x):
-    """The paper's equations, cell by cell; complex numbers are for derivatives."""
+    """Return the paper's equations, cell by cell; complex numbers are for derivatives."""
     p, (v, w) = dict(zip(kind.parameters(), values, strict=True)), x.reshape(2, -1)
     out = np.zeros((2, kind.cells), np.result_type(x, np.asarray(values)))
     for i in range(kind.cells):
@@ -94,7 +107,7 @@ def test_rates_and_derivatives_are_those_of_the_papers_equations(kind, data):
 
 @njit(**OPTIONS)
 def over(values, out):
-    """The exponential in a loop, where the compiler takes several at a time."""
+    """Return the exponential in a loop, where the compiler takes several at a time."""
     for i in range(values.size):
         out[i] = exp(values[i])
 
@@ -113,7 +126,7 @@ def test_exponential_over_its_whole_range():
 
 
 def shared(network, group):
-    """The biped with one weight for all pairs of cells that the group takes to one another."""
+    """Return the biped with one weight for all pairs that the group takes to one another."""
     def weight(name):
         j, k = (int(digit) - 1 for digit in name[2:])
         return getattr(network, 'w_{}{}'.format(*min((h[j] + 1, h[k] + 1) for h in group)))

@@ -1,16 +1,29 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """The Morris-Lecar networks in the generator: as the delayed one, by the same services."""
 
 from pathlib import Path
 
-import pytest
 from ament_index_python.packages import get_package_share_directory
-from graph import Process, Watcher, until
-from switches import check_all_switches, off
-
 from cpg_ros.motion.plan import plan
 from cpg_ros.networks.preset_files import write_presets
 from cpg_ros.networks.registry import NETWORKS, PRESETS
 from cpg_ros.robots.robot_file import load_robot
+from graph import Process, until, Watcher
+import pytest
+from switches import check_all_switches, off
 
 CONFIG = Path(get_package_share_directory('cpg_ros')) / 'config'
 # Phases of the legs, where the gait's symmetry prescribes them: docs/theory.md, section The
@@ -20,7 +33,7 @@ PHASES = {'quadruped': {'pronk': (0, 0, 0, 0), 'pace': (0, .5, 0, .5), 'bound': 
                         'walk': (0, .5, .75, .25)},
           'biped': {'walk': (0, .5), 'run': (0, .5), 'two_legged_jump': (0, 0),
                     'two_legged_hop': (0, 0), 'skip': (0, .5)}}
-TWIN = '''
+TWIN = """
 from dataclasses import dataclass
 
 from cpg_ros.networks.delayed import PRESETS, Delayed
@@ -35,7 +48,7 @@ class Twin(Delayed):
     def presets(cls):
         return {name: Preset(one.gait, cls(**one.network.as_dict()))
                 for name, one in PRESETS.items()}
-'''
+"""
 DEFAULT = {'quadruped': 'trot', 'biped': 'walk'}
 
 

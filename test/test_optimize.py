@@ -1,20 +1,31 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """The search for weights: as a function, as an executable, and what it is made of."""
 
 import csv
+from dataclasses import replace
 import os
 import subprocess
 import sys
-from dataclasses import replace
-
-import numpy as np
-import pytest
 
 from cpg_ros.dynamics.floquet import multipliers
 from cpg_ros.dynamics.orbit import solve_preset
 from cpg_ros.dynamics.periodic import richer
 from cpg_ros.gaits.waveform_comparison import lag, shape_difference, shifted, steadiness
 from cpg_ros.motion.phase_readout import PhaseReadout
-from cpg_ros.networks.biped import GAITS, PRIMARY, WEIGHTS, Biped
+from cpg_ros.networks.biped import Biped, GAITS, PRIMARY, WEIGHTS
 from cpg_ros.networks.preset_files import read_presets
 from cpg_ros.networks.quadruped import Quadruped
 from cpg_ros.networks.registry import PRESETS as ALL_PRESETS
@@ -23,6 +34,8 @@ from cpg_ros.search import objectives, search_space
 from cpg_ros.search import verification as polish
 from cpg_ros.search.pareto_front import write_front
 from cpg_ros.tools import optimize
+import numpy as np
+import pytest
 
 PRESETS = ALL_PRESETS['biped']
 SECONDARY = tuple(gait for gait in GAITS if gait not in PRIMARY)

@@ -1,19 +1,32 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Orbits and Hopf points against verified numbers and the whole delay equation."""
 
 from dataclasses import replace
 
-import numpy as np
-import pytest
-from hypothesis import assume, given, settings
-from hypothesis import strategies as st
-from modes import MODES, class_of, eigenvalue_terms
-from scipy.special import lambertw
-
 from cpg_ros.dynamics.hopf import first_hopf
 from cpg_ros.dynamics.hopf_search import hopf_points
 from cpg_ros.dynamics.orbit import NoOrbit, solve_orbit
-from cpg_ros.networks.delayed import GAITS, PRESETS, Delayed
+from cpg_ros.networks.delayed import Delayed, GAITS, PRESETS
 from cpg_ros.networks.parameter_line import ParameterLine
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+from modes import class_of, eigenvalue_terms, MODES
+import numpy as np
+import pytest
+from scipy.special import lambertw
 
 TAU = ParameterLine(('tau',), (1.0,))
 EXAMPLE = Delayed(-4.5, 1.0, 6.5, -2.0, 0.4)

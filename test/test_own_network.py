@@ -1,3 +1,17 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """A network of one's own, this file: what it states is enough for everything else.
 
 Stuart-Landau oscillators, one a leg, coupled through both variables: on the walk the radius is
@@ -11,14 +25,13 @@ from dataclasses import dataclass, replace
 from fractions import Fraction
 from pathlib import Path
 
+from cpg_ros.networks.network import known, Network, Preset, Range
+from cpg_ros.networks.symmetry import Group, Symmetry
 import numpy as np
 import pytest
-import yaml
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
-
-from cpg_ros.networks.network import Network, Preset, Range, known
-from cpg_ros.networks.symmetry import Group, Symmetry
+import yaml
 
 OTHER = (1, 0)
 Z2 = Group(2, (('side', OTHER),))
@@ -70,7 +83,7 @@ class TwoLegs(Network):
 
 
 def late_network():
-    """The second network; in here, since a file holds one."""
+    """Return the second network; in here, since a file holds one."""
     @dataclass(frozen=True)
     class LateLegs(TwoLegs):
         """The same, the other leg heard a delay ago."""

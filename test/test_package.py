@@ -1,16 +1,30 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """The package as colcon builds it, and as ROS finds it."""
 
 import os
+from pathlib import Path
 import shutil
 import subprocess
 import sys
-from pathlib import Path
 
-import pytest
-import yaml
 from ament_index_python.packages import get_package_share_directory
 from catkin_pkg.package import parse_package
 from graph import Process
+import pytest
+import yaml
 
 SOURCE = Path(__file__).resolve().parent.parent
 SHARE = Path(get_package_share_directory('cpg_ros'))

@@ -1,31 +1,45 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """The panel on a graph, seen by pages without a browser."""
 
 import contextlib
 import http.client
+from io import BytesIO
 import math
 import os
 import re
 import socket
 import subprocess
 import time
-import zipfile
-from io import BytesIO
 from urllib.parse import urlsplit
+import zipfile
 
 import pytest
 import yaml
 
 pytest.importorskip('websockets')
 
-from geometry_msgs.msg import Twist
-from graph import Process, Watcher, free_domain, until
-from panel_client import PANEL, Client, start_panel
-from websockets.exceptions import InvalidStatus
+from geometry_msgs.msg import Twist  # noqa: E402, I100
+from graph import free_domain, Process, until, Watcher  # noqa: E402
+from panel_client import Client, PANEL, start_panel  # noqa: E402
+from websockets.exceptions import InvalidStatus  # noqa: E402
 
 
 @pytest.fixture(scope='module')
 def rig(tmp_path_factory):
-    """A steered generator, a panel, and a watcher."""
+    """Yield a steered generator, a panel, and a watcher."""
     folder = tmp_path_factory.mktemp('recordings')
     generator = Process('-p', 'robot:=unitree_go2', '-p', 'cmd_vel:=true', '-p', 'rate:=200.0',
                         '-p', 'transition:=0.3', '-p', 'ramp:=0.2')
@@ -106,8 +120,8 @@ def test_a_click_changes_the_gait_for_every_page(rig, page):
         page.send(do='set', name='gait', value=gait)
         until(lambda: rig[3].gaits[-1] == gait, gait)  # noqa: B023
         for one in (page, other):
-            until(lambda: one.last['gait']['gait'] == gait and one.value('gait') == gait,  # noqa: B023
-                  gait)
+            until(lambda: one.last['gait']['gait'] == gait  # noqa: B023
+                  and one.value('gait') == gait, gait)  # noqa: B023
     other.end()
 
 
@@ -296,8 +310,8 @@ def test_robots_in_two_namespaces_and_one_that_comes_later():
         for space, network in (('/a', 'delayed'), ('/b', 'biped')):
             started.append(Process('-p', f'network:={network}', '-r', f'__ns:={space}',
                                    domain=domain))
-            until(lambda: f'{space}/cpg_generator' in page.last['state']['generators'],  # noqa: B023
-                  'a generator')
+            name = f'{space}/cpg_generator'
+            until(lambda: name in page.last['state']['generators'], name)  # noqa: B023
         assert page.ready().last['chosen']['node'] == '/a/cpg_generator'
         assert page.last['shape']['source'] == 'quadruped.urdf'
         for one in ('chosen', 'controls', 'shape', 'names', 'gait'):
@@ -316,4 +330,3 @@ def test_robots_in_two_namespaces_and_one_that_comes_later():
         page.end()
         for one in (*started, panel):
             one.end()
-

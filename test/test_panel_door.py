@@ -1,3 +1,17 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Who may come in to the panel, and what may be asked of it."""
 
 import json
@@ -6,9 +20,9 @@ import pytest
 
 pytest.importorskip('websockets')
 
-from cpg_ros.panel.controls import choices, unit
-from cpg_ros.panel.door import Door, DoorError, is_loopback
-from cpg_ros.panel.requests import LONGEST, RequestError, read
+from cpg_ros.panel.controls import choices, unit  # noqa: E402, I100
+from cpg_ros.panel.door import Door, DoorError, is_loopback  # noqa: E402
+from cpg_ros.panel.requests import LONGEST, read, RequestError  # noqa: E402
 
 
 @pytest.mark.parametrize(('host', 'only_here'), [

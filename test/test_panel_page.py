@@ -1,3 +1,17 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """The panel's page in a real browser: Chromium without a screen."""
 
 import re
@@ -8,10 +22,10 @@ import pytest
 pytest.importorskip('websockets')
 pytest.importorskip('playwright', reason='playwright is not installed')
 
-from geometry_msgs.msg import Twist
-from graph import Process, Watcher, until
-from panel_client import start_panel
-from playwright.sync_api import sync_playwright
+from geometry_msgs.msg import Twist  # noqa: E402, I100
+from graph import Process, until, Watcher  # noqa: E402
+from panel_client import start_panel  # noqa: E402
+from playwright.sync_api import sync_playwright  # noqa: E402
 
 CHROMIUM = shutil.which('chromium') or shutil.which('chromium-browser') or shutil.which(
     'google-chrome')
@@ -24,7 +38,7 @@ FLAGS = ['--headless', '--no-sandbox', '--disable-gpu', '--use-angle=swiftshader
 
 @pytest.fixture(scope='module')
 def rig():
-    """A steered generator, the address of its page, a watcher, and what cmd_vel says."""
+    """Yield a steered generator, the address of its page, a watcher, and what cmd_vel says."""
     generator = Process('-p', 'robot:=unitree_go2', '-p', 'cmd_vel:=true', '-p', 'rate:=100.0',
                         '-p', 'transition:=0.2', '-p', 'ramp:=0.2')
     panel, address = start_panel(generator.domain)
@@ -41,7 +55,7 @@ def rig():
 
 @pytest.fixture(scope='module')
 def browser():
-    """A browser that looks at nothing but this machine."""
+    """Yield a browser that looks at nothing but this machine."""
     with sync_playwright() as running:
         started = running.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
         yield started
@@ -80,11 +94,11 @@ def test_it_shows_the_robot_and_all_that_is_known_of_it(rig, open_page):
     assert page.locator('#gaits button.on').get_attribute('data-gait') == 'trot'
     assert page.evaluate('panel.scene.gl.getError()') == 0
     # Something is drawn: there are more colours than of a sky and a floor.
-    colours = page.evaluate('''() => { panel.scene.draw({}); const gl = panel.scene.gl;
+    colours = page.evaluate("""() => { panel.scene.draw({}); const gl = panel.scene.gl;
         const all = new Uint8Array(4 * gl.drawingBufferWidth * gl.drawingBufferHeight);
         gl.readPixels(0, 0, gl.drawingBufferWidth, gl.drawingBufferHeight, gl.RGBA,
             gl.UNSIGNED_BYTE, all);
-        return new Set(new Uint32Array(all.buffer)).size; }''')
+        return new Set(new Uint32Array(all.buffer)).size; }""")
     assert colours > 300
     sliders = page.locator('input[type=range][data-parameter]')
     assert {'rate', 'amplitude', 'delayed.tau'} <= set(sliders.evaluate_all(
@@ -150,8 +164,8 @@ def test_the_robot_stops_when_the_page_lets_go(rig, open_page, how):
         page.keyboard.up('ArrowUp')
     elif how == 'hidden':
         # As a browser does when another tab comes to the front.
-        page.evaluate('''() => { Object.defineProperty(document, 'hidden', { get: () => true });
-            document.dispatchEvent(new Event('visibilitychange')); }''')
+        page.evaluate("""() => { Object.defineProperty(document, 'hidden', { get: () => true });
+            document.dispatchEvent(new Event('visibilitychange')); }""")
     elif how == 'space':
         page.keyboard.press(' ')
         page.locator('#said p.told', has_text='ramping down').wait_for()
@@ -159,7 +173,7 @@ def test_the_robot_stops_when_the_page_lets_go(rig, open_page, how):
     elif how == 'closed':
         page.close()
     else:
-        page.evaluate('''() => { const end = Date.now() + 1500; while (Date.now() < end); }''')
+        page.evaluate("""() => { const end = Date.now() + 1500; while (Date.now() < end); }""")
     until(lambda: rig[3][-1] == (0.0, 0.0), 'the stop')
 
 

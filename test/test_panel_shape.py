@@ -1,3 +1,17 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """The shapes that the panel draws: where their links are, and what they are made of."""
 
 import struct
@@ -7,10 +21,10 @@ import pytest
 
 pytest.importorskip('websockets')
 
-from cpg_ros.files.shared_resources import share
-from cpg_ros.panel import body_shape as solids
-from cpg_ros.panel import mesh_files, shape_source, stick_figure, urdf_shape
-from cpg_ros.robots.robot_file import find_robot
+from cpg_ros.files.shared_resources import share  # noqa: E402, I100
+from cpg_ros.panel import body_shape as solids  # noqa: E402
+from cpg_ros.panel import mesh_files, shape_source, stick_figure, urdf_shape  # noqa: E402
+from cpg_ros.robots.robot_file import find_robot  # noqa: E402
 
 
 def worlds(shape, angles):
@@ -118,10 +132,10 @@ def test_vertices_that_lie_close_together_become_one():
     assert len(left) == 4 and volume(left) == pytest.approx(1 / 6, rel=0.02)
 
 
-URDF = '''<robot name="one"><link name="base"><visual><geometry><mesh filename="{mesh}"
+URDF = """<robot name="one"><link name="base"><visual><geometry><mesh filename="{mesh}"
   scale="0.5 0.5 0.5"/></geometry></visual><visual><geometry><mesh filename="package://no/x.stl"/>
   </geometry></visual></link><link name="arm"/><joint name="shoulder" type="revolute"><parent
-  link="base"/><child link="arm"/><limit lower="-1" upper="2" velocity="3"/></joint></robot>'''
+  link="base"/><child link="arm"/><limit lower="-1" upper="2" velocity="3"/></joint></robot>"""
 
 
 def test_a_urdf_with_meshes_of_which_one_is_missing(tmp_path):

@@ -1,18 +1,31 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """The moving pattern: smooth, within limits, true to its figures, and hard to put out."""
 
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
-import numpy as np
-import pytest
-
 from cpg_ros.integration.stepper import Stepper
 from cpg_ros.motion.pattern import Pattern
-from cpg_ros.motion.plan import Refused, plan
-from cpg_ros.networks.delayed import GAITS, PRESETS, Delayed
+from cpg_ros.motion.plan import plan, Refused
+from cpg_ros.networks.delayed import Delayed, GAITS, PRESETS
 from cpg_ros.robots.robot import JointMotion, Motion
 from cpg_ros.robots.robot_file import load_robot
+import numpy as np
+import pytest
 
 ROBOTS = {name: load_robot(Path(__file__).parents[1] / 'config' / f'{name}.yaml')
           for name in ('goat', 'quadruped')}
@@ -122,7 +135,6 @@ def test_a_joint_that_a_gait_only_moves_elsewhere_does_not_hold_up_the_ramp():
     run = drive(one, 1.2, 0.002)
     assert one.level == 1.0 and one.position[0] == pytest.approx(0.3)
     check_the_robot_can_follow(moved, run, 0.002)
-
 
 
 @pytest.mark.parametrize('dt', [0.001, 0.02])

@@ -1,15 +1,28 @@
-"""The period of signals, and their mean cycle: never a half, never a double."""
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 
-import numpy as np
-import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
-from rhythm import BIPED, QUADRUPED, Rhythm, around, recordings, seeds
+"""The period of signals, and their mean cycle: never a half, never a double."""
 
 from cpg_ros.gaits.mean_cycle import mean_cycle
 from cpg_ros.gaits.period import find_period
 from cpg_ros.gaits.recognition import recognise
 from cpg_ros.networks.symmetry import D2, Z4_Z2
+from hypothesis import given, settings
+from hypothesis import strategies as st
+import numpy as np
+import pytest
+from rhythm import around, BIPED, QUADRUPED, recordings, Rhythm, seeds
 
 
 @pytest.mark.parametrize('gait', ['pronk', 'trot', 'walk'])

@@ -1,11 +1,22 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Joints and legs read off the phase of Morris-Lecar cells, alone and in the moving pattern."""
 
 from functools import cache
 from itertools import permutations
 from pathlib import Path
-
-import numpy as np
-import pytest
 
 from cpg_ros.dynamics.orbit import solve_preset
 from cpg_ros.motion.pattern import Pattern
@@ -13,6 +24,8 @@ from cpg_ros.motion.phase_readout import PhaseReadout
 from cpg_ros.motion.plan import plan
 from cpg_ros.networks.registry import PRESETS
 from cpg_ros.robots.robot_file import load_robot
+import numpy as np
+import pytest
 
 ROBOTS = {name: load_robot(Path(__file__).parents[1] / 'config' / f'{name}.yaml')
           for name in ('quadruped', 'biped')}
@@ -45,7 +58,7 @@ class Theory:
         slope, bend = (self.sum(cycle, order)[top, each] for order in (1, 2))
         self.crests = cycle[top] - slope / bend / (2.0 * np.pi)
 
-    def sum(self, theta, order):
+    def sum(self, theta, order):  # noqa: A003
         turn = np.exp(2j * np.pi * np.multiply.outer(theta, self.k)) * (1j * self.k)**order
         return (turn @ self.terms).real
 

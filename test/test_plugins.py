@@ -1,24 +1,37 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Networks from outside the package: in a file of the user's, or offered by another package."""
 
 import json
 import os
+from pathlib import Path
 import shutil
 import subprocess
 import sys
-from pathlib import Path
-
-import numpy as np
-import pytest
-import yaml
 
 from cpg_ros.dynamics.orbit import solve_preset
 from cpg_ros.inversion.parameter_files import write_fitted
 from cpg_ros.inversion.recording_fit import inverted
 from cpg_ros.motion.plan import plan
-from cpg_ros.networks.registry import NETWORKS, PRESETS, NetworkError, find_network
+from cpg_ros.networks.registry import find_network, NetworkError, NETWORKS, PRESETS
 from cpg_ros.recordings.csv_reader import read_csv
-from cpg_ros.robots.robot_file import RobotError, load_robot, write_robot
+from cpg_ros.robots.robot_file import load_robot, RobotError, write_robot
 from cpg_ros.search.search_space import search_space
+import numpy as np
+import pytest
+import yaml
 
 CONFIG = Path(__file__).resolve().parent.parent / 'config'
 TWIN = '''\
@@ -58,7 +71,7 @@ def twin(tmp_path_factory):
 
 
 def robot_tree(shipped, network, **places):
-    """A shipped robot's tree for the twin, with what the file says of each leg's place."""
+    """Return a shipped robot's tree for the twin, with what the file says of each leg's place."""
     tree = yaml.safe_load((CONFIG / f'{shipped}.yaml').read_text())
     tree['network'] = str(network)
     tree.pop('geometry', None)
@@ -201,7 +214,7 @@ def analysed(network, **environment):
 
 @pytest.fixture
 def offered(tmp_path):
-    """A package that offers a network, as pip would install it."""
+    """Return a package that offers a network, as pip would install it."""
     written(tmp_path, 'lent')
     (info := tmp_path / 'lent-1.0.dist-info').mkdir()
     (info / 'METADATA').write_text('Metadata-Version: 2.1\nName: lent\nVersion: 1.0\n')

@@ -1,18 +1,31 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Preset files: what is written is read again, and every bad file says what is wrong with it."""
 
-import os
 from dataclasses import replace
+import os
 from pathlib import Path
-
-import pytest
-import yaml
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from cpg_ros.networks.biped import Biped
 from cpg_ros.networks.network import Preset
 from cpg_ros.networks.preset_files import PresetError, read_presets, write_presets
 from cpg_ros.networks.registry import NETWORKS, PRESETS
+from hypothesis import given, settings
+from hypothesis import strategies as st
+import pytest
+import yaml
 
 CONFIG = Path(__file__).parents[1] / 'config' / 'presets'
 WALK = PRESETS['biped']['walk']

@@ -1,14 +1,28 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """The node as a process: how it starts, ends, and lives beside others."""
 
-import signal
 from pathlib import Path
+import signal
 
+from ament_index_python.packages import get_package_share_directory
+from diagnostic_msgs.msg import DiagnosticStatus
+from graph import off_grid, until, Watcher
 import numpy as np
 import pytest
 import yaml
-from ament_index_python.packages import get_package_share_directory
-from diagnostic_msgs.msg import DiagnosticStatus
-from graph import Watcher, off_grid, until
 
 CONFIG = Path(get_package_share_directory('cpg_ros')) / 'config'
 

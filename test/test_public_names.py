@@ -1,13 +1,26 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """What `import cpg_ros` gives."""
 
 import importlib
+from pathlib import Path
 import subprocess
 import sys
-from pathlib import Path
-
-import pytest
 
 import cpg_ros
+import pytest
 
 ROOMS = sorted(file.parent for file in Path(cpg_ros.__file__).parent.glob('*/__init__.py'))
 

@@ -1,16 +1,29 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Priority, cores and locked memory of the publishing thread, as the system has them."""
 
 import contextlib
 import os
+from pathlib import Path
 import re
 import subprocess
 import sys
-from pathlib import Path
-
-import pytest
-from graph import EXECUTABLE
 
 from cpg_ros.nodes.real_time import NoSuchCore, RealTime
+from graph import EXECUTABLE
+import pytest
 
 MAY = 'import os; os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(1))'
 #: Not in this process: locking all of its memory, too, would stay.
@@ -55,7 +68,7 @@ def test_nothing_is_asked_for_by_default(start):
 
 def test_what_is_refused_is_a_line_that_says_what_to_set():
     # In a process of its own, as a user who may not.
-    text = '''
+    text = """
 import os, resource
 from cpg_ros.nodes.real_time import RealTime
 for limit in (resource.RLIMIT_RTPRIO, resource.RLIMIT_MEMLOCK):
@@ -65,7 +78,7 @@ if os.getuid() == 0:
 granted, refused = RealTime(80, (), True).claim()
 assert granted == [], granted
 print(*refused, sep='\\n')
-'''
+"""
     ended = subprocess.run([sys.executable, '-c', text], capture_output=True, text=True)
     assert ended.returncode == 0, ended.stderr
     memory, priority = ended.stdout.splitlines()

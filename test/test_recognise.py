@@ -1,13 +1,26 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """The gait, H and K of signals: with noise, uneven samples, and none to be found."""
 
-import numpy as np
-import pytest
+from cpg_ros.gaits.recognition import nearest_gait, recognise
+from cpg_ros.networks.symmetry import D2, Symmetry, Z4_Z2
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from rhythm import BIPED, EVERY, NAMED, QUADRUPED, Rhythm, around, phase_error, recordings, seeds
-
-from cpg_ros.gaits.recognition import nearest_gait, recognise
-from cpg_ros.networks.symmetry import D2, Z4_Z2, Symmetry
+import numpy as np
+import pytest
+from rhythm import around, BIPED, EVERY, NAMED, phase_error, QUADRUPED, recordings, Rhythm, seeds
 
 
 @pytest.mark.parametrize(('table', 'name'), NAMED, ids=lambda value: value
@@ -92,7 +105,7 @@ def test_distances_are_those_of_the_definition(seed, cycles):
 
 
 def ring(amplitude):
-    """A trot whose cells differ in size along the ring: d(omega^2) is sqrt(2) d(omega)."""
+    """Return a trot whose cells differ in size along the ring: d(omega^2) is sqrt(2) d(omega)."""
     t = np.linspace(0.0, 5.0, 301)
     gait = QUADRUPED['trot']
     sizes = 1.0 + amplitude * np.cos(np.pi * (np.arange(8) // 2) / 2.0)

@@ -1,11 +1,24 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Recordings merged from chunks, against a dictionary filled sample by sample."""
 
-import numpy as np
-import pytest
+from cpg_ros.recordings.recording import merged, Recording, RecordingError
 from hypothesis import given, settings
 from hypothesis import strategies as st
-
-from cpg_ros.recordings.recording import Recording, RecordingError, merged
+import numpy as np
+import pytest
 
 JOINTS = ('lf_hip', 'lf_knee', 'rf_hip', 'rf_knee')
 START = 1_700_000_000_000_000_000

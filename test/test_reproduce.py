@@ -1,15 +1,26 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """The reproduction report: as an executable, its rows, and what makes it fail."""
 
 import base64
+from dataclasses import replace
 import json
+from pathlib import Path
 import re
 import subprocess
 import sys
-from dataclasses import replace
-from pathlib import Path
-
-import numpy as np
-import pytest
 
 from cpg_ros.dynamics.hopf import first_hopf
 from cpg_ros.dynamics.periodic import NoOrbit
@@ -18,6 +29,8 @@ from cpg_ros.papers.catalogue import PAPERS
 from cpg_ros.papers.errata import ERRATA
 from cpg_ros.papers.row import Citation
 from cpg_ros.tools import reproduce
+import numpy as np
+import pytest
 
 AT = Citation('Somebody 2000', 'Table 1')
 KEYS = {'paper': str, 'place': str, 'quantity': str, 'published': str, 'computed': str,

@@ -1,15 +1,28 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Robot files: the shipped ones load, and whatever is wrong is said in one line."""
 
 import copy
 from pathlib import Path
 
+from cpg_ros.robots.robot_file import load_robot, RobotError, write_robot
+from hypothesis import given, HealthCheck, settings
+from hypothesis import strategies as st
 import numpy as np
 import pytest
 import yaml
-from hypothesis import HealthCheck, given, settings
-from hypothesis import strategies as st
-
-from cpg_ros.robots.robot_file import RobotError, load_robot, write_robot
 
 CONFIG = Path(__file__).resolve().parent.parent / 'config'
 GOAT = yaml.safe_load((CONFIG / 'goat.yaml').read_text())
@@ -17,7 +30,7 @@ DROP = '(dropped)'
 
 
 def broken(path, value):
-    """The goat's tree with the value at this path (keys with dots) replaced or dropped."""
+    """Return the goat's tree with the value at this path (keys with dots) replaced or dropped."""
     *parents, last = [int(key) if key.isdigit() else key for key in path.split('.')]
     node = tree = copy.deepcopy(GOAT)
     for key in parents:

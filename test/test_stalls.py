@@ -1,21 +1,34 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """A generator that was stopped goes on where it stood, slowed in, as its receivers see it."""
 
+from pathlib import Path
 import signal
 import time
-from pathlib import Path
-
-import numpy as np
-import pytest
-from diagnostic_msgs.msg import DiagnosticStatus
-from graph import until
-from rclpy.qos import QoSProfile
-from sensor_msgs.msg import JointState
-from std_msgs.msg import Float64MultiArray
 
 from cpg_ros.motion.pattern import Pattern
 from cpg_ros.motion.plan import plan
 from cpg_ros.networks.registry import PRESETS
 from cpg_ros.robots.robot_file import find_robot
+from diagnostic_msgs.msg import DiagnosticStatus
+from graph import until
+import numpy as np
+import pytest
+from rclpy.qos import QoSProfile
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Float64MultiArray
 
 #: Of every joint of the generic quadruped, rad/s.
 LIMIT = 20.0

@@ -1,18 +1,31 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Stands against scipy on all equations, and blocks against the whole linearisation."""
 
 from dataclasses import replace
 
-import numpy as np
-import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
-from scipy.optimize import fsolve
-
-from cpg_ros.dynamics.equilibrium import NoEquilibrium, equilibria, equilibrium, everywhere
+from cpg_ros.dynamics.equilibrium import equilibria, equilibrium, everywhere, NoEquilibrium
 from cpg_ros.dynamics.isotypic import blocks
 from cpg_ros.networks.biped import Biped
 from cpg_ros.networks.quadruped import Quadruped
-from cpg_ros.papers.buono_tables import Tables, square_root
+from cpg_ros.papers.buono_tables import square_root, Tables
+from hypothesis import given, settings
+from hypothesis import strategies as st
+import numpy as np
+import pytest
+from scipy.optimize import fsolve
 
 COUPLINGS = st.builds(Quadruped, *[st.floats(-0.4, 0.4)] * 6)
 BIPEDS = st.builds(Biped.symmetric, st.floats(0.15, 0.6), st.floats(0.05, 1.0),

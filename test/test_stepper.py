@@ -1,17 +1,30 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """The real-time stepper against the simulation and against the equation."""
 
 from dataclasses import replace
 
-import numpy as np
-import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
-from modes import Mode
-
 from cpg_ros.dynamics.orbit import solve_orbit
 from cpg_ros.integration.simulate import simulate
 from cpg_ros.integration.stepper import Stepper
-from cpg_ros.networks.delayed import STEP, Delayed
+from cpg_ros.networks.delayed import Delayed, STEP
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from modes import Mode
+import numpy as np
+import pytest
 
 WALK = Delayed(-4.5, 1.0, 6.5, -2.0, 0.4)
 START = np.array([0.1, -0.1, 0.1, -0.1, -0.1, 0.1, -0.1, 0.1])

@@ -1,17 +1,31 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """What stops a robot acts at once, whatever the parameter services are doing."""
 
 import signal
 import time
 
-import numpy as np
-import pytest
-import steered
 from geometry_msgs.msg import Twist
 from graph import until
+import numpy as np
+import pytest
 from rcl_interfaces.srv import SetParameters
 from rclpy.parameter import Parameter
 from rclpy.qos import qos_profile_parameters
 from std_srvs.srv import SetBool
+import steered
 
 #: Enough to plan for seconds, were all of them planned.
 FLOOD = np.linspace(1.0, 2.0, 200)

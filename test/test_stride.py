@@ -1,17 +1,30 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """The stride of recordings whose motion is known: found, measured, named, or refused."""
 
-import numpy as np
-import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
-from motion import BY_LEG, GAITS, NAMES, Driven, Recorded, leg, noisy, quadruped, stamps
-
 from cpg_ros.gaits.leg_names import legs_of
-from cpg_ros.gaits.stride import NoSteadyGait, find_stride
+from cpg_ros.gaits.stride import find_stride, NoSteadyGait
 from cpg_ros.networks.biped import Biped
 from cpg_ros.networks.delayed import Delayed
 from cpg_ros.networks.quadruped import Quadruped
 from cpg_ros.networks.registry import NETWORKS, PRESETS
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from motion import BY_LEG, Driven, GAITS, leg, NAMES, noisy, quadruped, Recorded, stamps
+import numpy as np
+import pytest
 
 EVERY = [(network, name) for network in PRESETS for name in PRESETS[network]]
 seeds = st.integers(0, 2**32)

@@ -1,17 +1,30 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Gaits and parameters changed while the robot moves, through the real parameter services."""
 
 from pathlib import Path
 
-import numpy as np
-import pytest
 from ament_index_python.packages import get_package_share_directory
-from graph import until
-from std_srvs.srv import SetBool
-from switches import by_leg, check_all_switches, off
-
 from cpg_ros.motion.plan import plan
 from cpg_ros.networks.delayed import GAITS, PRESETS
 from cpg_ros.robots.robot_file import load_robot
+from graph import until
+import numpy as np
+import pytest
+from std_srvs.srv import SetBool
+from switches import by_leg, check_all_switches, off
 
 ROBOT = load_robot(Path(get_package_share_directory('cpg_ros')) / 'config' / 'quadruped.yaml')
 OFFSET, LOWER, UPPER = (ROBOT.column(key) for key in ('offset', 'lower', 'upper'))

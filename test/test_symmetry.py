@@ -1,21 +1,34 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Symmetry groups of the networks: subgroups, admissible pairs, gaits as homomorphisms."""
 
 from fractions import Fraction
 from itertools import chain, combinations, product
 from math import gcd
 
-import numpy as np
-import pytest
+from cpg_ros.networks.hk_theorem import admissible_pairs, label, subgroups, symmetries
+from cpg_ros.networks.symmetry import D2, Group, Symmetry, Z4_Z2
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from rhythm import BIPED, GROUPS, QUADRUPED, Z6, seeds
-
-from cpg_ros.networks.hk_theorem import admissible_pairs, label, subgroups, symmetries
-from cpg_ros.networks.symmetry import D2, Z4_Z2, Group, Symmetry
+import numpy as np
+import pytest
+from rhythm import BIPED, GROUPS, QUADRUPED, seeds, Z6
 
 
 def times(a, b):
-    """The permutation a after b."""
+    """Return the permutation a after b."""
     return tuple(a[i] for i in b)
 
 

@@ -1,14 +1,27 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """The vectorisable tanh against libm's."""
 
 import math
 
-import numpy as np
-import pytest
+from cpg_ros.integration.jit import OPTIONS, tanh
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numba import njit
-
-from cpg_ros.integration.jit import OPTIONS, tanh
+import numpy as np
+import pytest
 
 SPECIAL = [0.0, -0.0, math.inf, -math.inf, 5e-324, -5e-324, 2.2250738585072014e-308,
            -2.2250738585072009e-308, 1e-160, 1e-8, 0.5 * math.log(2.0), 19.06, 19.07, 20.0,
@@ -17,7 +30,7 @@ SPECIAL = [0.0, -0.0, math.inf, -math.inf, 5e-324, -5e-324, 2.2250738585072014e-
 
 @njit(**OPTIONS)
 def over(values, out):
-    """The same in a loop, where the compiler takes several at a time."""
+    """Return the same in a loop, where the compiler takes several at a time."""
     for i in range(values.size):
         out[i] = tanh(values[i])
 

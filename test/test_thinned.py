@@ -1,21 +1,34 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Long recordings are smoothed to a coarser grid while they are read; short ones are not."""
 
-import numpy as np
-import pytest
-from bags import START, joint_state, write_bag
-from test_inversion_tool import table_of
-
+from bags import joint_state, START, write_bag
 from cpg_ros.recordings import joint_streams, thinned
 from cpg_ros.recordings.bag_reader import read_bag
 from cpg_ros.recordings.csv_reader import read_csv
-from cpg_ros.recordings.thinned import Thinned, smoothed
+from cpg_ros.recordings.thinned import smoothed, Thinned
+import numpy as np
+import pytest
+from test_inversion_tool import table_of
 
 STEP = 10_000_000
 
 
 @pytest.fixture
 def soon(monkeypatch):
-    """What counts as long is short."""
+    """Make what counts as long short."""
     monkeypatch.setattr(thinned, 'LONG', 2000)
     monkeypatch.setattr(joint_streams, 'LONG', 2000)
 

@@ -1,18 +1,31 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """What the generator publishes, as another process on the graph sees it."""
 
 from pathlib import Path
 
-import numpy as np
-import pytest
 from ament_index_python.packages import get_package_share_directory
+from cpg_ros.robots.robot_file import load_robot
 from diagnostic_msgs.msg import DiagnosticStatus
 from graph import off_grid, until
+import numpy as np
+import pytest
 from rclpy.qos import ReliabilityPolicy
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray
 from trajectory_msgs.msg import JointTrajectory
-
-from cpg_ros.robots.robot_file import load_robot
 
 CONFIG = Path(get_package_share_directory('cpg_ros')) / 'config'
 QUADRUPED = load_robot(CONFIG / 'quadruped.yaml')

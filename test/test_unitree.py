@@ -1,9 +1,20 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """The machine that keeps a robot and people safe, and its watchdog; no ROS graph."""
 
 import math
-
-import numpy as np
-import pytest
 
 from cpg_ros.errors import CpgError
 from cpg_ros.robots.robot_file import find_robot
@@ -11,6 +22,8 @@ from cpg_ros.unitree.models import JOINTS, MODELS
 from cpg_ros.unitree.settings import settings_of
 from cpg_ros.unitree.supervisor import Phase, Supervisor
 from cpg_ros.unitree.vigil import Vigil
+import numpy as np
+import pytest
 
 DT = 0.002
 GO2 = settings_of(find_robot('unitree_go2'), MODELS['go2'], [60.0], [2.0])

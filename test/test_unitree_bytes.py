@@ -1,19 +1,32 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Unitree's messages as bytes, their check sum, and announcements of DDS; no ROS graph."""
 
 import re
-
-import numpy as np
-import pytest
-from stand_in import C_STRUCT, COMMAND, STATE, check_sum, mpeg2
 
 from cpg_ros.unitree.crc import crc32
 from cpg_ros.unitree.low_cmd import LowCmd
 from cpg_ros.unitree.low_state import BUTTONS, LowState
 from cpg_ros.unitree.participants import harmful
+import numpy as np
+import pytest
+from stand_in import C_STRUCT, check_sum, COMMAND, mpeg2, STATE
 
 
 def filled(seed):
-    """A command of random numbers."""
+    """Return a command of random numbers."""
     rng, command = np.random.default_rng(seed), LowCmd()
     for part in (command.q, command.dq, command.tau, command.kp, command.kd):
         part[:] = rng.normal(0.0, 30.0, 12)
@@ -61,7 +74,7 @@ def codes(form):
 
 
 def state_bytes(**given):
-    """A state with random numbers, as struct packs it."""
+    """Return a state with random numbers, as struct packs it."""
     rng = np.random.default_rng(3)
     values = [float(np.float32(rng.normal())) if code == 'f' else int(rng.integers(0, 100))
               for code in codes(STATE.format)]

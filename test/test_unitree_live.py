@@ -1,3 +1,17 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """The bridge beside a stand-in robot and a real generator, as processes on a real ROS graph."""
 
 import importlib.util
@@ -5,13 +19,13 @@ import os
 import signal
 import time
 
+from graph import Process, until
 import numpy as np
 import pytest
-from graph import Process, until
 from sensor_msgs.msg import BatteryState, Imu
 from std_msgs.msg import Float64MultiArray
 from std_srvs.srv import Trigger
-from unitree_faults import BRIDGE, FAULTS, Walk, inflict, mend
+from unitree_faults import BRIDGE, FAULTS, inflict, mend, Walk
 
 for name, how in (('unitree_go', "'make unitree' has not been run"),
                   ('mujoco', 'the extra [sim] is not installed')):

@@ -1,3 +1,17 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """A robot whose generator is gone in mid-stride sits down and does not topple, in MuJoCo."""
 
 import math
@@ -6,13 +20,12 @@ import pytest
 
 pytest.importorskip('mujoco', reason='the extra [sim] is not installed')
 
-from go2 import DT, GO2, program
-
-from cpg_ros.motion.pattern import Pattern
-from cpg_ros.simulation.body import Body
-from cpg_ros.unitree.models import MODELS
-from cpg_ros.unitree.settings import settings_of
-from cpg_ros.unitree.supervisor import Phase, Supervisor
+from cpg_ros.motion.pattern import Pattern  # noqa: E402, I100
+from cpg_ros.simulation.body import Body  # noqa: E402
+from cpg_ros.unitree.models import MODELS  # noqa: E402
+from cpg_ros.unitree.settings import settings_of  # noqa: E402
+from cpg_ros.unitree.supervisor import Phase, Supervisor  # noqa: E402
+from go2 import DT, GO2, program  # noqa: E402
 
 
 # Moments of the trot at which a robot that held its legs as they were fell on its back.

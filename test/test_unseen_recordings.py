@@ -1,15 +1,24 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Recordings as nobody here made them: read, fitted and written, or refused with the reason."""
 
 import gzip
 import json
 
-import numpy as np
-import pytest
-import yaml
-from bags import START, joint_state, write_bag
-from test_inversion_tool import LEGS, bag_of, table_of, walked
-
-from cpg_ros.gaits.stride import NoSteadyGait, find_stride
+from bags import joint_state, START, write_bag
+from cpg_ros.gaits.stride import find_stride, NoSteadyGait
 from cpg_ros.inversion import given_up, parameter_files
 from cpg_ros.motion.plan import Refused
 from cpg_ros.networks.delayed import Delayed
@@ -17,13 +26,17 @@ from cpg_ros.networks.registry import PRESETS
 from cpg_ros.recordings.recording import Recording
 from cpg_ros.robots.robot_file import load_robot
 from cpg_ros.tools.inversion import main
+import numpy as np
+import pytest
+from test_inversion_tool import bag_of, LEGS, table_of, walked
+import yaml
 
 #: What is fitted fast.
 FAST = ['--free', 'c', '--order', '2', '--json']
 
 
 def said_of(capsys, *arguments):
-    """What the executable says of a recording that it fits."""
+    """Return what the executable says of a recording that it fits."""
     assert main([*map(str, arguments), *FAST]) == 0, capsys.readouterr().err
     said = capsys.readouterr()
     assert 'Warning' not in said.err
@@ -129,7 +142,7 @@ def test_two_robots_in_one_topic(tmp_path, capsys):
 
 
 def rewritten(path, change):
-    """A table whose lines are changed, but for the header."""
+    """Return a table whose lines are changed, but for the header."""
     head, *rows = path.read_text().splitlines()
     path.write_text('\n'.join([head, *map(change, rows)]) + '\n')
 

@@ -1,18 +1,32 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """URDF files as ROS has them: packages, meshes and masses, each defect in a made-up robot."""
 
+from pathlib import Path
 import re
 import struct
-from pathlib import Path
 
-import numpy as np
-import pytest
 from four_legs import ROBOT, stood, urdf
 from hypothesis import given, settings
 from hypothesis import strategies as st
+import numpy as np
+import pytest
 
 mujoco = pytest.importorskip('mujoco')
 
-from cpg_ros.simulation.body import Body  # noqa: E402
+from cpg_ros.simulation.body import Body  # noqa: E402, I100
 from cpg_ros.simulation.inertia import possible  # noqa: E402
 from cpg_ros.simulation.robot_model import load  # noqa: E402
 from cpg_ros.simulation.servo_gains import usual_gains  # noqa: E402
@@ -21,14 +35,14 @@ from cpg_ros.simulation.servo_gains import usual_gains  # noqa: E402
 BOX = np.array([[x, y, z] for x in (-0.1, 0.1) for y in (-0.05, 0.05) for z in (-0.03, 0.03)])
 FACES = [(0, 1, 3), (0, 3, 2), (4, 6, 7), (4, 7, 5), (0, 4, 5), (0, 5, 1),
          (2, 3, 7), (2, 7, 6), (0, 2, 6), (0, 6, 4), (1, 5, 7), (1, 7, 3)]
-COLLADA = '''<COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema"><asset>
+COLLADA = """<COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema"><asset>
 <unit name="millimeter" meter="0.001"/><up_axis>{up}</up_axis></asset>
 <library_geometries><geometry id="box"><mesh><source id="p"><float_array id="pa" count="24">
 {numbers}</float_array></source><vertices id="v"><input semantic="POSITION" source="#p"/>
 </vertices></mesh></geometry></library_geometries>
 <library_visual_scenes><visual_scene id="s"><node>
 <translate>0 0 5</translate><rotate>0 0 1 90</rotate><instance_geometry url="#box"/></node>
-</visual_scene></library_visual_scenes></COLLADA>'''
+</visual_scene></library_visual_scenes></COLLADA>"""
 
 
 def binary_stl(path):

@@ -1,3 +1,17 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Velocities are the derivatives of the positions: of any set that runs, whatever happens to it.
 
 Between two ticks at 100 Hz a difference quotient is not the derivative. The measure is therefore
@@ -11,14 +25,13 @@ from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
-import numpy as np
-import pytest
-
 from cpg_ros.integration.stepper import Stepper
 from cpg_ros.motion.pattern import Pattern
-from cpg_ros.motion.plan import Refused, plan
+from cpg_ros.motion.plan import plan, Refused
 from cpg_ros.networks.registry import PRESETS
 from cpg_ros.robots.robot_file import load_robot
+import numpy as np
+import pytest
 
 ROBOTS = {name: load_robot(Path(__file__).parents[1] / 'config' / f'{name}.yaml')
           for name in ('quadruped', 'biped')}

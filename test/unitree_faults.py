@@ -1,3 +1,17 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """A stand-in robot, a bridge and a walking generator; and the faults of the table in docs."""
 
 import contextlib
@@ -6,15 +20,14 @@ import signal
 import socket
 import time
 
+from cpg_ros.nodes.unitree.watchdog_link import address
+from cpg_ros.unitree.vigil import Vigil
+from graph import EXECUTABLE, free_domain, Process, until, Watcher
 import numpy as np
-from graph import EXECUTABLE, Process, Watcher, free_domain, until
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from stand_in import StandIn
 from std_msgs.msg import Float64MultiArray, String
 from std_srvs.srv import Trigger
-
-from cpg_ros.nodes.unitree.watchdog_link import address
-from cpg_ros.unitree.vigil import Vigil
 
 BRIDGE = EXECUTABLE.with_name('unitree_bridge')
 COMMANDS = 'forward_position_controller/commands'

@@ -1,3 +1,17 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Our check sum and Unitree's library: run by Python 3.10 with cyclonedds 0.10.
 
 usage: python unitree_sdk_crc.py FOLDER COUNT    Prints JSON: how many commands, how many differ.
@@ -5,19 +19,18 @@ usage: python unitree_sdk_crc.py FOLDER COUNT    Prints JSON: how many commands,
 
 import ctypes
 import json
+from pathlib import Path
 import struct
 import sys
-from pathlib import Path
 
 folder, count = Path(sys.argv[1]), int(sys.argv[2])
 sys.path.insert(0, str(folder / 'unitree_sdk2_python'))
 sys.path.append(str(Path(__file__).resolve().parent.parent))
 
+from cpg_ros.unitree.low_cmd import LowCmd  # noqa: E402
 import numpy as np  # noqa: E402
 from unitree_sdk2py.idl.unitree_go.msg.dds_ import LowCmd_  # noqa: E402
 from unitree_sdk2py.utils.crc import CRC  # noqa: E402
-
-from cpg_ros.unitree.low_cmd import LowCmd  # noqa: E402
 
 theirs, ours = CRC(), LowCmd()
 rng, wrong, whole = np.random.default_rng(1), 0, 0

@@ -1,3 +1,17 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Unitree's own simulator bridge as the robot, headless: run by Python 3.10 with cyclonedds 0.10.
 
 usage: python unitree_sdk_robot.py FOLDER DOMAIN INTERFACE    FOLDER has unitree_mujoco and
@@ -6,10 +20,10 @@ unitree_sdk2_python as fetched. Prints a line of JSON every second, and at the e
 
 import json
 import math
+from pathlib import Path
 import sys
 import threading
 import time
-from pathlib import Path
 
 folder, domain, interface = Path(sys.argv[1]), int(sys.argv[2]), sys.argv[3]
 sys.path[:0] = [str(folder / 'unitree_sdk2_python'),

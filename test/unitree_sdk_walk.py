@@ -1,3 +1,17 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """The generator and the bridge walk Unitree's simulated Go2, in a network namespace of its own.
 
 usage: unshare --net python unitree_sdk_walk.py FOLDER [SECONDS_A_GAIT SECONDS_A_SWITCH]
@@ -7,12 +21,12 @@ Prints JSON: what the robot saw.
 import json
 import math
 import os
+from pathlib import Path
 import signal
 import subprocess
 import sys
 import threading
 import time
-from pathlib import Path
 
 folder = Path(sys.argv[1]).resolve()
 GAIT, SWITCH = map(float, sys.argv[2:4] or ('10', '3'))
@@ -20,7 +34,7 @@ os.environ.update(ROS_AUTOMATIC_DISCOVERY_RANGE='SUBNET', ROS_DOMAIN_ID='1')
 for words in ('link set lo up', 'link set lo multicast on', 'route add 224.0.0.0/4 dev lo'):
     subprocess.run(['ip', *words.split()], check=True)
 
-from graph import EXECUTABLE, Process, Watcher, until  # noqa: E402
+from graph import EXECUTABLE, Process, until, Watcher  # noqa: E402
 from rclpy.qos import DurabilityPolicy, QoSProfile  # noqa: E402
 from std_msgs.msg import String  # noqa: E402
 

@@ -1,3 +1,17 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Run by autox: a branch of the quadruped in AUTO-07p, both ways, and what it cost.
 
 Usage: autox branch.py DATA END,END VALUE,VALUE A,B,C,D,E,F START, where DATA names a file of the
@@ -8,7 +22,7 @@ import resource
 import sys
 
 sys.path.insert(0, '/usr/lib/auto-07p/python')
-from auto import run
+from auto import run  # noqa: E402
 
 data, ends, values, couplings, start = sys.argv[1:6]
 low, high = map(float, ends.split(','))

@@ -1,9 +1,21 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """An efference copy from a recording: a robot that walks steadily, nothing fed back."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-
-import numpy as np
 
 from cpg_ros.calibration.walk_recording import WalkRecording
 from cpg_ros.errors import InputError
@@ -15,6 +27,7 @@ from cpg_ros.gaits.stride import find_stride
 from cpg_ros.motion.plan import plan
 from cpg_ros.networks.registry import NETWORKS
 from cpg_ros.robots.robot import Robot
+import numpy as np
 
 #: Joints are where the pattern has them this much later, s, if a bag does not tell: what a servo
 #: with a damping of a thirtieth of its stiffness, and some load, gives.

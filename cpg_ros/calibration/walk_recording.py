@@ -1,3 +1,17 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """A robot that walks, as a bag has it: joints, IMU and forces of the feet, on one clock."""
 
 from collections.abc import Mapping
@@ -5,14 +19,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from cpg_ros.feedback.estimate import Senses
 from cpg_ros.recordings.bag_storage import opened
 from cpg_ros.recordings.cdr import JOINT_STATE
 from cpg_ros.recordings.recording import RecordingError
-from cpg_ros.recordings.rosbags_library import STORE, SerdeError
+from cpg_ros.recordings.rosbags_library import SerdeError, STORE
 from cpg_ros.robots.robot import Robot
+import numpy as np
 
 #: What is read: key -> type of its topic.
 TYPES = {'joint_states': JOINT_STATE, 'imu': 'sensor_msgs/msg/Imu',

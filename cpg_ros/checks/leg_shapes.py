@@ -1,13 +1,26 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """The part ``geometry`` of a first robot file, from a URDF."""
 
 from collections.abc import Mapping
 
-import numpy as np
-
 from cpg_ros.robots.body_keys import BodyGeometry, leg_of
 from cpg_ros.robots.robot import Robot
-from cpg_ros.robots.urdf import UrdfJoint, chain, direction
-from cpg_ros.robots.urdf_links import UrdfLink, foot_below, placed
+from cpg_ros.robots.urdf import chain, direction, UrdfJoint
+from cpg_ros.robots.urdf_links import foot_below, placed, UrdfLink
+import numpy as np
 
 
 def geometry_from(robot: Robot, urdf: Mapping[str, UrdfJoint], links: dict[str, UrdfLink]

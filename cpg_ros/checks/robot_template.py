@@ -1,3 +1,17 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """A first robot file from a URDF: legs by the joints' names, what each joint does by its axis.
 
 x forward, y left, z up (REP 103). In each leg the joints that turn about y are, down the leg,
@@ -9,15 +23,14 @@ from collections.abc import Mapping
 from dataclasses import replace
 from math import copysign, inf, pi
 
-import numpy as np
-
 from cpg_ros.checks.urdf_match import unlimited
 from cpg_ros.gaits.leg_names import Legs, legs_of
 from cpg_ros.motion.plan import plan
 from cpg_ros.networks.registry import NETWORKS, SHIPPED
 from cpg_ros.robots.robot import HARMONICS, Joint, Robot
 from cpg_ros.robots.robot_file import LARGEST, LIMITS
-from cpg_ros.robots.urdf import UrdfError, UrdfJoint, chain, direction
+from cpg_ros.robots.urdf import chain, direction, UrdfError, UrdfJoint
+import numpy as np
 
 #: How far the knees are bent at the stand, rad, by the number of legs.
 BEND = {2: 0.5, 4: 1.4}

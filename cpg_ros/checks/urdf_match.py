@@ -1,3 +1,17 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """A robot file held against a URDF: names, kinds, limits, and whether each gait fits."""
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -8,8 +22,8 @@ from math import inf, nan
 from typing import Any
 
 from cpg_ros.files.plain_text import table
-from cpg_ros.gaits.leg_names import LegsError, legs_of, role_of
-from cpg_ros.motion.plan import Refused, plan
+from cpg_ros.gaits.leg_names import legs_of, LegsError, role_of
+from cpg_ros.motion.plan import plan, Refused
 from cpg_ros.networks.registry import NETWORKS
 from cpg_ros.robots.robot import Joint, Motion, Robot
 from cpg_ros.robots.urdf import UrdfJoint
@@ -168,16 +182,16 @@ def _faults(joint: Joint, urdf: UrdfJoint | None, near: str) -> Iterator[str]:
         yield f'cannot be driven, in the URDF it {urdf.flaw}'
         return
     if joint.lower < urdf.lower - ROUNDING:
-        yield (f"lower limit {joint.lower:g} rad is {urdf.lower - joint.lower:.4g} rad below the "
+        yield (f'lower limit {joint.lower:g} rad is {urdf.lower - joint.lower:.4g} rad below the '
                f"URDF's {urdf.lower:g}")
     if joint.upper > urdf.upper + ROUNDING:
-        yield (f"upper limit {joint.upper:g} rad is {joint.upper - urdf.upper:.4g} rad above the "
+        yield (f'upper limit {joint.upper:g} rad is {joint.upper - urdf.upper:.4g} rad above the '
                f"URDF's {urdf.upper:g}")
     if not urdf.lower - ROUNDING <= joint.offset <= urdf.upper + ROUNDING:
         yield (f"offset {joint.offset:g} rad is outside the URDF's limits {urdf.lower:g} to "
                f'{urdf.upper:g}: the robot could not stand')
     if joint.velocity > urdf.velocity + ROUNDING:
-        yield (f"velocity limit {joint.velocity:g} rad/s is {joint.velocity - urdf.velocity:.4g} "
+        yield (f'velocity limit {joint.velocity:g} rad/s is {joint.velocity - urdf.velocity:.4g} '
                f"rad/s above the URDF's {urdf.velocity:g}")
 
 

@@ -1,3 +1,17 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Pseudo-arclength continuation: curves of solutions, followed past their folds.
 
 n equations in n + 1 unknowns, the last of which is a parameter, have a curve of solutions. From a
@@ -7,15 +21,14 @@ control of bifurcation problems*, 1991). The parameter is an unknown like all ot
 fold, where it turns round, is a point like all others.
 """
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+import math
 from typing import Any, Protocol
 
+from cpg_ros.errors import CpgError
 import numpy as np
 from scipy.optimize import brentq
-
-from cpg_ros.errors import CpgError
 
 #: Newton stops at steps this short; what is left then is of the order of its square.
 TOLERANCE = 1e-9
@@ -102,8 +115,8 @@ class Place:
         """Half the range of what is continued."""
         return self.curve.amplitude(self.z)
 
-    def reversed(self) -> 'Place':
-        """The same point, to be left the other way."""
+    def reversed(self) -> 'Place':  # noqa: A003
+        """Return the same point, to be left the other way."""
         return replace(self, tangent=-self.tangent)
 
 
@@ -144,7 +157,7 @@ def resolved(curve: Curve, z: np.ndarray, border: np.ndarray) -> Place | None:
 
 
 def held(size: int, which: int) -> np.ndarray:
-    """The border that holds one of the unknowns."""
+    """Return the border that holds one of the unknowns."""
     border = np.zeros(size)
     border[which] = 1.0
     return border

@@ -1,3 +1,17 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Where orbits on a branch gain or lose stability other than by a fold.
 
 A multiplier that crosses the unit circle at 1 lets another branch leave (or this one fold), one
@@ -10,14 +24,13 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
-import numpy as np
-from scipy.optimize import brentq
-
 from cpg_ros.dynamics import arclength
 from cpg_ros.dynamics.arclength import Place
 from cpg_ros.dynamics.continuation import Branch, BranchPoint
 from cpg_ros.dynamics.floquet import Multipliers, multipliers
 from cpg_ros.dynamics.periodic import NoOrbit
+import numpy as np
+from scipy.optimize import brentq
 
 #: Share of the way between two points of a branch to which a crossing is located.
 EXACT = 1e-7
@@ -86,7 +99,7 @@ def _parts(judged: Multipliers) -> list[np.ndarray]:
 
 def _crossings(branch: Branch, spectra: list[list[np.ndarray]]
                ) -> Iterator[tuple[int, int, int]]:
-    """Number of the point before, of the subspace, and how many there are larger."""
+    """Yield the number of the point before, of the subspace, and how many there are larger."""
     for k, (left, right) in enumerate(pairwise(spectra)):
         for part, (one, other) in enumerate(zip(left, right, strict=True)):
             before, after = (int((np.abs(some) > 1.0).sum()) for some in (one, other))
@@ -101,7 +114,7 @@ def _crossings(branch: Branch, spectra: list[list[np.ndarray]]
 
 
 def _between(left: Place, right: Place, share: float) -> Place | None:
-    """The curve's point at a share of the way, in the value or, if that hardly moves, the period.
+    """Return the curve's point at a share of the way in the value or, if that stays, the period.
 
     Raises:
         NoOrbit: it cannot be resolved.
@@ -118,7 +131,7 @@ def _between(left: Place, right: Place, share: float) -> Place | None:
 
 
 def _located(left: BranchPoint, right: BranchPoint, part: int, rank: int) -> Bifurcation | None:
-    """The crossing between two points of a multiplier with so many that are larger."""
+    """Return the crossing between two points of a multiplier with so many that are larger."""
     tried: dict[float, tuple[BranchPoint, complex]] = {}
 
     def size(share: float) -> float:

@@ -1,3 +1,17 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Characteristic roots of a linear equation with a delay, ``h' = L0 h(t) + L1 h(t - tau)``.
 
 They are where ``Delta(lambda) = lambda - L0 - L1 exp(-lambda tau)`` is singular. Without a delay
@@ -88,7 +102,7 @@ def _branches(a: complex, b: complex, tau: float, n: np.ndarray) -> np.ndarray:
 
 
 def _generator(now: np.ndarray, past: np.ndarray, delay: float, points: int) -> np.ndarray:
-    """The generator on Chebyshev points of [-tau, 0], n components at each, those of 0 first."""
+    """Return the generator on Chebyshev points of [-tau, 0], the n components at 0 first."""
     k = np.arange(points + 1)
     x = np.cos(np.pi * k / points)
     weights = np.where((k == 0) | (k == points), 2.0, 1.0) * (-1.0) ** k

@@ -1,3 +1,17 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Branches of periodic orbits: a gait followed along a line of parameters, past its folds.
 
 A branch says over which range of parameters a gait exists, where two orbits of it coexist, and
@@ -8,8 +22,6 @@ more symmetry, near a homoclinic orbit, where its period has no bound, or at the
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
-import numpy as np
-
 from cpg_ros.dynamics import arclength
 from cpg_ros.dynamics.arclength import Place
 from cpg_ros.dynamics.branch_end import End, grows_alone, without_period
@@ -19,6 +31,7 @@ from cpg_ros.errors import InputError
 from cpg_ros.networks.network import Network
 from cpg_ros.networks.parameter_line import ParameterLine
 from cpg_ros.networks.symmetry import Symmetry
+import numpy as np
 
 #: Below this amplitude an orbit is as good as its Hopf point.
 REST = 2e-3

@@ -1,3 +1,17 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Equilibria at which all cells are equal: the stand of a network.
 
 Every symmetry of the network fixes them (Buono & Golubitsky 2001, section 5.1), so they are those
@@ -10,12 +24,11 @@ from collections.abc import Iterator
 from dataclasses import replace
 from functools import cache, lru_cache
 
-import numpy as np
-
 from cpg_ros.dynamics.sign_changes import crossings
 from cpg_ros.errors import CpgError, InputError
 from cpg_ros.networks.equations import equations_of, values_of
 from cpg_ros.networks.network import Network
+import numpy as np
 
 #: Where equilibria are looked for: close to where the cell's functions bend, and far out.
 _FAR = np.geomspace(3.0, 100.0, 400)[1:]
@@ -66,7 +79,7 @@ class Quotient:
         return np.array(rates, dtype=float), jacobian
 
     def push(self, state: np.ndarray) -> np.ndarray:
-        """Derivative of the rates by the share of the couplings, shape (variables,)."""
+        """Return the derivative of the rates by the share of the couplings, shape (variables,)."""
         out = np.zeros(self.size)
         found = self._equations.by_parameter([state[v] for v in self._variables], self._p)
         for (v, r), slope in found.items():
@@ -135,7 +148,7 @@ def equilibria(network: Network) -> np.ndarray:
 
 @cache
 def _scanned(network: type[Network]) -> int | None:
-    """A variable x such that the rates are linear in all others, or None."""
+    """Return a variable x such that the rates are linear in all others, or None."""
     equations = equations_of(network)
     with np.errstate(all='ignore'):
         # Only which derivatives there are matters, not where.

@@ -1,3 +1,17 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """A cell's rates about a state in which all cells are alike, expanded in what the cell hears.
 
 Near such a state the arguments of a cell's equations differ from it by what the cell hears of a
@@ -10,11 +24,10 @@ from functools import cached_property
 from itertools import permutations
 from typing import Any
 
-import numpy as np
-
 from cpg_ros.networks.equations import equations_of, values_of
 from cpg_ros.networks.network import Network
 from cpg_ros.networks.parameter_line import ParameterLine
+import numpy as np
 
 
 class Expansion:
@@ -101,14 +114,14 @@ class Expansion:
         return {r: signs[name] for r, name in enumerate(names) if name in signs}
 
     def along(self, line: ParameterLine) -> np.ndarray:
-        """Derivative of the rates along a line of parameters, shape (variables,)."""
+        """Return the derivative of the rates along a line of parameters, shape (variables,)."""
         out, moving = np.zeros(self.network.variables), self._moving(line)
         for (v, r), slope in self._equations.by_parameter(self._x, self._p).items():
             out[v] += slope * moving.get(r, 0.0)
         return out
 
     def linear_along(self, line: ParameterLine, chi: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Derivatives of L0 and L1 along a line of parameters, at a state that stays."""
+        """Return derivatives of L0 and L1 along a line of parameters, at a state that stays."""
         moving = self._moving(line)
         slopes: dict[tuple[int, int], float] = {}
         mixed = self._equations.by_parameter_and_argument(self._x, self._p)

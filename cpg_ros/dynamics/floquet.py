@@ -1,3 +1,17 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Floquet multipliers of a gait: what a small disturbance is multiplied by in a period.
 
 They split into those within the gait's symmetry class, 1 among them, and those transverse to it,
@@ -6,10 +20,9 @@ which the symmetry lock -g (I - P) x shrinks and nothing else does.
 
 from dataclasses import dataclass
 
+from cpg_ros.dynamics.orbit import Orbit, way
 import numpy as np
 from scipy.optimize import brentq
-
-from cpg_ros.dynamics.orbit import Orbit, way
 
 #: A multiplier from here on up is 1 as far as can be told.
 ATTRACTS = 1.0 - 1e-7

@@ -1,3 +1,17 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """What a parameter set does, gait by gait: whether there is one, how large, how fast, how stable.
 
 And what stands nearest where there is none: the threshold at which rest gives way.
@@ -10,7 +24,7 @@ from typing import Any
 
 from cpg_ros.dynamics.continuation import from_hopf
 from cpg_ros.dynamics.equilibrium import NoEquilibrium
-from cpg_ros.dynamics.floquet import Multipliers, attracts_with, multipliers, smallest_gain
+from cpg_ros.dynamics.floquet import attracts_with, Multipliers, multipliers, smallest_gain
 from cpg_ros.dynamics.hopf import first_hopf
 from cpg_ros.dynamics.hopf_search import hopf_points
 from cpg_ros.dynamics.orbit import NoOrbit, Orbit, solve_orbit

@@ -1,3 +1,17 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Hopf points of the equilibrium of any network, with their normal forms.
 
 On the centre manifold ``x = rest + z q + conj(z q) + ...`` with the eigenvector q of the class,
@@ -15,8 +29,6 @@ with ``Delta q = 0``, ``p Delta = 0`` and ``<p, Delta'(i omega) q> = 1``.
 from dataclasses import dataclass, replace
 from functools import cached_property
 
-import numpy as np
-
 from cpg_ros.dynamics.characteristic import characteristic_matrix, rightmost_first
 from cpg_ros.dynamics.delay_crossings import delay_crossings
 from cpg_ros.dynamics.equilibrium import equilibrium, everywhere
@@ -25,6 +37,7 @@ from cpg_ros.dynamics.isotypic import Block, block_of, blocks, character, power
 from cpg_ros.dynamics.normal_form import NormalForm
 from cpg_ros.networks.network import Network
 from cpg_ros.networks.parameter_line import ParameterLine
+import numpy as np
 
 #: Roots this close to the imaginary axis lie on it, 1/model time or against omega.
 ON_AXIS = 1e-8
@@ -116,7 +129,7 @@ class HopfPoint:
         return Expansion(self.network, self.rest)
 
     def _speed(self, line: ParameterLine) -> complex:
-        """Derivative of the critical root by the value on a line of parameters."""
+        """Return the derivative of the critical root by the value on a line of parameters."""
         expansion, delay = self._expansion, self.network.delay
         axis, chi, (q, p) = 1j * self.omega, self.block.vector, self._eigenvectors
         one, late = np.ones_like(chi), np.exp(-axis * delay)

@@ -1,3 +1,17 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """All Hopf points of a network's equilibrium along a line of parameters.
 
 Where the delay alone moves they are known in closed form. Elsewhere the real parts of each class's
@@ -8,17 +22,16 @@ from collections.abc import Callable
 from functools import cache
 from itertools import pairwise
 
-import numpy as np
-
 from cpg_ros.dynamics.delay_crossings import delay_crossings
-from cpg_ros.dynamics.equilibrium import NoEquilibrium, equilibrium
-from cpg_ros.dynamics.hopf import ON_AXIS, HopfPoint, crossing_at
+from cpg_ros.dynamics.equilibrium import equilibrium, NoEquilibrium
+from cpg_ros.dynamics.hopf import crossing_at, HopfPoint, ON_AXIS
 from cpg_ros.dynamics.isotypic import Block, blocks, classes
 from cpg_ros.dynamics.sign_changes import crossings
 from cpg_ros.errors import InputError
 from cpg_ros.networks.equations import equations_of
 from cpg_ros.networks.network import Network
 from cpg_ros.networks.parameter_line import ParameterLine
+import numpy as np
 
 #: Values of the parameters at which the equilibrium is looked at before crossings are refined.
 GRID = 241
@@ -89,7 +102,7 @@ def _by_delay(network: Network, line: ParameterLine, low: float, high: float) ->
 def _on_grid(network: Network, line: ParameterLine, low: float, high: float) -> list[HopfPoint]:
     @cache
     def split(value: float) -> tuple[Block, ...]:
-        """The blocks; none where there is no equilibrium."""
+        """Return the blocks; none where there is no equilibrium."""
         there = line.at(network, value)
         try:
             return blocks(there, equilibrium(there))

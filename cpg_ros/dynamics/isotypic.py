@@ -1,3 +1,17 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Isotypic blocks of the linearisation at an equilibrium: small matrices, one for each class.
 
 The cells are permuted by an abelian group, simply and transitively, so each of its characters
@@ -12,13 +26,12 @@ from fractions import Fraction
 from functools import cache, cached_property
 from itertools import product
 
-import numpy as np
-
 from cpg_ros.dynamics.characteristic import characteristic_roots, roots_right_of
 from cpg_ros.dynamics.expansion import Expansion
 from cpg_ros.errors import InputError
 from cpg_ros.networks.network import Network
 from cpg_ros.networks.symmetry import Group, Symmetry
+import numpy as np
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,3 +1,17 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Subspaces of a network's states that its linearised flow along a gait keeps apart.
 
 Elements of K, and with x -> -x those with a shift of half a cycle, leave a gait alone, so the
@@ -8,9 +22,8 @@ mix. The states that all of them leave alone are the gait's class.
 from fractions import Fraction
 from functools import cache
 
-import numpy as np
-
 from cpg_ros.networks.symmetry import Symmetry
+import numpy as np
 
 
 @cache

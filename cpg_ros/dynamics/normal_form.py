@@ -1,11 +1,25 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """The normal form of a Hopf bifurcation: ``z' = (i omega + k1 mu) z + k2 z |z|^2``.
 
 With ``z = r exp(i theta)``: ``r' = Re k1 mu r + Re k2 r^3`` and
 ``theta' = omega + Im k1 mu + Im k2 r^2``, mu the distance of the parameter from the bifurcation.
 """
 
-import math
 from dataclasses import dataclass
+import math
 
 from cpg_ros.dynamics.periodic import NoOrbit
 
@@ -50,5 +64,5 @@ class NormalForm:
         return math.sqrt(square)
 
     def shift(self, mu: float) -> float:
-        """What the orbit's angular frequency there has over omega: ``Im k1 mu + Im k2 r^2``."""
+        """Return the orbit's angular frequency less omega: ``Im k1 mu + Im k2 r^2``."""
         return self.k1.imag * mu + self.k2.imag * self.radius(mu)**2

@@ -1,3 +1,17 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Gaits as exact periodic orbits, for every network.
 
 This is the one place that chooses between the two ways to solve for them: Fourier collocation,
@@ -9,8 +23,6 @@ from collections.abc import Callable
 from types import ModuleType
 from typing import Any, NamedTuple
 
-import numpy as np
-
 from cpg_ros.dynamics.fourier import curve as fourier_curve
 from cpg_ros.dynamics.fourier import floquet as fourier_floquet
 from cpg_ros.dynamics.fourier import solve as fourier_solve
@@ -21,6 +33,7 @@ from cpg_ros.dynamics.periodic import NoOrbit, Orbit
 from cpg_ros.networks.network import Network, Preset
 from cpg_ros.networks.parameter_line import ParameterLine
 from cpg_ros.networks.symmetry import Symmetry
+import numpy as np
 
 __all__ = ['NoOrbit', 'Orbit', 'curve_beside', 'curve_through', 'solve_beside',
            'solve_from_path', 'solve_orbit', 'solve_preset', 'way']

@@ -1,15 +1,28 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Periodic orbits of a network in a gait, whatever solves them."""
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from functools import cached_property
 
-import numpy as np
-
 from cpg_ros.dynamics.arclength import NoOrbit
 from cpg_ros.errors import InputError
 from cpg_ros.networks.network import Network
 from cpg_ros.networks.symmetry import Symmetry
+import numpy as np
 
 __all__ = ['NoOrbit', 'Orbit', 'added_symmetry', 'check_values', 'richer']
 
@@ -45,11 +58,11 @@ class Orbit(ABC):
     @abstractmethod
     def waveform(self, theta: np.ndarray, order: int = 0, wave: int = 0, variable: int = 0
                  ) -> np.ndarray:
-        """A waveform, or its derivative in theta of order 1 or 2, at theta in cycles."""
+        """Return a waveform, or its derivative in theta of order 1 or 2, at theta in cycles."""
 
     @abstractmethod
     def d_waveform(self, theta: np.ndarray, wave: int = 0, variable: int = 0) -> np.ndarray:
-        """Derivatives of a waveform by the parameters, shape theta.shape + (parameters,)."""
+        """Return the derivatives by the parameters, shape theta.shape + (parameters,)."""
 
     @property
     @abstractmethod

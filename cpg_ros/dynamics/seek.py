@@ -1,14 +1,27 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Gaits sought by letting the network run, held in the gait's symmetry, until it repeats."""
 
 from collections.abc import Callable, Iterator
 
-import numpy as np
-
 from cpg_ros.dynamics.equilibrium import equilibrium
 from cpg_ros.dynamics.periodic import added_symmetry
-from cpg_ros.integration.simulate import LANES, Trajectory, simulate
+from cpg_ros.integration.simulate import LANES, simulate, Trajectory
 from cpg_ros.networks.network import Network
 from cpg_ros.networks.symmetry import Symmetry
+import numpy as np
 
 #: Periods the network gets to find its gait, held by a lock of this gain (1/model time).
 SETTLING, HOLD = 30, 1.0

@@ -1,3 +1,17 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Onto the branch that leaves at a branch point or a period doubling.
 
 The orbits that leave differ from the one at the point by a small share of the disturbance that
@@ -5,8 +19,6 @@ belongs to the multiplier 1 or -1, and have the symmetries that this keeps.
 """
 
 from fractions import Fraction
-
-import numpy as np
 
 from cpg_ros.dynamics.bifurcation import Bifurcation
 from cpg_ros.dynamics.continuation import Branch, from_disturbance
@@ -16,6 +28,7 @@ from cpg_ros.dynamics.periodic import NoOrbit, richer
 from cpg_ros.errors import InputError
 from cpg_ros.networks.parameter_line import ParameterLine
 from cpg_ros.networks.symmetry import Symmetry
+import numpy as np
 
 #: Shares of the disturbance that are tried, and points of a cycle at which symmetry is tested.
 AMPLITUDES, POINTS = (0.02, 0.005, 0.06), 96

@@ -1,3 +1,17 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Efference copy: what the body does by itself in a gait, by stride phase and speed.
 
 Only what differs from it is fed back. The term is von Holst and Mittelstaedt's (1950).
@@ -5,12 +19,11 @@ Only what differs from it is fed back. The term is von Holst and Mittelstaedt's 
 
 from dataclasses import dataclass
 
-import numpy as np
-
 from cpg_ros.errors import InputError
 from cpg_ros.integration.jit import jit
 from cpg_ros.robots import body_keys
 from cpg_ros.robots.body_keys import EfferenceTable
+import numpy as np
 
 #: Bins of a stride, and how many signals there are; see ``body_keys.SIGNALS``.
 BINS, SIGNALS = body_keys.BINS, len(body_keys.SIGNALS)

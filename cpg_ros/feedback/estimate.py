@@ -1,12 +1,25 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """What a robot feels, and what it makes of it: contact, lean, and its velocity over ground."""
 
-import math
 from dataclasses import dataclass
+import math
 
-import numpy as np
-
-from cpg_ros.feedback.kinematics import GRAVITY, Geometry, foot_of, slopes_of
+from cpg_ros.feedback.kinematics import foot_of, Geometry, GRAVITY, slopes_of
 from cpg_ros.integration.jit import entry, jit, sources_digest
+import numpy as np
 
 #: A foot counts as on the ground above this share of the weight, until below the other.
 TOUCH, LEAVE = 0.10, 0.04

@@ -1,18 +1,31 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """The feedback of a robot, or of many: from what is felt to corrected angles, strides and pace."""
 
 from collections.abc import Callable
 
-import numpy as np
-
 from cpg_ros.feedback.efference_copy import EfferenceCopy
 from cpg_ros.feedback.estimate import Senses
 from cpg_ros.feedback.gains import Gains
-from cpg_ros.feedback.gait_tables import SLOTS, GaitTables
+from cpg_ros.feedback.gait_tables import GaitTables, SLOTS
 from cpg_ros.feedback.kinematics import Geometry
 from cpg_ros.feedback.tick import Memory, tick
 from cpg_ros.feedback.timetable import Timetable
 from cpg_ros.motion.pattern import Pattern
 from cpg_ros.motion.plan import Program
+import numpy as np
 
 
 class Feedback:

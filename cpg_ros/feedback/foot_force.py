@@ -1,11 +1,24 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """How much of the ground's force a leg's motors bear, where feet have no sensors."""
 
 import math
 
-import numpy as np
-
 from cpg_ros.feedback.kinematics import slopes_of
 from cpg_ros.integration.jit import entry, jit, sources_digest
+import numpy as np
 
 #: A leg whose joints hardly move its foot says nothing: least determinant, m^3.
 SINGULAR = 1e-6

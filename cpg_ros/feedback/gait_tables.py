@@ -1,13 +1,26 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """What the feedback knows of each gait it may meet, in arrays that are filled once."""
 
 from typing import NamedTuple
 
-import numpy as np
-
 from cpg_ros.errors import InputError
-from cpg_ros.feedback.efference_copy import BINS, SIGNALS, SPEEDS, EfferenceCopy
+from cpg_ros.feedback.efference_copy import BINS, EfferenceCopy, SIGNALS, SPEEDS
 from cpg_ros.feedback.timetable import POINTS, Timetable
 from cpg_ros.motion.plan import Program
+import numpy as np
 
 #: Gaits known at the same time, and most rows of a steering table.
 SLOTS, ROWS = 8, 32

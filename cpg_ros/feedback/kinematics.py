@@ -1,18 +1,31 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Legs of a hip that abducts and two joints that pitch: forward, Jacobian, inverse, compiled.
 
 Frames are the base's: x forward, y left, z up. A leg of two joints has no way sideways.
 """
 
-import math
 from dataclasses import dataclass
 from functools import cached_property
-
-import numpy as np
+import math
 
 from cpg_ros.errors import InputError
 from cpg_ros.integration.jit import entry, jit, sources_digest
 from cpg_ros.robots.body_keys import BodyGeometry
 from cpg_ros.robots.robot import Robot
+import numpy as np
 
 #: Of free fall, m/s^2.
 GRAVITY = 9.81

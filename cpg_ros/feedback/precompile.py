@@ -1,19 +1,32 @@
-"""Make every kernel of the feedback ready, compiling those not yet on disk."""
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 
-import numpy as np
+"""Make every kernel of the feedback ready, compiling those not yet on disk."""
 
 from cpg_ros.feedback.estimate import Senses
 from cpg_ros.feedback.feedback import Feedback
 from cpg_ros.feedback.foot_force import loads_of
-from cpg_ros.feedback.kinematics import GRAVITY, Geometry
+from cpg_ros.feedback.kinematics import Geometry, GRAVITY
 from cpg_ros.feedback.plausibility import (
+    agreement,
     IMU,
     IMU_MEMORY,
-    agreement,
     judge_imu,
     judge_joints,
     judge_loads,
 )
+import numpy as np
 
 
 def precompile(geometry: Geometry, joints: int) -> None:

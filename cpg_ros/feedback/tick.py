@@ -1,9 +1,21 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """One tick of the feedback, compiled: all laws together, run by run and leg by leg."""
 
 import math
 from typing import NamedTuple
-
-import numpy as np
 
 from cpg_ros.feedback import (
     heading,
@@ -17,12 +29,13 @@ from cpg_ros.feedback import (
     tegotae,
     touchdown,
 )
-from cpg_ros.feedback.efference_copy import SIGNALS, expect
+from cpg_ros.feedback.efference_copy import expect, SIGNALS
 from cpg_ros.feedback.estimate import update
 from cpg_ros.feedback.kinematics import foot_of, move_foot
 from cpg_ros.feedback.timetable import POINTS
 from cpg_ros.integration.jit import entry, jit, sources_digest
 from cpg_ros.motion.steering import TIME_CONSTANT
+import numpy as np
 
 #: Joints are where they are told to be a little later: corrections come ahead by this, cycles.
 LEAD = 0.04

@@ -1,9 +1,22 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """When each leg of a gait swings, and how far it has got, by the stride phase of the first leg."""
 
-import numpy as np
-
-from cpg_ros.feedback.kinematics import Geometry, forward
+from cpg_ros.feedback.kinematics import forward, Geometry
 from cpg_ros.motion.plan import Program
+import numpy as np
 
 #: Points of a stride.
 POINTS = 512

@@ -1,6 +1,20 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """The style sheet of the pages that are written: one that needs no other file."""
 
-STYLE = '''
+STYLE = """
 body { font: 15px/1.45 system-ui, sans-serif; margin: 2em auto; max-width: 78em; padding: 0 1em;
        color: #1a202c; background: #fff; }
 h1 { font-size: 1.5em; } h2 { font-size: 1.2em; margin-top: 2em; }
@@ -17,4 +31,4 @@ tr.fails { background: #fff5f5; } tr.fails td.verdict { color: #c53030; }
 figure { display: inline-block; margin: 0.5em 1em 1em 0; max-width: 100%; }
 figure img { max-width: 100%; border: 1px solid #e2e8f0; }
 figcaption { font-size: 0.9em; color: #4a5568; max-width: 40em; }
-'''
+"""

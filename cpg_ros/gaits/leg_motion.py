@@ -1,3 +1,17 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """What legs do besides their phases: walk on, step on the spot, turn, or run.
 
 The two joints of a leg that move most go round a loop: a foot is lifted on its way forward and set
@@ -11,10 +25,9 @@ below the hip, and how far it bends in between.
 
 from collections.abc import Collection, Mapping, Sequence
 
-import numpy as np
-
 from cpg_ros.gaits.doubts import Doubt
 from cpg_ros.gaits.leg_names import role_of, words_of
+import numpy as np
 
 #: Area of a loop over that of an ellipse of the same amplitudes, a quarter of a cycle apart: below
 #: the first there is no telling from a path, above the second the sense is sure.

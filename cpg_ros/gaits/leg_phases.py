@@ -1,3 +1,17 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Phases between legs from their mean cycles, and the gait that they make.
 
 A leg is ahead of another by the shift at which the same joints of both are most alike (circular
@@ -12,11 +26,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-import numpy as np
-
 from cpg_ros.gaits.leg_names import role_of
 from cpg_ros.gaits.recognition import nearest_gait, recognise
 from cpg_ros.networks.network import Network
+import numpy as np
 
 #: Largest distance of a gait that is one, RMS over the legs in cycles. A quarter of the way from
 #: one gait to the next has about 0.05.

@@ -1,3 +1,17 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """The mean cycle of a recording: one harmonic series per channel, fitted to all its cycles.
 
 Being a fit, it takes times as they come, and averages noise.
@@ -5,10 +19,9 @@ Being a fit, it takes times as they come, and averages noise.
 
 from dataclasses import dataclass
 
+from cpg_ros.errors import InputError
 import numpy as np
 from scipy.linalg import solve_toeplitz, toeplitz
-
-from cpg_ros.errors import InputError
 
 #: Most harmonics of a mean cycle.
 HARMONICS = 32

@@ -1,3 +1,17 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """The period of a recording, to the precision its samples allow.
 
 The first guess is the lag at which the recording repeats (the normalised square difference of
@@ -6,12 +20,11 @@ the harmonics (variable projection, Gauss-Newton), first to a few cycles, then t
 them, so that it never slips by one.
 """
 
+from cpg_ros.errors import InputError
+from cpg_ros.gaits.mean_cycle import determined, rows_of, series, weights_for
 import numpy as np
 from scipy.interpolate import PchipInterpolator
 from scipy.signal import argrelmin
-
-from cpg_ros.errors import InputError
-from cpg_ros.gaits.mean_cycle import determined, rows_of, series, weights_for
 
 #: What deviates by less, as a share of the signals' RMS, does not tell a period from its half.
 NEGLIGIBLE = 0.005

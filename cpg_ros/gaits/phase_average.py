@@ -1,3 +1,17 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """The mean cycle of a motion whose phase is known, and how far each cycle is from it.
 
 The mean is a harmonic series fitted to a joint's own samples at their phases: nothing is
@@ -9,10 +23,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
-import numpy as np
-
 from cpg_ros.errors import InputError
 from cpg_ros.gaits.mean_cycle import determined, rows_of, series, weights_for
+import numpy as np
 
 #: Most harmonics of a mean cycle.
 HARMONICS = 24

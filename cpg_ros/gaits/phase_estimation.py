@@ -1,3 +1,17 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Time to stride phase: where in its cycle a motion is that is never quite as fast as before.
 
 Roughly from the first harmonic of all signals together: their complex amplitudes in a sliding
@@ -8,12 +22,11 @@ fitted with the mean cycle in turn (Gauss-Newton). With few cycles it is linear 
 
 from dataclasses import dataclass
 
-import numpy as np
-from scipy.linalg import solveh_banded
-
 from cpg_ros.gaits.mean_cycle import rows_of, series, weights_for
 from cpg_ros.gaits.phase_average import blocks, mean_weights
-from cpg_ros.gaits.steady_stretch import Stretch, even, longest
+from cpg_ros.gaits.steady_stretch import even, longest, Stretch
+import numpy as np
+from scipy.linalg import solveh_banded
 
 #: Blocks in a period, a window begins at each of them, and points in a block.
 BLOCKS, POINTS = 8, 4

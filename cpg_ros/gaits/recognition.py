@@ -1,3 +1,17 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Which gait is this? The spatio-temporal symmetry of a recorded or simulated rhythm.
 
 A symmetry g with shift theta asks ``x_{g(i)}(t) = x_i(t + theta T)`` of every cell (Buono &
@@ -9,13 +23,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 
-import numpy as np
-
 from cpg_ros.errors import InputError
 from cpg_ros.gaits.mean_cycle import Cycle, mean_cycle
 from cpg_ros.gaits.period import find_period, holds_two
 from cpg_ros.networks.hk_theorem import symmetries
 from cpg_ros.networks.symmetry import Group, Permutation, Symmetry
+import numpy as np
 
 #: Grid for the best shift, per cycle; a mean cycle has far fewer harmonics.
 GRID = 1024

@@ -1,3 +1,17 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """The stride of a recording: its steady stretch, frequency, mean cycle, leg phases and gait.
 
 Found where the joints repeat themselves (steady), followed from there with its own phase, as no
@@ -7,8 +21,6 @@ real stride is quite as long as the last (warp), and averaged over that phase (w
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Protocol
-
-import numpy as np
 
 from cpg_ros.errors import CpgError, InputError
 from cpg_ros.gaits.doubts import (
@@ -23,9 +35,10 @@ from cpg_ros.gaits.leg_motion import doubts_of_travel, running
 from cpg_ros.gaits.leg_names import Legs
 from cpg_ros.gaits.leg_phases import leg_phases, named, named_by_cells, told_apart
 from cpg_ros.gaits.phase_average import Warped, warped
-from cpg_ros.gaits.phase_estimation import Rough, Warp, followed, grown
-from cpg_ros.gaits.steady_stretch import CYCLES, FASTEST, FEWEST, FINER, best, even, stretches
+from cpg_ros.gaits.phase_estimation import followed, grown, Rough, Warp
+from cpg_ros.gaits.steady_stretch import best, CYCLES, even, FASTEST, FEWEST, FINER, stretches
 from cpg_ros.networks.network import Network
+import numpy as np
 
 #: Points of a mean cycle.
 POINTS = 64

@@ -1,3 +1,17 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Kernel code for a network's right-hand side, written from its equations.
 
 It takes ``lanes`` copies of the network at once, component ``cell * lanes + lane`` of each
@@ -8,11 +22,10 @@ step share it.
 from collections.abc import Sequence
 from typing import Any
 
-import sympy
-
 from cpg_ros.integration.loops import LoopProgram, Writer
 from cpg_ros.networks.derivation import expressions
 from cpg_ros.networks.equations import Equations, Source
+import sympy
 
 
 def _share_exponentials(parts: list[Any]) -> tuple[list[Any], dict[Any, Any]]:
@@ -92,7 +105,7 @@ def kernel_source(equations: Equations) -> str:
             continue
         results, powers = _share_exponentials(results)
         program = LoopProgram([(symbol, one) for symbol, one in arguments
-                            if one.delayed == (name == 'drive')], powers)
+                               if one.delayed == (name == 'drive')], powers)
         lowered = [program.lowered(part) for part in results]
         used = {str(symbol) for part in (*lowered, *(call for _, call in program.functions),
                                          *(what for _, what, _ in program.fetched))

@@ -1,15 +1,28 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """How the numerical kernels are compiled, and the elementary functions they share."""
 
+from functools import cache
 import hashlib
 import math
-from functools import cache
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-from numba import config, njit
-
 from cpg_ros.networks import generated
+from numba import config, njit
+import numpy as np
 
 #: Whether machine code can be kept; numba reads where, if not beside its source.
 KEPT = generated.folder() is not None

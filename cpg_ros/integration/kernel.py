@@ -1,3 +1,17 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """The one integrator: fixed-step RK4 over a history of nodes, for real time and simulation.
 
 A history is three arrays of shape (nodes, components), used as a ring: the state x at each
@@ -13,20 +27,19 @@ registers. In real time there is one lane. For networks without delay the ring o
 interpolation between nodes.
 """
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
+import math
 from types import FunctionType
 from typing import Any
 
-import numpy as np
-from numba import njit, prange
-
-from cpg_ros.integration.jit import KEPT, OPTIONS, jit, part, renamed, sources_digest
+from cpg_ros.integration.jit import jit, KEPT, OPTIONS, part, renamed, sources_digest
 from cpg_ros.networks import generated
 from cpg_ros.networks.equations import equations_of
 from cpg_ros.networks.network import Network
+from numba import njit, prange
+import numpy as np
 
 
 def _field_code():
@@ -114,7 +127,7 @@ def _compiled(decorate, equations):
 
     @own
     def past_states(n, x, after, before, head, c, tau, step, out):
-        """The same with a delay for each lane, tau of shape (lanes,); one pass if all agree."""
+        """Return the same with a delay a lane, tau of shape (lanes,); one pass if all agree."""
         lanes = tau.shape[0]
         same = True
         for lane in range(1, lanes):
@@ -247,7 +260,7 @@ def _cached(digest, network, components, **functions):
 
     def integrate_one(p, tau, gain, basis, step, x, after, before, head, steps, noise,
                       seed, states, slopes, row, every):
-        """The same as integrate for a single trajectory, built in one piece, loops unrolled."""
+        """Return what integrate does for a single trajectory, in one piece, loops unrolled."""
         digest  # noqa: B018
         np.random.seed(seed)
         return _steps_of_one(components, 1, p, tau, gain, basis, step, x, after, before, head,

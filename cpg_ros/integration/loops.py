@@ -1,3 +1,17 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Loops over all cells and lanes that work out expressions, as kernel code.
 
 A function of what another cell has is worked out where it is and then fetched, so that it is
@@ -8,11 +22,10 @@ compilers turn into vector instructions.
 from collections.abc import Sequence
 from typing import Any
 
-import sympy
-from sympy.printing.pycode import PythonCodePrinter
-
 from cpg_ros.networks.derivation import print_float
 from cpg_ros.networks.equations import Argument, Source
+import sympy
+from sympy.printing.pycode import PythonCodePrinter
 
 
 class _KernelPrinter(PythonCodePrinter):  # type: ignore[misc]
@@ -34,7 +47,7 @@ class LoopProgram:
         self.fetched: list[tuple[Any, Any, Source]] = []
 
     def own(self, variable: int) -> Any:
-        """The symbol of a cell's own variable."""
+        """Return the symbol of a cell's own variable."""
         return sympy.Symbol(f'z{variable}', real=True)
 
     def _fetch(self, what: Any, source: Source) -> Any:

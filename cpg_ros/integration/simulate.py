@@ -1,15 +1,28 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Offline simulation: the real-time kernel, every node of it recorded."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-
-import numpy as np
 
 from cpg_ros.errors import InputError
 from cpg_ros.files.progress_bar import progress_bar
 from cpg_ros.integration import kernel
 from cpg_ros.networks.network import Network
 from cpg_ros.networks.symmetry import Symmetry
+import numpy as np
 
 #: A constant state, shape (components,), or a function of times t <= 0, shape (m,), that
 #: returns states, shape (m, components); an attribute ``derivative`` of the same form gives the
@@ -173,7 +186,7 @@ def simulate(network: Network | Sequence[Network], history: History | Sequence[H
     head = nodes - 1
     for block in range(blocks):
         compiled.set_slope(flat_p[block], tau[block], gain, basis, step,
-                         *(array[block] for array in flat), head)
+                           *(array[block] for array in flat), head)
     states = np.empty((batch, rows + 1, components))
     slopes = np.empty_like(states)
     for m, (block, lane) in enumerate(np.ndindex(blocks, lanes)):
@@ -192,8 +205,8 @@ def simulate(network: Network | Sequence[Network], history: History | Sequence[H
                                  states, slopes, done + 1, every)
             else:
                 head = compiled.integrate_many(flat_p, tau, gain, basis, step, *flat, head,
-                                             chunk, noise, seeds, states, slopes, done + 1,
-                                             every)
+                                               chunk, noise, seeds, states, slopes, done + 1,
+                                               every)
             done += chunk
             bar(done)
 

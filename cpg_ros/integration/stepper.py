@@ -1,15 +1,28 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """A network in real time: a ring of history, a fixed model step, constant memory."""
 
 import copy
 import math
-
-import numpy as np
 
 from cpg_ros.errors import InputError
 from cpg_ros.integration import kernel
 from cpg_ros.integration.simulate import History, sample_history
 from cpg_ros.networks.network import Network
 from cpg_ros.networks.symmetry import Symmetry
+import numpy as np
 
 
 class Stepper:
@@ -56,7 +69,8 @@ class Stepper:
         self.set(network, gain, symmetry)
         self.advance(0.0)
 
-    def set(self, network: Network, gain: float = 0.0, symmetry: Symmetry | None = None) -> None:
+    def set(self, network: Network, gain: float = 0.0,  # noqa: A003
+            symmetry: Symmetry | None = None) -> None:
         """Go on with other parameters from the next step, keeping the history.
 
         Raises:

@@ -1,12 +1,25 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """What a fit has to be taken with a grain of salt for, in words."""
 
 from collections.abc import Mapping, Sequence
 
-import numpy as np
-
 from cpg_ros.inversion.free_parameters import Free
-from cpg_ros.inversion.identifiability import SHARE, Estimate, Spread
+from cpg_ros.inversion.identifiability import Estimate, SHARE, Spread
 from cpg_ros.inversion.trust_region import Trial
+import numpy as np
 
 #: A 95 % interval wider than this share of the value on either side is named.
 WIDE = 0.1

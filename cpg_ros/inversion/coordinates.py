@@ -1,3 +1,17 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Coordinates in which a trust region moves: the delay is measured by the gait's critical one.
 
 Close to where a gait is born its shape is the same all along the Hopf set, which is curved. With
@@ -9,13 +23,12 @@ from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import replace
 
-import numpy as np
-
-from cpg_ros.dynamics.hopf import HopfPoint, first_hopf
+from cpg_ros.dynamics.hopf import first_hopf, HopfPoint
 from cpg_ros.dynamics.periodic import NoOrbit
 from cpg_ros.inversion.free_parameters import Free, with_values, within_hopf_set
-from cpg_ros.inversion.trust_region import Evaluate, Trial, descend
+from cpg_ros.inversion.trust_region import descend, Evaluate, Trial
 from cpg_ros.networks.network import Network
+import numpy as np
 
 #: Least share of the critical delay by which the delay is above it.
 ABOVE = 1e-7
@@ -70,7 +83,7 @@ class Coordinates:
         return found
 
     def slopes(self, coordinates: np.ndarray) -> np.ndarray:
-        """Derivatives of the values by the coordinates, shape (n, n)."""
+        """Return the derivatives of the values by the coordinates, shape (n, n)."""
         found = np.eye(coordinates.size)
         if not self.straight:
             point, k = self._onset(coordinates), self._delay

@@ -1,3 +1,17 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Parameters of a network from one recorded cycle, by a trust region and exact derivatives.
 
 The objective is that of Liu & Zhang (2024), section 4: ``f = 1/2 sum_il (xhat_i(t_l) -
@@ -8,14 +22,13 @@ cycle, so it is the shape, size and phases of the waveforms that are fitted, not
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import numpy as np
-
 from cpg_ros.dynamics.orbit import Orbit, solve_orbit
 from cpg_ros.dynamics.periodic import NoOrbit
 from cpg_ros.errors import InputError
 from cpg_ros.inversion.free_parameters import free_numbers, with_values
-from cpg_ros.inversion.trust_region import Trial, descend
+from cpg_ros.inversion.trust_region import descend, Trial
 from cpg_ros.networks.delayed import Delayed
+import numpy as np
 
 #: Relative change of parameters and objective at which the method stops.
 TOLERANCE = 1e-12

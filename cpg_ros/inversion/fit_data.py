@@ -1,14 +1,27 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """What is fitted: joints over one cycle, and the cells that drive them."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
-import numpy as np
-
 from cpg_ros.errors import InputError
 from cpg_ros.networks.network import Network
 from cpg_ros.robots.robot import Robot
+import numpy as np
 
 #: A mean cycle is never known better than to this share of the joint's range.
 KNOWN = 1e-4
@@ -91,7 +104,7 @@ def cells_of(source: Robot | Mapping[str, Sequence[str]], network: type[Network]
 
 
 def joints_of(cycle: MeanCycle, cells: Mapping[str, int], network: Network
-            ) -> Joints:
+              ) -> Joints:
     """Return the joints that cells drive.
 
     Args:

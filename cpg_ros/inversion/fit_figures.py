@@ -1,12 +1,25 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """The pictures of an inverted recording."""
 
 from typing import Any
 
+from cpg_ros.inversion.recording_fit import Inverted, POOR
 import matplotlib
-import numpy as np
 from matplotlib.figure import Figure
-
-from cpg_ros.inversion.recording_fit import POOR, Inverted
+import numpy as np
 
 RECORDED, FITTED, BAND = '#1a202c', '#c53030', '#cbd5e0'
 LINES = ('#2b6cb0', '#c53030', '#2f855a', '#b7791f', '#805ad5', '#00838f')
@@ -18,7 +31,7 @@ POINTS = 20
 
 
 def _grid(count: int, height: float) -> tuple[Figure, np.ndarray]:
-    """A figure of panels in columns, those beyond the count left empty."""
+    """Return a figure of panels in columns, those beyond the count left empty."""
     matplotlib.use('Agg')
     from matplotlib import pyplot
     rows = -(-count // COLUMNS)
@@ -39,7 +52,7 @@ def _grid(count: int, height: float) -> tuple[Figure, np.ndarray]:
 
 
 def joints(found: Inverted) -> Figure:
-    """Recorded mean cycle with its spread, and the fitted one, joint by joint."""
+    """Draw the recorded mean cycle with its spread, and the fitted one, joint by joint."""
     fit, stride = found.fit, found.stride
     figure, grid = _grid(len(fit.joints), 1.9)
     share = fit.rms_share
@@ -77,7 +90,7 @@ def errors(found: Inverted) -> Figure:
 
 
 def phases(found: Inverted) -> Figure:
-    """Recorded phases of the legs beside those of the gait, round the cycle: 0 is where 1 is."""
+    """Draw the recorded phases of the legs beside those of the gait, round the cycle."""
     matplotlib.use('Agg')
     from matplotlib import pyplot
     figure, axes = pyplot.subplots(figsize=(6.0, 0.9 + 0.45 * len(found.stride.phases)),
@@ -113,7 +126,7 @@ def phases(found: Inverted) -> Figure:
 
 
 def stretch(found: Inverted) -> Figure:
-    """The whole recording of the joint that moves most, and where in it the stretch lies."""
+    """Draw the whole recording of the joint that moves most, and the stretch in it."""
     matplotlib.use('Agg')
     from matplotlib import pyplot
     recording, stride = found.recording, found.stride

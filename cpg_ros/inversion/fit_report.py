@@ -1,16 +1,29 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """An inverted recording in words, and as a page that needs no other file."""
 
 import base64
-import io
 from html import escape
-
-from matplotlib.figure import Figure
+import io
 
 from cpg_ros.files.page_style import STYLE
 from cpg_ros.files.plain_text import table
 from cpg_ros.inversion import fit_figures
 from cpg_ros.inversion.paper_fit import PaperFit
 from cpg_ros.inversion.recording_fit import Inverted
+from matplotlib.figure import Figure
 
 FIGURES = (('The recording', fit_figures.stretch),
            ('Recorded and fitted', fit_figures.joints),
@@ -91,7 +104,7 @@ def _shares(found: Inverted) -> str:
 
 
 def as_text(found: Inverted) -> str:
-    """The report for a terminal."""
+    """Return the report for a terminal."""
     notes = [*found.recording.notes, *found.stride.notes]
     lines = [*_stride(found), '', *table(parameters(found), '<>>'), '',
              *table(joints(found), '<>>>'), _shares(found), '']
@@ -103,7 +116,7 @@ def as_text(found: Inverted) -> str:
 
 
 def as_table(fits: list[PaperFit]) -> list[str]:
-    """The paper's fits as its Tables 1 and 2, and the ranges of errors as its Figures 5 to 9."""
+    """Return the paper's fits as its Tables 1 and 2, and error ranges as its Figures 5 to 9."""
     if not fits:
         return []
 
@@ -117,7 +130,7 @@ def as_table(fits: list[PaperFit]) -> list[str]:
     best = min(fits, key=lambda one: one.fit.cost)
     ranges = ', '.join(f'{name} [{low:.3f}, {high:.3f}]'
                        for name, (low, high) in best.errors.items())
-    return ['', "As Liu & Zhang (2024) fit, eight joints taken for the eight cells:",
+    return ['', 'As Liu & Zhang (2024) fit, eight joints taken for the eight cells:',
             *table(rows, '<>><'), f'synchronisation errors [rad]: {ranges}']
 
 
@@ -140,7 +153,7 @@ def _image(figure: Figure, name: str) -> str:
 
 
 def _warned(found: Inverted) -> str:
-    """The warnings, before anything else; red where the fit is poor."""
+    """Return the warnings, before anything else; red where the fit is poor."""
     if not found.warnings:
         return ''
     rows = '\n'.join(f'<tr class="{"fails" if found.poor else "erratum"}"><td>{escape(text)}'
@@ -149,7 +162,7 @@ def _warned(found: Inverted) -> str:
 
 
 def as_html(found: Inverted) -> str:
-    """The report as one page with its figures in it."""
+    """Return the report as one page with its figures in it."""
     def paragraphs(lines: list[str]) -> str:
         return '\n'.join(f'<p>{escape(line)}</p>' for line in lines)
 

@@ -1,14 +1,27 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Which numbers of a network a fit may move, and within what bounds."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TypeVar
 
-import numpy as np
-
 from cpg_ros.dynamics.hopf import first_hopf
 from cpg_ros.errors import InputError
 from cpg_ros.networks.network import Network
+import numpy as np
 
 N = TypeVar('N', bound=Network)
 #: Places at which the edge of the Hopf set is looked for between a value and a bound, and

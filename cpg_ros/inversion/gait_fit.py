@@ -1,18 +1,31 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """A gait fitted to a recording: parameters, readouts, how well they do, and what is not known."""
 
 from dataclasses import dataclass
 from functools import cached_property
 
-import numpy as np
-
 from cpg_ros.dynamics.gait_assessment import GaitAssessment
-from cpg_ros.dynamics.hopf import HopfPoint, first_hopf
+from cpg_ros.dynamics.hopf import first_hopf, HopfPoint
 from cpg_ros.dynamics.periodic import Orbit
 from cpg_ros.inversion.identifiability import Estimate
 from cpg_ros.inversion.trust_region import Trial
 from cpg_ros.inversion.variable_projection import basis
 from cpg_ros.inversion.waveform_harmonics import signals
 from cpg_ros.networks.network import Network
+import numpy as np
 
 #: Phases between recording and orbit that are tried.
 SHIFTS = 120

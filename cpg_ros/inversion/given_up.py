@@ -1,3 +1,17 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """A fit for every steady gait: where the one asked for has no orbit, a humbler one.
 
 In turn: other starts, lower orders of the readouts, one free parameter alone, and last the
@@ -7,14 +21,13 @@ parameters of the preset as they are, with readouts fitted to them. What was giv
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 
-import numpy as np
-
 from cpg_ros.dynamics.periodic import NoOrbit
 from cpg_ros.inversion.fit_data import MeanCycle
 from cpg_ros.inversion.gait_fit import Fit
 from cpg_ros.inversion.invert import invert
 from cpg_ros.motion.plan import refusal
 from cpg_ros.networks.network import Network
+import numpy as np
 
 #: Half the room that a parameter has which is to stay what it is, of its size.
 STAYS = 1e-9

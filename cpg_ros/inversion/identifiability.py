@@ -1,3 +1,17 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """How well a fit determines its free numbers: standard errors, intervals, and what it cannot tell.
 
 The residual of a model that is not the truth is no noise: it is larger than the standard errors
@@ -10,11 +24,10 @@ is not.
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-import numpy as np
-
 from cpg_ros.dynamics.periodic import NoOrbit
 from cpg_ros.inversion.free_parameters import Free
 from cpg_ros.inversion.trust_region import Evaluate, Trial
+import numpy as np
 
 #: Half the width of a 95 % interval, in standard errors.
 QUANTILE = 1.959964
@@ -201,7 +214,7 @@ class Optimum:
                                              for side in (-1.0, 1.0))
 
     def _nearby(self, k: int, error: float, side: float) -> float | None:
-        """The end of the interval where the cost is about quadratic as far as there, or None."""
+        """Return the interval's end where the cost is about quadratic as far as there, or None."""
         step = QUANTILE
         for _ in range(STEPS_NEARBY):
             try:

@@ -1,3 +1,17 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Parameters of a network, and joints' readouts, from the mean cycle of a recorded gait.
 
 Joints are read off the gait's exact orbit as the generator reads them; their readouts are
@@ -9,21 +23,20 @@ counts only where a time scale is given.
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 
-import numpy as np
-
 from cpg_ros.dynamics.periodic import NoOrbit
 from cpg_ros.errors import InputError
 from cpg_ros.inversion.caveats import findings
-from cpg_ros.inversion.fit_data import MeanCycle, joints_of
+from cpg_ros.inversion.fit_data import joints_of, MeanCycle
 from cpg_ros.inversion.free_parameters import Free, free_numbers
 from cpg_ros.inversion.gait_fit import Fit
-from cpg_ros.inversion.identifiability import Optimum, correlation_length, spread
+from cpg_ros.inversion.identifiability import correlation_length, Optimum, spread
 from cpg_ros.inversion.least_squares import Period, Problem
 from cpg_ros.inversion.trust_region import Trial
 from cpg_ros.inversion.variable_projection import WEIGHTS
 from cpg_ros.motion.plan import refusal
 from cpg_ros.networks.network import Network
 from cpg_ros.robots.robot import HARMONICS
+import numpy as np
 
 #: A frequency is never known better than to this share.
 KNOWN_FREQUENCY = 1e-4

@@ -1,18 +1,31 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """The fit of a gait to a mean cycle as a least-squares problem in its free numbers alone."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-
-import numpy as np
 
 from cpg_ros.dynamics.orbit import solve_beside, solve_orbit
 from cpg_ros.dynamics.periodic import NoOrbit, Orbit
 from cpg_ros.inversion.coordinates import Coordinates
 from cpg_ros.inversion.fit_data import Joints
 from cpg_ros.inversion.free_parameters import Free, with_values
-from cpg_ros.inversion.variable_projection import WEIGHTS, basis, basis_moved, project
+from cpg_ros.inversion.variable_projection import basis, basis_moved, project, WEIGHTS
 from cpg_ros.inversion.waveform_harmonics import Signals, signals
 from cpg_ros.networks.network import Network
+import numpy as np
 
 #: Phases among which the first guess of the one between recording and orbit is chosen.
 SHIFTS = 32
@@ -151,7 +164,7 @@ class Problem:
             x, y, z = seen.values(theta, shift, wave)
             psi, by_phase = basis(self.order, x, y, z)
             moved = basis_moved(self.order, x, y, seen.derivatives(theta, shift, wave,
-                                                                          self._members))
+                                                                   self._members))
             part = project(psi, np.concatenate([moved, by_phase[..., None]], axis=-1),
                            self.joints.data[:, columns])
             weights[:, columns] = part.weights

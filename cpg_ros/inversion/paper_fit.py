@@ -1,3 +1,17 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """A recorded gait inverted as Liu & Zhang (2024) do it: eight joints taken for the eight cells.
 
 Twenty instants of a cycle; each joint's angle about its mean, in rad, is held against its cell as
@@ -7,16 +21,15 @@ it is, without a readout; the objective is half the sum of squares (section 4, T
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
-import numpy as np
-from scipy.optimize import minimize_scalar
-
 from cpg_ros.dynamics.orbit import Orbit, solve_orbit
 from cpg_ros.errors import InputError
-from cpg_ros.inversion.cycle_fit import CycleFit, cycle_samples, fit_cycle
+from cpg_ros.inversion.cycle_fit import cycle_samples, CycleFit, fit_cycle
 from cpg_ros.inversion.fit_data import MeanCycle
 from cpg_ros.networks.delayed import CELLS, Delayed
 from cpg_ros.networks.network import Network
 from cpg_ros.robots.robot import Robot
+import numpy as np
+from scipy.optimize import minimize_scalar
 
 #: Instants of a cycle, and phases between recording and orbit that are tried.
 POINTS, SHIFTS = 20, 60

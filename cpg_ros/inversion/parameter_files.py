@@ -1,19 +1,32 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """A fit as files that the generator loads as they are: its parameters, and a robot file."""
 
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-import numpy as np
-import yaml
-
 from cpg_ros.errors import InputError
 from cpg_ros.files.atomic_write import write_atomically
 from cpg_ros.inversion.recording_fit import Inverted
-from cpg_ros.motion.plan import Refused, plan
+from cpg_ros.motion.plan import plan, Refused
 from cpg_ros.networks.registry import find_network, reference
 from cpg_ros.robots.robot import Joint, Motion, Robot
 from cpg_ros.robots.robot_file import load_robot, write_robot
+import numpy as np
+import yaml
 
 #: Limits of joints that no robot file gives: the share of the recorded range that is left on
 #: either side, and the multiple of the fastest fitted speed.
@@ -120,7 +133,7 @@ def write_fitted(path: Path, found: Inverted, robot: Robot | None = None) -> lis
     beside = robot_file_of(path)
     said = (f'{found.fit.gait} at {found.stride.frequency:.4f} Hz, fitted to '
             f'{found.recording.source}\nmean RMS error {100 * found.fit.mean_rms_share:.1f} % of '
-            f'the joints\' range, readout of order {found.fit.order}')
+            f"the joints' range, readout of order {found.fit.order}")
     moved, tree = fitted_robot(found, robot), parameter_tree(found, beside.resolve())
     comment = ''.join(f'# {line}\n' for line in said.splitlines())
     with TemporaryDirectory(prefix='.', dir=path.absolute().parent) as folder:

@@ -1,3 +1,17 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """A recording inverted: its steady stride, the gait fitted to it, and how well that does."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -6,12 +20,12 @@ from typing import Any
 
 from cpg_ros.errors import InputError
 from cpg_ros.gaits.leg_names import legs_of
-from cpg_ros.gaits.stride import Stride, find_stride
+from cpg_ros.gaits.stride import find_stride, Stride
 from cpg_ros.inversion.fit_data import cells_of
 from cpg_ros.inversion.gait_fit import Fit
 from cpg_ros.inversion.given_up import fit_at_all
 from cpg_ros.networks.preset_files import Preset
-from cpg_ros.networks.registry import SHIPPED, NetworkError, find_network
+from cpg_ros.networks.registry import find_network, NetworkError, SHIPPED
 from cpg_ros.recordings.recording import Recording
 from cpg_ros.robots.robot import Robot
 
@@ -181,6 +195,6 @@ def inverted(recording: Recording, robot: Robot | None = None, network: str = ''
     if not found.poor:
         return found
     return replace(found, warnings=(
-        f'a poor fit: {100.0 * fit.mean_rms_share:.0f} % of the joints\' range are left on '
+        f"a poor fit: {100.0 * fit.mean_rms_share:.0f} % of the joints' range are left on "
         f'average; what was recorded may be no {fit.gait}, but turning, hopping or several gaits',
         *found.warnings))

@@ -1,3 +1,17 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """A trust region from one start, with a record of its way.
 
 Values without an orbit are infeasible: the region shrinks until it holds a step that has one.
@@ -6,10 +20,9 @@ Values without an orbit are infeasible: the region shrinks until it holds a step
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from cpg_ros.dynamics.periodic import NoOrbit
 import numpy as np
 from scipy.optimize import least_squares
-
-from cpg_ros.dynamics.periodic import NoOrbit
 
 #: Values -> residual (n,) and its derivative (n, values); NoOrbit where there is none.
 Evaluate = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]

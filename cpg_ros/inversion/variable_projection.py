@@ -1,3 +1,17 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """The linear readout of joints and its elimination from a fit: variable projection.
 
 A joint is ``offset + sum_k w_k psi_k(x, y)``, psi = x, y, x^2, x y, x^3, x^2 y up to the order
@@ -8,9 +22,8 @@ alone. Its exact derivative is Golub & Pereyra's (1973).
 
 from dataclasses import dataclass
 
-import numpy as np
-
 from cpg_ros.motion.readout import monomials
+import numpy as np
 
 #: Weights of each readout order.
 WEIGHTS = {1: 2, 2: 4, 3: 6}

@@ -1,3 +1,17 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """What joints see of a gait: x of every waveform as harmonics, and how it moves with parameters.
 
 The generator's joints are polynomials in x and in y, its derivative by phase in radians: x is the
@@ -9,10 +23,9 @@ short Fourier series, ``x(theta) = Re sum_k terms_k exp(2 pi i k theta)``.
 from dataclasses import dataclass
 from functools import lru_cache
 
-import numpy as np
-
 from cpg_ros.dynamics.periodic import Orbit
-from cpg_ros.motion.phase_readout import POINTS, evaluate, smooth_terms
+from cpg_ros.motion.phase_readout import evaluate, POINTS, smooth_terms
+import numpy as np
 
 TURN = 2.0 * np.pi
 #: Points of a cycle from which the harmonics' derivatives are made.
@@ -54,7 +67,7 @@ class Signals:
 
     def derivatives(self, theta: np.ndarray, shift: float, wave: int, members: np.ndarray
                     ) -> np.ndarray:
-        """Derivatives of x and y by numbers that move the parameters.
+        """Return the derivatives of x and y by numbers that move the parameters.
 
         Args:
             theta: as above.
@@ -92,7 +105,7 @@ def signals(orbit: Orbit, harmonics: int) -> Signals:
 
 
 def _whole(orbit: Orbit, wave: int, harmonics: int) -> tuple[np.ndarray, np.ndarray]:
-    """The waveform over the peak of cell 1, which stays at phase 0."""
+    """Return the waveform over the peak of cell 1, which stays at phase 0."""
     theta = np.arange(orbit.samples) / orbit.samples
     terms = np.fft.rfft(orbit.waveform(theta, 0, wave)) / theta.size
     slopes = np.fft.rfft(orbit.d_waveform(theta, wave), axis=0) / theta.size
@@ -104,7 +117,7 @@ def _whole(orbit: Orbit, wave: int, harmonics: int) -> tuple[np.ndarray, np.ndar
 
 
 def _smooth(orbit: Orbit, wave: int, harmonics: int) -> tuple[np.ndarray, np.ndarray]:
-    """The first harmonics from -1 to 1; where they end moves the middle and half the range."""
+    """Return the first harmonics from -1 to 1; their ends move the middle and half the range."""
     theta = np.arange(POINTS) / POINTS
     values = orbit.waveform(theta, 0, wave)
     pairs = smooth_terms(values, harmonics)

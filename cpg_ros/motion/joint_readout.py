@@ -1,10 +1,23 @@
-"""The readout of a network's joints: of the waveform or of the phase, as the network states."""
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
 
-import numpy as np
+"""The readout of a network's joints: of the waveform or of the phase, as the network states."""
 
 from cpg_ros.dynamics.periodic import Orbit
 from cpg_ros.motion.phase_readout import PhaseReadout
 from cpg_ros.motion.readout import WaveReadout
+import numpy as np
 
 
 def joint_readout(orbit: Orbit, cells: np.ndarray, weights: np.ndarray, leg_cells: np.ndarray,

@@ -1,3 +1,17 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """The moving pattern: from programs to joint positions and velocities, tick by tick.
 
 A gait switch cross-fades two networks whose legs share one phase; a ramp scales the whole
@@ -6,11 +20,9 @@ network with its orbit. All three run on the pattern's own clock, which is slowe
 move whenever a joint would exceed the speed that the gaits themselves reach, and after a stall.
 """
 
-import math
 from collections import deque
 from collections.abc import Callable
-
-import numpy as np
+import math
 
 from cpg_ros.motion.plan import Program
 from cpg_ros.motion.ramp import Ramp
@@ -19,6 +31,7 @@ from cpg_ros.motion.resumption import Resumption
 from cpg_ros.motion.smoothstep import smoothstep
 from cpg_ros.motion.steering import Drive
 from cpg_ros.motion.track import Track
+import numpy as np
 
 #: Cross-fades and ramps are worked out at least this often (s), whatever the tick.
 SUBSTEP = 1e-3

@@ -1,3 +1,17 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """From cells to joints by the cells' phase: for relaxation oscillators.
 
 A Morris-Lecar cell jumps: its potential crosses most of its range within a few per cent of a
@@ -15,14 +29,13 @@ rates that are continuous in time, and velocities are made of those rates: they 
 derivatives of the positions whatever the network does, and whatever is done to it.
 """
 
-import math
 from functools import lru_cache
-
-import numpy as np
+import math
 
 from cpg_ros.dynamics.periodic import Orbit
 from cpg_ros.integration.jit import entry, sources_digest
-from cpg_ros.motion.readout import TURN, NoPhase, monomials
+from cpg_ros.motion.readout import monomials, NoPhase, TURN
+import numpy as np
 
 #: Points of a cycle in the tables of an orbit: a cell may jump within a hundredth of a cycle.
 POINTS = 4096
@@ -211,9 +224,9 @@ class PhaseMap:
             first = 2.0 * np.fft.rfft(states, axis=0)[1] / POINTS
             square = 0.5 * (np.abs(first)**2).sum()
             if square < LEAST_SHARE * (states**2).mean(axis=0).sum():
-                raise NoPhase("its waveform repeats within a cycle: the first harmonic, by "
-                                 f"which its phase is followed, has less than {LEAST_SHARE:.0%} "
-                                 "of it")
+                raise NoPhase('its waveform repeats within a cycle: the first harmonic, by '
+                              f'which its phase is followed, has less than {LEAST_SHARE:.0%} '
+                              'of it')
             self.shape[wave] = *mean, *half
             self.circles[wave] = np.stack([first.real, -first.imag], axis=1).ravel() / square
             self.tables[wave] = np.hstack([states, slopes / half / POINTS])

@@ -1,10 +1,22 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """What the generator is asked to do, worked out and checked before anything moves."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
-
-import numpy as np
 
 from cpg_ros.dynamics.orbit import Orbit, solve_orbit, solve_preset
 from cpg_ros.dynamics.stability import Stability, stability
@@ -12,11 +24,12 @@ from cpg_ros.errors import CpgError
 from cpg_ros.integration.stepper import Stepper
 from cpg_ros.motion.joint_readout import joint_readout
 from cpg_ros.motion.phase_readout import PhaseReadout
-from cpg_ros.motion.readout import WaveReadout, extremes
+from cpg_ros.motion.readout import extremes, WaveReadout
 from cpg_ros.motion.runnable import obstacle
 from cpg_ros.networks.network import Network
 from cpg_ros.networks.preset_files import Preset
 from cpg_ros.robots.robot import Joint, Motion, Robot, Steering
+import numpy as np
 
 #: Strides per second below which a robot would seem to stand (Hz).
 SLOWEST = 0.01

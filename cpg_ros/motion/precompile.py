@@ -1,15 +1,28 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Make every kernel of the real-time path ready, compiling those not yet on disk."""
 
 from collections.abc import Callable
-
-import numpy as np
-from numba.core import event
 
 from cpg_ros.integration.simulate import simulate
 from cpg_ros.integration.stepper import Stepper
 from cpg_ros.motion.phase_readout import observe_phases
 from cpg_ros.motion.readout import confine, observe
 from cpg_ros.networks.registry import find_network
+from numba.core import event
+import numpy as np
 
 
 class _Notice(event.Listener):

@@ -1,3 +1,17 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """From cells to joints: what a network in its gait means for the legs, compiled.
 
 Here for cells whose waveform drives the joints as it is (the delayed network): x is the cell over
@@ -6,11 +20,10 @@ the gait's peak, y its derivative by phase. See phase_readout for those whose ph
 
 import math
 
-import numpy as np
-
 from cpg_ros.dynamics.periodic import Orbit
 from cpg_ros.errors import CpgError
 from cpg_ros.integration.jit import entry, jit, sources_digest
+import numpy as np
 
 #: Entries of the tables over one cycle.
 TABLE = 512

@@ -1,13 +1,26 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Whether the generator can run a gait at all, whatever the robot."""
 
 from dataclasses import dataclass
-
-import numpy as np
 
 from cpg_ros.dynamics.periodic import Orbit
 from cpg_ros.dynamics.stability import Stability
 from cpg_ros.motion.joint_readout import joint_readout
 from cpg_ros.motion.readout import NoPhase
+import numpy as np
 
 #: A period needs this many steps for the integrator to stay on the orbit.
 STEPS_A_PERIOD = 40

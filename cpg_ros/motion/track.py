@@ -1,11 +1,24 @@
-"""One network running one gait, watched: is it still where the gait has it?"""
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""One network running one gait, and a watch that it is still where the gait has it."""
 
 import math
 
-import numpy as np
-
 from cpg_ros.motion.plan import Program
 from cpg_ros.motion.steering import Drive
+import numpy as np
 
 #: Off the orbit: a cell further away than this share of the peak, or the phase behind or ahead
 #: of the clock by this share of a cycle, for longer than this many strides.

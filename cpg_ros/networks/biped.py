@@ -1,3 +1,17 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """The biped network: four Morris-Lecar cells (Rashidi et al. 2016, after Pinto & Golubitsky 2006).
 
 Cells: 1 left flexor, 2 right flexor, 3 left extensor, 4 right extensor. Coupling is diffusive
@@ -12,14 +26,14 @@ from typing import Any, ClassVar
 
 from cpg_ros.networks.equations import Cell
 from cpg_ros.networks.morris_lecar import MorrisLecar
-from cpg_ros.networks.network import Network, Range, known
+from cpg_ros.networks.network import known, Network, Range
 from cpg_ros.networks.symmetry import D2, Symmetry
 from cpg_ros.networks.terms import Number
 
 CELLS = 4
 #: Constants of Table 1.
 CELL = MorrisLecar(g_ca=0.9, v_ca=1.0, g_k=2.0, v_k=-0.7, g_l=0.5, v_l=-0.5,
-                         v1=0.01, v2=0.15, v3=0.10, v4=0.15, base=1.0)
+                   v1=0.01, v2=0.15, v3=0.10, v4=0.15, base=1.0)
 
 #: Partner of each cell (from 0) along a, b and c.
 PARTNERS = {'a': (1, 0, 3, 2), 'b': (2, 3, 0, 1), 'c': (3, 2, 1, 0)}

@@ -1,3 +1,17 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """The delayed network: eight tanh cells in two rings (Liu & Zhang 2024, eq. 1.1).
 
 ``x_i' = a x_i + b tanh(x_i) + d tanh(x_{i-2}) + c tanh(x_{s(i)}(t - tau))``, i = 1..8 with
@@ -5,15 +19,15 @@ indices cyclic, s swapping 1-2, 3-4, 5-6, 7-8. Time is in model units. The netwo
 equivariant under Z4 (i -> i + 2), Z2 (s) and x -> -x.
 """
 
-import math
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cache
+import math
 from typing import Any, ClassVar
 
 from cpg_ros.networks.equations import Cell
-from cpg_ros.networks.network import LeastCoupling, Network, Preset, Range, known
-from cpg_ros.networks.symmetry import GAITS, Z4_Z2, Symmetry
+from cpg_ros.networks.network import known, LeastCoupling, Network, Preset, Range
+from cpg_ros.networks.symmetry import GAITS, Symmetry, Z4_Z2
 from cpg_ros.networks.terms import Number, tanh
 
 CELLS = 8

@@ -1,15 +1,28 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Numpy code for a network's rates and their derivatives, derived by sympy."""
 
 from collections.abc import Iterable, Sequence
 from itertools import combinations_with_replacement, product
-from typing import TYPE_CHECKING, Any
+from typing import Any, TYPE_CHECKING
 
 import sympy
 from sympy.printing.numpy import NumPyPrinter
 
 if TYPE_CHECKING:
     from cpg_ros.networks.equations import Equations
-
 
 
 def print_float(printer: Any, value: Any) -> str:

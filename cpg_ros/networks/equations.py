@@ -1,3 +1,17 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """A network's equations, read once: what they are made of, and functions on arrays from them.
 
 Every cell obeys the same equations, in which it hears other cells, now or a delay ago. They are
@@ -5,18 +19,17 @@ written once for a cell (``Network.equations``); here they are read as texts, an
 rates and their derivatives, exactly, as numpy code that is kept on disk.
 """
 
-import hashlib
-import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache, cached_property
+import hashlib
+import re
 from types import ModuleType
-from typing import TYPE_CHECKING, Any
-
-import numpy as np
+from typing import Any, TYPE_CHECKING
 
 from cpg_ros.networks import generated
 from cpg_ros.networks.terms import Term
+import numpy as np
 
 if TYPE_CHECKING:
     from cpg_ros.networks.network import Network

@@ -1,3 +1,17 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """A network's right-hand side on arrays, with exact derivatives, on all cells or a quotient.
 
 Where a symmetry makes cells equal, or equal but for the sign, one cell of each class stands for
@@ -6,9 +20,8 @@ all: the equations are the same, and what a cell hears is found among the classe
 
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from cpg_ros.networks.equations import equations_of, values_of
+import numpy as np
 
 if TYPE_CHECKING:
     from cpg_ros.networks.network import Network
@@ -91,7 +104,7 @@ class Field:
         return self._filled(rates, now.shape), by_now, by_past
 
     def by_parameter(self, now: np.ndarray, past: np.ndarray | None = None) -> np.ndarray:
-        """Derivative of the rates by the network's parameters, shape (..., d, parameters).
+        """Return the rates' derivative by the network's parameters, shape (..., d, parameters).
 
         What the delay does is not in it: that depends on the slope of the past.
         """

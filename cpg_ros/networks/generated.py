@@ -1,15 +1,29 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Code that is generated from a network's equations, kept on disk between processes."""
 
+from collections.abc import Callable
 import contextlib
+from functools import cache
 import importlib.util
 import logging
 import os
+from pathlib import Path
 import stat
 import sys
 import tempfile
-from collections.abc import Callable
-from functools import cache
-from pathlib import Path
 from types import ModuleType
 
 from cpg_ros.files.atomic_write import write_atomically

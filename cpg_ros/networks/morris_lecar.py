@@ -1,3 +1,17 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """The Morris-Lecar cell: membrane potential v and the share w of open potassium channels.
 
 ``v' = -gCa m(v)(v - vCa) - gK w (v - vK) - gL (v - vL) + i``, ``w' = phi tau(v) (n(v) - w)``,
@@ -8,7 +22,7 @@ base 1 in Rashidi et al. 2016, eq. 2. All quantities are without dimension.
 
 from dataclasses import dataclass
 
-from cpg_ros.networks.terms import Number, Term, cosh, tanh
+from cpg_ros.networks.terms import cosh, Number, tanh, Term
 
 
 @dataclass(frozen=True)

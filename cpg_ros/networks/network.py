@@ -1,3 +1,17 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """What every network states: parameters, cells, legs, gaits and presets; what is usual for it.
 
 States are vectors of ``components`` numbers, variable by variable: first that of every cell
@@ -11,14 +25,13 @@ from dataclasses import dataclass, fields
 from functools import cache
 from typing import Any, ClassVar, Literal, NamedTuple
 
-import numpy as np
-
 from cpg_ros.errors import InputError
 from cpg_ros.networks.equations import Cell, values_of
 from cpg_ros.networks.field import Field
-from cpg_ros.networks.preset_files import Preset, own_presets
+from cpg_ros.networks.preset_files import own_presets, Preset
 from cpg_ros.networks.symmetry import Symmetry
 from cpg_ros.networks.terms import Number
+import numpy as np
 
 __all__ = ['Network', 'Preset', 'Range', 'footfall_order', 'known']
 
@@ -143,11 +156,11 @@ class Network(ABC):
         return Field(self).rates(x, past)
 
     def jacobian(self, x: np.ndarray, past: np.ndarray | None = None) -> np.ndarray:
-        """Derivative of the rates by the state now, shape (..., components, components)."""
+        """Return the rates' derivative by the state now, (..., components, components)."""
         return Field(self).linearised(x, past)[1]
 
     def by_parameter(self, x: np.ndarray, past: np.ndarray | None = None) -> np.ndarray:
-        """Derivative of the rates by the parameters, shape (..., components, parameters)."""
+        """Return the rates' derivative by the parameters, (..., components, parameters)."""
         return Field(self).by_parameter(x, past)
 
     @property

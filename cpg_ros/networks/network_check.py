@@ -1,3 +1,17 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """What a network states, checked: for those that do not come with the package."""
 
 from collections.abc import Iterator
@@ -35,7 +49,7 @@ def _names(network: type[Network]) -> Iterator[str]:
     parameters = network.parameters()
     either = (*network.groups, *parameters)
     if not (isinstance(network.name, str) and network.name.isidentifier()):
-        yield f"name: {network.name!r} is not of letters, digits and _"
+        yield f'name: {network.name!r} is not of letters, digits and _'
     for name in parameters:
         if name not in network.ranges:
             yield f"ranges: the parameter '{name}' has none"

@@ -1,12 +1,25 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """A line in a network's parameter space: parameters that move together, each with a sign."""
 
 from dataclasses import dataclass, replace
 from typing import TypeVar
 
-import numpy as np
-
 from cpg_ros.errors import InputError
 from cpg_ros.networks.network import Network
+import numpy as np
 
 AnyNetwork = TypeVar('AnyNetwork', bound=Network)
 
@@ -59,7 +72,7 @@ class ParameterLine:
         return network.as_dict()[self.names[0]]
 
     def direction(self, network: Network) -> np.ndarray:
-        """Derivative of the network's parameters by the value on the line, (parameters,)."""
+        """Return the parameters' derivative by the value on the line, (parameters,)."""
         signs = dict(zip(self.names, self.signs, strict=True))
         return np.array([signs.get(name, 0.0) for name in network.parameters()])
 

@@ -1,17 +1,30 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Preset files: named parameter sets with the gait each of them runs and a state on its orbit."""
 
-import inspect
 from dataclasses import dataclass
 from functools import cache
+import inspect
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
-
-import yaml
+from typing import Any, TYPE_CHECKING
 
 from cpg_ros.errors import CpgError
 from cpg_ros.files.atomic_write import write_atomically
 from cpg_ros.files.shared_resources import share
 from cpg_ros.files.yaml_reader import Reader
+import yaml
 
 if TYPE_CHECKING:
     from cpg_ros.networks.network import Network
@@ -117,4 +130,4 @@ def write_presets(path: str | Path, network: 'type[Network]', presets: dict[str,
             **({'start': list(preset.start), 'period': preset.period} if preset.start else {})}
     lines = ''.join(f'# {line}\n' for line in comment.splitlines())
     write_atomically(path, lines + yaml.safe_dump(tree, sort_keys=False, default_flow_style=None,
-                                             width=96))
+                                                  width=96))

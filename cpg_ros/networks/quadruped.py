@@ -1,3 +1,17 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """The quadruped network: eight Morris-Lecar cells in two rings (Buono & Golubitsky 2001).
 
 Coupling is linear synaptic (their eq. 4.4): to v_i' is added ``alpha v_{i-2} + gamma v_{s(i)} +
@@ -11,15 +25,15 @@ from typing import Any, ClassVar
 
 from cpg_ros.networks.equations import Cell
 from cpg_ros.networks.morris_lecar import MorrisLecar
-from cpg_ros.networks.network import Network, Range, known
-from cpg_ros.networks.symmetry import GAITS, Z4_Z2, Symmetry
+from cpg_ros.networks.network import known, Network, Range
+from cpg_ros.networks.symmetry import GAITS, Symmetry, Z4_Z2
 from cpg_ros.networks.terms import Number
 
 CELLS = 8
 CURRENT, PHI = 1.0, 0.2
 #: Constants of section 6.
 CELL = MorrisLecar(g_ca=3.0, v_ca=1.0, g_k=1.8, v_k=-0.8, g_l=0.6, v_l=-1.8,
-                         v1=0.2, v2=0.4, v3=0.3, v4=0.2, base=0.0)
+                   v1=0.2, v2=0.4, v3=0.3, v4=0.2, base=0.0)
 
 #: Which cell cell i hears: i - 2 behind it, s(i) on the other side, i + 4 across its ring.
 BEHIND = tuple((i - 2) % CELLS for i in range(CELLS))

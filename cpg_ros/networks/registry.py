@@ -1,3 +1,17 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """The networks by name: shipped ones, those of other packages, and those in files of users.
 
 A package offers a network by an entry point of the group ``cpg_ros.networks`` with the network's
@@ -5,13 +19,13 @@ name: ``my_network = my_package.my_network:MyNetwork``. A file that defines one 
 is named by its path; its presets stand in it or beside it, in a file of the same name but .yaml.
 """
 
-import importlib.util
-import sys
 from collections.abc import Callable, Iterator, Mapping
 from functools import cache, cached_property
-from importlib.metadata import EntryPoint, entry_points
+from importlib.metadata import entry_points, EntryPoint
+import importlib.util
 from inspect import isabstract
 from pathlib import Path
+import sys
 from typing import TypeVar
 from zlib import crc32
 

@@ -1,3 +1,17 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Symmetry groups of networks, and gaits as what a group does to a periodic solution.
 
 A symmetry g of a network permutes its cells. It is a spatio-temporal symmetry of a periodic
@@ -12,9 +26,8 @@ from fractions import Fraction
 from functools import cache, cached_property
 from itertools import product
 
-import numpy as np
-
 from cpg_ros.errors import InputError
+import numpy as np
 
 #: g as a permutation: cell i (from 0) goes to cell g[i].
 Permutation = tuple[int, ...]
@@ -152,7 +165,7 @@ class Symmetry:
 
     @cached_property
     def turn(self) -> np.ndarray:
-        """Cells, shape (cells,), with ``x_i(t + T/m) = x_turn(i)(t)``."""
+        """Return the cells, shape (cells,), with ``x_i(t + T/m) = x_{turn_i}(t)``."""
         name = next(name for name, shift in self.shifts
                     if shift == Fraction(1, self.order) % 1)
         return np.array(self.group.elements[name])

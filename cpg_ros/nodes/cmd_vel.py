@@ -1,19 +1,32 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Walking as the topic cmd_vel asks: fast or slow, turning, and standing where nobody asks."""
 
+from collections.abc import Callable
 import math
 import threading
-from collections.abc import Callable
 from typing import Any
 
+from cpg_ros.motion.pattern import Pattern
+from cpg_ros.motion.plan import Program
 from geometry_msgs.msg import Twist
 from rclpy.clock import Clock
 from rclpy.clock_type import ClockType
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
 from rclpy.qos_overriding_options import QoSOverridingOptions
-
-from cpg_ros.motion.pattern import Pattern
-from cpg_ros.motion.plan import Program
 
 #: How often it is seen whether the last command is too old, s.
 LOOK = 0.02

@@ -1,21 +1,34 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Joint commands taken from topics, as a robot's controllers would take them."""
 
 from collections.abc import Sequence
 from functools import partial
 from typing import Any
 
+from cpg_ros.errors import CpgError
+from cpg_ros.nodes.joint_publishers import COMMAND_TOPICS
+from cpg_ros.nodes.unserved import subscribe, taken
+from cpg_ros.robots.robot import Robot
+from cpg_ros.robots.robot_file import LARGEST
 import numpy as np
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
-
-from cpg_ros.errors import CpgError
-from cpg_ros.nodes.joint_publishers import COMMAND_TOPICS
-from cpg_ros.nodes.unserved import subscribe, taken
-from cpg_ros.robots.robot import Robot
-from cpg_ros.robots.robot_file import LARGEST
 
 KINDS = ('joint_states', *COMMAND_TOPICS)
 #: Least time between two warnings about commands, s.

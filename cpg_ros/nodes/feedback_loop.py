@@ -1,9 +1,21 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """The loop through the robot: from the topics of its sensors to the pattern, at every tick."""
 
-import math
 from collections.abc import Callable
-
-import numpy as np
+import math
 
 from cpg_ros.feedback.estimate import TOUCH
 from cpg_ros.feedback.feedback import Feedback
@@ -16,6 +28,7 @@ from cpg_ros.feedback.watch import Fade
 from cpg_ros.motion.pattern import Pattern
 from cpg_ros.motion.plan import Program
 from cpg_ros.nodes.senses_input import SensesInput
+import numpy as np
 
 #: A heading that is asked for is no further ahead of the robot's than this, rad.
 FURTHEST = 0.5

@@ -1,10 +1,22 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Whether the feedback can be on, and on or off as the parameters say."""
 
-import time
 from collections.abc import Sequence
+import time
 from typing import Any
-
-from rclpy.parameter import Parameter
 
 from cpg_ros.feedback.kinematics import geometry_of
 from cpg_ros.feedback.precompile import precompile
@@ -15,6 +27,7 @@ from cpg_ros.nodes.feedback_loop import FeedbackLoop, Motion
 from cpg_ros.nodes.feedback_parameters import PREFIX
 from cpg_ros.nodes.senses_input import SensesInput
 from cpg_ros.robots.robot import Robot
+from rclpy.parameter import Parameter
 
 #: The switch itself.
 NAME = 'feedback'

@@ -1,16 +1,22 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """The generator node: a central pattern generator that publishes joint states in real time."""
 
+from pathlib import Path
 import sys
 import time
-from pathlib import Path
-
-from rcl_interfaces.msg import ParameterType, SetParametersResult
-from rclpy.logging import get_logger
-from rclpy.parameter import Parameter
-from rclpy.qos import DurabilityPolicy, QoSProfile
-from rclpy.qos_overriding_options import QoSOverridingOptions
-from std_msgs.msg import String
-from std_srvs.srv import SetBool
 
 from cpg_ros.motion.pattern import Pattern
 from cpg_ros.motion.plan import Refused
@@ -18,7 +24,7 @@ from cpg_ros.motion.precompile import precompile
 from cpg_ros.motion.steering import Drive
 from cpg_ros.networks.network import Network, Preset
 from cpg_ros.networks.preset_files import PresetError, read_presets
-from cpg_ros.networks.registry import NetworkError, find_network
+from cpg_ros.networks.registry import find_network, NetworkError
 from cpg_ros.nodes import feedback_parameters
 from cpg_ros.nodes.cells_publisher import Cells
 from cpg_ros.nodes.cmd_vel import CmdVel
@@ -27,21 +33,28 @@ from cpg_ros.nodes.diagnostics import Diagnostics
 from cpg_ros.nodes.feedback_switch import FeedbackSwitch
 from cpg_ros.nodes.generator_parameters import (
     COMMANDS,
-    NETWORK,
-    Planner,
     exclusive,
     gait_spec,
+    NETWORK,
+    Planner,
     specs,
 )
 from cpg_ros.nodes.joint_publishers import Outputs
 from cpg_ros.nodes.measured_pose import MeasuredPose
-from cpg_ros.nodes.node_base import StartedNode, StartError, asked_for_help, run
+from cpg_ros.nodes.node_base import asked_for_help, run, StartedNode, StartError
 from cpg_ros.nodes.parameter_spec import as_doubles
-from cpg_ros.nodes.real_time import SPECS, NoSuchCore, RealTime
+from cpg_ros.nodes.real_time import NoSuchCore, RealTime, SPECS
 from cpg_ros.nodes.rivals import Rivals
 from cpg_ros.nodes.senses_input import CONTACTS
 from cpg_ros.robots.robot import Robot
-from cpg_ros.robots.robot_file import RobotError, find_robot
+from cpg_ros.robots.robot_file import find_robot, RobotError
+from rcl_interfaces.msg import ParameterType, SetParametersResult
+from rclpy.logging import get_logger
+from rclpy.parameter import Parameter
+from rclpy.qos import DurabilityPolicy, QoSProfile
+from rclpy.qos_overriding_options import QoSOverridingOptions
+from std_msgs.msg import String
+from std_srvs.srv import SetBool
 
 NAME = 'cpg_generator'
 #: On SIGINT or SIGTERM the ramp takes this long, and the node ends by the later time, s.

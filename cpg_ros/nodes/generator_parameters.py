@@ -1,21 +1,34 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """The generator's parameters: descriptors, presets, and what a batch of changes asks for."""
 
+from collections.abc import Iterable
 import contextlib
+from dataclasses import dataclass
 import functools
 import math
-from collections.abc import Iterable
-from dataclasses import dataclass
 from typing import Any
 
-from rclpy.parameter import Parameter
-
 from cpg_ros.errors import CpgError
-from cpg_ros.motion.plan import Program, Refused, gait_of, plan
+from cpg_ros.motion.plan import gait_of, plan, Program, Refused
 from cpg_ros.networks.network import Network, Preset
 from cpg_ros.networks.registry import NETWORKS
 from cpg_ros.nodes import real_time
 from cpg_ros.nodes.parameter_spec import Spec
 from cpg_ros.robots.robot import Robot
+from rclpy.parameter import Parameter
 
 COMMANDS = ('none', 'joint_trajectory', 'forward_position')
 NETWORK = Spec('delayed', 'network of cells that makes the rhythm', read_only=True,
@@ -42,7 +55,7 @@ def specs(network: type[Network]) -> dict[str, Spec]:
         'command': Spec('none', 'command topic for ros2_control', read_only=True,
                         constraints='one of: ' + ', '.join(COMMANDS)),
         'measured_topic': Spec('joint_states', "the robot's own joint states, from which it is "
-                               "led to the stand if autostart is false; empty for none",
+                               'led to the stand if autostart is false; empty for none',
                                read_only=True),
         'autostart': Spec(True, 'ramp into the gait at start; false publishes nothing until '
                           '~/enable', read_only=True),
@@ -110,8 +123,8 @@ class Planner:
                                    "strides per second [Hz]; 0 runs in the model's own time, one "
                                    'unit a second', 0.0, 10.0)}
         found |= {f'{network.name}.{key}': Spec(values[key], allowed.text, allowed.low,
-                                               allowed.high)
-                 for key, allowed in network.ranges.items()}
+                                                allowed.high)
+                  for key, allowed in network.ranges.items()}
         for group, members in network.groups.items():
             allowed = network.ranges[members[0]]
             found[f'{network.name}.{group}'] = Spec(

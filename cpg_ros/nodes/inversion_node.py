@@ -1,27 +1,27 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """The node ``cpg_inversion``: listens to joint states, and fits them when it is asked to.
 
 One thread listens and answers; a fit runs in a thread of its own, while more comes in.
 """
 
+from functools import partial
 import json
+from pathlib import Path
 import threading
 import traceback
-from functools import partial
-from pathlib import Path
-
-from rcl_interfaces.msg import ParameterDescriptor
-from rcl_interfaces.srv import SetParametersAtomically
-from rclpy.callback_groups import ReentrantCallbackGroup
-from rclpy.exceptions import NameValidationException, ParameterException
-from rclpy.parameter import Parameter
-from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
-from rclpy.qos_overriding_options import QoSOverridingOptions
-from rclpy.task import Future
-from rclpy.timer import Timer
-from rclpy.validate_topic_name import validate_topic_name
-from sensor_msgs.msg import JointState
-from std_msgs.msg import String
-from std_srvs.srv import Trigger
 
 from cpg_ros.errors import CpgError
 from cpg_ros.files.atomic_write import write_atomically
@@ -35,6 +35,19 @@ from cpg_ros.recordings.live_buffer import Live
 from cpg_ros.recordings.servo import Servo
 from cpg_ros.robots.robot import Robot
 from cpg_ros.robots.robot_file import find_robot
+from rcl_interfaces.msg import ParameterDescriptor
+from rcl_interfaces.srv import SetParametersAtomically
+from rclpy.callback_groups import ReentrantCallbackGroup
+from rclpy.exceptions import NameValidationException, ParameterException
+from rclpy.parameter import Parameter
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.qos_overriding_options import QoSOverridingOptions
+from rclpy.task import Future
+from rclpy.timer import Timer
+from rclpy.validate_topic_name import validate_topic_name
+from sensor_msgs.msg import JointState
+from std_msgs.msg import String
+from std_srvs.srv import Trigger
 
 NAME = 'cpg_inversion'
 #: Seconds that a generator gets to answer.

@@ -1,13 +1,26 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """The generator's messages: joint states, phases and commands, published every tick."""
 
+from cpg_ros.nodes.message_block import MessageBlock, Template
+from cpg_ros.robots.robot import Robot
 import numpy as np
 from rclpy.node import Node
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray, MultiArrayDimension
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
-
-from cpg_ros.nodes.message_block import MessageBlock, Template
-from cpg_ros.robots.robot import Robot
 
 #: Names under which ros2_control's controllers listen by default.
 COMMAND_TOPICS = {'joint_trajectory': 'joint_trajectory_controller/joint_trajectory',

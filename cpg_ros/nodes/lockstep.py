@@ -1,12 +1,25 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """A thread that lets a simulation and what commands it take turns, no faster than they should."""
 
+from collections.abc import Callable
 import threading
 import time
-from collections.abc import Callable
-
-from rclpy.node import Node
 
 from cpg_ros.nodes.command_topics import Commands
+from rclpy.node import Node
 
 #: How long an answer to an instant is waited for, s: at first, and while none comes.
 PATIENCE, IMPATIENCE = 1.0, 0.02

@@ -1,15 +1,28 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Where a robot's joints are, as its own driver publishes them."""
 
 import math
 import time
 
+from cpg_ros.nodes.unserved import subscribe, taken
+from cpg_ros.robots.robot import Robot
 import numpy as np
 from rclpy.node import Node
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import JointState
-
-from cpg_ros.nodes.unserved import subscribe, taken
-from cpg_ros.robots.robot import Robot
 
 #: Joint states older than this tell nothing of where the joints are now, s.
 FRESH = 1.0

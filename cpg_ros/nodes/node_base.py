@@ -1,5 +1,20 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """How nodes declare parameters, start, serve and end."""
 
+from collections.abc import Callable, Iterator, Mapping
 import contextlib
 import gc
 import os
@@ -7,9 +22,12 @@ import signal
 import sys
 import threading
 import traceback
-from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
+from cpg_ros.errors import CpgError
+from cpg_ros.nodes.parameter_services import StrictParameterService
+from cpg_ros.nodes.parameter_spec import as_doubles, as_list, kind_of, Spec
+from cpg_ros.nodes.shutdown import ended
 import rclpy
 from rclpy.exceptions import (
     InvalidParameterTypeException,
@@ -23,11 +41,6 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import remove_ros_args
-
-from cpg_ros.errors import CpgError
-from cpg_ros.nodes.parameter_services import StrictParameterService
-from cpg_ros.nodes.parameter_spec import Spec, as_doubles, as_list, kind_of
-from cpg_ros.nodes.shutdown import ended
 
 #: The ports of the domains after it are too high for UDP.
 LAST_DOMAIN = 232

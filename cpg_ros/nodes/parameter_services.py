@@ -1,12 +1,27 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Parameter services that judge requests in a thread of their own and survive malformed ones."""
 
-import threading
-import traceback
-import weakref
 from collections.abc import Callable, Sequence
 from functools import partial
+import threading
+import traceback
 from typing import Any
+import weakref
 
+from cpg_ros.nodes.unserved import Unserved
 from rcl_interfaces import srv
 from rcl_interfaces.msg import Parameter as ParameterMessage
 from rcl_interfaces.msg import SetParametersResult
@@ -17,8 +32,6 @@ from rclpy.parameter import Parameter
 from rclpy.parameter_service import ParameterService
 from rclpy.qos import qos_profile_parameters
 from rclpy.service import Service
-
-from cpg_ros.nodes.unserved import Unserved
 
 #: How often it is seen whether the node is to end, ns.
 LOOK = 100_000_000

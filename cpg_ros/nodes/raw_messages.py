@@ -1,20 +1,33 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Messages taken as bytes, and where their numbers are: decoding whole ones costs far more.
 
 The bytes are CDR: four of encapsulation, then the fields, each aligned to its size.
 """
 
-import struct
 from collections.abc import Sequence
+import struct
 from typing import Any
 
+from cpg_ros.nodes.unserved import subscribe
 import numpy as np
 from rclpy.node import Node
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray
-
-from cpg_ros.nodes.unserved import subscribe
 
 #: Bytes of the encapsulation, from behind which everything is aligned.
 HEADER = 4

@@ -1,11 +1,25 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Real-time scheduling of a thread: priority, cores and locked memory, as controller_manager's."""
 
+from collections.abc import Sequence
 import contextlib
 import ctypes
+from dataclasses import dataclass
 import os
 import threading
-from collections.abc import Sequence
-from dataclasses import dataclass
 
 from cpg_ros.errors import CpgError
 from cpg_ros.nodes.parameter_spec import Spec

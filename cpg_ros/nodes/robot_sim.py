@@ -1,14 +1,44 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """The node ``robot_sim``: a robot in MuJoCo that takes a generator's commands like a real one."""
 
+from collections import deque
+from pathlib import Path
 import signal
 import sys
 import time
-from collections import deque
-from pathlib import Path
 
-import numpy as np
+from cpg_ros.nodes.command_topics import Commands, KINDS
+from cpg_ros.nodes.deadline_thread import Ticker
+from cpg_ros.nodes.lockstep import Lockstep
+from cpg_ros.nodes.node_base import asked_for_help, run, StartedNode, StartError
+from cpg_ros.nodes.parameter_spec import Spec
+from cpg_ros.nodes.sensor_publishers import Measurements
+from cpg_ros.robots.robot import Robot
+from cpg_ros.robots.robot_file import find_robot, RobotError
+from cpg_ros.simulation.body import Body
+from cpg_ros.simulation.camera import without_opengl
+from cpg_ros.simulation.inertial_unit import Dullness, InertialUnit
+from cpg_ros.simulation.robot_model import SimulationError
+from cpg_ros.simulation.run_recorder import Diary, summary
+from cpg_ros.simulation.soft_start import Approach
+from cpg_ros.simulation.terrain import add_ground, lay, set_friction, Terrain
+from cpg_ros.simulation.terrain import KINDS as GROUNDS
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from geometry_msgs.msg import Wrench
+import numpy as np
 from rclpy.clock import Clock as RosClock
 from rclpy.clock_type import ClockType
 from rclpy.parameter import Parameter
@@ -17,23 +47,6 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 from rosgraph_msgs.msg import Clock
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
-
-from cpg_ros.nodes.command_topics import KINDS, Commands
-from cpg_ros.nodes.deadline_thread import Ticker
-from cpg_ros.nodes.lockstep import Lockstep
-from cpg_ros.nodes.node_base import StartedNode, StartError, asked_for_help, run
-from cpg_ros.nodes.parameter_spec import Spec
-from cpg_ros.nodes.sensor_publishers import Measurements
-from cpg_ros.robots.robot import Robot
-from cpg_ros.robots.robot_file import RobotError, find_robot
-from cpg_ros.simulation.body import Body
-from cpg_ros.simulation.camera import without_opengl
-from cpg_ros.simulation.inertial_unit import Dullness, InertialUnit
-from cpg_ros.simulation.robot_model import SimulationError
-from cpg_ros.simulation.run_recorder import Diary, summary
-from cpg_ros.simulation.soft_start import Approach
-from cpg_ros.simulation.terrain import KINDS as GROUNDS
-from cpg_ros.simulation.terrain import Terrain, add_ground, lay, set_friction
 
 NAME = 'robot_sim'
 #: How long the force of one message on ~/push acts, s of simulated time.

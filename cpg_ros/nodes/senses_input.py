@@ -1,14 +1,22 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """The topics on which a robot tells what it feels: newest messages, judged, as arrays."""
 
-import math
 from collections.abc import Callable, Sequence
 from functools import partial
-
-import numpy as np
-from geometry_msgs.msg import WrenchStamped
-from rclpy.node import Node
-from sensor_msgs.msg import Imu, JointState
-from std_msgs.msg import Float64MultiArray
+import math
 
 from cpg_ros.feedback.estimate import Senses
 from cpg_ros.feedback.foot_force import loads_of
@@ -16,14 +24,19 @@ from cpg_ros.feedback.kinematics import Geometry
 from cpg_ros.feedback.plausibility import (
     IMU,
     IMU_MEMORY,
-    VERDICTS,
     judge_imu,
     judge_joints,
     judge_loads,
+    VERDICTS,
 )
 from cpg_ros.feedback.watch import Watch
-from cpg_ros.nodes.raw_messages import JointLayout, Newest, last_numbers, legs_of, stamp_of
+from cpg_ros.nodes.raw_messages import JointLayout, last_numbers, legs_of, Newest, stamp_of
 from cpg_ros.robots.robot import Robot
+from geometry_msgs.msg import WrenchStamped
+import numpy as np
+from rclpy.node import Node
+from sensor_msgs.msg import Imu, JointState
+from std_msgs.msg import Float64MultiArray
 
 #: Where the feet's loads are from.
 CONTACTS = ('foot_contacts', 'wrenches', 'efforts')

@@ -1,19 +1,32 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """What a simulated robot publishes every period."""
 
 from importlib import import_module, util
 from itertools import pairwise
-
-import numpy as np
-from geometry_msgs.msg import TransformStamped
-from nav_msgs.msg import Odometry
-from rclpy.node import Node
-from sensor_msgs.msg import Imu
 
 from cpg_ros.nodes.joint_publishers import joint_state, labelled
 from cpg_ros.nodes.message_block import MessageBlock, Template
 from cpg_ros.simulation.body import Body
 from cpg_ros.simulation.inertial_unit import InertialUnit
 from cpg_ros.simulation.robot_model import legs
+from geometry_msgs.msg import TransformStamped
+from nav_msgs.msg import Odometry
+import numpy as np
+from rclpy.node import Node
+from sensor_msgs.msg import Imu
 
 
 class Measurements:

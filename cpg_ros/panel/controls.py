@@ -1,10 +1,26 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """The parameters of a node as controls of a page, made from its own descriptors."""
 
 import asyncio
-import re
 from collections.abc import Callable
+import re
 from typing import Any
 
+from cpg_ros.panel.requests import RequestError
+from cpg_ros.panel.service_calls import CallError, Services
 from rcl_interfaces.msg import Parameter as ParameterMessage
 from rcl_interfaces.msg import ParameterEvent, ParameterType
 from rcl_interfaces.srv import (
@@ -14,9 +30,6 @@ from rcl_interfaces.srv import (
     SetParametersAtomically,
 )
 from rclpy.parameter import Parameter, parameter_value_to_python
-
-from cpg_ros.panel.requests import RequestError
-from cpg_ros.panel.service_calls import CallError, Services
 
 #: Types that a page has a control for.
 KINDS = {ParameterType.PARAMETER_BOOL: 'bool', ParameterType.PARAMETER_INTEGER: 'integer',
@@ -94,7 +107,7 @@ class Controls:
         """Return a parameter's value, None if there is none."""
         return self.known.get(name, {}).get('value')
 
-    def set(self, name: str, value: Any) -> None:
+    def set(self, name: str, value: Any) -> None:  # noqa: A003
         """Set a parameter soon; of several values that wait the last one is sent.
 
         Raises:

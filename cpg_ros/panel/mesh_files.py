@@ -1,11 +1,24 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Triangles from the files that a URDF names: STL, binary or text, and OBJ."""
 
-import re
 from pathlib import Path
-
-import numpy as np
+import re
 
 from cpg_ros.errors import CpgError
+import numpy as np
 
 #: Vertices closer than this are made one: a page draws a robot, not its screws, m.
 GRAIN = 0.008

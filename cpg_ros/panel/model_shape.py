@@ -1,14 +1,27 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """The shape of a robot from the MuJoCo model in which robot_sim moves it."""
 
 from typing import Any
-
-import numpy as np
 
 from cpg_ros.panel import body_shape as solids
 from cpg_ros.panel.body_shape import Link, Shape
 from cpg_ros.panel.mesh_files import coarse
 from cpg_ros.robots.robot import Robot
 from cpg_ros.simulation.robot_model import engine, legs, load
+import numpy as np
 
 #: Geoms of these groups and above are for collisions, by the custom of the models.
 COLLISION_GROUP = 3

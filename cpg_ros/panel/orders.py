@@ -1,10 +1,22 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """What is done when a page asks for it."""
 
 import asyncio
 from collections.abc import Callable
 from typing import Any
-
-from std_srvs.srv import SetBool, Trigger
 
 from cpg_ros.errors import CpgError
 from cpg_ros.panel.graph import namespace
@@ -14,6 +26,7 @@ from cpg_ros.panel.requests import Request
 from cpg_ros.panel.robot_view import RobotView
 from cpg_ros.panel.service_calls import PATIENCE, Services
 from cpg_ros.panel.steering import push
+from std_srvs.srv import SetBool, Trigger
 
 #: A fit may take this long, s.
 FIT = 120.0

@@ -1,12 +1,26 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """The pages that are open: what each looks at, what it may ask, and what it is sent."""
 
 import asyncio
+from collections.abc import Callable, Iterable
 import json
 import time
-from collections.abc import Callable, Iterable
 from typing import Any
 
-from websockets.asyncio.server import ServerConnection, broadcast
+from websockets.asyncio.server import broadcast, ServerConnection
 
 #: A page may ask this often, by the second and at once.
 RATE, BURST = 60.0, 120.0

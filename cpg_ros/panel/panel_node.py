@@ -1,29 +1,42 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """The node ``cpg_panel``: a page in the browser for every generator on the graph."""
 
 import asyncio
+from pathlib import Path
 import socket
 import sys
 import threading
 import traceback
-from pathlib import Path
 from typing import Any
 
-import rclpy
-from rclpy.node import Node
-
 from cpg_ros.errors import CpgError
-from cpg_ros.nodes.node_base import StartedNode, StartError, asked_for_help, run
+from cpg_ros.nodes.node_base import asked_for_help, run, StartedNode, StartError
 from cpg_ros.nodes.parameter_spec import Spec
 from cpg_ros.panel import requests, shape_source
 from cpg_ros.panel.door import Door, DoorError, is_loopback
 from cpg_ros.panel.graph import Graph, look
 from cpg_ros.panel.orders import Orders
-from cpg_ros.panel.pages import SLOW, Page, Pages
+from cpg_ros.panel.pages import Page, Pages, SLOW
 from cpg_ros.panel.recorder import Recorder
 from cpg_ros.panel.requests import RequestError
 from cpg_ros.panel.robot_view import RobotView
 from cpg_ros.panel.service_calls import Services
 from cpg_ros.panel.web_server import WebServer
+import rclpy
+from rclpy.node import Node
 
 NAME = 'cpg_panel'
 #: Frames a second, and how often it is seen what is on the graph, s.

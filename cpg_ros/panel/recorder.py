@@ -1,19 +1,32 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """What is on the topics, into a bag: every message, by a thread of its own."""
 
-import shutil
-import threading
-import time
-import zipfile
 from collections.abc import Callable, Iterable
 from importlib import import_module
 from pathlib import Path
+import shutil
+import threading
+import time
 from typing import Any
-
-from rclpy.node import Node
-from rclpy.qos import QoSProfile
+import zipfile
 
 from cpg_ros.errors import CpgError
-from cpg_ros.panel.topics import Topic, latched
+from cpg_ros.panel.topics import latched, Topic
+from rclpy.node import Node
+from rclpy.qos import QoSProfile
 
 #: How often messages are fetched, s, and how many a topic may have had by then.
 EVERY, DEPTH = 0.02, 1000
@@ -61,7 +74,7 @@ class Recorder:
         if self.running:
             raise RecordingError(f'{self.bag} is being recorded already')
         from rosbags.rosbag2 import StoragePlugin, Writer, WriterError
-        from rosbags.typesys import Stores, get_typestore
+        from rosbags.typesys import get_typestore, Stores
         store = get_typestore(Stores.ROS2_JAZZY)
         known = sorted((name, kind) for name, kind in topics if kind in store.types)
         if not known:

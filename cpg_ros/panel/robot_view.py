@@ -1,11 +1,31 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """One generator and the robot that it moves, as pages see them."""
 
 import asyncio
+from collections.abc import Callable
 import math
 import time
-from collections.abc import Callable
 from typing import Any
 
+from cpg_ros.panel import shape_facts, shape_source
+from cpg_ros.panel.controls import Controls
+from cpg_ros.panel.graph import Graph, namespace
+from cpg_ros.panel.service_calls import CallError, Services
+from cpg_ros.panel.steering import Steering
+from cpg_ros.panel.topics import latched, Topic
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import Twist, Wrench
 from nav_msgs.msg import Odometry
@@ -13,13 +33,6 @@ from rcl_interfaces.msg import ParameterEvent
 from rclpy.node import Node
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray, String
-
-from cpg_ros.panel import shape_facts, shape_source
-from cpg_ros.panel.controls import Controls
-from cpg_ros.panel.graph import Graph, namespace
-from cpg_ros.panel.service_calls import CallError, Services
-from cpg_ros.panel.steering import Steering
-from cpg_ros.panel.topics import Topic, latched
 
 LEVELS = {0: 'ok', 1: 'warn', 2: 'error', 3: 'stale'}
 #: Digits of what is sent: a tenth of a milliradian is less than a pixel.

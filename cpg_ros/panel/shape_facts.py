@@ -1,18 +1,31 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """What the graph tells of a robot's shape."""
 
 import asyncio
 from typing import Any
 
+from cpg_ros.panel.graph import Graph, namespace
+from cpg_ros.panel.service_calls import Services
+from cpg_ros.panel.shape_source import is_known, Known
+from cpg_ros.panel.topics import latched, Topic
 from rcl_interfaces.srv import GetParameters
 from rclpy.node import Node
 from rclpy.parameter import parameter_value_to_python
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
-
-from cpg_ros.panel.graph import Graph, namespace
-from cpg_ros.panel.service_calls import Services
-from cpg_ros.panel.shape_source import Known, is_known
-from cpg_ros.panel.topics import Topic, latched
 
 #: How long a topic may be silent before nothing is expected of it, s.
 PATIENCE = 1.0

@@ -1,10 +1,23 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """A robot of which nothing is known but its legs and joints, drawn with sticks."""
 
 from collections.abc import Mapping, Sequence
 
+from cpg_ros.panel.body_shape import along, box, Link, Shape, sphere
 import numpy as np
-
-from cpg_ros.panel.body_shape import Link, Shape, along, box, sphere
 
 #: From hip to hip along and across, half of them, and the length of a leg, m.
 LONG, WIDE, LEG = 0.24, 0.11, 0.42

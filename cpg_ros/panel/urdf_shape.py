@@ -1,21 +1,34 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """The shape of a robot from its URDF, a file or the text on ``robot_description``.
 
 URDF: https://wiki.ros.org/urdf/XML/link.
 """
 
-import os
-import tempfile
 from collections.abc import Callable, Mapping
+import os
 from pathlib import Path
+import tempfile
 from xml.etree import ElementTree as Xml
 
-import numpy as np
-from ament_index_python.packages import PackageNotFoundError, get_package_share_directory
-
+from ament_index_python.packages import get_package_share_directory, PackageNotFoundError
 from cpg_ros.panel import body_shape as solids
 from cpg_ros.panel import mesh_files
 from cpg_ros.panel.body_shape import Link, Shape
-from cpg_ros.robots.urdf import UrdfError, UrdfJoint, load_urdf, root, rotation
+from cpg_ros.robots.urdf import load_urdf, root, rotation, UrdfError, UrdfJoint
+import numpy as np
 
 
 def from_text(text: str, source: str, said: Callable[[str], None]) -> Shape:
@@ -90,7 +103,8 @@ def _draw(link: Link, visual: Xml.Element, colours: Mapping[str, tuple[float, ..
     pose = rotation(tuple(_numbers(None if origin is None else origin.get('rpy'), '0 0 0')))
     colour = solids.GREY
     if material is not None:
-        colour = _colour(material) or colours.get(material.get('name', ''), solids.GREY)  # type: ignore[assignment]
+        named = colours.get(material.get('name', ''), solids.GREY)
+        colour = _colour(material) or named  # type: ignore[assignment]
     for one in visual.iterfind('geometry/*'):
         link.add(_triangles(one, folder), colour, place, pose)
 

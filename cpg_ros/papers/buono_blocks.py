@@ -1,3 +1,17 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Buono & Golubitsky (2001), section 5.2: Tables 5 to 11, formulas against the linearisation.
 
 The formulas stand in ``dynamics.buono_tables`` as printed. They are held against the blocks of the
@@ -8,14 +22,13 @@ drawn at random, so that no formula holds by chance.
 from collections.abc import Iterator
 from dataclasses import replace
 
-import numpy as np
-
 from cpg_ros.dynamics.equilibrium import everywhere
 from cpg_ros.dynamics.isotypic import Block, blocks
 from cpg_ros.networks.quadruped import Quadruped
 from cpg_ros.papers.buono_gaits import AUTHORS
-from cpg_ros.papers.buono_tables import Tables, square_root
+from cpg_ros.papers.buono_tables import square_root, Tables
 from cpg_ros.papers.row import Citation, Picture, Row
+import numpy as np
 
 #: Table 5: phases of cells 1 to 8, upper and lower signs, by (j, k).
 TABLE_5 = {(0, 0): ('pronk', '0 0 0 0 0 0 0 0'), (0, 1): ('pace', '0 1/2 0 1/2 0 1/2 0 1/2'),
@@ -101,7 +114,7 @@ def phases() -> Iterator[Row | Picture]:
 def _signed(signs: str, operator: str) -> str:
     pairs = (('alpha', 'beta'), ('gamma', 'delta'), ('xi', 'eta'))
     return ' '.join(f'{sign} ({a} {operator} {b})' for sign, (a, b) in zip(signs, pairs,
-                                                                          strict=True))
+                                                                           strict=True))
 
 
 def tables() -> Iterator[Row | Picture]:
@@ -110,7 +123,7 @@ def tables() -> Iterator[Row | Picture]:
     printed, parts = sample.tables, sample.blocks
     for name, text in TABLE_6.items():
         yield Citation(AUTHORS, 'Table 6').formula(name, text, printed.block(*parts[name].mode),
-                                                parts[name].now)
+                                                   parts[name].now)
     for name, signs in SIGNS.items():
         wrong, n = name == 'L_21', sample.network
         text = '(a + d) ' + _signed(signs if not wrong else '---', '+')
@@ -125,9 +138,9 @@ def tables() -> Iterator[Row | Picture]:
     for name in ('L_10', 'L_30', 'L_11', 'L_31'):
         mode, whole = parts[name].mode, sample.discriminant(name)
         yield Citation(AUTHORS, 'Table 9').formula(f'Phi of {name}', 'as printed',
-                                                printed.phi(*mode), whole.real)
+                                                   printed.phi(*mode), whole.real)
         yield Citation(AUTHORS, 'Table 10').formula(f'Psi of {name}', 'as printed',
-                                                 printed.psi(*mode), whole.imag)
+                                                    printed.psi(*mode), whole.imag)
         root = square_root(whole.real, whole.imag)
         yield Citation(AUTHORS, 'eq. 5.3').formula(
             f'square of the root of Phi + i Psi, {name}', 'Phi + i Psi', whole, root**2,

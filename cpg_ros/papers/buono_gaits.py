@@ -1,3 +1,17 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Buono & Golubitsky (2001): the six primary gaits, Tables 1, 2, 4 and 13, section 7, Figure 2.
 
 Phases are measured on simulations of all eight cells that start off the gait and run free of any
@@ -8,8 +22,6 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from fractions import Fraction
 
-import numpy as np
-
 from cpg_ros.dynamics.floquet import multipliers
 from cpg_ros.dynamics.orbit import solve_orbit
 from cpg_ros.networks.hk_theorem import label
@@ -17,8 +29,9 @@ from cpg_ros.networks.quadruped import Quadruped
 from cpg_ros.networks.symmetry import Z4_Z2
 from cpg_ros.papers.cell_constants import cell_constants
 from cpg_ros.papers.figures import trajectories
-from cpg_ros.papers.rhythm import Rhythm, primary_gaits, rhythm
+from cpg_ros.papers.rhythm import primary_gaits, Rhythm, rhythm
 from cpg_ros.papers.row import Citation, Picture, Row
+import numpy as np
 
 AUTHORS = 'Buono & Golubitsky 2001'
 #: Periods that a disturbed gait gets to settle, and size of the disturbance.
@@ -129,11 +142,11 @@ def _section_7(gait: Gait) -> Iterator[Row]:
 
 def _figure_2(gait: Gait) -> Iterator[Row | Picture]:
     order = ' '.join(f'u_{cell + 1}' for cell in np.argsort(-gait.phases[:4] % 1.0,
-                                                           kind='stable'))
+                                                            kind='stable'))
     where = 'top' if gait.name == 'walk' else 'bottom'
     if gait.name == 'walk':
         yield Citation(AUTHORS, 'Figure 2').word('order in which the cells peak in the walk',
-                                              'u_1 u_3 u_2 u_4', order)
+                                                 'u_1 u_3 u_2 u_4', order)
     run, period = gait.seen.run, gait.seen.found.period
     drawn = run.t >= run.t[-1] - 4.0 * period
     cells = gait.network.cells
@@ -173,7 +186,7 @@ def slow_gaits() -> Iterator[Row | Picture]:
 
 
 def constants() -> Iterator[Row | Picture]:
-    """The cell of section 6, read off the compiled rates."""
+    """Yield the cell of section 6, read off the compiled rates."""
     at = Citation(AUTHORS, 'section 6')
     found = cell_constants(Quadruped(0.0, 0.0, 0.0, 0.0), float(CURRENT))
     for name, printed in SECTION_6.items():

@@ -1,3 +1,17 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Buono & Golubitsky (2001), sections 2.3 and 3: D4, four cells, and which leg each cell moves.
 
 All of it is found by going through all cases.
@@ -7,7 +21,7 @@ from collections.abc import Iterator
 from functools import cache
 from itertools import permutations
 
-from cpg_ros.networks.symmetry import Z4_Z2, Permutation
+from cpg_ros.networks.symmetry import Permutation, Z4_Z2
 from cpg_ros.papers.buono_gaits import AUTHORS, LEGS
 from cpg_ros.papers.row import Citation, Picture, Row
 
@@ -25,17 +39,17 @@ def cycles(text: str, cells: int) -> Permutation:
 
 
 def after(outer: Permutation, inner: Permutation) -> Permutation:
-    """The product: first the inner one."""
+    """Return the product: first the inner one."""
     return tuple(outer[i] for i in inner)
 
 
 def inverse(element: Permutation) -> Permutation:
-    """The inverse."""
+    """Return the inverse."""
     return tuple(sorted(range(len(element)), key=element.__getitem__))
 
 
 def generated(*generators: Permutation) -> Subgroup:
-    """The subgroup that permutations generate."""
+    """Return the subgroup that permutations generate."""
     found = {tuple(range(len(generators[0])))}
     waiting = list(found)
     while waiting:
@@ -129,7 +143,7 @@ def four_cells() -> Iterator[Row | Picture]:
 
 
 def _written(element: Permutation) -> str:
-    """A permutation in cycles from 1, without the cells it leaves in place."""
+    """Return a permutation in cycles from 1, without the cells it leaves in place."""
     left, text = [i for i in range(len(element)) if element[i] != i], ''
     while left:
         cycle = [left[0]]

@@ -1,10 +1,21 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Buono & Golubitsky (2001), sections 4 to 6: Table 12, the stand, Theorems 4.1 to 4.3."""
 
 from collections.abc import Iterator
 from typing import cast
-
-import numpy as np
-from scipy.optimize import brentq
 
 from cpg_ros.dynamics.equilibrium import equilibrium
 from cpg_ros.dynamics.hopf import HopfPoint
@@ -13,9 +24,11 @@ from cpg_ros.networks.network import Network
 from cpg_ros.networks.parameter_line import ParameterLine
 from cpg_ros.networks.quadruped import Quadruped
 from cpg_ros.networks.symmetry import GAITS
-from cpg_ros.papers.buono_blocks import UNCOUPLED, Sample
+from cpg_ros.papers.buono_blocks import Sample, UNCOUPLED
 from cpg_ros.papers.buono_gaits import AUTHORS
 from cpg_ros.papers.row import Citation, Picture, Row
+import numpy as np
+from scipy.optimize import brentq
 
 #: Section 6.
 STAND, NU_0 = ('0.31', '0.52'), '-1.24'

@@ -1,3 +1,17 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Tables 6 to 11 of Buono & Golubitsky (2001) exactly as printed, for linear synaptic coupling.
 
 They stand here to be compared with the blocks of the linearisation; what is wrong in them is
@@ -7,9 +21,8 @@ the network, (j, k) the class; j is 0 to 3, or 0 and 2 for the real blocks.
 
 from dataclasses import dataclass
 
-import numpy as np
-
 from cpg_ros.networks.quadruped import Quadruped
+import numpy as np
 
 #: Table 6: L_jk = A + sum of these multiples of B, C and D.
 TABLE_6 = {(0, 0): (1, 1, 1), (0, 1): (1, -1, 1), (2, 0): (-1, 1, 1), (2, 1): (-1, -1, 1),

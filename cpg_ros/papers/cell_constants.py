@@ -1,14 +1,27 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Constants of a Morris-Lecar cell, read off the compiled rates of a network in closed form.
 
 v' is linear in w, and in v where m is 0 or 1; w' is linear in w, and its zero n is a tanh. So
 every constant follows from rates at a few states, whatever the code was given.
 """
 
-import numpy as np
-
 from cpg_ros.integration.simulate import simulate
 from cpg_ros.networks.biped import Biped
 from cpg_ros.networks.quadruped import Quadruped
+import numpy as np
 
 #: Where m is 0 or 1 to rounding, and where m and n bend.
 FAR, NEAR = np.array([6.0, 8.0]), np.array([-0.05, 0.0, 0.05, 0.1, 0.2])

@@ -1,3 +1,17 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Errata of the three papers, by number. Rows of the report that differ name one of these.
 
 docs/numbers_and_errata.md, section Errata, says how 1 to 8 were verified; the others were found
@@ -47,57 +61,57 @@ ERRATA: dict[int, tuple[str, str]] = {
         'omega and once that of kappa: in pronk and bound they stay in phase, in the jump '
         'half a cycle apart.'),
     10: (BUONO,
-        "Table 1's walk runs the wrong way: u_3(t) = u_1(t + 1/4) would put the fore leg "
-        "ahead of the hind leg, against Table 1's own jump, Table 2 with eq. 3.1 (u_3(t) = "
-        'u_1(t - 1/4)), section 3 (LH, LF, RH, RF) and the text on Figure 2. From both senses '
-        "of the wave Table 13's walk settles in u_3(t) = u_1(t - 1/4)."),
+         "Table 1's walk runs the wrong way: u_3(t) = u_1(t + 1/4) would put the fore leg "
+         "ahead of the hind leg, against Table 1's own jump, Table 2 with eq. 3.1 (u_3(t) = "
+         'u_1(t - 1/4)), section 3 (LH, LF, RH, RF) and the text on Figure 2. From both senses '
+         "of the wave Table 13's walk settles in u_3(t) = u_1(t - 1/4)."),
     11: (RASHIDI,
-        'Table 5 lacks the asymmetric hop (H = K = <rho tau>) and the one-legged hop (H = K = '
-        '<tau>). In both some cells are equal at all times, which section 5 says happens in '
-        'primary gaits only.'),
+         'Table 5 lacks the asymmetric hop (H = K = <rho tau>) and the one-legged hop (H = K = '
+         '<tau>). In both some cells are equal at all times, which section 5 says happens in '
+         'primary gaits only.'),
     12: (BUONO,
-        'Table 7: the trace of L_21 has the wrong sign of (xi + eta); Tables 6, 8 and 11 have '
-        'it right.'),
+         'Table 7: the trace of L_21 has the wrong sign of (xi + eta); Tables 6, 8 and 11 have '
+         'it right.'),
     13: (BUONO,
-        'Proposition 5.2 and Table 11 call the trace, and what is added to it, the real part '
-        'of an eigenvalue: it is twice that. So is the speed of crossing in the proof of '
-        'Theorem 4.1. Signs, and so the theorems, are not touched.'),
+         'Proposition 5.2 and Table 11 call the trace, and what is added to it, the real part '
+         'of an eigenvalue: it is twice that. So is the speed of crossing in the proof of '
+         'Theorem 4.1. Signs, and so the theorems, are not touched.'),
     14: (BUONO,
-        'Section 2.1: in Z4 x Z2 the element omega kappa has order 4, as (omega kappa)^2 = '
-        'omega^2. So the spatial symmetries of the trot are Z4(omega kappa), not Z2.'),
+         'Section 2.1: in Z4 x Z2 the element omega kappa has order 4, as (omega kappa)^2 = '
+         'omega^2. So the spatial symmetries of the trot are Z4(omega kappa), not Z2.'),
     15: (BUONO,
-        'Proof of Theorem 3.2: Z4 in D4 is a fourth type with kappa as a half-period shift '
-        'and a spatial symmetry. It is no pace or trot either, as cells 1 and 5 (LH and RH) '
-        'are in phase: the theorem stands.'),
+         'Proof of Theorem 3.2: Z4 in D4 is a fourth type with kappa as a half-period shift '
+         'and a spatial symmetry. It is no pace or trot either, as cells 1 and 5 (LH and RH) '
+         'are in phase: the theorem stands.'),
     16: (BUONO,
-        'Theorem 3.3 needs more than F(1) = LH and eq. 3.2, which 18 assignments satisfy: its '
-        'proof also takes F(2) = RH, F(3) = LF and F(4) = RF from the gaits; then there are '
-        'two.'),
+         'Theorem 3.3 needs more than F(1) = LH and eq. 3.2, which 18 assignments satisfy: its '
+         'proof also takes F(2) = RH, F(3) = LF and F(4) = RF from the gaits; then there are '
+         'two.'),
     17: (RASHIDI,
-        'Section 5 calls K spatio-temporal and H spatial; it is the other way round. The '
-        'entries of Table 5 are right.'),
+         'Section 5 calls K spatio-temporal and H spatial; it is the other way round. The '
+         'entries of Table 5 are right.'),
     18: (RASHIDI,
-        'Section 5: the asymmetric and the one-legged hop could not be reached. Both can, as '
-        'stable orbits, with directed weights that keep their symmetry.'),
+         'Section 5: the asymmetric and the one-legged hop could not be reached. Both can, as '
+         'stable orbits, with directed weights that keep their symmetry.'),
     19: (BUONO,
-        'Eqs. 4.3 and 4.4 have delta x_{i + eps} in the equation of y_i; Tables 7 to 10 and '
-        'eq. 5.2 take delta y_{i + eps}. Linear synaptic coupling is h(x_i, x_j) = x_i from '
-        'cell i, not x_j.'),
+         'Eqs. 4.3 and 4.4 have delta x_{i + eps} in the equation of y_i; Tables 7 to 10 and '
+         'eq. 5.2 take delta y_{i + eps}. Linear synaptic coupling is h(x_i, x_j) = x_i from '
+         'cell i, not x_j.'),
     20: (BUONO,
-        'Lemma 5.8: sigma_21 = 0 gives nu_0 = 2 alpha + 2 gamma - 2 xi, not - xi, and it is '
-        'sigma_01 that becomes 4 alpha, not sigma_10. The values that follow are right.'),
+         'Lemma 5.8: sigma_21 = 0 gives nu_0 = 2 alpha + 2 gamma - 2 xi, not - xi, and it is '
+         'sigma_01 that becomes 4 alpha, not sigma_10. The values that follow are right.'),
     21: (BUONO,
-        'Proof of Proposition 5.6: nu = 2 gamma makes sigma_11 vanish, not sigma_10.'),
+         'Proof of Proposition 5.6: nu = 2 gamma makes sigma_11 vanish, not sigma_10.'),
     22: (BUONO,
-        'Proposition 5.5, Lemma 5.8: that the solution is asymptotically stable needs a '
-        'supercritical bifurcation. With the cells of section 6 those of Table 12 are '
-        'subcritical (first Lyapunov coefficients 2.2 and 2.3 > 0): what branches off is '
-        'unstable, and the gaits of Table 13 coexist with a stable stand nearby.'),
+         'Proposition 5.5, Lemma 5.8: that the solution is asymptotically stable needs a '
+         'supercritical bifurcation. With the cells of section 6 those of Table 12 are '
+         'subcritical (first Lyapunov coefficients 2.2 and 2.3 > 0): what branches off is '
+         'unstable, and the gaits of Table 13 coexist with a stable stand nearby.'),
     23: (BUONO,
-        'Theorem 4.2 (e, f) and Proposition 5.7 take traces for real parts, as if the '
-        'eigenvalues of the real blocks were never real; that needs small couplings. At alpha '
-        '= -beta = 0.05, gamma = delta = -0.9966 there is a Hopf bifurcation to the walk with '
-        'gamma < 0 that is not stable: L_21 has a real eigenvalue 0.10.'),
+         'Theorem 4.2 (e, f) and Proposition 5.7 take traces for real parts, as if the '
+         'eigenvalues of the real blocks were never real; that needs small couplings. At alpha '
+         '= -beta = 0.05, gamma = delta = -0.9966 there is a Hopf bifurcation to the walk with '
+         'gamma < 0 that is not stable: L_21 has a real eigenvalue 0.10.'),
     24: (BUONO,
-        'Eq. 5.3 holds for Psi >= 0 only: for Psi < 0 its square is Phi - i Psi. Only the '
-        'real part is used, which is right.')}
+         'Eq. 5.3 holds for Psi >= 0 only: for Psi < 0 its square is Phi - i Psi. Only the '
+         'real part is used, which is right.')}

@@ -1,9 +1,23 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Figures of the papers: what the cells do over time."""
 
 from collections.abc import Sequence
 
-import numpy as np
 from matplotlib.figure import Figure
+import numpy as np
 
 #: Colours of the waveforms, as in the other pictures.
 WAVES = ('#2b6cb0', '#c05621', '#2f855a', '#6b46c1')

@@ -1,21 +1,34 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Liu & Zhang (2024), A neural network model for goat gait: the delayed network."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
-import numpy as np
-
 from cpg_ros.dynamics.floquet import multipliers
-from cpg_ros.dynamics.hopf import HopfPoint, first_hopf
+from cpg_ros.dynamics.hopf import first_hopf, HopfPoint
 from cpg_ros.dynamics.orbit import solve_orbit
 from cpg_ros.dynamics.periodic import NoOrbit
-from cpg_ros.inversion.cycle_fit import CycleFit, cycle_samples, fit_cycle
+from cpg_ros.inversion.cycle_fit import cycle_samples, CycleFit, fit_cycle
 from cpg_ros.networks.delayed import Delayed
 from cpg_ros.networks.symmetry import Z4_Z2
 from cpg_ros.papers.figures import trajectories
 from cpg_ros.papers.published_normal_form import published_normal_form
 from cpg_ros.papers.rhythm import primary_gaits, rhythm
 from cpg_ros.papers.row import Citation, Paper, Picture, Row
+import numpy as np
 
 AUTHORS = 'Liu & Zhang 2024'
 #: Model time that a gait gets to develop, and that is drawn.
@@ -92,7 +105,7 @@ ONE_MINIMUM = 1e-4
 
 
 def _coefficients(example: Example, point: HopfPoint) -> Iterator[Row]:
-    """Normal form: by the formula that is printed, and by the right one."""
+    """Yield the normal form: by the formula that is printed, and by the right one."""
     at = Citation(AUTHORS, example.place)
     printed, right = published_normal_form(point), point.in_delays
     for name, wrong_value, value in (
@@ -148,7 +161,7 @@ def _example(example: Example) -> Iterator[Row | Picture]:
 
 
 def _simulated(example: Example) -> Iterator[Row | Picture]:
-    """The gait that the printed start values lead to."""
+    """Yield the gait that the printed start values lead to."""
     gait, place = example.gait, f'Figure {example.figure}'
     at = Citation(AUTHORS, place)
     gaits = primary_gaits(variables=1)
@@ -185,17 +198,17 @@ def conditions() -> Iterator[Row | Picture]:
 
 
 def walk() -> Iterator[Row | Picture]:
-    """Example 1, the walk."""
+    """Return what is said of Example 1, the walk."""
     return _example(EXAMPLES['walk'])
 
 
 def trot() -> Iterator[Row | Picture]:
-    """Example 1, the trot."""
+    """Return what is said of Example 1, the trot."""
     return _example(EXAMPLES['trot'])
 
 
 def pace() -> Iterator[Row | Picture]:
-    """Example 2."""
+    """Return what is said of Example 2."""
     return _example(EXAMPLES['pace'])
 
 

@@ -1,22 +1,35 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Rashidi, Noorani & Shoaran (2016), Optimization of coupling weights in a 4-cell CPG network."""
 
 from collections.abc import Iterator
 from functools import cache
 
-import numpy as np
-from scipy.integrate import solve_ivp
-
 from cpg_ros.dynamics.floquet import multipliers
 from cpg_ros.dynamics.orbit import solve_orbit
 from cpg_ros.gaits.mean_cycle import mean_cycle
 from cpg_ros.gaits.waveform_comparison import lag, shape_difference
-from cpg_ros.networks.biped import GAITS, PRIMARY, Biped
+from cpg_ros.networks.biped import Biped, GAITS, PRIMARY
 from cpg_ros.networks.hk_theorem import admissible_pairs
 from cpg_ros.networks.symmetry import D2, Symmetry
 from cpg_ros.papers.cell_constants import cell_constants
 from cpg_ros.papers.figures import trajectories
 from cpg_ros.papers.rhythm import Rhythm, rhythm
-from cpg_ros.papers.row import PHASE, Citation, Paper, Picture, Row
+from cpg_ros.papers.row import Citation, Paper, PHASE, Picture, Row
+import numpy as np
+from scipy.integrate import solve_ivp
 
 AUTHORS = 'Rashidi et al. 2016'
 NAMES = ('left flexor', 'right flexor', 'left extensor', 'right extensor')
@@ -80,24 +93,24 @@ def simulated(network: Biped, start: tuple[float, ...]) -> Rhythm:
 
 
 def disturbed(gait: str) -> tuple[float, ...]:
-    """A state near the orbit of a shipped preset, every variable disturbed."""
+    """Return a state near the orbit of a shipped preset, every variable disturbed."""
     start = np.array(Biped.presets()[gait].start)
     start = start + DISTURBANCE * np.random.default_rng(0).standard_normal(start.size)
     return tuple(start.tolist())
 
 
 def named(gait: str) -> str:
-    """A gait's name as the paper writes it."""
+    """Return a gait's name as the paper writes it."""
     return gait.replace('_legged', '-legged').replace('_', ' ')
 
 
 def printed(gait: str) -> Biped:
-    """The network with a row of Table 2."""
+    """Return the network with a row of Table 2."""
     return Biped.symmetric(*TABLE_2[gait])
 
 
 def settled(gait: str) -> Rhythm:
-    """A gait: primary ones by Table 2, the others by the shipped presets."""
+    """Return a gait: primary ones by Table 2, the others by the shipped presets."""
     network = printed(gait) if gait in PRIMARY else Biped.presets()[gait].network
     assert isinstance(network, Biped)
     return simulated(network, disturbed(gait))
@@ -129,7 +142,7 @@ def signals(seen: Rhythm) -> list[str]:
 
 
 def _written(elements: tuple[str, ...]) -> str:
-    """A subgroup of D2 as Table 5 writes it."""
+    """Return a subgroup of D2 as Table 5 writes it."""
     others = [name for name in elements if name != '1']
     return 'D' if len(others) == 3 else others[0].replace(' ', '-') if others else 'I'
 
@@ -143,8 +156,8 @@ def cell() -> Iterator[Row | Picture]:
         yield at.number(name, value, found[name], within=1e-8,
                         note='read off the compiled rates')
     yield Citation(AUTHORS, 'eq. 2').formula('tau ten widths V4 from V3, over its least',
-                                          '(1 + cosh(5))/2', (1.0 + np.cosh(5.0)) / 2.0,
-                                          found['tau_far'])
+                                             '(1 + cosh(5))/2', (1.0 + np.cosh(5.0)) / 2.0,
+                                             found['tau_far'])
     at = Citation(AUTHORS, 'eq. 1')
     yield at.holds("the walk's cells oscillate with u' = -phi tau(v) (n(v) - u), as printed",
                    _oscillates(-1.0), erratum=8, note='u runs away')
@@ -258,7 +271,7 @@ def kinds() -> Iterator[Row | Picture]:
         yield at.number(f'of these with {what}', count, waveforms.count(number))
     gaits = [gait for gait in GAITS if settled(gait).gait == gait]
     yield Citation(AUTHORS, 'Table 5').number('gaits of the paper with their H and K',
-                                           str(len(TABLE_5)), len(gaits), erratum=(11, '9'))
+                                              str(len(TABLE_5)), len(gaits), erratum=(11, '9'))
     in_phase = [gait for gait in gaits if gait not in PRIMARY and len(settled(gait).found.k) > 1]
     yield at.holds('cells are equal at all times in primary gaits only', not in_phase,
                    erratum=11, note='they are in: ' + ', '.join(map(named, in_phase)))

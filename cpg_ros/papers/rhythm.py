@@ -1,15 +1,28 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Which gait a network settles in, measured on a simulation of all its cells, free of any lock."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 
-import numpy as np
-
-from cpg_ros.gaits.recognition import Recognised, recognise
-from cpg_ros.integration.simulate import Trajectory, simulate
+from cpg_ros.gaits.recognition import recognise, Recognised
+from cpg_ros.integration.simulate import simulate, Trajectory
 from cpg_ros.networks.network import Network
-from cpg_ros.networks.symmetry import Z4_Z2, Group, Symmetry
+from cpg_ros.networks.symmetry import Group, Symmetry, Z4_Z2
+import numpy as np
 
 #: Share of a simulation, from its end, on which the rhythm is measured.
 SETTLED = 0.15

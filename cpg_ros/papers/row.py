@@ -1,3 +1,17 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """A quantity as a paper prints it, what our numerics give for it, and whether the two agree."""
 
 from collections.abc import Callable, Iterable, Sequence
@@ -5,8 +19,8 @@ from dataclasses import dataclass
 from decimal import Decimal
 from fractions import Fraction
 
-import numpy as np
 from matplotlib.figure import Figure
+import numpy as np
 
 #: Phases agree to this part of a cycle; values of a formula to this part of their size.
 PHASE, FORMULA = 0.002, 1e-9

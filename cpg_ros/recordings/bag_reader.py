@@ -1,3 +1,17 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Joint states out of rosbag2 bags: sqlite3 and mcap, compressed or not, without ROS.
 
 The library `rosbags` reads the storage; positions come from the messages' bytes in bulk (see
@@ -9,7 +23,7 @@ from pathlib import Path
 
 from cpg_ros.files.progress_bar import progress_bar
 from cpg_ros.recordings.bag_storage import opened
-from cpg_ros.recordings.joint_streams import BATCH, Stream, recorded
+from cpg_ros.recordings.joint_streams import BATCH, recorded, Stream
 from cpg_ros.recordings.recording import Recording
 from cpg_ros.recordings.servo import Servo
 

@@ -1,3 +1,17 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """The storage of rosbag2 bags: which topics are there, and their messages as bytes.
 
 Whatever the library raises on a damaged bag ends here, as one line that names the file.
@@ -5,12 +19,12 @@ Whatever the library raises on a damaged bag ends here, as one line that names t
 
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from contextlib import ExitStack, contextmanager
+from contextlib import contextmanager, ExitStack
 from pathlib import Path
 
 from cpg_ros.recordings.bag_library import Reader, ReaderError
 from cpg_ros.recordings.cdr import JOINT_STATE
-from cpg_ros.recordings.recording import RecordingError, few
+from cpg_ros.recordings.recording import few, RecordingError
 from cpg_ros.recordings.unfinished_mcap import UnfinishedPath, whole_part
 
 STORAGES = ('.mcap', '.db3')

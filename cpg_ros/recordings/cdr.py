@@ -1,3 +1,17 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """JointState messages decoded in bulk, straight from their CDR bytes.
 
 The messages of a publisher mostly share one layout: frame, names and lengths are the same bytes
@@ -11,10 +25,9 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-
 from cpg_ros.errors import CpgError
-from cpg_ros.recordings.bag_library import SerdeError, deserialize
+from cpg_ros.recordings.bag_library import deserialize, SerdeError
+import numpy as np
 
 JOINT_STATE = 'sensor_msgs/msg/JointState'
 #: Layouts of a batch that are decoded in bulk; what is left goes one by one.
@@ -88,7 +101,7 @@ def decode(messages: Sequence[bytes], efforts: bool = False) -> Iterator[Message
         message = _decoded(messages, k)
         stamp = message.header.stamp
         yield MessageBlock(np.array([k]), np.array([stamp.sec * 10**9 + stamp.nanosec]),
-                    tuple(message.name), *(
+                           tuple(message.name), *(
                         np.array(getattr(message, which) if which in fields else (), float)[None]
                         for which in FIELDS))
 

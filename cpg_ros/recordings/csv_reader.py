@@ -1,27 +1,40 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Joint angles out of CSV files: a time column and one column per joint."""
 
-import csv
-import io
-import re
 from collections.abc import Iterator, Sequence
+import csv
 from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
+import io
 from itertools import chain, islice
 from pathlib import Path
-
-import numpy as np
+import re
 
 from cpg_ros.files.progress_bar import progress_bar
 from cpg_ros.recordings.recording import (
-    LATEST,
     Chunk,
+    few,
+    LATEST,
+    merged,
     Recording,
     RecordingError,
-    few,
-    merged,
     require,
 )
 from cpg_ros.recordings.table_text import decimal_commas, opened, preamble, units_of
+import numpy as np
 
 #: What a header may call its unit -> that in rad, or in s.
 ANGLES = {'rad': 1.0, 'radian': 1.0, 'radians': 1.0,

@@ -1,24 +1,37 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Joint states topic by topic, from serialised messages to one recording."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import compress
 
-import numpy as np
-
 from cpg_ros.recordings.bag_storage import line
-from cpg_ros.recordings.cdr import JOINT_STATE, MessageBlock, UndecodableError, decode, in_order
+from cpg_ros.recordings.cdr import decode, in_order, JOINT_STATE, MessageBlock, UndecodableError
 from cpg_ros.recordings.recording import (
     Chunk,
-    Recording,
-    RecordingError,
     few,
     merged,
     named,
+    Recording,
+    RecordingError,
     require,
 )
 from cpg_ros.recordings.servo import Servo
 from cpg_ros.recordings.thinned import LONG, Thinned
+import numpy as np
 
 #: Messages of a topic that are decoded together; a few MB.
 BATCH = 4096

@@ -1,3 +1,17 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Joint angles over time, wherever they were recorded, and what had to be mended in them.
 
 Bags, tables and live topics all deliver chunks of samples; `merged` makes one recording of them.
@@ -6,17 +20,16 @@ Bags, tables and live topics all deliver chunks of samples; `merged` makes one r
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
-import numpy as np
-
 from cpg_ros.errors import CpgError
 from cpg_ros.recordings.stray_samples import (
+    counted,
     FARTHEST,
     Part,
-    counted,
     without_astray,
     without_far,
 )
 from cpg_ros.recordings.thinned import Thinned
+import numpy as np
 
 #: Stamps, shape (n,), int64, ns; the joints' names; positions, shape (n, names), rad.
 Chunk = tuple[np.ndarray, Sequence[str], np.ndarray]

@@ -1,3 +1,17 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Bags through ROS's own ``rosbag2_py``, where the library `rosbags` is not installed.
 
 What is offered is what `rosbags_library` offers, so that nothing else knows which one reads.
@@ -8,8 +22,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import rosbag2_py
 from rclpy.serialization import deserialize_message
+import rosbag2_py
 from sensor_msgs.msg import JointState
 
 STORAGES = {'.mcap': 'mcap', '.db3': 'sqlite3'}
@@ -68,7 +82,7 @@ class Reader:
     def __exit__(self, *_: object) -> None:
         self.close()
 
-    def open(self) -> None:
+    def open(self) -> None:  # noqa: A003
         """Read what topics there are.
 
         Raises:

@@ -1,10 +1,23 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """What joints were told, from what they did and how hard they pulled."""
 
 from dataclasses import dataclass
 
-import numpy as np
-
 from cpg_ros.errors import InputError
+import numpy as np
 
 #: Gains beyond these are mistakes, and would make numbers overflow.
 SMALLEST, LARGEST = 1e-3, 1e5

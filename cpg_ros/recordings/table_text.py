@@ -1,12 +1,26 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """The text of tables as programs write it: packed, with a preamble, with a row of units."""
 
-import gzip
-import io
-import re
-import zlib
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+import gzip
+import io
 from pathlib import Path
+import re
+import zlib
 
 from cpg_ros.recordings.recording import RecordingError
 

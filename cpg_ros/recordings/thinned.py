@@ -1,3 +1,17 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Long recordings on a coarser even grid, smoothed as they are read, so that they fit in memory.
 
 Around each point of the grid a parabola is fitted to the samples of three of its steps: that
@@ -8,9 +22,8 @@ side come to lie on the same stamps.
 
 from itertools import pairwise
 
-import numpy as np
-
 from cpg_ros.recordings.stray_samples import FARTHEST
+import numpy as np
 
 #: Samples from which on a recording is long, of all joints in one message or row.
 LONG = 1 << 17
@@ -102,7 +115,7 @@ def _joined(parts: list[tuple[np.ndarray, np.ndarray]]) -> tuple[np.ndarray, np.
 
 
 def _places(stamps: np.ndarray, step: int) -> np.ndarray:
-    """Number of the grid point nearest to each stamp."""
+    """Return the number of the grid point nearest to each stamp."""
     return (stamps + step // 2) // step
 
 
@@ -196,7 +209,7 @@ def _parabolas(own: np.ndarray, values: np.ndarray, first: np.ndarray, points: n
     for side in (-1.0, 1.0):
         # About the point, the neighbours' samples are a step further.
         into, of = (slice(1, None), slice(None, -1)) if side < 0.0 else (slice(None, -1),
-                                                                        slice(1, None))
+                                                                         slice(1, None))
         for p in range(5):
             moved = sum(_BINOMIAL[p][j] * side**(p - j) * sums[j, of] for j in range(p + 1))
             whole[p, into] += np.where(beside, moved, 0.0)

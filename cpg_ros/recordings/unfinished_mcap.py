@@ -1,3 +1,17 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """What is whole of an mcap file whose recorder never finished it.
 
 A recorder that dies leaves no index and no footer at the end of the file, and the library then
@@ -7,7 +21,7 @@ footer that says there is no index; messages of a chunk that was cut are lost.
 
 import io
 from pathlib import Path, PosixPath
-from typing import IO, Any
+from typing import Any, IO
 
 MAGIC = b'\x89MCAP0\r\n'
 #: Footer record: opcode, length, and no summary, no summary offsets, no checksum; then the end.
@@ -39,7 +53,7 @@ def whole_part(path: Path) -> int | None:
 class UnfinishedPath(PosixPath):
     """A path below which unfinished mcap files read as if their recorder had stopped there."""
 
-    def open(self, mode: str = 'r', *args: Any, **options: Any) -> Any:
+    def open(self, mode: str = 'r', *args: Any, **options: Any) -> Any:  # noqa: A003
         """Open the file; see the class."""
         end = whole_part(self) if mode == 'rb' and self.suffix == '.mcap' else None
         file = super().open(mode, *args, **options)

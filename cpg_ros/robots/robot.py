@@ -1,3 +1,17 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """A robot as the generator sees it: legs, joints, which cell drives each joint and how, limits.
 
 A joint's angle is ``offset + amplitude * sum_k w_k psi_k(x, y)``: x is its cell's waveform (of a
@@ -10,11 +24,10 @@ from -1 to 1.
 
 from dataclasses import dataclass, field
 
-import numpy as np
-
 from cpg_ros.errors import InputError
 from cpg_ros.networks.registry import NETWORKS
 from cpg_ros.robots.body_keys import BodyGeometry, EfferenceTable
+import numpy as np
 
 #: Harmonics of a Morris-Lecar cell that joints follow, if the file does not say.
 HARMONICS = 3

@@ -1,3 +1,17 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Robot files: YAML that people write, read with every mistake named, and written.
 
 The first part says which cell drives each joint and how, and the joints' limits; the optional
@@ -9,13 +23,11 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
-import yaml
-
 from cpg_ros.errors import CpgError
 from cpg_ros.files.atomic_write import write_atomically
 from cpg_ros.files.shared_resources import share
 from cpg_ros.files.yaml_reader import Reader, shown
-from cpg_ros.networks.registry import NETWORKS, NetworkError, find_network, reference
+from cpg_ros.networks.registry import find_network, NetworkError, NETWORKS, reference
 from cpg_ros.robots.body_keys import (
     efference_tree,
     geometry_tree,
@@ -24,13 +36,14 @@ from cpg_ros.robots.body_keys import (
 )
 from cpg_ros.robots.robot import (
     HARMONICS,
-    WEIGHTS,
     Joint,
     JointMotion,
     Motion,
     Robot,
     Steering,
+    WEIGHTS,
 )
+import yaml
 
 #: Limits of a joint.
 LIMITS = ('lower', 'upper', 'velocity')
@@ -294,7 +307,7 @@ def write_robot(path: str | Path, robot: Robot, comment: str = '') -> None:
         tree['gaits'] = {name: _motion_tree(motion) for name, motion in robot.motions.items()}
     lines = ''.join(f'# {line}\n' for line in comment.splitlines())
     write_atomically(path, lines + yaml.safe_dump(tree, sort_keys=False, default_flow_style=None,
-                                             width=96))
+                                                  width=96))
 
 
 def _motion_tree(motion: Motion) -> dict[str, Any]:

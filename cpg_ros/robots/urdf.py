@@ -1,17 +1,30 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Joints of a URDF file: kind, limits, and where they are in the robot.
 
 Reads what a robot file is compared with and leaves the rest (meshes, sensors, gazebo and
 transmission blocks, whatever their prefixes) alone. URDF: https://wiki.ros.org/urdf/XML/joint.
 """
 
-import math
 from dataclasses import dataclass, field
+import math
 from pathlib import Path
 from xml.parsers import expat
 
-import numpy as np
-
 from cpg_ros.errors import CpgError
+import numpy as np
 
 #: Kinds of joints that turn, which a cell can drive.
 TURNING = ('revolute', 'continuous')

@@ -1,3 +1,17 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Weights that give a network a gait, found by NSGA-II (Deb et al. 2000).
 
 As in Rashidi et al. (2016), section 4, with what the paper leaves to luck asked for: that the
@@ -8,14 +22,13 @@ end near the gait are judged by their exact orbit, and the chosen one is proven.
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-import numpy as np
-
 from cpg_ros.errors import CpgError, InputError
 from cpg_ros.files.progress_bar import progress_bar
 from cpg_ros.networks.network import Network
-from cpg_ros.search.objectives import Score, evaluate, pairs
-from cpg_ros.search.search_space import Space, search_space
+from cpg_ros.search.objectives import evaluate, pairs, Score
+from cpg_ros.search.search_space import search_space, Space
 from cpg_ros.search.verification import Chosen, NotGood, polish
+import numpy as np
 
 #: Sets of the front that are tried before the search is given up.
 TRIALS = 20

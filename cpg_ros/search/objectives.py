@@ -1,3 +1,17 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """What makes a parameter set good for a gait: phases, stability, and waveforms that differ.
 
 Phase errors are those of Rashidi et al. (2016), eqs. 6-9, with the cell numbers of their Table 5:
@@ -9,8 +23,6 @@ multiplier. All sets of a generation are simulated in one batch.
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-import numpy as np
-
 from cpg_ros.dynamics.floquet import multipliers
 from cpg_ros.dynamics.orbit import solve_from_path
 from cpg_ros.dynamics.periodic import richer
@@ -20,12 +32,13 @@ from cpg_ros.networks.network import Network
 from cpg_ros.networks.symmetry import Symmetry
 from cpg_ros.search.settled_cycle import (
     ALIVE,
-    SPAN,
-    SettledCycle,
     last_cycle,
     population_run,
+    SettledCycle,
+    SPAN,
     start_states,
 )
+import numpy as np
 
 #: Sets that are simulated at once, which limits memory: a usual generation is one batch.
 LARGEST_BATCH = 256

@@ -1,3 +1,17 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """The Pareto front of a search for weights, as a table in a file and as a picture."""
 
 import csv
@@ -5,14 +19,13 @@ import io
 from pathlib import Path
 from typing import Any
 
-import matplotlib
-import numpy as np
-from matplotlib.axes import Axes
-
 from cpg_ros.files.atomic_write import write_atomically
 from cpg_ros.search.nsga2 import Front, objective_names
 from cpg_ros.search.objectives import APERIODIC, RESOLUTION
 from cpg_ros.search.verification import orbit_signals
+import matplotlib
+from matplotlib.axes import Axes
+import numpy as np
 
 #: Colours of the waveforms, of sets that were tried or solved, and of the front.
 WAVES, TRIED, SOLVED, BEST = ('#2b6cb0', '#c05621'), '#cbd5e0', '#718096', '#2f855a'

@@ -1,3 +1,17 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """What may vary when weights are looked for: couplings that keep a gait's symmetry, and cells.
 
 A gait with the spatio-temporal symmetries H needs a network that every element g of H maps onto
@@ -8,11 +22,10 @@ under H: three for the biped's primary gaits, six for its secondary ones.
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-import numpy as np
-
 from cpg_ros.errors import InputError
-from cpg_ros.networks.network import Network, known
-from cpg_ros.networks.registry import NETWORKS, SHIPPED, find_network, is_path
+from cpg_ros.networks.network import known, Network
+from cpg_ros.networks.registry import find_network, is_path, NETWORKS, SHIPPED
+import numpy as np
 
 #: Shipped networks whose weights can be looked for.
 SEARCHED: dict[str, type[Network]] = {

@@ -1,12 +1,25 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """What networks do in the end: many are simulated at once, and the cycle of each is found."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import numpy as np
-
-from cpg_ros.integration.simulate import Trajectory, simulate
+from cpg_ros.integration.simulate import simulate, Trajectory
 from cpg_ros.networks.network import Network
+import numpy as np
 
 #: Model time that every set is simulated for, and between the states that are kept.
 SPAN, KEPT = 500.0, 0.1

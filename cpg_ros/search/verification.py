@@ -1,19 +1,32 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """The last word on a parameter set: its exact orbit, its multipliers, and how it stands noise."""
 
 from dataclasses import dataclass
-
-import numpy as np
 
 from cpg_ros.dynamics.floquet import multipliers
 from cpg_ros.dynamics.orbit import solve_preset
 from cpg_ros.dynamics.periodic import NoOrbit, Orbit
 from cpg_ros.errors import CpgError
 from cpg_ros.gaits.waveform_comparison import shape_difference
-from cpg_ros.integration.simulate import Trajectory, simulate
+from cpg_ros.integration.simulate import simulate, Trajectory
 from cpg_ros.networks.network import Preset
 from cpg_ros.networks.symmetry import Symmetry
-from cpg_ros.search.objectives import Score, phase_errors, waveform_shortfall
+from cpg_ros.search.objectives import phase_errors, Score, waveform_shortfall
 from cpg_ros.search.settled_cycle import ALIVE, COARSER, KEPT, last_cycle
+import numpy as np
 
 #: Noise that a gait has to survive (per square root of model time), for how long (model time),
 #: and in how many runs of it at once: as many as fit into the vector registers.

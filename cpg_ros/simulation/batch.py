@@ -1,16 +1,28 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Many runs at once, open loop: what a program publishes, and bodies that follow it on all cores.
 
 Physics is MuJoCo's own ``rollout``, native threads; nothing is fed back, so that all of a run's
 targets are known beforehand.
 """
 
-import copy
-import os
 from collections.abc import Callable, Sequence
+import copy
 from dataclasses import dataclass
+import os
 from typing import Any
-
-import numpy as np
 
 from cpg_ros.motion.pattern import Pattern
 from cpg_ros.motion.plan import Program
@@ -19,7 +31,8 @@ from cpg_ros.robots.robot import Robot
 from cpg_ros.simulation.body import Body
 from cpg_ros.simulation.model_indices import Anatomy
 from cpg_ros.simulation.robot_model import engine
-from cpg_ros.simulation.run_metrics import RunMetrics, judge
+from cpg_ros.simulation.run_metrics import judge, RunMetrics
+import numpy as np
 
 #: A push lasts this long, s.
 PUSH = 0.1

@@ -1,13 +1,26 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """A robot's body in MuJoCo: angles wanted go in, what the body does comes out."""
 
-import math
 from collections.abc import Callable
+import math
 from typing import Any
 
-import numpy as np
-
 from cpg_ros.robots.robot import Robot
-from cpg_ros.simulation.robot_model import SimulationError, engine, legs, load
+from cpg_ros.simulation.robot_model import engine, legs, load, SimulationError
+import numpy as np
 
 #: A base that leans more than this has fallen, rad.
 FALLEN = math.radians(60.0)

@@ -1,21 +1,34 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Pictures of a robot, drawn offscreen by OpenGL, and films of them."""
 
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 import importlib
 import math
 import os
+from pathlib import Path
 import shutil
 import subprocess
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
-from pathlib import Path
 from typing import Any, BinaryIO, Protocol
-
-import numpy as np
-from PIL import GifImagePlugin, Image
 
 from cpg_ros.files.progress_bar import progress_bar
 from cpg_ros.simulation.body import yaw
-from cpg_ros.simulation.robot_model import SimulationError, engine
+from cpg_ros.simulation.robot_model import engine, SimulationError
+import numpy as np
+from PIL import GifImagePlugin, Image
 
 #: Colours of a GIF; few, and no dithering, make it small.
 COLOURS = 96
@@ -220,7 +233,7 @@ def check_film(path: Path) -> None:
 
 @contextmanager
 def film(path: Path, fps: float) -> Iterator[Film]:
-    """Open a film (.gif or .mp4) that is at ``path`` when it is whole, and not before.
+    """Open a film, GIF or MP4, that is at ``path`` when it is whole, and not before.
 
     Raises:
         SimulationError: as ``check_film``, or ffmpeg failed.

@@ -1,15 +1,27 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Many bodies at once with feedback, or without it: pushed, on rough ground, on slopes.
 
 All of them take a step of physics together, MuJoCo's own ``rollout`` of one step, and what they
 feel goes through one ``Feedback`` of as many runs. A run that has ended takes no more steps.
 """
 
+from collections.abc import Mapping, Sequence
 import copy
 import math
-from collections.abc import Mapping, Sequence
 from typing import Any
-
-import numpy as np
 
 from cpg_ros.feedback.efference_copy import EfferenceCopy
 from cpg_ros.feedback.estimate import BodyState, Senses
@@ -19,7 +31,7 @@ from cpg_ros.feedback.kinematics import geometry_of
 from cpg_ros.feedback.timetable import Timetable
 from cpg_ros.motion.plan import Program
 from cpg_ros.simulation.batch import PUSH
-from cpg_ros.simulation.body import FALLEN, Body
+from cpg_ros.simulation.body import Body, FALLEN
 from cpg_ros.simulation.leg_geometry import read_geometry
 from cpg_ros.simulation.model_indices import Anatomy
 from cpg_ros.simulation.pattern_batch import PatternBatch
@@ -27,7 +39,8 @@ from cpg_ros.simulation.proprioception import Dulled, felt
 from cpg_ros.simulation.robot_model import engine
 from cpg_ros.simulation.run_metrics import BEGINNING
 from cpg_ros.simulation.scenario import Noise, Outcome, Scenario
-from cpg_ros.simulation.terrain import Terrain, add_ground, lay
+from cpg_ros.simulation.terrain import add_ground, lay, Terrain
+import numpy as np
 
 
 class ClosedLoop:

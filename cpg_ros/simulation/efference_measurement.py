@@ -1,17 +1,30 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """A gait's efference copy, measured: what its body does on flat ground with nothing fed back."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
-import numpy as np
-
-from cpg_ros.feedback.efference_copy import SPEEDS, EfferenceCopy, fold
+from cpg_ros.feedback.efference_copy import EfferenceCopy, fold, SPEEDS
 from cpg_ros.motion.plan import plan
 from cpg_ros.networks.registry import NETWORKS
 from cpg_ros.robots.robot import Robot
 from cpg_ros.simulation.closed_loop import ClosedLoop
 from cpg_ros.simulation.leg_geometry import read_geometry
 from cpg_ros.simulation.scenario import Scenario
+import numpy as np
 
 #: Length of a run, and what of it says nothing about the gait itself, s.
 DURATION, BEGINNING = 10.0, 3.0

@@ -1,20 +1,33 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """From the way of a foot to a gait's readout: path, inverse kinematics, fit.
 
 A gait is described by a few lengths and times, the same for the left and right leg of a pair.
 Legs move in the plane of their last two joints; the first ones hold still.
 """
 
-import math
 from dataclasses import dataclass, replace
-
-import numpy as np
+import math
 
 from cpg_ros.dynamics.periodic import Orbit
 from cpg_ros.motion.joint_readout import joint_readout
 from cpg_ros.robots.robot import JointMotion
 from cpg_ros.simulation.body import Body
 from cpg_ros.simulation.model_indices import Anatomy
-from cpg_ros.simulation.robot_model import SimulationError, engine, legs
+from cpg_ros.simulation.robot_model import engine, legs, SimulationError
+import numpy as np
 
 #: Points of a cycle that the fit looks at.
 POINTS = 128

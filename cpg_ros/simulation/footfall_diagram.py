@@ -1,13 +1,26 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Footfall diagrams after Hildebrand: which foot stands when, and how fast the robot goes."""
 
 from collections.abc import Sequence
 from io import BytesIO
 from pathlib import Path
 
-import numpy as np
-from matplotlib.figure import Figure
-
 from cpg_ros.files.atomic_write import write_atomically
+from matplotlib.figure import Figure
+import numpy as np
 
 #: A foot that bears more than this share of the weight stands.
 STANDING = 0.04

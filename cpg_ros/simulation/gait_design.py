@@ -1,3 +1,17 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """A gait in a few numbers, and what each gait of a robot about knee high is to reach.
 
 All figures are for a leg of LENGTH from thigh joint to foot in the stand; for other robots lengths
@@ -6,9 +20,8 @@ go with that length, times and speeds with its square root, as for pendulums.
 
 from dataclasses import astuple, dataclass, replace
 
-import numpy as np
-
 from cpg_ros.simulation.foot_path import Path
+import numpy as np
 
 #: Of a leg in the stand, m.
 LENGTH = 0.2664

@@ -1,19 +1,32 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Meshes of URDF files: where they are, and whether MuJoCo can read them.
 
 MuJoCo reads binary STL, OBJ and MSH. Bodies collide as convex hulls, so that of other files the
 points are enough for a shape to collide; for pictures they are not.
 """
 
-import os
-import re
 from collections.abc import Iterator
+import os
 from pathlib import Path
+import re
 from urllib.parse import unquote
 from xml.etree import ElementTree
 
-import numpy as np
-
 from cpg_ros.robots.urdf import UrdfError
+import numpy as np
 
 #: What a reference may begin with, beside the name of a package.
 _PACKAGE = re.compile(r'(?:package|model):/+([^/]+)/(.*)', re.DOTALL)

@@ -1,9 +1,21 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """The patterns of many runs: orbits looked up, ramped in, steered, switched, held to limits."""
 
-import math
 from collections.abc import Mapping, Sequence
-
-import numpy as np
+import math
 
 from cpg_ros.feedback.timetable import POINTS, Timetable
 from cpg_ros.integration.jit import entry, sources_digest
@@ -11,6 +23,7 @@ from cpg_ros.motion.plan import Program
 from cpg_ros.motion.smoothstep import smoothstep
 from cpg_ros.motion.steering import TIME_CONSTANT
 from cpg_ros.simulation.scenario import Scenario
+import numpy as np
 
 #: From the stand into the gait, and from one gait into another, s.
 RAMP, TRANSITION = 1.0, 1.0
@@ -95,7 +108,7 @@ def _cached(digest):
 
     @entry
     def advance(angles, still, frequencies, legs, offset, asked, drive, rates, strides, hurries,
-                 phases, gaits, faded, mix, turning, course, level, dt, planned):
+                phases, gaits, faded, mix, turning, course, level, dt, planned):
         """Advance each run; arguments as of PatternBatch."""
         digest  # noqa: B018
         for run in range(len(phases)):

@@ -1,14 +1,27 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """What bodies feel, from the true state of the physics, and what dulls it."""
 
 import math
-
-import numpy as np
 
 from cpg_ros.feedback.estimate import Senses
 from cpg_ros.feedback.kinematics import GRAVITY
 from cpg_ros.integration.jit import entry, sources_digest
 from cpg_ros.simulation.body import Body
 from cpg_ros.simulation.scenario import Noise
+import numpy as np
 
 
 def _cached(digest):

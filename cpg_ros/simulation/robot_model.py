@@ -1,17 +1,29 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """MuJoCo models of a robot on a floor, its joints held by PD control.
 
 A model file gives bodies, masses, collision shapes and torque limits; which joints are driven, and
 in which order, the robot file says.
 """
 
+from collections.abc import Callable
 import difflib
 import importlib.util
-from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType
 from typing import Any
-
-import numpy as np
 
 from cpg_ros.errors import CpgError
 from cpg_ros.networks.registry import NETWORKS
@@ -19,6 +31,7 @@ from cpg_ros.robots.robot import Robot
 from cpg_ros.robots.urdf import UrdfError
 from cpg_ros.simulation.servo_gains import set_gains
 from cpg_ros.simulation.urdf_model import part_touching, read_urdf
+import numpy as np
 
 #: Side of a square of the floor, m.
 SQUARE = 0.25

@@ -1,13 +1,26 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """What a run of a body is judged by."""
 
-import math
 from dataclasses import dataclass
+import math
 
-import numpy as np
-
-from cpg_ros.simulation.body import FALLEN, Body
+from cpg_ros.simulation.body import Body, FALLEN
 from cpg_ros.simulation.model_indices import Anatomy
 from cpg_ros.simulation.robot_model import engine
+import numpy as np
 
 GRAVITY = 9.81
 #: Seconds from the stand that say nothing about the gait itself.

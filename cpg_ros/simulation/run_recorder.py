@@ -1,16 +1,29 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """What is kept of a run for its film, its footfall diagram and its summary."""
 
-import math
 from collections import deque
 from collections.abc import Callable
+import math
 from pathlib import Path
-
-import numpy as np
 
 from cpg_ros.networks.network import footfall_order
 from cpg_ros.simulation.body import Body
-from cpg_ros.simulation.robot_model import SimulationError, legs, load
-from cpg_ros.simulation.terrain import Terrain, add_ground, lay
+from cpg_ros.simulation.robot_model import legs, load, SimulationError
+from cpg_ros.simulation.terrain import add_ground, lay, Terrain
+import numpy as np
 
 #: How much of the end of a run is kept, s: a longer film or diagram nobody looks at.
 KEPT = 60.0

@@ -1,12 +1,25 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """How fast a tuned gait goes and turns with strides of other lengths: measured, not assumed."""
 
 from collections.abc import Callable
 
-import numpy as np
-
 from cpg_ros.motion.plan import Program
 from cpg_ros.robots.robot import Steering
 from cpg_ros.simulation.batch import Batch, Scenario, targets
+import numpy as np
 
 #: Strides that are tried, and how much slower the legs move at a stride of 0.
 STRIDES = (-0.4, -0.2, 0.0, 0.2, 0.4, 0.6, 0.8, 1.0)

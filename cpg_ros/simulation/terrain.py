@@ -1,12 +1,25 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Ground that is not flat, flat at the origin: heights on a grid, or slabs."""
 
-import math
 from dataclasses import dataclass
+import math
 from typing import Any
 
+from cpg_ros.simulation.robot_model import engine, SimulationError
 import numpy as np
-
-from cpg_ros.simulation.robot_model import SimulationError, engine
 
 #: Extent of the ground in front of the robot, behind it and to either side, and grid, m.
 AHEAD, BEHIND, ASIDE, GRID = 8.0, 1.5, 3.0, 0.05
@@ -97,7 +110,7 @@ def _boxes(terrain: Terrain, x: np.ndarray, y: np.ndarray, rng: np.random.Genera
 
 def _stairs(terrain: Terrain, x: np.ndarray, y: np.ndarray, _: np.random.Generator
             ) -> np.ndarray:
-    """Steps up as far as HIGHEST, and down again, and so on."""
+    """Return the height of steps up as far as HIGHEST, and down again, and so on."""
     steps = max(1, int(HIGHEST / max(terrain.size, 1e-9)))
     tread = np.maximum(np.floor((x - PLACE) / TREAD) + 1.0, 0.0) % (2 * steps)
     return np.tile(terrain.size * np.minimum(tread, 2 * steps - tread), (y.size, 1))
@@ -105,7 +118,7 @@ def _stairs(terrain: Terrain, x: np.ndarray, y: np.ndarray, _: np.random.Generat
 
 def _course(terrain: Terrain, x: np.ndarray, y: np.ndarray, rng: np.random.Generator
             ) -> np.ndarray:
-    """A height field up to 3 m, a ramp of 15 degrees up and down, boxes from 5.5 m on."""
+    """Return a height field up to 3 m, a ramp of 15 degrees up and down, boxes from 5.5 m on."""
     slope = math.tan(math.radians(15.0))
     ramp = np.clip(slope * np.minimum(x - 3.0, 5.3 - x), 0.0, HIGHEST)
     return np.where(x < 2.8, _rough(terrain, x, y, rng),

@@ -1,30 +1,43 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Gaits for a robot's body: foot paths that walk far and stay upright, found in simulation.
 
 CMA-ES (Hansen) looks for the design of a gait with the lowest price over several runs on floors of
 different friction, with different loads and with pushes.
 """
 
-import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import cycle
+import math
 from types import ModuleType
 from typing import Any
 
-import numpy as np
-
 from cpg_ros.files.progress_bar import progress_bar
-from cpg_ros.motion.plan import OutOfLimits, Program, Refused, gait_of, plan
+from cpg_ros.motion.plan import gait_of, OutOfLimits, plan, Program, Refused
 from cpg_ros.networks.registry import NETWORKS
 from cpg_ros.robots.robot import Motion, Robot, Steering
 from cpg_ros.simulation.batch import Batch, Scenario, targets
 from cpg_ros.simulation.efference_measurement import calibrated
 from cpg_ros.simulation.foot_path import Feet
-from cpg_ros.simulation.gait_design import AIMS, LENGTH, Aim, Design
+from cpg_ros.simulation.gait_design import Aim, AIMS, Design, LENGTH
 from cpg_ros.simulation.robot_model import SimulationError
 from cpg_ros.simulation.run_metrics import RunMetrics
-from cpg_ros.simulation.steering_table import STRIDES, measure
+from cpg_ros.simulation.steering_table import measure, STRIDES
+import numpy as np
 
 #: Length of the runs that designs are compared by, and of the one that figures are of, s.
 SHORT, LONG = 6.0, 10.0

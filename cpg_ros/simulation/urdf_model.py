@@ -1,3 +1,17 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """URDF files as ROS has them, made ones that MuJoCo takes; every change is told.
 
 A URDF may name meshes by package, in formats that MuJoCo does not read, and have links without
@@ -11,11 +25,10 @@ from typing import Any
 from xml.etree import ElementTree
 from xml.parsers import expat
 
-import numpy as np
-
 from cpg_ros.robots.urdf import UrdfError
-from cpg_ros.simulation.inertia import LEAST, LIGHTEST, ball, possible
+from cpg_ros.simulation.inertia import ball, LEAST, LIGHTEST, possible
 from cpg_ros.simulation.mesh_files import find_mesh, hull, trouble
+import numpy as np
 
 #: Where an inertia has its numbers.
 _KEYS = ('ixx', 'ixy', 'ixz', 'iyy', 'iyz', 'izz')

@@ -1,14 +1,22 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """The picture of ``analyze --plot``: branches, roots, trajectories and footfalls."""
 
 import io
 from itertools import pairwise
 from typing import Literal
-
-import matplotlib
-import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 
 from cpg_ros.dynamics.bifurcation import bifurcations
 from cpg_ros.dynamics.continuation import Branch, follow, from_hopf
@@ -19,6 +27,11 @@ from cpg_ros.errors import InputError
 from cpg_ros.files.progress_bar import progress_bar
 from cpg_ros.tools import gait_diagram as footfall
 from cpg_ros.tools.analysis_report import Analysis
+import matplotlib
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+import numpy as np
 
 COLOURS = {'pronk': '#805ad5', 'pace': '#2f855a', 'bound': '#b7791f', 'trot': '#c53030',
            'jump': '#00838f', 'walk': '#2b6cb0', 'run': '#c53030', 'two_legged_jump': '#00838f',
@@ -75,7 +88,7 @@ def _on_line(analysis: Analysis) -> list[HopfPoint]:
 
 
 def _born(point: HopfPoint, analysis: Analysis) -> list[Branch]:
-    """The branch of a Hopf point; none where the first orbit cannot be found."""
+    """Return the branch of a Hopf point; none where the first orbit cannot be found."""
     low, high = analysis.span
     try:
         return [from_hopf(point.network, point.block.symmetry, point.omega, analysis.along, low,
@@ -195,7 +208,7 @@ def picture(analysis: Analysis, suffix: str) -> bytes:
     matplotlib.use('Agg')
     if suffix.lstrip('.') not in Figure().canvas.get_supported_filetypes():
         raise InputError(f"--plot: '{suffix}' is not a kind of picture that can be written, such "
-                         "as .png, .pdf or .svg")
+                         'as .png, .pdf or .svg')
     from matplotlib import pyplot
     count = max(1, len(analysis.existing))
     figure = pyplot.figure(figsize=(12.0, 7.4 + 1.7 * max(0, count - 3)), layout='constrained')

@@ -1,12 +1,24 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """What ``analyze`` has to say about a parameter set: as text, and as JSON."""
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
+import math
 from typing import Any
-
-import numpy as np
 
 from cpg_ros.dynamics.equilibrium import equilibrium, named, odd
 from cpg_ros.dynamics.gait_assessment import GaitAssessment, nearest_threshold
@@ -18,10 +30,11 @@ from cpg_ros.files.plain_text import table
 from cpg_ros.networks.network import Network
 from cpg_ros.networks.parameter_line import ParameterLine
 from cpg_ros.papers.commentary import COMMENTARIES, Commentary
+import numpy as np
 
 
 def _root(value: complex) -> str:
-    """A root or a pair of them, without a minus at zero."""
+    """Return a root or a pair of them, without a minus at zero."""
     if abs(value.imag) < 1e-12:
         return f'{value.real:.4f}'
     return f'{value.real:.4f} +- {abs(value.imag):.4f}i'
@@ -139,7 +152,7 @@ class Analysis:
         return f'{head} of the way, no further' if way else said
 
     def _conclusion(self) -> str:
-        """The whole in a sentence or two."""
+        """Return the whole in a sentence or two."""
         if not self.existing:
             nearest = f'; {nearest_threshold(self.network)}' if self.delay else ''
             return f'This set gives no gait{nearest}.'

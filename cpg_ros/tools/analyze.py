@@ -1,3 +1,17 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Executable ``analyze``: what a parameter set does, before it runs on a robot.
 
 ``analyze --network delayed --set a=-4.5 b=1 c=6.5 d=-2 tau=0.4`` tells whether the set oscillates,
@@ -5,13 +19,11 @@ in which gaits, from which delay on, how large and how fast, and how stable each
 centre manifold, in the full network, and with the symmetry lock.
 """
 
-import sys
 from argparse import Namespace, RawDescriptionHelpFormatter
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-
-import numpy as np
+import sys
 
 from cpg_ros.dynamics.gait_assessment import verdicts
 from cpg_ros.errors import CpgError, InputError
@@ -20,21 +32,22 @@ from cpg_ros.files.plain_text import as_json
 from cpg_ros.files.progress_bar import progress_bar
 from cpg_ros.networks.network import Network
 from cpg_ros.networks.parameter_line import ParameterLine
-from cpg_ros.networks.registry import SHIPPED, NetworkError, find_network
+from cpg_ros.networks.registry import find_network, NetworkError, SHIPPED
 from cpg_ros.tools.analysis_report import Analysis
-from cpg_ros.tools.arguments import Parser, assignment, interval, number, say, twice
+from cpg_ros.tools.arguments import assignment, interval, number, Parser, say, twice
+import numpy as np
 
-DESCRIPTION = '''\
+DESCRIPTION = """\
 Tell what a parameter set does before it runs on a robot: the rest state and its Hopf points, the
 gaits as exact periodic orbits, and whether each attracts in the full network and with the
-symmetry lock. Works without a ROS graph.'''
-EPILOG = '''\
+symmetry lock. Works without a ROS graph."""
+EPILOG = """\
 examples:
   analyze --network delayed --set a=-4.5 b=1 c=6.5 d=-2 tau=0.4 --plot branches.png
   analyze --network quadruped --preset pace --along gamma=delta --range -0.6:0.2
   analyze --network biped --set w_a=0.2 current=0.25 --json
 
-exit codes: 0 analysed (also where no gait was found), 2 wrong arguments.'''
+exit codes: 0 analysed (also where no gait was found), 2 wrong arguments."""
 #: Delays beyond which no Hopf points are looked for, model time.
 LONGEST = 100.0
 #: No parameter is larger: beyond, the arithmetic breaks down before it tells anything.
@@ -61,7 +74,8 @@ def _parser() -> Parser:
                             f'{name}: {kind.line}' if kind.span else kind.line
                             for name, kind in SHIPPED.items()) + ')')
     parser.add_argument('--range', type=interval, metavar='LOW:HIGH', help='how far it moves '
-                        '(default: ' + ', '.join(f'{name} {kind.span[0]:g}:{kind.span[1]:g}'
+                        '(default: ' + ', '.join(
+                            f'{name} {kind.span[0]:g}:{kind.span[1]:g}'
                             for name, kind in SHIPPED.items() if kind.span) + ')')
     parser.add_argument('--json', action='store_true', help='print JSON instead of tables')
     parser.add_argument('--plot', type=Path, metavar='FILE', help='draw the branches, the roots, '

@@ -1,20 +1,33 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """A bag's messages published on a graph, as ``ros2 bag play`` does it."""
 
-import time
 from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
-
-import rclpy
-from rclpy.node import Node
-from rclpy.publisher import Publisher
-from rclpy.qos import DurabilityPolicy, QoSProfile
-from rosbags.interfaces import Connection, QosDurability
+import time
 
 from cpg_ros.files.progress_bar import progress_bar
 from cpg_ros.recordings.bag_storage import opened
 from cpg_ros.recordings.recording import RecordingError
 from cpg_ros.tools.graph_topics import message_class
+import rclpy
+from rclpy.node import Node
+from rclpy.publisher import Publisher
+from rclpy.qos import DurabilityPolicy, QoSProfile
+from rosbags.interfaces import Connection, QosDurability
 
 #: How long a player waits for listeners, s.
 PATIENCE = 1.0

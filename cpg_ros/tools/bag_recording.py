@@ -1,21 +1,34 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """What is published on a graph, recorded into a bag as ``ros2 bag record`` does it."""
 
-import shutil
 from collections import Counter
 from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
+import shutil
 
-from ament_index_python.packages import PackageNotFoundError, get_package_share_directory
+from ament_index_python.packages import get_package_share_directory, PackageNotFoundError
+from cpg_ros.errors import CpgError
+from cpg_ros.tools.graph_topics import message_class
+from cpg_ros.tools.running_node import Unanswered
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rosbags.interfaces import Connection
 from rosbags.rosbag2 import StoragePlugin, Writer
-from rosbags.typesys import Stores, get_types_from_msg, get_typestore
-
-from cpg_ros.errors import CpgError
-from cpg_ros.tools.graph_topics import message_class
-from cpg_ros.tools.running_node import Unanswered
+from rosbags.typesys import get_types_from_msg, get_typestore, Stores
 
 #: Messages that may wait for the disk.
 DEPTH = 5000

@@ -1,3 +1,17 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Executable ``calibrate``: what feedback has to know of a robot, measured.
 
 ``calibrate BAG --robot my_robot.yaml`` writes into the robot file what the base does by itself in
@@ -5,25 +19,25 @@ the gait that the bag has; ``calibrate --model go2 --robot ...`` measures it in 
 """
 
 import argparse
-import sys
 from collections.abc import Sequence
 from pathlib import Path
+import sys
 
 from cpg_ros.calibration.recorded_efference import Calibrated, efference_from, with_efference
-from cpg_ros.calibration.walk_recording import TYPES, read_walk
+from cpg_ros.calibration.walk_recording import read_walk, TYPES
 from cpg_ros.errors import CpgError
 from cpg_ros.files.plain_text import table
 from cpg_ros.robots.robot import Robot
 from cpg_ros.robots.robot_file import find_robot, write_robot
 from cpg_ros.tools.arguments import Parser, say
 
-DESCRIPTION = '''\
+DESCRIPTION = """\
 Measure a gait's efference copy: the velocity, lean and angular rates that walking itself gives the
 base, by the phase of the stride. Feedback then answers only what differs from it. Record the robot
 walking straight on flat ground without feedback, each gait and speed for ten strides or more in a
 bag of its own: joint_states, imu, foot_contacts, and the generator's phase (without that, the
-lag of the joints is guessed).'''
-EPILOG = '''\
+lag of the joints is guessed)."""
+EPILOG = """\
 examples:
   calibrate trot_slow trot_fast walk --robot my_robot.yaml
   calibrate --model go2 --robot my_robot.yaml --gait trot walk
@@ -31,7 +45,7 @@ examples:
 The rest of the robot file stays as it is, its comments but the first ones do not. Feedback needs
 its part geometry: check_robot --make writes it from a URDF, --model from a model.
 
-exit codes: 0 written, 1 a gait cannot be had, 2 wrong arguments or a file that cannot be used.'''
+exit codes: 0 written, 1 a gait cannot be had, 2 wrong arguments or a file that cannot be used."""
 
 
 def _parser() -> Parser:

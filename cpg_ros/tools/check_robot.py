@@ -1,43 +1,57 @@
-"""Executable ``check_robot``: does a robot file match the robot's URDF, and do its gaits fit?
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Executable ``check_robot``: holds a robot file against its URDF and its gaits.
 
 ``check_robot my_robot.yaml --urdf my.urdf`` compares names, kinds and limits, and works out every
 gait. ``check_robot --urdf my.urdf --make my_robot.yaml`` writes a first robot file.
 """
 
-import sys
 from argparse import Namespace, RawDescriptionHelpFormatter
 from collections.abc import Sequence
 from dataclasses import replace
 from math import isfinite
 from pathlib import Path
+import sys
 
 from cpg_ros.checks.leg_shapes import geometry_from
 from cpg_ros.checks.robot_template import robot_from
-from cpg_ros.checks.urdf_match import RobotCheck, checked
+from cpg_ros.checks.urdf_match import checked, RobotCheck
 from cpg_ros.errors import CpgError, InputError
 from cpg_ros.files.plain_text import as_json
 from cpg_ros.networks.registry import NETWORKS
 from cpg_ros.robots.robot import Robot
 from cpg_ros.robots.robot_file import find_robot, write_robot
-from cpg_ros.robots.urdf import UrdfJoint, load_urdf
+from cpg_ros.robots.urdf import load_urdf, UrdfJoint
 from cpg_ros.robots.urdf_links import load_links
-from cpg_ros.tools.arguments import Parser, number, say
+from cpg_ros.tools.arguments import number, Parser, say
 
-DESCRIPTION = '''\
+DESCRIPTION = """\
 Compare a robot file with the robot's URDF: joints that the URDF does not have or that cannot
-be driven, limits wider than the URDF's, and gaits that would leave them. Works without ROS.'''
-EPILOG = '''\
+be driven, limits wider than the URDF's, and gaits that would leave them. Works without ROS."""
+EPILOG = """\
 examples:
   check_robot my_robot.yaml --urdf my.urdf
   check_robot my_robot.yaml --urdf my.urdf --gaits trot --frequency 2.5 --amplitude 1.2
   check_robot --urdf my.urdf --make my_robot.yaml
 
 exit codes: 0 all matches, 1 something does not, 2 wrong arguments or a file that cannot be
-used.'''
-COMMENT = '''\
+used."""
+COMMENT = """\
 A first robot file, made from {urdf}: limits are those of the URDF, the stand and
 the small amplitudes are guesses to start from. Tune it in simulation before it moves a robot.
-{says}'''
+{says}"""
 
 
 def _parser() -> Parser:

@@ -1,34 +1,47 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Executable ``cpg``: the package's executables, and a running graph, from one command line.
 
 ``cpg param set gait walk`` is ``ros2 param set /cpg_generator gait walk``, by the same services;
 ros2 comes with ROS and is not on PyPI.
 """
 
+from argparse import ArgumentTypeError, Namespace, RawDescriptionHelpFormatter, REMAINDER
+from collections.abc import Sequence
+from pathlib import Path
 import signal
 import sys
 import time
-from argparse import REMAINDER, ArgumentTypeError, Namespace, RawDescriptionHelpFormatter
-from collections.abc import Sequence
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
-
-import yaml
+from typing import Any, TYPE_CHECKING
 
 from cpg_ros.errors import CpgError
 from cpg_ros.tools import completion
-from cpg_ros.tools.arguments import Parser, number, say
+from cpg_ros.tools.arguments import number, Parser, say
 from cpg_ros.tools.executables import PLACES, start
-
-#: How often the graph is asked for new topics while recording, s.
-LOOK = 0.5
+import yaml
 
 if TYPE_CHECKING:
     from rclpy.node import Node
 
-DESCRIPTION = '''\
+#: How often the graph is asked for new topics while recording, s.
+LOOK = 0.5
+
+DESCRIPTION = """\
 Run an executable of the package, or ask, change, record and play a running graph: a small stand-in
-for ros2 run, param, topic, service and bag.'''
-EPILOG = '''\
+for ros2 run, param, topic, service and bag."""
+EPILOG = """\
 examples:
   cpg run generator --ros-args -p gait:=walk
   cpg gait trot
@@ -40,7 +53,7 @@ examples:
 
 eval "$(cpg completion)" makes the shell complete all of it, parameters and topics included.
 
-exit codes: 0 done, 1 refused, or nothing answered in time, 2 wrong arguments.'''
+exit codes: 0 done, 1 refused, or nothing answered in time, 2 wrong arguments."""
 
 
 def parser() -> Parser:
@@ -66,7 +79,7 @@ def parser() -> Parser:
                        ('reset', 'put robot_sim back to its start (--node /robot_sim)')):
         add(actions, name, text)
 
-    parameters = add(actions, 'param', 'a node\'s parameters').add_subparsers(
+    parameters = add(actions, 'param', "a node's parameters").add_subparsers(
         dest='what', required=True, metavar='WHAT')
     for name, text in (('set', 'set a parameter'), ('get', 'print a parameter')):
         one = add(parameters, name, text)
@@ -76,7 +89,7 @@ def parser() -> Parser:
             value.completer = completion.values
     add(parameters, 'list', 'print all parameters, and what they are')
 
-    topics = add(actions, 'topic', 'a graph\'s topics').add_subparsers(
+    topics = add(actions, 'topic', "a graph's topics").add_subparsers(
         dest='what', required=True, metavar='WHAT')
     add(topics, 'list', 'print all topics and their types')
     echo = add(topics, 'echo', 'print the messages of a topic until Ctrl-C')
@@ -145,7 +158,7 @@ def _asked(chosen: Namespace, node: 'Node') -> str:
 
 
 def _listened(chosen: Namespace, node: 'Node') -> str:
-    from cpg_ros.tools.graph_topics import Topic, shown, topics
+    from cpg_ros.tools.graph_topics import shown, Topic, topics
     if chosen.what == 'list':
         return '\n'.join(f'{name}  {kind}' for name, kind in topics(node).items())
     topic = Topic(node, chosen.topic, chosen.wait)
@@ -159,9 +172,8 @@ def _listened(chosen: Namespace, node: 'Node') -> str:
 
 
 def _recorded(chosen: Namespace, node: 'Node') -> str:
-    import rclpy
-
     from cpg_ros.tools.bag_recording import Recorder
+    import rclpy
     recorder = Recorder(node, chosen.bag, chosen.topics)
     try:
         looked = 0.0

@@ -1,9 +1,27 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """A robot that walks in simulation: starts a generator and a body, and tours the gaits.
 
 ``ros2 run cpg_ros demo``: two nodes run as a user would start them, this one sets the
 generator's parameter ``gait``, by itself or as typed. A film and a footfall diagram are left.
 """
 
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, ExitStack
+from importlib.util import find_spec
+from pathlib import Path
 import queue
 import signal
 import socket
@@ -11,24 +29,19 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Iterator, Sequence
-from contextlib import ExitStack, contextmanager
-from importlib.util import find_spec
-from pathlib import Path
 
-import rclpy
 from ament_index_python.packages import get_package_prefix
+from cpg_ros.errors import CpgError
+from cpg_ros.tools import demo_course
+from cpg_ros.tools.arguments import Parser, say
 from nav_msgs.msg import Odometry
 from rcl_interfaces.srv import SetParametersAtomically
+import rclpy
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import try_shutdown
 from std_msgs.msg import String
-
-from cpg_ros.errors import CpgError
-from cpg_ros.tools import demo_course
-from cpg_ros.tools.arguments import Parser, say
 
 TOUR = ('trot', 'walk', 'pace', 'bound', 'jump', 'pronk', 'trot')
 #: A node must answer within this time, s: the very first start compiles for 20 s.

@@ -1,13 +1,26 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """The demonstration's course: rough ground, a ramp and blocks, with pushes on the way."""
 
 from collections.abc import Callable
 
-import rclpy
+from cpg_ros.tools.arguments import say
 from geometry_msgs.msg import Twist, Wrench
 from nav_msgs.msg import Odometry
+import rclpy
 from rclpy.node import Node
-
-from cpg_ros.tools.arguments import say
 
 #: What robot_sim and the generator are told, beside what every demonstration tells them.
 GROUND = ('-p', 'terrain:=course', '-p', 'terrain_size:=0.05')

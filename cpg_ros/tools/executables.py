@@ -1,17 +1,32 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """The executables: each loads what it runs, and can be interrupted while it does."""
 
+from functools import partial
+from importlib import import_module
 import os
 import signal
 import sys
-from functools import partial
-from importlib import import_module
 from types import FrameType
 
 #: Executable -> module whose ``main`` it runs.
 PLACES = {'generator': 'nodes.generator', 'robot_sim': 'nodes.robot_sim',
-          'unitree_bridge': 'nodes.unitree.bridge', 'panel': 'panel.panel_node', **{
-    name: f'tools.{name}' for name in ('inversion', 'cpg', 'demo', 'analyze', 'check_robot',
-                                       'optimize', 'reproduce', 'tune', 'calibrate')}}
+          'unitree_bridge': 'nodes.unitree.bridge', 'panel': 'panel.panel_node',
+          **{name: f'tools.{name}'
+             for name in ('inversion', 'cpg', 'demo', 'analyze', 'check_robot', 'optimize',
+                          'reproduce', 'tune', 'calibrate')}}
 
 
 def start(name: str) -> int:

@@ -1,3 +1,17 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Footfall (Hildebrand) diagrams: when legs stand, or muscles are active, over two strides.
 
 ``python -m cpg_ros.tools.gait_diagram gaits.png --network biped`` draws a network's gaits from
@@ -6,20 +20,19 @@ drive muscles, a muscle is active while its cell is above the middle of its rang
 """
 
 import argparse
-import sys
 from collections.abc import Sequence
 from pathlib import Path
-
-import matplotlib
-import numpy as np
-from matplotlib.axes import Axes
+import sys
 
 from cpg_ros.dynamics.orbit import Orbit, solve_preset
 from cpg_ros.errors import CpgError, InputError
 from cpg_ros.motion.phase_readout import evaluate, phase_map
-from cpg_ros.networks.network import Network, footfall_order
-from cpg_ros.networks.registry import SHIPPED, find_network
+from cpg_ros.networks.network import footfall_order, Network
+from cpg_ros.networks.registry import find_network, SHIPPED
 from cpg_ros.robots.robot import HARMONICS
+import matplotlib
+from matplotlib.axes import Axes
+import numpy as np
 
 STRIDES = 2.0
 #: Of the fore and the hind girdle, or of one leg after the other.
@@ -27,7 +40,7 @@ COLOURS = ('#2b6cb0', '#c05621')
 
 
 def rows(network: type[Network]) -> list[tuple[str, int, str]]:
-    """What is drawn, from the top: a leg or a muscle, its cell from 1, and its colour."""
+    """Return what is drawn, from the top: a leg or a muscle, its cell from 1, and its colour."""
     legs, girdles = next(iter(network.legs.values())), network.girdles
     if network.muscles:
         names = {cell: name.replace('_', ' ') for name, cell in network.muscles.items()}
@@ -38,7 +51,7 @@ def rows(network: type[Network]) -> list[tuple[str, int, str]]:
 
 
 def signal(orbit: Orbit, cell: int, theta: np.ndarray, order: int = 0) -> np.ndarray:
-    """What drives a leg: its cell over its range, smoothed as joints see it, from -1 to 1.
+    """Return what drives a leg: its cell over its range, smoothed as joints see it, from -1 to 1.
 
     Args:
         orbit: the gait.

@@ -1,15 +1,28 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """The topics of a graph: what there is, the next message, how often one comes."""
 
-import time
 from collections.abc import Iterator
 from importlib import import_module
+import time
 from typing import Any
 
+from cpg_ros.tools.running_node import Unanswered
 import rclpy
 from rclpy.node import Node
 from rclpy.qos import qos_profile_sensor_data
-
-from cpg_ros.tools.running_node import Unanswered
 
 #: How long the graph is looked at before its topics are listed, s: discovery takes a moment.
 LOOK = 1.0

@@ -1,3 +1,17 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Executable ``inversion``: a recording in, a gait out; or the node that does it on call.
 
 ``inversion --bag walk_bag --robot go1.yaml --out fitted.yaml --report report.html`` finds the
@@ -5,10 +19,10 @@ steady gait of a recording, fits a network's gait and the joints' readouts to it
 the generator loads. Without a recording the executable is the node ``cpg_inversion``.
 """
 
-import sys
 from argparse import Namespace, RawDescriptionHelpFormatter
 from collections.abc import Sequence
 from pathlib import Path
+import sys
 
 from cpg_ros.errors import CpgError
 from cpg_ros.files.atomic_write import write_atomically
@@ -17,7 +31,7 @@ from cpg_ros.files.progress_bar import progress_bar
 from cpg_ros.files.yaml_reader import shown
 from cpg_ros.gaits.leg_names import BIPED, QUADRUPED
 from cpg_ros.gaits.stride import NoSteadyGait
-from cpg_ros.inversion.paper_fit import PaperFit, paper_fits, refuse_others
+from cpg_ros.inversion.paper_fit import paper_fits, PaperFit, refuse_others
 from cpg_ros.inversion.parameter_files import write_fitted
 from cpg_ros.inversion.recording_fit import Inverted, inverted, network_of, preset_of
 from cpg_ros.networks.registry import SHIPPED
@@ -27,13 +41,13 @@ from cpg_ros.recordings.recording import Recording
 from cpg_ros.recordings.servo import Servo
 from cpg_ros.robots.robot import Robot
 from cpg_ros.robots.robot_file import find_robot
-from cpg_ros.tools.arguments import Parser, assignment, say, twice
+from cpg_ros.tools.arguments import assignment, Parser, say, twice
 
-DESCRIPTION = '''\
+DESCRIPTION = """\
 Find the steady gait of a recording and the parameters of a network that move a robot like it.
 What is read: joint states of a rosbag2 bag, or a CSV file with a column for time and one for each
-joint. What is written: a parameter file and a robot file that the generator loads as they are.'''
-EPILOG = '''\
+joint. What is written: a parameter file and a robot file that the generator loads as they are."""
+EPILOG = """\
 examples:
   inversion --bag walk_bag --robot go1.yaml --out fitted.yaml --report report.html
   inversion --csv walk.csv --unit deg --free c tau --json
@@ -42,7 +56,7 @@ examples:
 Without --bag and --csv it is the node cpg_inversion, which listens to joint states and fits them
 when ~/fit is called.
 
-exit codes: 0 fitted, 1 no steady gait or none that fits, 2 wrong arguments or damaged input.'''
+exit codes: 0 fitted, 1 no steady gait or none that fits, 2 wrong arguments or damaged input."""
 
 
 def _parser() -> Parser:
@@ -50,7 +64,7 @@ def _parser() -> Parser:
                     formatter_class=RawDescriptionHelpFormatter)
     source = parser.add_mutually_exclusive_group(required=True)
     source.add_argument('--bag', type=Path, metavar='DIR', help='a rosbag2 bag, sqlite3 or mcap')
-    source.add_argument('--csv', type=Path, metavar='FILE', help="a table with a head, "
+    source.add_argument('--csv', type=Path, metavar='FILE', help='a table with a head, '
                         "packed by gzip or not, or OpenSim's .mot or .sto")
     parser.add_argument('--topics', nargs='+', default=[], metavar='TOPIC', help='topics of the '
                         'bag to read (default: all of type sensor_msgs/msg/JointState)')
@@ -72,7 +86,7 @@ def _parser() -> Parser:
                         "a Python file with one (default: the robot's first; "
                         f'four legs: {network_of(QUADRUPED)}, two legs: {network_of(BIPED)})')
     parser.add_argument('--gait', metavar='NAME', help='gait to fit (default: as recognised)')
-    parser.add_argument('--preset', metavar='NAME', help="shipped set that parameters which are "
+    parser.add_argument('--preset', metavar='NAME', help='shipped set that parameters which are '
                         "not free are taken from (default: the gait's)")
     parser.add_argument('--free', nargs='+', default=[], metavar='PARAMETER',
                         help='parameters to fit (default: ' + ', '.join(

@@ -1,3 +1,17 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Executable ``optimize``: weights that give a network a gait, found by NSGA-II.
 
 ``optimize --network biped --gait skip --seed 0`` prints the set that was chosen and writes the
@@ -5,25 +19,25 @@ Pareto front (``front.csv``, ``front.png``) and a preset file that ``generator``
 """
 
 import argparse
+from collections.abc import Sequence
+from pathlib import Path
 import re
 import shlex
 import sys
-from collections.abc import Sequence
-from pathlib import Path
 
 from cpg_ros.errors import CpgError
 from cpg_ros.networks.preset_files import write_presets
 from cpg_ros.search.nsga2 import Front, NothingFound, optimise
 from cpg_ros.search.pareto_front import draw_front, write_front
 from cpg_ros.search.search_space import SEARCHED
-from cpg_ros.tools.arguments import Parser, assignment, interval, say, twice
+from cpg_ros.tools.arguments import assignment, interval, Parser, say, twice
 
-DESCRIPTION = '''\
+DESCRIPTION = """\
 Look for weights that give a network a gait, by NSGA-II. What is minimised: the phase errors of
 the cells, the leading Floquet multiplier of the gait's orbit and, where a gait has two waveforms,
 minus their difference in shape. The set that is chosen from the Pareto front has the smallest
-phase errors and then the smallest multiplier; it is proven by its exact orbit and under noise.'''
-EPILOG = '''\
+phase errors and then the smallest multiplier; it is proven by its exact orbit and under noise."""
+EPILOG = """\
 variables: biped, primary gaits: w_a w_b w_c current phi; secondary gaits: six directed weights
 such as w_12 (from cell 1 to cell 2), each with its partner under the gait's symmetry, current and
 phi; quadruped: alpha beta gamma delta, and xi and eta if --bounds are given for them.
@@ -31,7 +45,7 @@ phi; quadruped: alpha beta gamma delta, and xi and eta if --bounds are given for
 files: front.csv, front.png and preset.yaml, for
   ros2 run cpg_ros generator --ros-args -p network:=... -p presets:=FILE -p gait:=NAME
 
-exit codes: 0 found, 1 nothing found, 2 wrong arguments.'''
+exit codes: 0 found, 1 nothing found, 2 wrong arguments."""
 
 
 def _bounds(text: str) -> tuple[str, tuple[float, float]]:
@@ -49,7 +63,7 @@ def _name(text: str) -> str:
 
 def _parser() -> Parser:
     parser = Parser(prog='optimize', description=DESCRIPTION, epilog=EPILOG,
-                     formatter_class=argparse.RawDescriptionHelpFormatter)
+                    formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument('--network', default='biped', metavar='NAME',
                         help=f'{" or ".join(SEARCHED)}, or the path of a Python file with a '
                         'network (default: %(default)s)')

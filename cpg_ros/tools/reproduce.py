@@ -1,14 +1,28 @@
-"""Executable ``reproduce``: does every number that the three papers print come out?
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Executable ``reproduce``: computes every number that the three papers print.
 
 ``reproduce`` prints a row for each: paper, place, quantity, published, computed, and whether they
 agree or which erratum says why not.
 """
 
 import argparse
-import os
-import sys
 from collections.abc import Sequence
+import os
 from pathlib import Path
+import sys
 
 from cpg_ros.files.atomic_write import write_atomically
 from cpg_ros.files.progress_bar import progress_bar
@@ -17,9 +31,9 @@ from cpg_ros.papers.reproduction import parts, reproduce
 from cpg_ros.tools.arguments import Parser, say
 from cpg_ros.tools.reproduction_report import as_html, as_json, table
 
-DESCRIPTION = '''\
+DESCRIPTION = """\
 Compute every quantity that the three papers print, and hold it against the printed one. What
-differs names the erratum that explains it, or fails.'''
+differs names the erratum that explains it, or fails."""
 EPILOG = 'exit codes: 0 nothing fails, 1 a row fails, 2 wrong arguments.'
 
 

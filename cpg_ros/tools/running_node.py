@@ -1,15 +1,28 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """A running node, asked and changed by its services."""
 
 import time
 from typing import Any
 
-import rclpy
+from cpg_ros.errors import CpgError
 from rcl_interfaces.srv import DescribeParameters, GetParameters, ListParameters, SetParameters
+import rclpy
 from rclpy.node import Node
 from rclpy.parameter import Parameter, parameter_value_to_python
 from std_srvs.srv import SetBool, Trigger
-
-from cpg_ros.errors import CpgError
 
 
 class Unanswered(CpgError):
@@ -45,7 +58,7 @@ class RunningNode:
             raise Unanswered(f'{name} did not answer within {self._wait:g} s')
         return future.result()
 
-    def set(self, name: str, value: Any) -> None:
+    def set(self, name: str, value: Any) -> None:  # noqa: A003
         """Set a parameter.
 
         Raises:

@@ -1,3 +1,17 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Executable ``tune``: a robot's gaits, found by optimisation in simulation.
 
 ``tune --robot my_robot.yaml --model go2 --out tuned.yaml`` looks for foot paths that walk far and
@@ -5,29 +19,29 @@ upright, measures how to steer them, and writes the robot file with its part ``g
 """
 
 import argparse
-import shlex
-import sys
 from collections.abc import Sequence
 from pathlib import Path
+import shlex
+import sys
 
 from cpg_ros.errors import CpgError
 from cpg_ros.files.plain_text import table
 from cpg_ros.robots.robot import Robot
-from cpg_ros.robots.robot_file import LIMITS, find_robot, write_robot
+from cpg_ros.robots.robot_file import find_robot, LIMITS, write_robot
 from cpg_ros.simulation.gait_design import AIMS
 from cpg_ros.simulation.robot_model import SimulationError
-from cpg_ros.simulation.tuning import GOOD, LONG, Tuned, tune
-from cpg_ros.tools.arguments import Parser, number, say, twice
+from cpg_ros.simulation.tuning import GOOD, LONG, tune, Tuned
+from cpg_ros.tools.arguments import number, Parser, say, twice
 
-DESCRIPTION = '''\
+DESCRIPTION = """\
 Tune a robot's gaits in simulation: foot paths of a few lengths and times, turned into the joints'
 readout by inverse kinematics, chosen by CMA-ES over runs on good and slippery floors, with more
 and less load and with pushes. Then measure how fast each gait goes and turns with shorter strides,
-which is what cmd_vel asks for.'''
-EPILOG = f'''\
+which is what cmd_vel asks for."""
+EPILOG = f"""\
 exit codes: 0 written, 1 no gait is good (written if any can be had), 2 wrong arguments, 130
 stopped (nothing written). A gait is good if the robot stays upright and reaches {100 * GOOD:g} %
-of the speed aimed at.'''
+of the speed aimed at."""
 
 
 def _parser() -> Parser:

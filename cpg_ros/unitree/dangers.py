@@ -1,3 +1,17 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """What is wrong with a robot's state, in words; each of it lets the joints go at once."""
 
 import math
@@ -31,7 +45,7 @@ class Dangers:
         q = state.q
         # One look is enough for all: a sum is finite only where every number is.
         if not math.isfinite(float(q.sum()) + float(state.dq.sum())):
-            return 'a joint\'s angle or speed is not a number'
+            return "a joint's angle or speed is not a number"
         upright = state.tilt_cosine
         if not upright >= self._upright:
             return ('the IMU gives no orientation' if math.isnan(upright) else

@@ -1,3 +1,17 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """The message ``unitree_go/msg/LowCmd`` as bytes: made once, filled in place, sealed, sent.
 
 Little-endian CDR puts 4 bytes of header before the message; positions below count from the
@@ -6,9 +20,8 @@ of which CDR differs only around the first motor: CDR aligns the mode of a motor
 C as the struct it is in. Padding is zero in both.
 """
 
-import numpy as np
-
 from cpg_ros.unitree.crc import crc32
+import numpy as np
 
 #: CDR's header: little-endian.
 HEADER = b'\x00\x01\x00\x00'

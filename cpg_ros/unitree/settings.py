@@ -1,13 +1,26 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """All that a bridge must know of a robot and of what is safe with it."""
 
-import math
 from dataclasses import dataclass
-
-import numpy as np
+import math
 
 from cpg_ros.errors import InputError
 from cpg_ros.robots.robot import Robot
-from cpg_ros.unitree.models import JOINTS, Model, each
+from cpg_ros.unitree.models import each, JOINTS, Model
+import numpy as np
 
 
 @dataclass(frozen=True)

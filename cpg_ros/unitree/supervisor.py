@@ -1,3 +1,17 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """What a robot does and when it lets go: rise, stand, follow, sit, damp.
 
 Nothing leaves ``damping`` but a new start. Every way there and the times are in
@@ -7,14 +21,13 @@ docs/how_to/unitree.md, section What the bridge does when something goes wrong.
 from collections.abc import Callable
 from enum import Enum
 
-import numpy as np
-
 from cpg_ros.motion.smoothstep import smoothstep
 from cpg_ros.unitree.dangers import Dangers
 from cpg_ros.unitree.low_cmd import LowCmd
 from cpg_ros.unitree.low_state import LowState
 from cpg_ros.unitree.settings import Settings
 from cpg_ros.unitree.targets import Targets
+import numpy as np
 
 
 class Phase(Enum):

@@ -1,21 +1,27 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Directives whose tables come from the code: parameters, topics, options, robot files, presets.
 
 What only a person can say (what a topic is for) stands in the page, one line `name: text` each.
 The page and the code must name the same things, or the build fails.
 """
 
+from collections.abc import Iterable, Sequence
 import importlib
 import re
-from collections.abc import Iterable, Sequence
 from typing import Any
-
-import graph_names
-import launch_files
-import robot_keys
-from docutils import nodes
-from sphinx.application import Sphinx
-from sphinx.errors import ExtensionError
-from sphinx.util.docutils import SphinxDirective
 
 import cpg_ros
 from cpg_ros.dynamics.orbit import solve_preset
@@ -25,6 +31,13 @@ from cpg_ros.nodes.parameter_spec import Spec
 from cpg_ros.nodes.unitree import parameters as unitree_parameters
 from cpg_ros.panel import panel_node
 from cpg_ros.robots.robot_file import find_robot
+from docutils import nodes
+import graph_names
+import launch_files
+import robot_keys
+from sphinx.application import Sphinx
+from sphinx.errors import ExtensionError
+from sphinx.util.docutils import SphinxDirective
 
 
 def cell(text: object) -> str:
@@ -203,7 +216,7 @@ def door(_: str) -> str:
     kinds = {name: 'autoclass' if isinstance(thing := getattr(cpg_ros, name), type) else
              'autofunction' if callable(thing) else 'autodata' for name in cpg_ros.__all__}
     return rst(f'.. {kind}:: cpg_ros.{name}\n' + ('   :no-value:\n' if kind == 'autodata' else
-                                                 '   :members:\n' * (kind == 'autoclass'))
+                                                  '   :members:\n' * (kind == 'autoclass'))
                for name, kind in kinds.items())
 
 

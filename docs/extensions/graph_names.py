@@ -1,18 +1,31 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Topics and services of the nodes, asked of the nodes themselves."""
 
+from collections.abc import Callable, Iterator
 import gc
 import os
 import time
-from collections.abc import Callable, Iterator
 from typing import Any
-
-import rclpy
 
 from cpg_ros.nodes.generator import Generator
 from cpg_ros.nodes.inversion_node import Inversion
 from cpg_ros.nodes.node_base import StartedNode
 from cpg_ros.nodes.robot_sim import RobotSim
 from cpg_ros.nodes.unitree.bridge import UnitreeBridge
+import rclpy
 
 #: Node -> what makes one, and the parameters under which it has all of its topics.
 KINDS: dict[str, tuple[Callable[[], StartedNode], tuple[dict[str, str], ...]]] = {

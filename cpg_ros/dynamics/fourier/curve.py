@@ -1,3 +1,17 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """The orbits of a gait along a line of parameters as waveforms, a curve for continuation.
 
 Their collocation equations, the parameter as one more unknown and the border as one more equation.
@@ -8,22 +22,21 @@ the parameter against what is given.
 from collections.abc import Callable
 from dataclasses import dataclass
 
-import numpy as np
-
 from cpg_ros.dynamics.fourier import collocation
 from cpg_ros.dynamics.fourier.newton import (
-    MOST_NODES,
-    NODES,
-    RESOLVED,
     by_parameter,
     complete,
     equations,
+    MOST_NODES,
+    NODES,
+    RESOLVED,
 )
 from cpg_ros.dynamics.fourier.orbit import FourierOrbit
 from cpg_ros.dynamics.periodic import NoOrbit
 from cpg_ros.networks.network import Network
 from cpg_ros.networks.parameter_line import ParameterLine
 from cpg_ros.networks.symmetry import Symmetry
+import numpy as np
 
 #: States, shape (m, components), as a function of times in cycles, shape (m,).
 States = Callable[[np.ndarray], np.ndarray]
@@ -47,7 +60,7 @@ class FourierCurve:
     scales: tuple[float, float]
 
     def _rows(self, z: np.ndarray) -> np.ndarray:
-        """The waveforms, a row for each variable of each wave, shape (rows, n)."""
+        """Return the waveforms, a row for each variable of each wave, shape (rows, n)."""
         return z[:-2].reshape((int(self.symmetry.waves.max()) + 1) * self.network.variables, -1)
 
     def product(self, one: np.ndarray, other: np.ndarray) -> float:
@@ -107,7 +120,7 @@ class FourierCurve:
 
 def through(orbit: FourierOrbit, line: ParameterLine, scales: tuple[float, float]
             ) -> tuple[FourierCurve, np.ndarray]:
-    """The curve of the orbits along a line, and the place of one of them on it."""
+    """Return the curve of the orbits along a line, and the place of one of them on it."""
     return (FourierCurve(orbit.network, orbit.symmetry, line, scales),
             np.array([*orbit.values.ravel(), orbit.period, line.value(orbit.network)]))
 
@@ -115,7 +128,7 @@ def through(orbit: FourierOrbit, line: ParameterLine, scales: tuple[float, float
 def beside(network: Network, symmetry: Symmetry, line: ParameterLine,
            scales: tuple[float, float], path: States, disturbance: States, period: float
            ) -> tuple[FourierCurve, np.ndarray, np.ndarray]:
-    """The orbits near a state or an orbit: their curve, that on it, and how they leave it.
+    """Return the orbits near a state or an orbit: their curve, that on it, and how they leave it.
 
     Args:
         network: at the place.

@@ -1,3 +1,17 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Floquet multipliers of the gaits of networks with a delay: the variational equation, spectrally.
 
 Along a gait a disturbance obeys ``z' = D(t) z + B(t) z(t - tau)`` with T-periodic Jacobians, which
@@ -11,12 +25,11 @@ from collections.abc import Callable
 from contextlib import suppress
 from functools import lru_cache
 
-import numpy as np
-from scipy.sparse.linalg import ArpackError, LinearOperator, eigs
-
 from cpg_ros.dynamics.fourier.orbit import FourierOrbit
 from cpg_ros.dynamics.isotypic_split import split
 from cpg_ros.networks.field import Field
+import numpy as np
+from scipy.sparse.linalg import ArpackError, eigs, LinearOperator
 
 #: Polynomial degree on an element, and how much of a period one holds at most.
 DEGREE, SPAN = 20, 0.4

@@ -1,3 +1,17 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Gaits of networks with a delay as exact periodic orbits, by Fourier collocation.
 
 On a gait every cell is one of a few waveforms, shifted by a known phase, so the delay equations of
@@ -8,14 +22,13 @@ solved at even nodes with the period as unknown. Phase zero is where cell 1 peak
 
 from functools import lru_cache
 
-import numpy as np
-
 from cpg_ros.dynamics.fourier import collocation
 from cpg_ros.dynamics.fourier.orbit import FourierOrbit
 from cpg_ros.dynamics.periodic import NoOrbit
 from cpg_ros.networks.equations import equations_of, values_of
 from cpg_ros.networks.network import Network
 from cpg_ros.networks.symmetry import Symmetry
+import numpy as np
 
 NODES = 63
 MOST_NODES = 255
@@ -109,7 +122,7 @@ def equations(network: Network, symmetry: Symmetry, u: np.ndarray, period: float
 
 
 def by_parameter(network: Network, symmetry: Symmetry, point: Point) -> np.ndarray:
-    """Derivative of the residual by the parameters, shape (rows n + 1, parameters)."""
+    """Return the derivative of the residual by the parameters, shape (rows n + 1, parameters)."""
     states, p, by_delay, _ = point
     names, kind = network.parameters(), equations_of(type(network))
     rows, n = by_delay.shape

@@ -1,11 +1,24 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Orbits as trigonometric polynomials: the gaits of networks with a delay."""
 
 from dataclasses import dataclass, field
 
-import numpy as np
-
 from cpg_ros.dynamics.fourier import collocation
 from cpg_ros.dynamics.periodic import Orbit
+import numpy as np
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,11 +56,11 @@ class FourierOrbit(Orbit):
 
     def waveform(self, theta: np.ndarray, order: int = 0, wave: int = 0, variable: int = 0
                  ) -> np.ndarray:
-        """A waveform, or its derivative in theta of the given order, at theta in cycles."""
+        """Return a waveform, or its derivative in theta of the given order, at theta in cycles."""
         return collocation.evaluate(self.values[wave, variable], theta, order)
 
     def d_waveform(self, theta: np.ndarray, wave: int = 0, variable: int = 0) -> np.ndarray:
-        """Derivatives of a waveform by the parameters, shape theta.shape + (parameters,)."""
+        """Return the derivatives by the parameters, shape theta.shape + (parameters,)."""
         return np.stack([collocation.evaluate(column, theta)
                          for column in self.d_values[wave, variable].T], -1)
 

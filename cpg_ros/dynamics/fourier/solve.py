@@ -1,21 +1,34 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Finding the orbit of a gait of a network with a delay: from another, or from its onset."""
 
 from collections.abc import Callable
 from dataclasses import replace
 from functools import lru_cache
 
-import numpy as np
-from scipy.optimize import brentq
-
 from cpg_ros.dynamics.delay_crossings import critical_delay, frequencies
-from cpg_ros.dynamics.fourier.newton import NODES, newton
+from cpg_ros.dynamics.fourier.newton import newton, NODES
 from cpg_ros.dynamics.fourier.orbit import FourierOrbit
 from cpg_ros.dynamics.hopf import first_hopf
-from cpg_ros.dynamics.periodic import NoOrbit, check_values
+from cpg_ros.dynamics.periodic import check_values, NoOrbit
 from cpg_ros.dynamics.seek import sought
 from cpg_ros.networks.equations import equations_of, values_of
 from cpg_ros.networks.network import Network, Preset
 from cpg_ros.networks.symmetry import Symmetry
+import numpy as np
+from scipy.optimize import brentq
 
 #: Points of a cycle on which describing functions are worked out.
 POINTS = 32
@@ -205,7 +218,7 @@ def _simple(network: Network, symmetry: Symmetry) -> bool:
 
 
 def _onset(network: Network, gait: str) -> float | None:
-    """The gait's first critical delay."""
+    """Return the gait's first critical delay."""
     symmetry = network.symmetry(gait)
     if _simple(network, symmetry):
         a, b = _describing(network, symmetry)(1e-9)

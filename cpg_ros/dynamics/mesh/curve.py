@@ -1,3 +1,17 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """The orbits of a gait along a line of parameters on a mesh, as a curve for continuation.
 
 Their collocation equations, the parameter as one more unknown and the border as one more equation.
@@ -8,25 +22,24 @@ the parameter against what is given.
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
-import numpy as np
-
 from cpg_ros.dynamics.mesh.newton import (
-    FEWEST,
-    Reduced,
-    Solution,
     bordered,
     completed,
+    FEWEST,
     finer,
     first_mesh,
     linearised,
     path_of,
+    Reduced,
     remeshed,
     sampled,
+    Solution,
 )
 from cpg_ros.dynamics.mesh.orbit import MeshOrbit
 from cpg_ros.networks.network import Network
 from cpg_ros.networks.parameter_line import ParameterLine
 from cpg_ros.networks.symmetry import Symmetry
+import numpy as np
 
 #: States, shape (m, components), as a function of times in cycles, shape (m,).
 States = Callable[[np.ndarray], np.ndarray]
@@ -144,7 +157,7 @@ class MeshCurve:
         return float(part + near[path(near)[:, columns[part]].argmax()])
 
     def _turned(self, reduced: Reduced, path: Callable, start: float) -> Callable:
-        """The path from another start on: y(s + 1) = y(s)[turn]."""
+        """Return the path from another start on: y(s + 1) = y(s)[turn]."""
         def later(places: np.ndarray) -> np.ndarray:
             places = places + start
             parts = np.floor(places).astype(int)
@@ -155,7 +168,7 @@ class MeshCurve:
         return later
 
     def pack(self, now: Solution, length: float, value: float) -> np.ndarray:
-        """The vector of unknowns."""
+        """Return the vector of unknowns."""
         return np.concatenate([now.points.ravel(), now.stages.ravel(), [length, value]])
 
     def orbit(self, z: np.ndarray) -> MeshOrbit:
@@ -165,7 +178,7 @@ class MeshCurve:
 
 def through(orbit: MeshOrbit, line: ParameterLine, scales: tuple[float, float]
             ) -> tuple[MeshCurve, np.ndarray]:
-    """The curve of the orbits along a line, and the place of one of them on it."""
+    """Return the curve of the orbits along a line, and the place of one of them on it."""
     curve = MeshCurve(orbit.network, orbit.symmetry, line, scales, orbit.mesh)
     ends = np.vstack([orbit.coefficients[0], orbit.coefficients[:, -1].sum(axis=0)])
     length = orbit.period / orbit.symmetry.order
@@ -176,7 +189,7 @@ def through(orbit: MeshOrbit, line: ParameterLine, scales: tuple[float, float]
 def beside(network: Network, symmetry: Symmetry, line: ParameterLine,
            scales: tuple[float, float], path: States, disturbance: States, period: float
            ) -> tuple[MeshCurve, np.ndarray, np.ndarray]:
-    """The orbits near a state or an orbit: their curve, that on it, and how they leave it.
+    """Return the orbits near a state or an orbit: their curve, that on it, and how they leave it.
 
     Args:
         network: at the place.

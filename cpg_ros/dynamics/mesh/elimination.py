@@ -1,13 +1,26 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """The compiled part of collocation: every interval's linear equations, and their chain.
 
 They are small and many. Gaussian elimination written out, with the right-hand sides as further
 columns, takes a fraction of the time of a call of LAPACK for each.
 """
 
-import numpy as np
-
 from cpg_ros.dynamics.mesh import collocation
 from cpg_ros.integration.jit import entry
+import numpy as np
 
 
 @entry
@@ -125,7 +138,7 @@ def summed(jacobians: np.ndarray, lengths: np.ndarray, answers: np.ndarray) -> n
 
 
 def chained(steps: np.ndarray) -> np.ndarray:
-    """What is reached at the mesh points, from (1, 0) on, shape (n + 1, d, d + k).
+    """Return what is reached at the mesh points, from (1, 0) on, shape (n + 1, d, d + k).
 
     Args:
         steps: of the intervals, ``y -> steps[:, :d] y + steps[:, d:]``, shape (n, d, d + k).

@@ -1,3 +1,17 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Floquet multipliers of the gaits of networks without delay.
 
 A gait lies in Fix(K), K its spatial symmetries. Along it the linearised flow keeps Fix(K) and its
@@ -12,13 +26,12 @@ double.
 
 from functools import lru_cache
 
-import numpy as np
-
 from cpg_ros.dynamics.isotypic_split import split
 from cpg_ros.dynamics.mesh.elimination import summed, transfer
 from cpg_ros.dynamics.mesh.newton import Reduced
 from cpg_ros.dynamics.mesh.orbit import MeshOrbit
 from cpg_ros.dynamics.mesh.periodic_schur import eigenvalues
+import numpy as np
 
 
 def within(orbit: MeshOrbit) -> tuple[np.ndarray, complex]:

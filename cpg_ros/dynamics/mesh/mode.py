@@ -1,3 +1,17 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """The disturbance of an orbit that belongs to a Floquet multiplier, as a function of time.
 
 On a gait ``x(t + T/m) = M x(t)``, M the change of places of the cells after T/m. So the
@@ -7,13 +21,12 @@ frame that changes places with the cells, and ``v(t + j T/m) = M^j Re(nu^j w(t))
 
 from collections.abc import Callable
 
-import numpy as np
-from numpy.polynomial import polynomial
-
 from cpg_ros.dynamics.isotypic_split import split
 from cpg_ros.dynamics.mesh import collocation
 from cpg_ros.dynamics.mesh.floquet import Flow
 from cpg_ros.dynamics.mesh.orbit import MeshOrbit
+import numpy as np
+from numpy.polynomial import polynomial
 
 
 def mode(orbit: MeshOrbit, part: int, multiplier: complex

@@ -1,3 +1,17 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Gaits of the networks without delay as exact periodic orbits, by Gauss collocation on a mesh.
 
 On a gait the cells of one class under K are equal, and after T/m, m the order of H/K, the classes
@@ -10,9 +24,6 @@ waveforms, are no different.
 from collections.abc import Callable
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.polynomial import polynomial
-
 from cpg_ros.dynamics.mesh import collocation
 from cpg_ros.dynamics.mesh.elimination import chained, summed, transfer
 from cpg_ros.dynamics.mesh.orbit import MeshOrbit
@@ -20,6 +31,8 @@ from cpg_ros.dynamics.periodic import NoOrbit
 from cpg_ros.networks.field import Field
 from cpg_ros.networks.network import Network
 from cpg_ros.networks.symmetry import Symmetry
+import numpy as np
+from numpy.polynomial import polynomial
 
 #: A mesh is fine enough when its polynomials end with terms of this share of the whole.
 RESOLVED = 1e-11
@@ -89,7 +102,7 @@ def linearised(reduced: Reduced, now: Solution, extra: np.ndarray | None = None
 
 
 def bordered(reduced: Reduced, now: Solution, p: np.ndarray, r: np.ndarray) -> np.ndarray:
-    """The matrix of boundary and phase conditions in (dy_0, dL)."""
+    """Return the matrix of boundary and phase conditions in (dy_0, dL)."""
     d = p.shape[-1]
     matrix = np.zeros((d + 1, d + 1))
     matrix[:d, :d] = p[-1] - np.eye(d)[reduced.turn]
@@ -141,7 +154,7 @@ def sampled(path: Callable[[np.ndarray], np.ndarray], mesh: np.ndarray, length: 
 def _coefficients(reduced: Reduced, now: Solution) -> np.ndarray:
     """Of the polynomials on each interval, shape (S + 1, n, d)."""
     return collocation.power_coefficients(now.points[:-1], reduced.rates(now.stages),
-                                    now.length * np.diff(now.mesh))
+                                          now.length * np.diff(now.mesh))
 
 
 def path_of(reduced: Reduced, now: Solution) -> Callable[[np.ndarray], np.ndarray]:

@@ -1,3 +1,17 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Orbits as polynomials on a mesh: the gaits of the networks without delay.
 
 A gait with m = order of H/K is known from the cells of one class each, over one m-th of the cycle:
@@ -6,9 +20,8 @@ A gait with m = order of H/K is known from the cells of one class each, over one
 
 from dataclasses import dataclass, field
 
-import numpy as np
-
 from cpg_ros.dynamics.periodic import Orbit
+import numpy as np
 
 #: Even points of a cycle that resolve a relaxation oscillation.
 SAMPLES = 8192
@@ -66,11 +79,11 @@ class MeshOrbit(Orbit):
 
     def waveform(self, theta: np.ndarray, order: int = 0, wave: int = 0, variable: int = 0
                  ) -> np.ndarray:
-        """A waveform, or its derivative in theta of order 1 or 2, at theta in cycles."""
+        """Return a waveform, or its derivative in theta of order 1 or 2, at theta in cycles."""
         return self._evaluate(self.coefficients, theta, order, wave, variable)
 
     def d_waveform(self, theta: np.ndarray, wave: int = 0, variable: int = 0) -> np.ndarray:
-        """Derivatives of a waveform by the parameters, shape theta.shape + (parameters,)."""
+        """Return the derivatives by the parameters, shape theta.shape + (parameters,)."""
         return self._evaluate(self.d_coefficients, theta, 0, wave, variable)
 
     @property

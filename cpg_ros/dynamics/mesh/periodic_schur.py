@@ -1,3 +1,17 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Eigenvalues of a product of many matrices, each to its own size.
 
 Floquet multipliers of one orbit span thirty orders of magnitude, and a product of matrices keeps
@@ -10,9 +24,8 @@ iteration. Those of about one size stay together in a block.
 
 from itertools import pairwise
 
-import numpy as np
-
 from cpg_ros.integration.jit import entry
+import numpy as np
 
 #: Two spaces this close are one.
 SAME = 1e-13

@@ -1,3 +1,17 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Finding the orbit of a gait of a network without delay, from the nearest one known.
 
 From the given start Newton's method is tried at once; failing that, the network is left to find
@@ -9,17 +23,16 @@ from collections.abc import Callable
 from dataclasses import replace
 from functools import lru_cache
 
-import numpy as np
-
 from cpg_ros.dynamics.equilibrium import NoEquilibrium
 from cpg_ros.dynamics.mesh.newton import collocate as from_path
 from cpg_ros.dynamics.mesh.newton import predicted
 from cpg_ros.dynamics.mesh.orbit import MeshOrbit
-from cpg_ros.dynamics.periodic import NoOrbit, check_values, richer
+from cpg_ros.dynamics.periodic import check_values, NoOrbit, richer
 from cpg_ros.dynamics.seek import settled, sought
 from cpg_ros.integration.simulate import simulate
 from cpg_ros.networks.network import Network, Preset
 from cpg_ros.networks.symmetry import Symmetry
+import numpy as np
 
 
 def _accepted(orbit: MeshOrbit | None) -> MeshOrbit | None:
@@ -59,7 +72,7 @@ def _sought(network: Network, gait: str) -> MeshOrbit:
 
 
 def _settled(network: Network, gait: str) -> MeshOrbit | None:
-    """What the network settles on from many states of the gait's class."""
+    """Return what the network settles on from many states of the gait's class."""
     symmetry = network.symmetry(gait)
     try:
         found = (_accepted(from_path(network, symmetry, *one)) for one in sought(network, gait))

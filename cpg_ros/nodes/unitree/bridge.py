@@ -1,14 +1,45 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """The node ``unitree_bridge``: leads a Unitree robot by what a generator publishes."""
 
+from collections import deque
+from collections.abc import Callable
 import math
 import signal
 import socket
 import sys
 import time
-from collections import deque
-from collections.abc import Callable
 from typing import Any
 
+from cpg_ros.errors import CpgError
+from cpg_ros.nodes.command_topics import Commands, KINDS
+from cpg_ros.nodes.deadline_thread import Ticker
+from cpg_ros.nodes.node_base import asked_for_help, run, StartedNode, StartError
+from cpg_ros.nodes.unitree.interfaces import message
+from cpg_ros.nodes.unitree.parameters import SPECS
+from cpg_ros.nodes.unitree.robot_graph import best_effort, BRIDGE, Others, quality
+from cpg_ros.nodes.unitree.sensors import Sensors
+from cpg_ros.nodes.unitree.start import Start
+from cpg_ros.nodes.unitree.watchdog_link import address, WatchdogLink
+from cpg_ros.nodes.unserved import subscribe, taken
+from cpg_ros.robots.robot_file import find_robot
+from cpg_ros.unitree.low_state import BUTTONS
+from cpg_ros.unitree.models import MODELS
+from cpg_ros.unitree.participants import Announcements
+from cpg_ros.unitree.settings import places, settings_of
+from cpg_ros.unitree.supervisor import DRIVEN, Phase, Supervisor
 from diagnostic_msgs.msg import DiagnosticStatus
 from rclpy.clock import Clock
 from rclpy.clock_type import ClockType
@@ -17,24 +48,6 @@ from rclpy.publisher import Publisher
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
-
-from cpg_ros.errors import CpgError
-from cpg_ros.nodes.command_topics import KINDS, Commands
-from cpg_ros.nodes.deadline_thread import Ticker
-from cpg_ros.nodes.node_base import StartedNode, StartError, asked_for_help, run
-from cpg_ros.nodes.unitree.interfaces import message
-from cpg_ros.nodes.unitree.parameters import SPECS
-from cpg_ros.nodes.unitree.robot_graph import BRIDGE, Others, best_effort, quality
-from cpg_ros.nodes.unitree.sensors import Sensors
-from cpg_ros.nodes.unitree.start import Start
-from cpg_ros.nodes.unitree.watchdog_link import WatchdogLink, address
-from cpg_ros.nodes.unserved import subscribe, taken
-from cpg_ros.robots.robot_file import find_robot
-from cpg_ros.unitree.low_state import BUTTONS
-from cpg_ros.unitree.models import MODELS
-from cpg_ros.unitree.participants import Announcements
-from cpg_ros.unitree.settings import places, settings_of
-from cpg_ros.unitree.supervisor import DRIVEN, Phase, Supervisor
 
 #: How often others who command the robot are looked for, s.
 LOOK = 0.25

@@ -1,3 +1,17 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """The parameters of ``unitree_bridge``."""
 
 from cpg_ros.nodes.command_topics import KINDS
@@ -21,7 +35,7 @@ SPECS = {
     'sensor_rate': Spec(500.0, 'measured states published per second, at most [Hz]', 1.0, 1000.0),
     'target_timeout': Spec(0.1, 'longest time without a fresh target before it sits down [s]',
                            0.02, 1.0),
-    'state_timeout': Spec(0.02, "longest time without a fresh state, or without a tick of the "
+    'state_timeout': Spec(0.02, 'longest time without a fresh state, or without a tick of the '
                           'bridge, before it damps [s]', 0.005, 0.2),
     'tilt': Spec(50.0, 'lean of the body at which it damps [deg]', 10.0, 90.0),
     'hottest': Spec(85.0, "a motor's temperature at which it damps [deg C]", 30.0, 110.0),

@@ -1,20 +1,33 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """What a Unitree robot measures, under the topics that robot_sim has, and its health."""
 
 from collections.abc import Callable, Mapping
 from typing import Any
-
-from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
-from rclpy.node import Node
-from rclpy.qos import QoSProfile
-from rclpy.qos_overriding_options import QoSOverridingOptions
-from sensor_msgs.msg import BatteryState, Imu, JointState
-from std_msgs.msg import Float64MultiArray, MultiArrayDimension
 
 from cpg_ros.nodes.array_view import view_of
 from cpg_ros.robots.robot import Robot
 from cpg_ros.unitree.low_state import LowState
 from cpg_ros.unitree.models import JOINTS, PARTS
 from cpg_ros.unitree.settings import places
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from rclpy.node import Node
+from rclpy.qos import QoSProfile
+from rclpy.qos_overriding_options import QoSOverridingOptions
+from sensor_msgs.msg import BatteryState, Imu, JointState
+from std_msgs.msg import Float64MultiArray, MultiArrayDimension
 
 #: Unitree's feet are in the order of its legs.
 FEET = tuple(name.partition('_')[0] for name in JOINTS[::len(PARTS)])

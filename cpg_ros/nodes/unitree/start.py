@@ -1,18 +1,31 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """The way from a robot that walks by itself to one that can be commanded, step by step."""
 
+from collections.abc import Callable
 import json
 import threading
 import time
-from collections.abc import Callable
 from typing import Any
-
-from rclpy.node import Node
-from rclpy.qos import QoSProfile
 
 from cpg_ros.errors import CpgError
 from cpg_ros.nodes.unitree.interfaces import message
 from cpg_ros.nodes.unitree.robot_graph import BRIDGE, Others
 from cpg_ros.nodes.unserved import subscribe, taken
+from rclpy.node import Node
+from rclpy.qos import QoSProfile
 
 #: Numbers of unitree_api: of the service motion_switcher, and of sport.
 CHECK_MODE, RELEASE_MODE, STAND_DOWN = 1001, 1003, 1005

@@ -1,3 +1,17 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """A process that damps the robot while its bridge says nothing: see ``unitree.vigil``.
 
 The bridge starts it: python -m cpg_ros.nodes.unitree.watchdog DOMAIN TOPIC PERIOD PROCESS. It ends
@@ -12,16 +26,15 @@ import socket
 import sys
 import time
 
+from cpg_ros.nodes.unitree.interfaces import message
+from cpg_ros.nodes.unitree.robot_graph import quality, WATCHDOG
+from cpg_ros.nodes.unitree.watchdog_link import address
+from cpg_ros.unitree.low_cmd import LowCmd
+from cpg_ros.unitree.vigil import Vigil
 import rclpy
 from rclpy.impl.rcutils_logger import RcutilsLogger
 from rclpy.publisher import Publisher
 from rclpy.signals import SignalHandlerOptions
-
-from cpg_ros.nodes.unitree.interfaces import message
-from cpg_ros.nodes.unitree.robot_graph import WATCHDOG, quality
-from cpg_ros.nodes.unitree.watchdog_link import address
-from cpg_ros.unitree.low_cmd import LowCmd
-from cpg_ros.unitree.vigil import Vigil
 
 #: How often it looks whether a bridge that has not driven yet is there, s.
 LOOK = 1.0

@@ -1,3 +1,17 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """The bridge's line to its watchdog: starts it, tells it every tick, hears if it is gone."""
 
 import contextlib
@@ -7,9 +21,8 @@ import subprocess
 import sys
 import time
 
-import numpy as np
-
 from cpg_ros.unitree.vigil import Vigil
+import numpy as np
 
 #: A watchdog has this long to get ready, s: it loads ROS.
 READY = 20.0
