@@ -15,18 +15,20 @@
 """What is on the topics, into a bag: every message, by a thread of its own."""
 
 from collections.abc import Callable, Iterable
-from importlib import import_module
+import contextlib
 from pathlib import Path
 import shutil
 import threading
 import time
-from typing import Any
 import zipfile
 
 from cpg_ros.errors import CpgError
+from cpg_ros.nodes.message_types import message_class, message_fields, UnknownType
 from cpg_ros.panel.topics import latched, Topic
+from cpg_ros.recordings.bag_writer import BagError, BagWriter
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
+from rosbags.interfaces import Connection
 
 #: How often messages are fetched, s, and how many a topic may have had by then.
 EVERY, DEPTH = 0.02, 1000
@@ -56,8 +58,13 @@ class Recorder:
         self._node, self._folder, self._largest, self._ended = node, folder, largest, ended
         self._stop = threading.Event()
         self._thread: threading.Thread | None = None
+        self._writer: BagWriter | None = None
         self.bag = ''
-        self.bytes = 0
+
+    @property
+    def size(self) -> int:
+        """What the newest bag holds, bytes."""
+        return 0 if self._writer is None else self._writer.size
 
     @property
     def running(self) -> bool:
@@ -73,54 +80,51 @@ class Recorder:
         """
         if self.running:
             raise RecordingError(f'{self.bag} is being recorded already')
-        from rosbags.rosbag2 import StoragePlugin, Writer, WriterError
-        from rosbags.typesys import get_typestore, Stores
-        store = get_typestore(Stores.ROS2_JAZZY)
-        known = sorted((name, kind) for name, kind in topics if kind in store.types)
+        known = []
+        for name, kind in sorted(topics):
+            with contextlib.suppress(UnknownType):  # of a package that is not installed here
+                known.append((name, kind, message_class(kind), message_fields(kind)))
         if not known:
             raise RecordingError('there is nothing to record')
         bag = time.strftime('panel_%Y%m%d_%H%M%S')
-        path = self._folder / bag
         try:
             self._folder.mkdir(parents=True, exist_ok=True)
-            writer = Writer(path, version=9, storage_plugin=StoragePlugin.MCAP)
-            writer.open()
-        except (OSError, WriterError) as error:
-            raise RecordingError(f'{path}: {error}') from error
+            writer = BagWriter(self._folder / bag)
+        except OSError as error:
+            raise RecordingError(f'{self._folder}: {error.strerror}') from error
+        except BagError as error:
+            raise RecordingError(str(error)) from error
         readers = []
-        for name, kind in known:
-            package, _, message = kind.partition('/msg/')
+        for name, kind, message, _ in known:
             quality = latched() if name.endswith(LATCHED) else QoSProfile(depth=DEPTH)
-            try:
-                reader = Topic(self._node, getattr(import_module(f'{package}.msg'), message),
-                               name, quality, raw=True)
-            except (ImportError, AttributeError):
-                continue  # of a package that is not installed here
-            readers.append((reader, writer.add_connection(name, kind, typestore=store)))
+            readers.append((Topic(self._node, message, name, quality, raw=True),
+                            writer.connect(name, kind, message_fields)))
         self._stop.clear()
-        self.bag, self.bytes = bag, 0
+        self.bag, self._writer = bag, writer
         self._thread = threading.Thread(target=self._record, args=(writer, readers),
                                         name='recorder', daemon=True)
         self._thread.start()
         return bag
 
-    def _record(self, writer: Any, readers: list[tuple[Topic, Any]]) -> None:
+    def _record(self, writer: BagWriter, readers: list[tuple[Topic, Connection]]) -> None:
         why = ''
         try:
             while not self._stop.wait(EVERY):
                 for reader, connection in readers:
                     for data, when in reader.take():
                         writer.write(connection, when, data)
-                        self.bytes += len(data)
-                if self.bytes > self._largest:
-                    why = f'{self.bag} is full ({self.bytes / 1e6:.0f} MB)'
+                if writer.size > self._largest:
+                    why = f'{self.bag} is full ({writer.size / 1e6:.0f} MB)'
                     break
-        except OSError as error:
-            why = f'{self.bag}: {error.strerror}'
+        except BagError as error:
+            why = str(error)
         finally:
-            writer.close()
             for reader, _ in readers:
                 reader.close()
+            try:
+                writer.close()
+            except BagError as error:
+                why = why or str(error)
         if why:
             self._ended(why)
 

@@ -20,9 +20,9 @@ from pathlib import Path
 import time
 
 from cpg_ros.files.progress_bar import progress_bar
+from cpg_ros.nodes.message_types import message_class
 from cpg_ros.recordings.bag_storage import opened
 from cpg_ros.recordings.recording import RecordingError
-from cpg_ros.tools.graph_topics import message_class
 import rclpy
 from rclpy.node import Node
 from rclpy.publisher import Publisher

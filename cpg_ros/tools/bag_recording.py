@@ -18,26 +18,17 @@ from collections import Counter
 from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
-import shutil
 
-from ament_index_python.packages import get_package_share_directory, PackageNotFoundError
-from cpg_ros.errors import CpgError
-from cpg_ros.tools.graph_topics import message_class
-from cpg_ros.tools.running_node import Unanswered
+from cpg_ros.nodes.message_types import message_class, message_fields, UnknownType
+from cpg_ros.recordings.bag_writer import BagWriter
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rosbags.interfaces import Connection
-from rosbags.rosbag2 import StoragePlugin, Writer
-from rosbags.typesys import get_types_from_msg, get_typestore, Stores
 
 #: Messages that may wait for the disk.
 DEPTH = 5000
 #: Topics that come with every node and that nobody asked for.
 USUAL = ('/rosout', '/parameter_events')
-
-
-class BagError(CpgError):
-    """A bag cannot be written; one line."""
 
 
 class Recorder:
@@ -61,20 +52,11 @@ class Recorder:
             BagError: something is there already, or the folder cannot be written to.
 
         """
-        if path.exists():
-            raise BagError(f'{path}: there is something already')
-        self._node, self._path = node, path
-        self._beside = path.with_name(f'.{path.name}.unfinished')
+        self._node = node
         self._wanted = [node.resolve_topic_name(one) for one in wanted]
-        self._store = get_typestore(Stores.ROS2_JAZZY)
         self.counts: Counter[str] = Counter()
         self.passed_over: dict[str, str] = {}
-        try:
-            shutil.rmtree(self._beside, ignore_errors=True)
-            self._writer = Writer(self._beside, version=9, storage_plugin=StoragePlugin.MCAP)
-            self._writer.open()
-        except OSError as error:
-            raise BagError(f'{path}: {error.strerror}') from error
+        self._writer = BagWriter(path)
 
     def look(self) -> list[str]:
         """Listen to what is new on the graph; return the topics."""
@@ -88,7 +70,7 @@ class Recorder:
                 continue
             try:
                 self._listen(topic, kinds[0], [one.qos_profile for one in offered])
-            except (Unanswered, BagError) as error:
+            except UnknownType as error:
                 self.passed_over[topic] = str(error)
                 continue
             new.append(topic)
@@ -96,9 +78,7 @@ class Recorder:
 
     def _listen(self, topic: str, kind: str, offered: Sequence[QoSProfile]) -> None:
         message = message_class(kind)
-        if kind not in self._store.types:
-            self._store.register(_definitions(kind))
-        connection = self._writer.add_connection(topic, kind, typestore=self._store)
+        connection = self._writer.connect(topic, kind, message_fields)
         self.counts[topic] = 0
         # What every publisher offers: a reliable listener hears no best-effort one.
         kept = all(one.durability == DurabilityPolicy.TRANSIENT_LOCAL for one in offered)
@@ -121,21 +101,4 @@ class Recorder:
             BagError: the disk is full, or the like.
 
         """
-        try:
-            self._writer.close()
-            if sum(self.counts.values()):
-                self._beside.rename(self._path)
-            else:
-                shutil.rmtree(self._beside)
-        except OSError as error:
-            raise BagError(f'{self._path}: {error.strerror}') from error
-
-
-def _definitions(kind: str) -> dict:
-    """Return the fields of a message that the library does not know, from its package."""
-    package, _, name = kind.partition('/msg/')
-    try:
-        text = (Path(get_package_share_directory(package)) / 'msg' / f'{name}.msg').read_text()
-    except (PackageNotFoundError, OSError):
-        raise BagError(f'the fields of {kind} are not known here') from None
-    return get_types_from_msg(text, kind)
+        self._writer.close()

@@ -15,10 +15,10 @@
 """The topics of a graph: what there is, the next message, how often one comes."""
 
 from collections.abc import Iterator
-from importlib import import_module
 import time
 from typing import Any
 
+from cpg_ros.nodes.message_types import message_class
 from cpg_ros.tools.running_node import Unanswered
 import rclpy
 from rclpy.node import Node
@@ -28,20 +28,6 @@ from rclpy.qos import qos_profile_sensor_data
 LOOK = 1.0
 #: How long messages are counted, s.
 COUNT = 3.0
-
-
-def message_class(kind: str) -> Any:
-    """Return the class of a type such as sensor_msgs/msg/JointState.
-
-    Raises:
-        Unanswered: its package is not installed.
-
-    """
-    package, _, name = kind.partition('/msg/')
-    try:
-        return getattr(import_module(f'{package}.msg'), name)
-    except (ImportError, AttributeError):
-        raise Unanswered(f'the type {kind} is not installed here') from None
 
 
 def topics(node: Node) -> dict[str, str]:
