@@ -44,6 +44,16 @@ def test_a_signal_ends_it_at_the_stand_with_code_0(start, number):
     assert speeds.max() <= 20.0
 
 
+def test_a_volley_of_signals_ends_it(start):
+    # A launcher and a terminal signal the same process at once, each perhaps twice.
+    process, _ = start('-p', 'rate:=200', '-p', 'ramp:=0.2', watch=True)
+    while process.alive and 'ramping down' not in process.log:
+        for number in (signal.SIGTERM, signal.SIGINT) * 200:
+            process.signal(number)
+    assert process.wait() == 0
+    assert 'Traceback' not in process.log
+
+
 def test_a_second_generator_in_another_namespace_is_left_alone(start):
     one, watcher = start('-p', 'rate:=200')
     two = start('-p', 'rate:=200', '-p', 'gait:=walk', '-r', '__ns:=/other', domain=one.domain,

@@ -227,8 +227,11 @@ def run(make: Callable[[], StartedNode], name: str, args: list[str] | None) -> i
         get_logger(name).fatal(str(error))
         rclpy.shutdown()
         return 1
+    # An Event may not be set here: a signal that comes while it is being waited for, or while
+    # another one sets it, would wait for ever for the lock that its own thread holds.
+    signals: list[int] = []
     for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, lambda *_: node.stop.set())
+        signal.signal(number, lambda number, _: signals.append(number))
     executor = SingleThreadedExecutor()
     executor.add_node(node)
     serving = threading.Thread(target=_spin, args=(executor, node), name='executor', daemon=True)
@@ -238,8 +241,9 @@ def run(make: Callable[[], StartedNode], name: str, args: list[str] | None) -> i
     serving.start()
     node.parameter_service.thread.start()
     # A bare wait() can miss a signal that another thread received, and a stop must not wait.
-    while not node.stop.wait(0.02):
+    while not signals and not node.stop.wait(0.02):
         pass
+    node.stop.set()
     node.parameter_service.end()
     node.finish()
     for number in (signal.SIGINT, signal.SIGTERM):
