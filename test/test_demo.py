@@ -20,6 +20,7 @@ import os
 import re
 import signal
 import subprocess
+import time
 
 from graph import EXECUTABLE, free_domain, Process, until
 from panel_client import Client
@@ -98,6 +99,23 @@ def test_a_gait_that_is_chosen_on_its_page_ends_the_tour(tmp_path):
         page.end()
         output, _ = process.communicate(b'q\n', timeout=60)
         assert process.returncode == 0 and b'  walk ' not in output
+
+
+def test_it_can_be_driven_on_its_page(tmp_path):
+    with demo(tmp_path, '--drive') as process:
+        line = until(lambda: re.search(rb'in a browser: (http://\S+)', process.stdout.readline()),
+                     'the address')
+        page = Client(line[1].decode()).ready()
+        until(lambda: 'base' in page.frame, 'the robot')
+
+        def ahead():
+            page.send(do='steer', speed=0.5, turn=0.0)
+            time.sleep(0.1)
+            return page.frame['base'][0] > 0.3
+        until(ahead, 'a robot 0.3 m from where it stood')
+        page.end()
+        output, _ = process.communicate(b'q\n', timeout=60)
+        assert process.returncode == 0 and b'waits to be steered' in output
 
 
 def test_what_comes_through_a_pipe_ends_with_it(tmp_path):

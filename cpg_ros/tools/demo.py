@@ -197,9 +197,11 @@ def typed() -> queue.Queue:
     return lines
 
 
-def guide(operator: Operator, gaits: Sequence[str], every: float,
+def guide(operator: Operator, gaits: Sequence[str], every: float | None,
           interruption: Interruption) -> None:
     """Take the robot through the gaits, until a line is typed or a gait chosen elsewhere.
+
+    Without a time for each it stays with the first one until something is typed.
 
     Where what is typed ends, as in ``echo walk | demo``, the last gait has its time, too.
 
@@ -209,7 +211,7 @@ def guide(operator: Operator, gaits: Sequence[str], every: float,
     """
     # In the robot's own time, which goes slowly on a slow machine.
     lines, tour, began = typed(), list(gaits[1:]), operator.time
-    due: float | None = began + every
+    due = None if every is None else began + every
 
     def report(text: str) -> None:
         x, y = operator.place or (0.0, 0.0)
@@ -229,10 +231,10 @@ def guide(operator: Operator, gaits: Sequence[str], every: float,
                 return
             if wanted is not None:
                 tour, due = [], None
-            elif due is None:
+            elif due is None and every is not None:
                 due = operator.time + every
         elif tour and due is not None and operator.time >= due:
-            wanted, due = tour.pop(0), due + every
+            wanted, due = tour.pop(0), due + (every or 0.0)
         if wanted:
             report(operator.switch(wanted) or wanted)
 
@@ -260,6 +262,8 @@ def parser() -> Parser:
                       help=f'tour of gaits (default: {" ".join(TOUR)})')
     made.add_argument('--course', action='store_true', help='walk over rough ground, a ramp and '
                       'blocks instead, and be pushed on the way, with feedback')
+    made.add_argument('--drive', action='store_true', help='no tour: the robot stands until it is '
+                      'steered, on the page or by what publishes on cmd_vel')
     made.add_argument('--every', type=float, default=6.0, metavar='S',
                       help='seconds of simulated time for each (default: 6)')
     made.add_argument('--out', type=Path, default=Path('out'), metavar='DIR',
@@ -288,6 +292,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
                  '-p', f'rate:={RATE}.0', '-p', 'combined_topic:=""', '-p', 'use_sim_time:=true']
     if chosen.course:
         body, generator = [*body, *demo_course.GROUND], [*generator, *demo_course.GENERATOR]
+    if chosen.drive:
+        generator += ['-p', 'cmd_vel:=true']
     port = free_port()
     page = not chosen.no_panel and find_spec('websockets')
     interruption = Interruption()
@@ -308,8 +314,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
             if chosen.course:
                 demo_course.Runner(operator).run(interruption.look)
             else:
-                say('the robot walks; type a gait and Enter to switch, q to end')
-                guide(operator, chosen.gaits, chosen.every, interruption)
+                say(f"the robot {'waits to be steered' if chosen.drive else 'walks'}; type a gait "
+                    'and Enter to switch, q to end')
+                guide(operator, chosen.gaits, None if chosen.drive else chosen.every, interruption)
     except KeyboardInterrupt:
         pass
     except DemoError as error:
