@@ -26,10 +26,11 @@ from cpg_ros.dynamics.orbit import NoOrbit, solve_orbit, solve_preset
 from cpg_ros.errors import InputError
 from cpg_ros.integration.simulate import simulate
 from cpg_ros.networks.biped import Biped
-from cpg_ros.networks.delayed import Delayed, GAITS
+from cpg_ros.networks.delayed import Delayed
 from cpg_ros.networks.parameter_line import ParameterLine
 from cpg_ros.networks.quadruped import Quadruped
 from cpg_ros.networks.registry import NETWORKS, PRESETS
+from cpg_ros.networks.symmetry import GAITS
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from modes import class_of, Mode

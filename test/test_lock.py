@@ -17,7 +17,8 @@
 from cpg_ros.dynamics.orbit import solve_orbit
 from cpg_ros.integration.simulate import simulate
 from cpg_ros.integration.stepper import Stepper
-from cpg_ros.networks.delayed import Delayed, GAITS, PRESETS
+from cpg_ros.networks.delayed import Delayed, PRESETS
+from cpg_ros.networks.symmetry import GAITS
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from modes import eigenvalue_terms, Mode, MODES

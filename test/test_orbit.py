@@ -19,8 +19,9 @@ from dataclasses import replace
 from cpg_ros.dynamics.hopf import first_hopf
 from cpg_ros.dynamics.hopf_search import hopf_points
 from cpg_ros.dynamics.orbit import NoOrbit, solve_orbit
-from cpg_ros.networks.delayed import Delayed, GAITS, PRESETS
+from cpg_ros.networks.delayed import Delayed, PRESETS
 from cpg_ros.networks.parameter_line import ParameterLine
+from cpg_ros.networks.symmetry import GAITS
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from modes import class_of, eigenvalue_terms, MODES

@@ -21,7 +21,8 @@ from pathlib import Path
 from cpg_ros.integration.stepper import Stepper
 from cpg_ros.motion.pattern import Pattern
 from cpg_ros.motion.plan import plan, Refused
-from cpg_ros.networks.delayed import Delayed, GAITS, PRESETS
+from cpg_ros.networks.delayed import Delayed, PRESETS
+from cpg_ros.networks.symmetry import GAITS
 from cpg_ros.robots.robot import JointMotion, Motion
 from cpg_ros.robots.robot_file import load_robot
 import numpy as np

@@ -18,7 +18,8 @@ from pathlib import Path
 
 from ament_index_python.packages import get_package_share_directory
 from cpg_ros.motion.plan import plan
-from cpg_ros.networks.delayed import GAITS, PRESETS
+from cpg_ros.networks.delayed import PRESETS
+from cpg_ros.networks.symmetry import GAITS
 from cpg_ros.robots.robot_file import load_robot
 from graph import until
 import numpy as np

@@ -25,7 +25,7 @@ from cpg_ros.inversion.fit_data import cells_of
 from cpg_ros.inversion.gait_fit import Fit
 from cpg_ros.inversion.given_up import fit_at_all
 from cpg_ros.networks.preset_files import Preset
-from cpg_ros.networks.registry import find_network, NetworkError, SHIPPED
+from cpg_ros.networks.registry import find_network, NetworkError, numbered, SHIPPED, with_legs_of
 from cpg_ros.recordings.recording import Recording
 from cpg_ros.robots.robot import Robot
 
@@ -117,8 +117,9 @@ def preset_of(network: str, gait: str) -> Preset:
 
 def network_of(legs: Iterable[str]) -> str:
     """Name the first shipped network that has these legs."""
-    return next(name for name, kind in SHIPPED.items()
-                if set(legs) <= set(next(iter(kind.legs.values()))))
+    wanted = set(legs)
+    return next(kind.name for kind in (*SHIPPED.values(), *numbered(len(wanted)))
+                if wanted <= set(next(iter(kind.legs.values()))))
 
 
 def _legs(recording: Recording, robot: Robot | None) -> tuple[dict[str, tuple[str, ...]], str]:
@@ -163,7 +164,7 @@ def inverted(recording: Recording, robot: Robot | None = None, network: str = ''
     if not network:
         network = robot.networks[0] if robot is not None else network_of(legs)
     try:
-        kind = find_network(network)
+        kind = with_legs_of(find_network(network), legs)
     except NetworkError as error:
         raise InputError(f'network {error}') from error
     network = kind.name

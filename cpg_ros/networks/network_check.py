@@ -18,7 +18,7 @@ from collections.abc import Iterator
 from itertools import chain
 from typing import Any
 
-from cpg_ros.networks.network import Network
+from cpg_ros.networks.network import GIRDLES, Network
 from cpg_ros.networks.parameter_line import ParameterLine
 
 #: What every network has to state.
@@ -97,7 +97,7 @@ def _legs(network: type[Network]) -> Iterator[str]:
             yield from (f'{where}: {leg} has the cell {cell}, and there are {network.cells}'
                         for cell in cells if cell not in numbers)
     for name, table, words in (('sides', network.sides, ('left', 'right')),
-                               ('girdles', network.girdles, ('fore', 'hind'))):
+                               ('girdles', network.girdles, GIRDLES)):
         yield from _unknown(name, table, first)
         yield from _unknown(name, table.values(), words)
     yield from (f'muscles: {name} has the cell {cell}, and there are {network.cells}'
