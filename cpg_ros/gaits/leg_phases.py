@@ -212,9 +212,13 @@ def named(phases: Mapping[str, float], network: type[Network]) -> Named:
     own = np.array(list(phases.values()))
     cells = [listed[0] - 1 for listed in next(iter(network.legs.values())).values()]
     apart, size = {}, {}
-    for gait in network.gaits():
+    for gait in (one for one in network.gaits() if one != network.unnamed):
         symmetry = _symmetry(network, gait)
         wanted, waves = symmetry.phases[cells], symmetry.waves[cells]
+        if symmetry.leads:
+            # Stated, in either sense, between whatever waveforms.
+            apart[gait], size[gait] = _apart(own, wanted, np.zeros_like(waves)), 0
+            continue
         # A wave that runs round may do so in both senses.
         apart[gait] = min(_apart(own, wanted, waves), _apart(own, -wanted, waves))
         size[gait] = -symmetry.waves.max()

@@ -4,5 +4,5 @@ Imports ``files``; knows nothing of ROS.
 """
 
 __all__ = ['biped', 'delayed', 'derivation', 'equations', 'field', 'generated', 'hk_theorem',
-           'morris_lecar', 'network', 'network_check', 'parameter_line', 'preset_files',
-           'quadruped', 'registry', 'symmetry', 'terms']
+           'morris_lecar', 'network', 'network_check', 'oscillators', 'parameter_line',
+           'preset_files', 'quadruped', 'registry', 'symmetry', 'terms']
