@@ -20,10 +20,11 @@ from cpg_ros.dynamics.orbit import NoOrbit, solve_orbit, solve_preset
 from cpg_ros.errors import InputError
 from cpg_ros.integration.simulate import simulate
 from cpg_ros.networks.biped import Biped
-from cpg_ros.networks.delayed import GAITS, Delayed
+from cpg_ros.networks.delayed import Delayed
 from cpg_ros.networks.parameter_line import ParameterLine
 from cpg_ros.networks.quadruped import Quadruped
 from cpg_ros.networks.registry import NETWORKS, PRESETS
+from cpg_ros.networks.symmetry import GAITS
 
 EXAMPLE = Delayed(-4.5, 1.0, 6.5, -2.0, 0.4)
 TAU = ParameterLine.parse('tau', Delayed)

@@ -10,7 +10,8 @@ from scipy.special import lambertw
 from cpg_ros.dynamics.orbit import solve_orbit
 from cpg_ros.integration.simulate import simulate
 from cpg_ros.integration.stepper import Stepper
-from cpg_ros.networks.delayed import GAITS, PRESETS, Delayed
+from cpg_ros.networks.delayed import PRESETS, Delayed
+from cpg_ros.networks.symmetry import GAITS
 
 SWAP = [1, 0, 3, 2, 5, 4, 7, 6]
 rates = st.floats(-4.0, 4.0)

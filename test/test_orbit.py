@@ -12,8 +12,9 @@ from scipy.special import lambertw
 from cpg_ros.dynamics.hopf import first_hopf
 from cpg_ros.dynamics.hopf_search import hopf_points
 from cpg_ros.dynamics.orbit import NoOrbit, solve_orbit
-from cpg_ros.networks.delayed import GAITS, PRESETS, Delayed
+from cpg_ros.networks.delayed import PRESETS, Delayed
 from cpg_ros.networks.parameter_line import ParameterLine
+from cpg_ros.networks.symmetry import GAITS
 
 TAU = ParameterLine(('tau',), (1.0,))
 EXAMPLE = Delayed(-4.5, 1.0, 6.5, -2.0, 0.4)

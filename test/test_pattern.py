@@ -10,7 +10,8 @@ import pytest
 from cpg_ros.integration.stepper import Stepper
 from cpg_ros.motion.pattern import Pattern
 from cpg_ros.motion.plan import Refused, plan
-from cpg_ros.networks.delayed import GAITS, PRESETS, Delayed
+from cpg_ros.networks.delayed import PRESETS, Delayed
+from cpg_ros.networks.symmetry import GAITS
 from cpg_ros.robots.robot import JointMotion, Motion
 from cpg_ros.robots.robot_file import load_robot
 

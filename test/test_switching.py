@@ -10,7 +10,8 @@ from std_srvs.srv import SetBool
 from switches import by_leg, check_all_switches, off
 
 from cpg_ros.motion.plan import plan
-from cpg_ros.networks.delayed import GAITS, PRESETS
+from cpg_ros.networks.delayed import PRESETS
+from cpg_ros.networks.symmetry import GAITS
 from cpg_ros.robots.robot_file import load_robot
 
 ROBOT = load_robot(Path(get_package_share_directory('cpg_ros')) / 'config' / 'quadruped.yaml')

@@ -14,7 +14,7 @@ import numpy as np
 from cpg_ros.checks.urdf_match import unlimited
 from cpg_ros.gaits.leg_names import Legs, legs_of
 from cpg_ros.motion.plan import plan
-from cpg_ros.networks.registry import NETWORKS, SHIPPED
+from cpg_ros.networks.registry import NETWORKS, numbered
 from cpg_ros.robots.robot import HARMONICS, Joint, Robot
 from cpg_ros.robots.robot_file import LARGEST, LIMITS
 from cpg_ros.robots.urdf import UrdfError, UrdfJoint, chain, direction
@@ -39,7 +39,7 @@ def robot_from(urdf: Mapping[str, UrdfJoint], name: str) -> tuple[Robot, str]:
 
     """
     legs = legs_of([joint.name for joint in urdf.values() if not joint.flaw], True)
-    usual = {name: next(iter(kind.legs.items())) for name, kind in SHIPPED.items()}
+    usual = {kind.name: next(iter(kind.legs.items())) for kind in numbered(len(legs))}
     assignment, cells = next(one for one in usual.values() if set(one[1]) == set(legs))
     networks = tuple(name for name, one in usual.items() if one == (assignment, cells))
     joints, says = {}, []

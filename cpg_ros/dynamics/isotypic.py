@@ -43,8 +43,10 @@ class Block:
         """The network's gait that oscillates in this class, whichever way its wave runs."""
         mine = dict(self.symmetry.shifts)
         senses = [mine, {name: -shift % 1 for name, shift in mine.items()}]
-        return next((gait for gait in self.network.gaits()
-                     if dict(self.network.symmetry(gait).shifts) in senses), '')
+        found = {gait: dict(self.network.symmetry(gait).shifts) for gait in self.network.gaits()}
+        # Some networks have a name for each sense.
+        return next((gait for sense in senses for gait, shifts in found.items()
+                     if shifts == sense), '')
 
     @property
     def mode(self) -> tuple[int, ...]:

@@ -187,6 +187,13 @@ def _symmetry(network: type[Network], gait: str) -> Any:
     return network.presets()[gait].network.symmetry(gait)
 
 
+def _reversed(network: type[Network], gait: str, symmetry: Any) -> bool:
+    """Tell whether the gait with all shifts turned round is another one of the network's."""
+    turned = {name: -shift % 1 for name, shift in symmetry.shifts}
+    return any(dict(_symmetry(network, other).shifts) == turned for other in network.gaits()
+               if other != gait)
+
+
 def _apart(phases: np.ndarray, wanted: np.ndarray, waves: np.ndarray) -> float:
     """Distance of leg phases; between different waveforms any phase will do."""
     squares = [nearest_gait(phases[waves == wave], {'': wanted[waves == wave]})[1]**2
@@ -219,8 +226,10 @@ def named(phases: Mapping[str, float], network: type[Network]) -> Named:
             # Stated, in either sense, between whatever waveforms.
             apart[gait], size[gait] = _apart(own, wanted, np.zeros_like(waves)), 0
             continue
-        # A wave that runs round may do so in both senses.
-        apart[gait] = min(_apart(own, wanted, waves), _apart(own, -wanted, waves))
+        apart[gait] = _apart(own, wanted, waves)
+        # A wave that runs round may do so in both senses, where these are not two gaits.
+        if not _reversed(network, gait, symmetry):
+            apart[gait] = min(apart[gait], _apart(own, -wanted, waves))
         size[gait] = -symmetry.waves.max()
     fits = [gait for gait in apart if apart[gait] <= max(TOLERANCE, min(apart.values()))]
     nearest = min(fits, key=lambda gait: (-size[gait], round(apart[gait], 9)))

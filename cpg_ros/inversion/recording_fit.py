@@ -15,7 +15,14 @@ from cpg_ros.inversion.given_up import fit_at_all
 from cpg_ros.inversion.identifiability import Estimate
 from cpg_ros.networks.network import Network
 from cpg_ros.networks.preset_files import Preset
-from cpg_ros.networks.registry import NETWORKS, SHIPPED, NetworkError, find_network
+from cpg_ros.networks.registry import (
+    NETWORKS,
+    SHIPPED,
+    NetworkError,
+    find_network,
+    numbered,
+    with_legs_of,
+)
 from cpg_ros.recordings.recording import Recording
 from cpg_ros.robots.robot import Robot
 
@@ -107,8 +114,9 @@ def preset_of(network: str, gait: str) -> Preset:
 
 def network_of(legs: Iterable[str]) -> str:
     """Name the first shipped network that has these legs."""
-    return next(name for name, kind in SHIPPED.items()
-                if set(legs) <= set(next(iter(kind.legs.values()))))
+    wanted = set(legs)
+    return next(kind.name for kind in (*SHIPPED.values(), *numbered(len(wanted)))
+                if wanted <= set(next(iter(kind.legs.values()))))
 
 
 def _legs(recording: Recording, robot: Robot | None) -> tuple[dict[str, tuple[str, ...]], str]:
@@ -129,9 +137,10 @@ def _legs(recording: Recording, robot: Robot | None) -> tuple[dict[str, tuple[st
 
 def _networks(robot: Robot | None, legs: Iterable[str]) -> Iterator[type[Network]]:
     """The networks that drive a robot, or else those shipped that have these legs."""
+    wanted = set(legs)
     yield from ((NETWORKS[name] for name in robot.networks) if robot is not None else
-                (kind for kind in SHIPPED.values()
-                 if set(legs) <= set(next(iter(kind.legs.values())))))
+                (kind for kind in numbered(len(wanted))
+                 if wanted <= set(next(iter(kind.legs.values())))))
 
 
 def _stride(recording: Recording, legs: Mapping[str, Sequence[str]], kind: type[Network],
@@ -195,7 +204,7 @@ def inverted(recording: Recording, robot: Robot | None = None, network: str = ''
     if not network:
         network = robot.networks[0] if robot is not None else network_of(legs)
     try:
-        kind = find_network(network)
+        kind = with_legs_of(find_network(network), legs)
     except NetworkError as error:
         raise InputError(f'network {error}') from error
     cells, stride = _stride(recording, legs, kind, robot)

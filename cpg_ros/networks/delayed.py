@@ -2,18 +2,20 @@
 
 ``x_i' = a x_i + b tanh(x_i) + d tanh(x_{i-2}) + c tanh(x_{s(i)}(t - tau))``, i = 1..8 with
 indices cyclic, s swapping 1-2, 3-4, 5-6, 7-8. Time is in model units. The network is
-equivariant under Z4 (i -> i + 2), Z2 (s) and x -> -x.
+equivariant under Z4 (i -> i + 2), Z2 (s) and x -> -x. For 2n legs it has 4n cells, and Z2n for
+Z4; the equation is the same.
 """
 
 import math
 from dataclasses import dataclass
-from fractions import Fraction
 from functools import cache
 from typing import Any, ClassVar
 
 from cpg_ros.networks.equations import Cell
+from cpg_ros.networks.leg_numbers import leg_count
 from cpg_ros.networks.network import LeastCoupling, Network, Preset, Range, known
-from cpg_ros.networks.symmetry import GAITS, Z4_Z2, Symmetry
+from cpg_ros.networks.rings import across, behind, ring_gaits, ring_places, ring_symmetry
+from cpg_ros.networks.symmetry import Symmetry
 from cpg_ros.networks.terms import Number, tanh
 
 CELLS = 8
@@ -21,17 +23,6 @@ CELLS = 8
 STEP = 0.0025
 #: Longest delay that may be set at run time, in model time.
 MAX_DELAY = 5.0
-
-
-#: Which cell cell i hears: i - 2 behind it now, s(i) on the other side a delay ago.
-BEHIND = tuple((i - 2) % CELLS for i in range(CELLS))
-ACROSS = tuple(i ^ 1 for i in range(CELLS))
-
-
-@cache
-def _symmetry(j: int, k: int) -> Symmetry:
-    return Symmetry.of(Z4_Z2, {'omega': Fraction(j, 4), 'kappa': Fraction(k, 2)}, variables=1,
-                       odd=True)
 
 
 @dataclass(frozen=True)
@@ -73,36 +64,50 @@ class Delayed(Network):
     @staticmethod
     def equations(cell: Cell, p: Any) -> tuple[Number, ...]:
         """Eq. 1.1; see the module."""
-        (x,), (behind,), (across,) = cell.now(), cell.now(BEHIND), cell.past(ACROSS)
-        return (p.a * x + p.b * tanh(x) + p.d * tanh(behind) + p.c * tanh(across),)
+        (x,), (y,), (z,) = cell.now(), cell.now(behind), cell.past(across)
+        return (p.a * x + p.b * tanh(x) + p.d * tanh(y) + p.c * tanh(z),)
 
     @classmethod
     def gaits(cls) -> tuple[str, ...]:
-        """Names of the six primary gaits."""
-        return tuple(GAITS)
+        """Names of the primary gaits."""
+        return tuple(cls.modes())
+
+    @classmethod
+    def modes(cls) -> dict[str, tuple[int, int]]:
+        """Return gait -> (j, k)."""
+        return ring_gaits(leg_count(cls))
+
+    @classmethod
+    def fitted(cls, legs: int) -> dict[str, Any]:
+        """Return what two rings for this many legs have; InputError for an odd number."""
+        places = ring_places(legs)
+        return {**places, 'usual_gait': next(iter(ring_gaits(legs))),
+                'usual_robot': 'hexapod' if legs == 6 else ''}
 
     @classmethod
     def presets(cls) -> dict[str, Preset]:
-        """Return PRESETS."""
-        return PRESETS
+        """Return PRESETS, or of other numbers of legs a set for each gait by the same rule."""
+        return PRESETS if cls.family is None else _presets(cls)
 
     def symmetry(self, gait: str) -> Symmetry:
         """Return the gait's symmetry.
 
-        The sign of d turns the ring: the wave of walk and jump runs forward (j = 1, LF leads
-        LH) for d < 0 and backward (j = 3, LH leads LF) otherwise.
+        On four legs the sign of d turns the ring: the wave of walk and jump runs forward (j = 1,
+        LF leads LH) for d < 0 and backward (j = 3, LH leads LF) otherwise.
 
         Raises:
-            ValueError: the gait is not one of the six primary ones.
+            ValueError: the gait is not one of the primary ones.
 
         """
-        j, k = GAITS[known(gait, self.gaits())]
-        return _symmetry(3 if j == 1 and self.d >= 0.0 else j, k)
+        j, k = self.modes()[known(gait, self.gaits())]
+        if self.family is None and j == 1 and self.d >= 0.0:
+            j = 3
+        return ring_symmetry(leg_count(type(self)), (j, k), variables=1, odd=True)
 
     def obstacle(self, gait: str) -> str:
         """Say what in c rules a gait out: its sign, or that no delay makes it oscillate."""
-        j, k = GAITS[gait]
-        if j % 2 == 0 and self.c * (-1) ** k >= 0.0:
+        j, k = self.modes()[gait]
+        if 2 * j % leg_count(type(self)) == 0 and self.c * (-1) ** k >= 0.0:
             wanted = 'positive' if k else 'negative'
             return f'c {self.c:g} gives no {gait}: c must be {wanted}'
         text, value, least = self.least_coupling(gait)
@@ -112,7 +117,8 @@ class Delayed(Network):
 
     def least_coupling(self, gait: str) -> LeastCoupling:
         """Roots of ``lambda = A + B exp(-lambda tau)`` cross where |B| > |Re A|."""
-        least = abs(self.a + self.b + self.d * (1.0, 0.0, -1.0)[GAITS[gait][0]])
+        turn = self.modes()[gait][0] / leg_count(type(self))
+        least = abs(self.a + self.b + self.d * round(math.cos(2.0 * math.pi * turn), 15))
         return LeastCoupling('|c|', abs(self.c), least)
 
     def sufficient_gain(self, rate: float) -> float:
@@ -130,6 +136,24 @@ class Delayed(Network):
         """
         return max(0.0, self.a + abs(self.b) + abs(self.d)
                    + abs(self.c) * math.exp(rate * self.tau) + rate)
+
+
+@cache
+def _presets(network: type[Delayed]) -> dict[str, Preset]:
+    """Return a set for each gait of any number of legs: the signs of c and d choose it.
+
+    Of the two waves that can run round, d makes the wanted one the faster one (Im A > 0), which
+    attracts; a gives all waves the same Re A, but for rounding.
+    """
+    found = {}
+    for gait, (j, k) in network.modes().items():
+        turn = 2.0 * math.pi * j / leg_count(network)
+        d = -1.0 if j > 0 else 1.0
+        a = round(-3.5 - d * math.cos(turn), 1)
+        if 2 * j % leg_count(network) == 0:
+            a, d = -4.5, 2.0 * d
+        found[gait] = Preset(gait, network(a, 1.0, 6.5 if k else -6.5, d, 0.4))
+    return found
 
 
 # Ours share one time scale: trot, pace, bound and pronk have one waveform (T = 1.2783), walk

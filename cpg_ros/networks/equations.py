@@ -7,7 +7,7 @@ rates and their derivatives, exactly, as numpy code that is kept on disk.
 
 import hashlib
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cache, cached_property
 from types import ModuleType
@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 
 #: Which cell each cell hears, from 0.
 Source = tuple[int, ...]
+#: The same, or a rule: cell -> the cell that it hears, counted round.
+Heard = Source | Callable[[int], int]
 
 
 @dataclass(frozen=True)
@@ -44,20 +46,22 @@ class Argument:
 class Cell:
     """Any cell of a network, as its equations see it."""
 
-    def __init__(self, variables: int) -> None:
+    def __init__(self, variables: int, cells: int) -> None:
         """Begin to note what is heard."""
-        self._variables = variables
+        self._variables, self._cells = variables, cells
         self.arguments: list[Argument] = []
 
-    def now(self, source: Source | None = None) -> tuple[Term, ...]:
+    def now(self, source: Heard | None = None) -> tuple[Term, ...]:
         """Return the variables of the cell itself, or of those that each cell hears."""
         return self._heard(source, False)
 
-    def past(self, source: Source | None = None) -> tuple[Term, ...]:
+    def past(self, source: Heard | None = None) -> tuple[Term, ...]:
         """Return the same as they were a delay ago."""
         return self._heard(source, True)
 
-    def _heard(self, source: Source | None, delayed: bool) -> tuple[Term, ...]:
+    def _heard(self, source: Heard | None, delayed: bool) -> tuple[Term, ...]:
+        if callable(source):
+            source = tuple(source(i) % self._cells for i in range(self._cells))
         found = []
         for variable in range(self._variables):
             one = Argument(variable, None if source is None else tuple(source), delayed)
@@ -101,7 +105,7 @@ class Equations:
             TypeError: they are not as many as the cell has variables.
 
         """
-        cell = Cell(network.variables)
+        cell = Cell(network.variables, network.cells)
         found = network.equations(cell, Parameters(network))
         self.texts = tuple(term.text if isinstance(term, Term) else repr(float(term))
                            for term in found)

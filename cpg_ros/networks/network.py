@@ -16,11 +16,15 @@ import numpy as np
 from cpg_ros.errors import InputError
 from cpg_ros.networks.equations import Cell, values_of
 from cpg_ros.networks.field import Field
+from cpg_ros.networks.leg_numbers import leg_count, restored
 from cpg_ros.networks.preset_files import Preset, own_presets
 from cpg_ros.networks.symmetry import Symmetry
 from cpg_ros.networks.terms import Number
 
 __all__ = ['Network', 'Preset', 'Range', 'footfall_order', 'known']
+
+#: Pairs of legs from the head on.
+GIRDLES = ('fore', 'middle', 'hind')
 
 
 AnyNetwork = TypeVar('AnyNetwork', bound='Network')
@@ -62,8 +66,9 @@ class Network(ABC):
         ranges: parameter -> range in which it may be set at run time.
         legs: assignment of cells to legs -> leg -> cells numbered from 1, the first of which
             gives the leg's phase; the first assignment is the usual one.
+        family: of a network made for another number of legs, the one it is made after.
         sides: leg -> left or right; where this is not said, robot files say it.
-        girdles: leg -> fore or hind, the same; of two legs neither.
+        girdles: leg -> fore, middle or hind, the same; of two legs neither.
         muscles: name -> cell from 1, where cells drive muscles: phases are told of each, and
             diagrams draw when it is active. Otherwise both are of legs, which stand while their
             first cell falls.
@@ -87,6 +92,7 @@ class Network(ABC):
     """
 
     name: ClassVar[str]
+    family: ClassVar['type[Network] | None'] = None
     cells: ClassVar[int]
     states: ClassVar[tuple[str, ...]]
     variables: ClassVar[int]
@@ -118,6 +124,25 @@ class Network(ABC):
         if hasattr(cls, 'states'):
             cls.variables = len(cls.states)
 
+    def __reduce__(self) -> Any:
+        if self.family is None:
+            return super().__reduce__()
+        return restored, (self.family, leg_count(type(self)), tuple(self.as_dict().values()))
+
+    @classmethod
+    def fitted(cls, legs: int) -> dict[str, Any]:
+        """Return what the network states for another number of legs: attribute -> value.
+
+        One that takes any even number gives its cells, legs, sides and girdles by a rule, and
+        whatever else depends on them; ``equations`` then hear by rules, too. Parameters that the
+        legs have of their own are named by ``fields``.
+
+        Raises:
+            ValueError: it takes no such number.
+
+        """
+        raise InputError(f'the network {cls.name} has {leg_count(cls)} legs, not {legs}')
+
     def as_dict(self) -> dict[str, float]:
         """Return the parameters by name, in their own order."""
         return {name: getattr(self, name) for name in self.parameters()}
@@ -144,7 +169,8 @@ class Network(ABC):
 
         Args:
             cell: gives the variables: ``cell.now()`` its own, ``cell.now(source)`` those of the
-                cells that each cell hears, ``cell.past(source)`` the same a delay ago.
+                cells that each cell hears, ``cell.past(source)`` the same a delay ago. The source
+                is a cell for each cell, or a function that gives it, counted round.
             p: the parameters, and groups of them that have one for each cell, by name.
 
         """
@@ -280,8 +306,17 @@ def _names(network: type[Network]) -> tuple[str, ...]:
 
 def footfall_order(legs: Iterable[str], sides: Mapping[str, str], girdles: Mapping[str, str]
                    ) -> list[str]:
-    """Sort legs as footfall diagrams show them: fore before hind, left before right."""
-    return sorted(legs, key=lambda leg: (girdles.get(leg) == 'hind', sides.get(leg) == 'right'))
+    """Sort legs as footfall diagrams show them: fore before hind, left before right.
+
+    With more than four legs those of a side stay together, so that waves are seen.
+    """
+    # Legs stand from hind to fore: those of middle pairs are told by their order alone.
+    listed = list(legs)[::-1]
+    rank = [GIRDLES.index(girdles.get(leg, 'fore')) for leg in listed]
+    right = [sides.get(leg) == 'right' for leg in listed]
+    key = list(zip(right, rank, strict=True) if len(listed) > 4 else
+               zip(rank, right, strict=True))
+    return [listed[k] for k in sorted(range(len(listed)), key=lambda k: key[k])]
 
 
 def known(gait: str, gaits: tuple[str, ...]) -> str:

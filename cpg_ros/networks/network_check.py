@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from itertools import chain
 from typing import Any
 
-from cpg_ros.networks.network import Network
+from cpg_ros.networks.network import GIRDLES, Network
 from cpg_ros.networks.parameter_line import ParameterLine
 
 #: What every network has to state.
@@ -90,7 +90,7 @@ def _legs(network: type[Network]) -> Iterator[str]:
     if network.offsets and set(network.offsets) != set(first):
         yield 'offsets: there must be one for each leg'
     for name, table, words in (('sides', network.sides, ('left', 'right')),
-                               ('girdles', network.girdles, ('fore', 'hind'))):
+                               ('girdles', network.girdles, GIRDLES)):
         yield from _unknown(name, table, first)
         yield from _unknown(name, table.values(), words)
     yield from (f'muscles: {name} has the cell {cell}, and there are {network.cells}'

@@ -3,11 +3,13 @@
 A package offers a network by an entry point of the group ``cpg_ros.networks`` with the network's
 name: ``my_network = my_package.my_network:MyNetwork``. A file that defines one class of networks
 is named by its path; its presets stand in it or beside it, in a file of the same name but .yaml.
+A number after the name of one that takes any number of legs is that number: ``delayed6``.
 """
 
 import importlib.util
 import sys
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
+from contextlib import suppress
 from functools import cache, cached_property
 from importlib.metadata import EntryPoint, entry_points
 from inspect import isabstract
@@ -15,8 +17,9 @@ from pathlib import Path
 from typing import TypeVar
 from zlib import crc32
 
-from cpg_ros.errors import CpgError
+from cpg_ros.errors import CpgError, InputError
 from cpg_ros.networks import biped, delayed, oscillators, quadruped
+from cpg_ros.networks.leg_numbers import parted, with_legs
 from cpg_ros.networks.network import Network, Preset
 from cpg_ros.networks.network_check import flaw
 
@@ -55,12 +58,18 @@ class _Networks(Mapping[str, type[Network]]):
         """Return a network.
 
         Raises:
-            NetworkError: the entry point of another package is of no use.
+            NetworkError: the entry point of another package is of no use, or a network does not
+                take that number of legs.
             KeyError: there is none of this name.
 
         """
         own = {**SHIPPED, **{network.name: network for network in self.files}}
-        return own[name] if name in own else _of_entry_point(self._offered[name])
+        if name in own:
+            return own[name]
+        known = parted(name)
+        if name not in self._offered and known is not None and known[0] in self:
+            return _numbered(*known)
+        return _of_entry_point(self._offered[name])
 
 
 class _Presets(Mapping[str, dict[str, Preset]]):
@@ -113,6 +122,30 @@ def find_network(name: str, folder: Path | None = None) -> type[Network]:
 def reference(name: str) -> str:
     """Return what find_network finds a network by in another process: its name or its file."""
     return str(NETWORKS.files.get(NETWORKS[name], name))
+
+
+def numbered(legs: int) -> tuple[type[Network], ...]:
+    """Return the shipped networks for a number of legs."""
+    found = []
+    for network in SHIPPED.values():
+        with suppress(InputError):
+            found.append(with_legs(network, legs))
+    return tuple(found)
+
+
+def with_legs_of(network: type[Network], legs: Collection[str]) -> type[Network]:
+    """Return a network's like for as many legs, if it takes so many, or else itself."""
+    try:
+        return with_legs(network, len(legs))
+    except InputError:
+        return network
+
+
+def _numbered(family: str, legs: int) -> type[Network]:
+    try:
+        return _checked(f'{family}{legs}', with_legs(NETWORKS[family], legs))
+    except InputError as error:
+        raise NetworkError(f"'{family}{legs}': {error}") from error
 
 
 def _usable(source: str, load: Callable[[], Entry]) -> Entry:

@@ -15,6 +15,7 @@ from cpg_ros.errors import CpgError
 from cpg_ros.files.atomic_write import write_atomically
 from cpg_ros.files.shared_resources import share
 from cpg_ros.files.yaml_reader import Reader, shown
+from cpg_ros.networks.network import GIRDLES
 from cpg_ros.networks.registry import NETWORKS, NetworkError, find_network, reference
 from cpg_ros.robots.body_keys import (
     efference_tree,
@@ -55,7 +56,7 @@ class _Reader(Reader):
                 raise self.fail(where, str(error)) from error
         return tuple(found)
 
-    def place(self, tree: Mapping[str, Any], where: str, key: str, words: tuple[str, str],
+    def place(self, tree: Mapping[str, Any], where: str, key: str, words: tuple[str, ...],
               stated: str | None) -> dict[str, str]:
         """Return leg -> word where the file says it; what a network states must be the same."""
         if key not in tree:
@@ -213,7 +214,7 @@ def load_robot(path: str | Path) -> Robot:
         where = f'legs.{leg}'
         entry = reader.keys(tree['legs'][leg], where, {'joints'}, {'side', 'girdle'})
         sides |= reader.place(entry, where, 'side', ('left', 'right'), first.sides.get(leg))
-        girdles |= reader.place(entry, where, 'girdle', ('fore', 'hind'), first.girdles.get(leg))
+        girdles |= reader.place(entry, where, 'girdle', GIRDLES, first.girdles.get(leg))
         listed = reader.items(entry['joints'], f'{where}.joints')
         joints = []
         for k, entry in enumerate(listed):

@@ -22,8 +22,8 @@ from cpg_ros.networks.registry import SHIPPED, find_network
 from cpg_ros.robots.robot import HARMONICS
 
 STRIDES = 2.0
-#: Of the fore and the hind girdle, or of one leg after the other.
-COLOURS = ('#2b6cb0', '#c05621')
+#: Of the fore, the hind and the middle pairs, or of one leg after the other.
+COLOURS = ('#2b6cb0', '#c05621', '#2f855a')
 
 
 def rows(network: type[Network]) -> list[tuple[str, int, str]]:
@@ -33,7 +33,8 @@ def rows(network: type[Network]) -> list[tuple[str, int, str]]:
         names = {cell: name.replace('_', ' ') for name, cell in network.muscles.items()}
         return [(names[cell], cell, COLOURS[k % 2]) for k, cells in enumerate(legs.values())
                 for cell in cells if cell in names]
-    return [(leg.upper(), legs[leg][0], COLOURS[girdles.get(leg) == 'hind'])
+    colours = dict(zip(('fore', 'hind', 'middle'), COLOURS, strict=True))
+    return [(leg.upper(), legs[leg][0], colours[girdles.get(leg, 'fore')])
             for leg in footfall_order(legs, network.sides, girdles)]
 
 

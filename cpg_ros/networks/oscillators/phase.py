@@ -15,7 +15,6 @@ A cell has x = r cos(theta), y = r sin(theta) and s = r', so that nothing jumps 
 """
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
 from typing import Any, ClassVar
@@ -23,7 +22,9 @@ from typing import Any, ClassVar
 import numpy as np
 
 from cpg_ros.networks.equations import Cell
+from cpg_ros.networks.leg_numbers import leg_names, places
 from cpg_ros.networks.network import Network, Preset, Range, known
+from cpg_ros.networks.rings import ring_gaits
 from cpg_ros.networks.symmetry import Group, Symmetry
 from cpg_ros.networks.terms import Number, cos, sin, sqrt
 
@@ -38,20 +39,35 @@ def _alone(cells: int) -> Symmetry:
     return Symmetry.of(Group(cells, ()), {}, variables=3)
 
 
+def _stated(legs: int) -> dict[str, Any]:
+    """What the network has for a number of legs; ValueError where there is none such."""
+    names = leg_names(legs)
+    offsets = tuple(f'offset_{leg}' for leg in names)
+    return {
+        'cells': legs, **places(legs), 'offsets': dict(zip(names, offsets, strict=True)),
+        'legs': {'implicit': {leg: (n + 1,) for n, leg in enumerate(names)}},
+        # Of the cell n places further round: offset_j where i + n is j.
+        'own_of_cells': {f'offset{n}': offsets[n:] + offsets[:n] for n in range(legs)},
+        'ranges': {
+            'nu': Range(0.1, 10.0, 'intrinsic frequency of every oscillator [cycles/model time]'),
+            'r': Range(0.01, 10.0, 'amplitude R that every oscillator has in the end'),
+            'a': Range(1.0, 200.0, 'how fast amplitudes come back [1/model time]'),
+            'w': Range(0.0, 50.0, 'weight of every other oscillator [1/model time]'),
+            **{f'offset_{leg}': Range(-1.0, 1.0, f'cycles by which {leg} is ahead')
+               for leg in names}}}
+
+
 @dataclass(frozen=True)
 class PhaseOscillators(Network):
-    """Oscillators of any number of legs; subclasses state the legs and an ``offset_LEG`` of each.
-
-    nu in cycles, a and w per model time; amplitudes without dimension.
-    """
+    """Oscillators of any number of legs; nu in cycles, a and w per model time."""
 
     nu: float
     r: float
     a: float
     w: float
 
-    #: Gait -> cycles of a stride after the first leg's footfall at which each leg's comes.
-    footfalls: ClassVar[dict[str, tuple[float, ...]]] = {}
+    #: Gait -> cycles of a stride at which the legs come down, in their order.
+    footfalls: ClassVar[dict[str, tuple[float, ...]]]
     states: ClassVar[tuple[str, ...]] = ('x', 'y', 's')
     readout: ClassVar = 'phase'
     step: ClassVar[float] = 0.0025
@@ -62,21 +78,20 @@ class PhaseOscillators(Network):
     line: ClassVar[str] = 'w'
     span: ClassVar[tuple[float, float] | None] = (0.0, 5.0)
 
-    def __init_subclass__(cls, legs: tuple[str, ...] = (), **options: Any) -> None:
-        super().__init_subclass__(**options)
-        offsets = tuple(f'offset_{leg}' for leg in legs)
-        cls.cells = len(legs)
-        cls.legs = {'implicit': {leg: (n + 1,) for n, leg in enumerate(legs)}}
-        #: Of the cell n places further round, which stands for offset_j where i + n is j.
-        cls.own_of_cells = {f'offset{n}': offsets[n:] + offsets[:n] for n in range(len(legs))}
-        cls.offsets = dict(zip(legs, offsets, strict=True))
-        cls.ranges = {
-            'nu': Range(0.1, 10.0, 'intrinsic frequency of every oscillator [cycles/model time]'),
-            'r': Range(0.01, 10.0, 'amplitude R that every oscillator has in the end'),
-            'a': Range(1.0, 200.0, 'how fast amplitudes come back [1/model time]'),
-            'w': Range(0.0, 50.0, 'weight of every other oscillator [1/model time]'),
-            **{f'offset_{leg}': Range(-1.0, 1.0, f'cycles by which {leg} is ahead')
-               for leg in legs}}
+    @classmethod
+    def fitted(cls, legs: int) -> dict[str, Any]:
+        """Return what the network has for this many legs; InputError for an odd number."""
+        stated = _stated(legs)
+        gaits: dict[str, tuple[float, ...]] = {'walk': (0.0, 0.5), 'hop': (0.0, 0.0)}
+        if legs > 2:
+            # Leg by leg from behind, left before right; phases of the modes (j, k) of two rings.
+            gaits = {gait: tuple(-(i // 2 * j / legs + i % 2 * k / 2.0) % 1.0
+                                 for i in range(legs))
+                     for gait, (j, k) in ring_gaits(legs).items()}
+        between = tuple(0.5 * (i % 2) + 0.3 * (i // 2) for i in range(legs))
+        return {**stated, 'footfalls': {**gaits, 'unnamed': between},
+                'usual_gait': next(iter(gaits)), 'fields': tuple(stated['offsets'].values()),
+                'usual_robot': {2: 'biped', 6: 'hexapod'}.get(legs, '')}
 
     @classmethod
     def equations(cls, cell: Cell, p: Any) -> tuple[Number, ...]:
@@ -85,7 +100,7 @@ class PhaseOscillators(Network):
         r = sqrt(x**2 + y**2 + LEAST)
         speed: Number = TURN * p.nu
         for n in range(1, cls.cells):
-            x_j, y_j, _ = cell.now(tuple((i + n) % cls.cells for i in range(cls.cells)))
+            x_j, y_j, _ = cell.now(lambda i, n=n: i + n)
             phi = TURN * (getattr(p, f'offset{n}') - p.offset0)
             # r_j sin(theta_j - phi) and r_j cos(theta_j - phi).
             rise, lead = y_j * cos(phi) - x_j * sin(phi), x_j * cos(phi) + y_j * sin(phi)
@@ -115,23 +130,15 @@ class PhaseOscillators(Network):
                                np.zeros(self.cells)]), 1.0 / self.nu
 
     @classmethod
-    def at(cls, offsets: Mapping[str, float], nu: float = 1.0, r: float = 1.0, a: float = 20.0,
-           w: float = 1.0) -> 'PhaseOscillators':
-        """Build the network for leg phases: leg -> cycles by which it is ahead."""
-        return cls(nu, r, a, w, **{f'offset_{leg}': phase for leg, phase in offsets.items()})
-
-    @classmethod
     @cache
     def presets(cls) -> dict[str, Preset]:
         """One for each footfall pattern, all with a = 20 (Ijspeert et al.) and w = 1."""
-        legs = next(iter(cls.legs.values()))
-        return {gait: Preset(gait, cls.at({leg: -fall % 1.0 for leg, fall
-                                           in zip(legs, falls, strict=True)}))
+        return {gait: Preset(gait, cls(1.0, 1.0, 20.0, 1.0, *(-fall % 1.0 for fall in falls)))
                 for gait, falls in cls.footfalls.items()}
 
 
 @dataclass(frozen=True)
-class Phase(PhaseOscillators, legs=('lh', 'rh', 'lf', 'rf')):
+class Phase(PhaseOscillators):
     """Phase oscillators of four legs."""
 
     offset_lh: float
@@ -140,9 +147,6 @@ class Phase(PhaseOscillators, legs=('lh', 'rh', 'lf', 'rf')):
     offset_rf: float
 
     name: ClassVar[str] = 'phase'
-    sides: ClassVar[dict[str, str]] = {
-        'lh': 'left', 'rh': 'right', 'lf': 'left', 'rf': 'right'}
-    girdles: ClassVar[dict[str, str]] = {'lh': 'hind', 'rh': 'hind', 'lf': 'fore', 'rf': 'fore'}
     usual_gait: ClassVar[str] = 'trot'
     usual_robot: ClassVar[str] = 'quadruped'
     #: Footfalls of LH RH LF RF. Symmetrical gaits by how far a fore foot is behind the hind one
@@ -164,3 +168,8 @@ class Phase(PhaseOscillators, legs=('lh', 'rh', 'lf', 'rf')):
         'half_bound': (0.0, 0.0, 0.4, 0.6),
         'pronk': (0.0, 0.0, 0.0, 0.0),
         'unnamed': (0.0, 0.5, 0.375, 0.875)}
+
+
+# By the same rule as for other numbers of legs.
+for _name, _value in _stated(4).items():
+    setattr(Phase, _name, _value)

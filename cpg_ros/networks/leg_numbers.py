@@ -1,0 +1,109 @@
+"""Networks for other numbers of legs: ``delayed6`` is the delayed network for six legs.
+
+A network that takes any even number of legs says by a rule what changes with it (``fitted``);
+from that rule a class of networks is made for each number that is asked for, with the name of its
+family and the number: a network like any other, with parameters, gaits and presets of its own.
+
+Legs are named for where they are. Two: left and right. Four: left and right, hind and fore (lh,
+rh, lf, rf); six have a middle pair, lm and rm, between them. More are counted on each side from
+the foremost, l1 r1 l2 r2 ..., as arachnologists do.
+"""
+
+import re
+from dataclasses import dataclass
+from functools import cache
+from typing import TYPE_CHECKING, Any
+
+from cpg_ros.errors import InputError
+
+if TYPE_CHECKING:
+    from cpg_ros.networks.network import Network
+
+BIPED = ('left', 'right')
+#: Most legs that a network can be asked for.
+MOST = 32
+
+_NUMBERED = re.compile(r'(?P<family>\w*?[a-z_])(?P<legs>\d+)')
+
+
+def pairs(legs: int) -> tuple[str, ...]:
+    """Names of the pairs of legs, hindmost first.
+
+    Raises:
+        InputError: the number is not even, or not from 2 to MOST.
+
+    """
+    if legs % 2 or not 2 <= legs <= MOST:
+        raise InputError(f'{legs} legs are not an even number from 2 to {MOST}')
+    if legs == 2:
+        return ('',)
+    if legs <= 6:
+        return ('h', 'm', 'f') if legs == 6 else ('h', 'f')
+    return tuple(str(pair) for pair in range(legs // 2, 0, -1))
+
+
+def leg_names(legs: int) -> tuple[str, ...]:
+    """Names of the legs, pair by pair from behind, left before right.
+
+    Raises:
+        InputError: as of pairs.
+
+    """
+    found = pairs(legs)
+    return BIPED if legs == 2 else tuple(side + pair for pair in found for side in 'lr')
+
+
+def places(legs: int) -> dict[str, dict[str, str]]:
+    """Return ``sides`` and ``girdles`` of the legs, as a network states them.
+
+    Raises:
+        InputError: as of pairs.
+
+    """
+    if legs == 2:
+        return {'sides': {leg: leg for leg in BIPED}, 'girdles': {}}
+    known = pairs(legs)
+    words = dict.fromkeys(known, 'middle') | {known[0]: 'hind', known[-1]: 'fore'}
+    names = leg_names(legs)
+    return {'sides': {leg: {'l': 'left', 'r': 'right'}[leg[0]] for leg in names},
+            'girdles': {leg: words[leg[1:]] for leg in names}}
+
+
+def leg_count(network: 'type[Network]') -> int:
+    """Return how many legs a network has."""
+    return len(next(iter(network.legs.values())))
+
+
+def with_legs(network: 'type[Network]', legs: int) -> 'type[Network]':
+    """Return a network's like for another number of legs.
+
+    Raises:
+        InputError: the network takes no such number.
+
+    """
+    family = network.family or network
+    return family if legs == leg_count(family) else _made(family, legs)
+
+
+@cache
+def _made(family: 'type[Network]', legs: int) -> 'type[Network]':
+    stated: dict[str, Any] = family.fitted(legs)
+    names: tuple[str, ...] = stated.pop('fields', ())
+    # Where legs have parameters of their own, they are not those of the family's legs.
+    bases = (family.__bases__ if names else (family,))
+    found = type(f'{family.__name__}{legs}', bases, {
+        '__module__': family.__module__, '__doc__': family.__doc__, 'family': family,
+        'name': f'{family.name}{legs}', '__annotations__': dict.fromkeys(names, float),
+        **stated})
+    return dataclass(frozen=True)(found) if names else found
+
+
+def restored(family: 'type[Network]', legs: int, values: tuple[float, ...]) -> 'Network':
+    """Return a network from its family, number of legs and parameters: what pickle calls."""
+    return with_legs(family, legs)(*values)
+
+
+def parted(name: str) -> tuple[str, int] | None:
+    """Split a name such as 'delayed6' into that of the family and the number of legs."""
+    found = _NUMBERED.fullmatch(name)
+    return (found['family'], int(found['legs'])) if found and len(found['legs']) < 4 else None
