@@ -91,7 +91,7 @@ class Driven:
         n = np.arange(len(c))
         for name_of_leg, own in legs.items():
             listed = []
-            for cell, (joint, x, y, offset) in zip(own, self.READOUT, strict=True):
+            for cell, (joint, x, y, offset) in zip(2 * own, self.READOUT, strict=False):
                 listed.append(f'{name_of_leg}_{joint}')
                 self.cells[listed[-1]], self.gains[listed[-1]] = cell, complex(x, y)
                 self._series.append((offset, c[:, cell - 1] / size * (x + 1j * n * y)))

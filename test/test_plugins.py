@@ -25,7 +25,7 @@ from cpg_ros.dynamics.orbit import solve_preset
 from cpg_ros.inversion.parameter_files import write_fitted
 from cpg_ros.inversion.recording_fit import inverted
 from cpg_ros.motion.plan import plan
-from cpg_ros.networks.registry import find_network, NetworkError, NETWORKS, PRESETS
+from cpg_ros.networks.registry import find_network, NetworkError, NETWORKS, PRESETS, SHIPPED
 from cpg_ros.recordings.csv_reader import read_csv
 from cpg_ros.robots.robot_file import load_robot, RobotError, write_robot
 from cpg_ros.search.search_space import search_space
@@ -93,7 +93,7 @@ GIRDLES = {'lh': 'hind', 'rh': 'hind', 'lf': 'fore', 'rf': 'fore'}
 def test_a_file_is_a_network_and_then_has_a_name(twin):
     kind = find_network(str(twin))
     assert find_network(str(twin)) is kind is NETWORKS['twin'] is find_network('twin')
-    assert list(NETWORKS) == ['delayed', 'quadruped', 'biped', 'twin']
+    assert list(NETWORKS) == [*SHIPPED, 'twin'] and next(iter(SHIPPED)) == 'delayed'
     assert PRESETS['twin'] == kind.presets()
     orbit, known = (solve_preset(PRESETS[name]['trot']) for name in ('twin', 'delayed'))
     assert orbit.period == known.period
@@ -235,7 +235,7 @@ def test_other_packages_offer_networks(tmp_path, offered):
         found['gaits']['trot']['period'])
     assert set(found['gaits']['trot']['phases']) == {'p', 'q', 'r', 's'}
     code, said, _ = analysed('hexapod', **places)
-    assert code == 2 and "'hexapod' is not one of delayed, quadruped, biped, lent" in said
+    assert code == 2 and f"'hexapod' is not one of {', '.join(SHIPPED)}, lent" in said
 
 
 @pytest.mark.parametrize(('name', 'value', 'words'), [

@@ -56,7 +56,8 @@ class Quotient:
         self.size = network.variables
         self._variables = [one.variable for one in equations.arguments]
         self._whole = [float(value.flat[0]) for value in values_of(network)]
-        self._coupled = [(network.groups[row][0] if row in equations.groups else row)
+        by_cell = equations.by_cell
+        self._coupled = [(by_cell[row][0] if row in by_cell else row)
                          in network.couplings for row in equations.rows]
         self._p = self._whole
 

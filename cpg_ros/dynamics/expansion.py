@@ -109,8 +109,8 @@ class Expansion:
     def _moving(self, line: ParameterLine) -> dict[int, float]:
         """How fast the rows of parameters move along a line, those that do."""
         signs = dict(zip(line.names, line.signs, strict=True))
-        names = [self.network.groups[row][0] if row in self._equations.groups else row
-                 for row in self._equations.rows]
+        by_cell = self._equations.by_cell
+        names = [by_cell[row][0] if row in by_cell else row for row in self._equations.rows]
         return {r: signs[name] for r, name in enumerate(names) if name in signs}
 
     def along(self, line: ParameterLine) -> np.ndarray:

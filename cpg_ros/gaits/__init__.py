@@ -18,5 +18,5 @@ Imports ``networks`` and ``files``; knows nothing of ROS.
 """
 
 __all__ = ['doubts', 'leg_motion', 'leg_names', 'leg_phases', 'mean_cycle', 'period',
-           'phase_average', 'phase_estimation', 'recognition', 'steady_stretch', 'stride',
-           'waveform_comparison']
+           'phase_average', 'phase_estimation', 'phase_scatter', 'recognition',
+           'steady_stretch', 'stride', 'waveform_comparison']

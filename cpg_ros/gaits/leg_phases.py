@@ -232,9 +232,13 @@ def named(phases: Mapping[str, float], network: type[Network]) -> Named:
     own = np.array(list(phases.values()))
     cells = [listed[0] - 1 for listed in next(iter(network.legs.values())).values()]
     apart, size = {}, {}
-    for gait in network.gaits():
+    for gait in (one for one in network.gaits() if one != network.unnamed):
         symmetry = _symmetry(network, gait)
         wanted, waves = symmetry.phases[cells], symmetry.waves[cells]
+        if symmetry.leads:
+            # Stated, in either sense, between whatever waveforms.
+            apart[gait], size[gait] = _apart(own, wanted, np.zeros_like(waves)), 0
+            continue
         apart[gait] = _apart(own, wanted, waves)
         # A wave that runs round may do so in both senses, where these are not two gaits.
         if not _reversed(network, gait, symmetry):

@@ -36,6 +36,7 @@ from cpg_ros.gaits.leg_names import Legs
 from cpg_ros.gaits.leg_phases import leg_phases, named, named_by_cells, told_apart
 from cpg_ros.gaits.phase_average import Warped, warped
 from cpg_ros.gaits.phase_estimation import followed, grown, Rough, Warp
+from cpg_ros.gaits.phase_scatter import phase_scatter, PhaseScatter
 from cpg_ros.gaits.steady_stretch import best, CYCLES, even, FASTEST, FEWEST, FINER, stretches
 from cpg_ros.networks.network import Network
 import numpy as np
@@ -107,6 +108,7 @@ class Stride:
         counts: samples used, (joints,).
         phases: leg -> cycles in [0, 1) by which it is ahead of the first leg, in the order of
             the network's legs: x_leg(t) = x_first(t + phase T).
+        scatter: leg -> how well its phase is known, and kept from stride to stride.
         gait: name, None if none is near enough.
         nearest: the nearest gait.
         distance: of the leg phases from the nearest, RMS over legs, cycles.
@@ -131,6 +133,7 @@ class Stride:
     error: np.ndarray
     counts: np.ndarray
     phases: dict[str, float]
+    scatter: dict[str, PhaseScatter]
     gait: str | None
     nearest: str
     distance: float
@@ -223,7 +226,8 @@ def find_stride(recording: Recorded, legs: Legs | Mapping[str, Sequence[str]],
         doubts.append(Doubt(f'it may as well be a {rivals}: name the gait it is (--gait)', 1.0))
     return Stride(float(warp.knots[0]), float(warp.knots[-1]), warp.frequency,
                   warp.frequency_error, int(warp.cycles + 1e-6), tuple(names), theta,
-                  found.mean(theta), found.spread, found.error, found.counts, ahead, gait.gait,
+                  found.mean(theta), found.spread, found.error, found.counts, ahead,
+                  phase_scatter(phases, x, found, leading, names), gait.gait,
                   gait.nearest, gait.distance, gait.margin,
                   gait.sure * float(np.prod([one.left for one in doubts])),
                   tuple(one.said for one in doubts if one.said),

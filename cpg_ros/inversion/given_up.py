@@ -61,6 +61,9 @@ def fit_at_all(cycle: MeanCycle, cells: Mapping[str, int], network: Network, gai
         NoOrbit: not even the parameters given have an orbit that the generator runs.
 
     """
+    if not (free or network.free):
+        # Phases are known beforehand, and no other parameter shows.
+        return _as_it_is(cycle, cells, network, gait, order, done), ()
     first = ''
     for names, lower, begins, said in _ways(tuple(free or network.free), order, starts):
         try:

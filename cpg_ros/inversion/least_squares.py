@@ -14,7 +14,7 @@
 
 """The fit of a gait to a mean cycle as a least-squares problem in its free numbers alone."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from cpg_ros.dynamics.orbit import solve_beside, solve_orbit
@@ -152,14 +152,20 @@ class Problem:
         key = np.asarray(values).tobytes()
         if self._placed is None or self._placed[0] != key:
             orbit, seen = self._solve(values)
-            self._placed = key, Placed(orbit, *self._read(seen, float(values[-1])))
+            self._placed = key, Placed(orbit, *self._read(orbit, seen, float(values[-1])))
         return self._placed[1]
 
-    def _read(self, seen: Signals, phase: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def _placed_by(self, orbit: Orbit) -> Iterator[tuple[int, float, list[int]]]:
+        """Yield wave, phase in the orbit, and columns of the joints that cells alike drive."""
+        for (wave, _), columns in self._places.items():
+            yield wave, float(orbit.phases[self.joints.cells[columns[0]]]), columns
+
+    def _read(self, orbit: Orbit, seen: Signals, phase: float
+              ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         m, joints = self.joints.data.shape
         weights = np.empty((self.weights, joints))
         residual, jacobian = np.empty((m, joints)), np.empty((m, joints, len(self.free) + 1))
-        for (wave, place), columns in self._places.items():
+        for wave, place, columns in self._placed_by(orbit):
             theta, shift = self.joints.theta, place + phase
             x, y, z = seen.values(theta, shift, wave)
             psi, by_phase = basis(self.order, x, y, z)
@@ -193,9 +199,9 @@ class Problem:
 
     def first_phase(self, values: np.ndarray) -> float:
         """Guess the phase: of an even grid, the one whose readouts explain most."""
-        seen, shifts = self._solve(values)[1], np.arange(SHIFTS) / SHIFTS
+        (orbit, seen), shifts = self._solve(values), np.arange(SHIFTS) / SHIFTS
         explained = np.zeros(SHIFTS)
-        for (wave, place), columns in self._places.items():
+        for wave, place, columns in self._placed_by(orbit):
             psi = basis(self.order, *seen.values(self.joints.theta, place + shifts, wave))[0]
             data = (self.joints.data / self.sizes)[:, columns]
             sums = np.einsum('msn,mj->snj', psi, data)

@@ -14,7 +14,7 @@
 
 """A recording inverted: its steady stride, the gait fitted to it, and how well that does."""
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -24,10 +24,20 @@ from cpg_ros.gaits.stride import find_stride, Stride
 from cpg_ros.inversion.fit_data import cells_of
 from cpg_ros.inversion.gait_fit import Fit
 from cpg_ros.inversion.given_up import fit_at_all
+from cpg_ros.inversion.identifiability import Estimate
+from cpg_ros.networks.network import Network
 from cpg_ros.networks.preset_files import Preset
-from cpg_ros.networks.registry import find_network, NetworkError, numbered, SHIPPED, with_legs_of
+from cpg_ros.networks.registry import (
+    find_network,
+    NetworkError,
+    NETWORKS,
+    numbered,
+    SHIPPED,
+    with_legs_of,
+)
 from cpg_ros.recordings.recording import Recording
 from cpg_ros.robots.robot import Robot
+import numpy as np
 
 #: Mean RMS error over range above which a fit is poor, by the order of the readout: real trots
 #: and walks leave 0.14 to 0.19, 0.05 to 0.09 and 0.03 to 0.04; and what it leaves of confidence.
@@ -138,6 +148,48 @@ def _legs(recording: Recording, robot: Robot | None) -> tuple[dict[str, tuple[st
             read + (f'; not recorded: {", ".join(missing)}' if missing else ''))
 
 
+def _networks(robot: Robot | None, legs: Iterable[str]) -> Iterator[type[Network]]:
+    """The networks that drive a robot, or else those shipped that have these legs."""
+    wanted = set(legs)
+    yield from ((NETWORKS[name] for name in robot.networks) if robot is not None else
+                (kind for kind in numbered(len(wanted))
+                 if wanted <= set(next(iter(kind.legs.values())))))
+
+
+def _stride(recording: Recording, legs: Mapping[str, Sequence[str]], kind: type[Network],
+            robot: Robot | None) -> tuple[dict[str, int], Stride]:
+    """Return joint -> its cell in a network, and the steady stride of the recording."""
+    cells = cells_of(robot if robot is not None else legs, kind)
+    cells = {name: cell for name, cell in cells.items() if name in recording.joints}
+    gains = None if robot is None else {
+        joint.name: complex(*joint.weights[:2]) for joint in robot.joints}
+    return cells, find_stride(recording.select(tuple(cells)), legs, kind,
+                              None if robot is None else cells, gains)
+
+
+def _none_of(kind: type[Network], stride: Stride) -> str:
+    """Say that the phases are those of no gait, what they are and how far they scatter."""
+    said = ', '.join(f'{leg} {phase:.3f}' + (
+        f' +- {stride.scatter[leg].spread:.3f}' if stride.scatter[leg].spread > 0.0 else '')
+        for leg, phase in stride.phases.items())
+    return (f'the recorded phases are none of the gaits of the network {kind.name}: the nearest '
+            f'is {stride.nearest}, {stride.distance:.3f} of a cycle off; phases at '
+            f'{stride.frequency:.4g} Hz, and how far single strides are off them: {said}')
+
+
+def _phases_as_estimates(fit: Fit, stride: Stride) -> dict[str, Estimate]:
+    """What the recording tells of the phases that a network's parameters state."""
+    known, found = fit.network.as_dict(), {}
+    for leg, one in list(stride.scatter.items())[1:]:
+        name = fit.network.offsets.get(leg)
+        if name is not None and name not in fit.parameters:
+            told = one.error == one.error
+            half = one.half_width if told else np.inf
+            found[name] = Estimate(known[name], one.error if told else np.inf,
+                                   known[name] - half, known[name] + half, told)
+    return found
+
+
 def inverted(recording: Recording, robot: Robot | None = None, network: str = '', gait: str = '',
              free: Sequence[str] = (), order: int = 3, preset: str = '',
              starts: Sequence[Mapping[str, float]] = ({},),
@@ -161,35 +213,37 @@ def inverted(recording: Recording, robot: Robot | None = None, network: str = ''
 
     """
     legs, read = _legs(recording, robot)
+    asked = bool(network)
     if not network:
         network = robot.networks[0] if robot is not None else network_of(legs)
     try:
         kind = with_legs_of(find_network(network), legs)
     except NetworkError as error:
         raise InputError(f'network {error}') from error
-    network = kind.name
-    cells = cells_of(robot if robot is not None else legs, kind)
-    cells = {name: cell for name, cell in cells.items() if name in recording.joints}
-    gains = None if robot is None else {
-        joint.name: complex(*joint.weights[:2]) for joint in robot.joints}
-    stride = find_stride(recording.select(tuple(cells)), legs, kind,
-                         None if robot is None else cells, gains)
-    warnings = list(stride.doubts)
+    cells, stride = _stride(recording, legs, kind, robot)
+    between = ''
+    if not (gait or stride.gait or asked or kind.offsets):
+        between = _none_of(kind, stride)
+        as_they_are = next((one for one in _networks(robot, legs) if one.offsets), None)
+        if as_they_are is not None:
+            kind = as_they_are
+            cells, stride = _stride(recording, legs, kind, robot)
+            between += f'; they are fitted as they are, by the network {kind.name}'
+    warnings = [*([between] if between else []), *stride.doubts]
     if not gait:
-        gait = stride.gait or ''
+        gait = stride.gait or kind.unnamed
         if not gait:
-            said = ', '.join(f'{leg} {phase:.3f}' for leg, phase in stride.phases.items())
             raise InputError('; '.join((
-                f'{recording.source}: the recorded phases are none of the gaits of the network '
-                f'{network}: the nearest is {stride.nearest}, {stride.distance:.3f} of a cycle '
-                'off; name the gait to fit it all the same',
-                f'phases at {stride.frequency:.4g} Hz: {said}',
-                *recording.notes, *stride.notes, *stride.doubts)))
+                f'{recording.source}: {_none_of(kind, stride)}; name the gait to fit it all the '
+                'same', *recording.notes, *stride.notes, *stride.doubts)))
+        if not stride.gait and not between:
+            warnings.append(_none_of(kind, stride))
     elif stride.gait != gait:
         warnings.append(f'the recorded phases are those of {stride.gait or "none of the gaits"}, '
                         f'not of {gait}')
-    parameters = preset_of(network, preset or gait).network
+    parameters = preset_of(kind.name, preset or gait).network.with_phases(stride.phases)
     fit, given_up = fit_at_all(stride, cells, parameters, gait, free, order, starts, done)
+    fit = replace(fit, parameters={**_phases_as_estimates(fit, stride), **fit.parameters})
     found = Inverted(recording, read, legs, stride, fit,
                      {order: fit.share_at(order) for order in ORDERS},
                      (*warnings, *given_up, *fit.warnings))

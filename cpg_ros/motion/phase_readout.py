@@ -60,7 +60,8 @@ def _cached(digest):
         """Let the cells' clocks go on and read joints and legs off them.
 
         Args:
-            now: x, x', x'' of the components, shape (3, 2 size); only x is used.
+            now: x, x', x'' of the components, two or more of each cell, shape (3, ...); only x
+                of the first two is used.
             strides: since the last look; with 0 the clocks stand and are only read.
             waves: number of each cell's waveform, shape (size,).
             phases: phase of each cell in the gait, cycles, shape (size,).
@@ -216,7 +217,7 @@ class PhaseMap:
         self.tables = np.empty((count, POINTS, 4))
         self.terms, self.crests = np.empty((count, 1 + harmonics, 2)), np.empty(count)
         for wave, levels in enumerate(orbit.levels):
-            half = levels[:, 1]
+            half = levels[:2, 1]
             states, slopes = (np.stack([orbit.waveform(theta, order, wave, variable)
                                         for variable in (0, 1)], axis=1) for order in (0, 1))
             mean = states.mean(axis=0)
@@ -246,7 +247,7 @@ def phase_map(orbit: Orbit, harmonics: int) -> PhaseMap:
 
 
 class PhaseReadout:
-    """Joints driven by the phase of cells with two variables.
+    """Joints driven by the phase of cells, which their first two variables tell.
 
     Attributes:
         start: phase of the first leg at the orbit's phase 0, cycles.

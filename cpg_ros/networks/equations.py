@@ -89,8 +89,7 @@ class Parameters:
 
     def __init__(self, network: 'type[Network]') -> None:
         """Offer the parameters by name, and groups that have one for each cell."""
-        self._known = {*network.parameters(), *(
-            name for name, members in network.groups.items() if len(members) == network.cells)}
+        self._known = {*network.parameters(), *network.by_cell()}
 
     def __getattr__(self, name: str) -> Term:
         if name not in self._known:
@@ -106,7 +105,7 @@ class Equations:
     Attributes:
         arguments: that stand in them, in order.
         rows: names of the parameters, or groups of them, that stand in them.
-        groups: names that have a parameter for each cell.
+        by_cell: name that has a parameter for each cell -> these.
         texts: the rate of each variable, in x0, x1 ... for the arguments and p_NAME.
         key: digest of all that follows from them.
 
@@ -130,7 +129,7 @@ class Equations:
         self._numbers = tuple(k for k in range(len(cell.arguments))
                               if re.search(rf'\bx{k}\b', said))
         self.arguments = tuple(cell.arguments[k] for k in self._numbers)
-        self.groups = frozenset(network.groups)
+        self.by_cell = network.by_cell()
         self.rows = tuple(dict.fromkeys(re.findall(r'\bp_(\w+)', said)))
         words = repr((self.texts, cell.arguments, network.cells))
         self.key = f'{network.name}_{hashlib.sha256(words.encode()).hexdigest()[:16]}'
@@ -197,6 +196,7 @@ def equations_of(network: 'type[Network]') -> Equations:
 
 def values_of(network: 'Network') -> list[np.ndarray]:
     """Return the parameters of the equations' rows, each one number or one for each cell."""
-    groups = network.groups
-    return [np.array([getattr(network, name) for name in groups[row]]) if row in groups
-            else np.array(getattr(network, row)) for row in equations_of(type(network)).rows]
+    equations = equations_of(type(network))
+    return [np.array([getattr(network, name) for name in equations.by_cell[row]])
+            if row in equations.by_cell else np.array(getattr(network, row))
+            for row in equations.rows]

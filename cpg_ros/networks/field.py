@@ -62,8 +62,9 @@ class Field:
         self._p = [value[first] if value.ndim else value for value in values_of(network)]
         columns = list(network.parameters())
         #: For each row of parameters, the columns of the kept cells.
-        self._columns = [np.array([columns.index(name) for name in network.groups[row]])[first]
-                         if row in network.groups else columns.index(row)
+        by_cell = self._equations.by_cell
+        self._columns = [np.array([columns.index(name) for name in by_cell[row]])[first]
+                         if row in by_cell else columns.index(row)
                          for row in self._equations.rows]
 
     def _arguments(self, now: np.ndarray, past: np.ndarray | None) -> list[np.ndarray]:

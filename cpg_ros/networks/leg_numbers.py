@@ -23,6 +23,7 @@ rh, lf, rf); six have a middle pair, lm and rm, between them. More are counted o
 the foremost, l1 r1 l2 r2 ..., as arachnologists do.
 """
 
+from dataclasses import dataclass
 from functools import cache
 import re
 from typing import Any, TYPE_CHECKING
@@ -101,9 +102,14 @@ def with_legs(network: 'type[Network]', legs: int) -> 'type[Network]':
 @cache
 def _made(family: 'type[Network]', legs: int) -> 'type[Network]':
     stated: dict[str, Any] = family.fitted(legs)
-    return type(f'{family.__name__}{legs}', (family,), {
+    names: tuple[str, ...] = stated.pop('fields', ())
+    # Where legs have parameters of their own, they are not those of the family's legs.
+    bases = (family.__bases__ if names else (family,))
+    found = type(f'{family.__name__}{legs}', bases, {
         '__module__': family.__module__, '__doc__': family.__doc__, 'family': family,
-        'name': f'{family.name}{legs}', **stated})
+        'name': f'{family.name}{legs}', '__annotations__': dict.fromkeys(names, float),
+        **stated})
+    return dataclass(frozen=True)(found) if names else found
 
 
 def restored(family: 'type[Network]', legs: int, values: tuple[float, ...]) -> 'Network':

@@ -21,9 +21,9 @@ which the legs read (x or v), then the second one (w or u). All three networks h
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from functools import cache
-from typing import Any, ClassVar, Literal, NamedTuple
+from typing import Any, ClassVar, Literal, NamedTuple, TypeVar
 
 from cpg_ros.errors import InputError
 from cpg_ros.networks.equations import Cell, values_of
@@ -38,6 +38,9 @@ __all__ = ['Network', 'Preset', 'Range', 'footfall_order', 'known']
 
 #: Pairs of legs from the head on.
 GIRDLES = ('fore', 'middle', 'hind')
+
+
+AnyNetwork = TypeVar('AnyNetwork', bound='Network')
 
 
 @dataclass(frozen=True)
@@ -83,7 +86,12 @@ class Network(ABC):
             diagrams draw when it is active. Otherwise both are of legs, which stand while their
             first cell falls.
         groups: name -> parameters that can be set together under it.
+        own_of_cells: name in the equations -> the parameter that each cell has for it, where
+            they are not to be set together as a group is.
         couplings: parameters without which no cell hears another.
+        offsets: leg -> the parameter that states by how many cycles it is ahead, where any phases
+            are a gait and no symmetry tells them.
+        unnamed: the gait with whatever phases, of such a network.
         usual_gait: that it starts with; a gait's own name is that of its usual preset.
         usual_robot: file that it starts with, or name of a shipped one.
         free: parameters or groups that are usually fitted to a recording.
@@ -112,7 +120,10 @@ class Network(ABC):
     girdles: ClassVar[dict[str, str]] = {}
     muscles: ClassVar[dict[str, int]] = {}
     groups: ClassVar[dict[str, tuple[str, ...]]] = {}
+    own_of_cells: ClassVar[dict[str, tuple[str, ...]]] = {}
     couplings: ClassVar[tuple[str, ...]] = ()
+    offsets: ClassVar[dict[str, str]] = {}
+    unnamed: ClassVar[str] = ''
     usual_gait: ClassVar[str]
     usual_robot: ClassVar[str] = ''
     free: ClassVar[tuple[str, ...]]
@@ -136,7 +147,8 @@ class Network(ABC):
         """Return what the network states for another number of legs: attribute -> value.
 
         One that takes any even number gives its cells, legs, sides and girdles by a rule, and
-        whatever else depends on them; ``equations`` then hear by rules, too.
+        whatever else depends on them; ``equations`` then hear by rules, too. Parameters that the
+        legs have of their own are named by ``fields``.
 
         Raises:
             ValueError: it takes no such number.
@@ -217,6 +229,36 @@ class Network(ABC):
 
         """
 
+    @property
+    def leads(self) -> tuple[float, ...]:
+        """Phase of each cell against cell 1 in cycles, where parameters state it; or else ()."""
+        if not self.offsets:
+            return ()
+        found = [0.0] * self.cells
+        for leg, cells in next(iter(self.legs.values())).items():
+            for cell in cells:
+                found[cell - 1] = float(getattr(self, self.offsets[leg]))
+        return tuple((lead - found[0]) % 1.0 for lead in found)
+
+    def with_phases(self: AnyNetwork, phases: Mapping[str, float]) -> AnyNetwork:
+        """Return the network with the phases of these legs, cycles; itself if it states none."""
+        wanted = {self.offsets[leg]: float((phase + 0.5) % 1.0 - 0.5)
+                  for leg, phase in phases.items() if leg in self.offsets}
+        return replace(self, **wanted) if wanted else self  # type: ignore[type-var]
+
+    def on_orbit(self, gait: str) -> tuple[np.ndarray, float] | None:
+        """Return a state on the gait's orbit and its period, where they are known beforehand.
+
+        The state is of shape (components,), cell 1 about to peak; the period is in model time.
+        """
+        return None
+
+    @classmethod
+    def by_cell(cls) -> dict[str, tuple[str, ...]]:
+        """Names that stand in the equations for a parameter of each cell -> these parameters."""
+        return {**{name: members for name, members in cls.groups.items()
+                   if len(members) == cls.cells}, **cls.own_of_cells}
+
     @classmethod
     def families(cls, symmetry: Symmetry) -> tuple[tuple[str, ...], ...]:
         """Parameters that a gait's symmetry carries into one another, and so has to find equal."""
@@ -251,7 +293,7 @@ class Network(ABC):
         """Tell whether a gait is walk-like or run-like (Buono & Golubitsky 2001, section 7).
 
         Walk-like: the two cells of every leg, its flexors and extensors, are half a cycle
-        apart; run-like: in phase; neither otherwise.
+        apart; run-like: in phase; neither otherwise, and where a leg has not two cells.
 
         Raises:
             ValueError: an unknown gait, or an assignment that is not one of ``legs``.
@@ -260,7 +302,10 @@ class Network(ABC):
         if assignment not in self.legs:
             raise InputError(f"assignment '{assignment}' is not one of {', '.join(self.legs)}")
         symmetry = self.symmetry(gait)
-        pairs = [(a - 1, b - 1) for a, b in self.legs[assignment].values()]
+        legs = self.legs[assignment].values()
+        if any(len(cells) != 2 for cells in legs):
+            return 'neither'
+        pairs = [(a - 1, b - 1) for a, b in legs]
         alike = all(symmetry.waves[a] == symmetry.waves[b] for a, b in pairs)
         apart = {float((symmetry.phases[b] - symmetry.phases[a]) % 1.0) for a, b in pairs}
         return ('run-like' if alike and apart == {0.0} else

@@ -61,9 +61,14 @@ def _names(network: type[Network]) -> Iterator[str]:
     yield from _unknown('free', network.free, either)
     yield from _unknown('needed', network.needed, parameters)
     yield from _unknown('couplings', network.couplings, parameters)
+    yield from _unknown('offsets', network.offsets.values(), parameters)
     yield from _unknown('readout', [network.readout], ('waveform', 'phase'))
-    if network.readout == 'phase' and network.variables != 2:
+    if network.readout == 'phase' and network.variables < 2:
         yield 'readout: the phase is told by cells with two variables'
+    for name, members in network.own_of_cells.items():
+        yield from _unknown(f'own_of_cells: {name}', members, parameters)
+        if len(members) != network.cells:
+            yield f'own_of_cells: {name} names {len(members)} parameters for {network.cells} cells'
     if network.delay_parameter:
         yield from _unknown('delay_parameter', [network.delay_parameter], parameters)
         if not network.step <= network.longest_delay:
@@ -96,6 +101,8 @@ def _legs(network: type[Network]) -> Iterator[str]:
                 yield f'{where}: {leg} has no cell'
             yield from (f'{where}: {leg} has the cell {cell}, and there are {network.cells}'
                         for cell in cells if cell not in numbers)
+    if network.offsets and set(network.offsets) != set(first):
+        yield 'offsets: there must be one for each leg'
     for name, table, words in (('sides', network.sides, ('left', 'right')),
                                ('girdles', network.girdles, GIRDLES)):
         yield from _unknown(name, table, first)
@@ -107,6 +114,8 @@ def _legs(network: type[Network]) -> Iterator[str]:
 def _gaits(network: type[Network]) -> Iterator[str]:
     gaits, presets = network.gaits(), network.presets()
     yield from _unknown('usual_gait', [network.usual_gait], gaits)
+    if network.offsets:
+        yield from _unknown('unnamed', [network.unnamed], gaits)
     for gait in gaits:
         if gait not in presets:
             yield f"presets: the gait '{gait}' has none of its own name"

@@ -32,15 +32,16 @@ from typing import TypeVar
 from zlib import crc32
 
 from cpg_ros.errors import CpgError, InputError
-from cpg_ros.networks import biped, delayed, quadruped
+from cpg_ros.networks import biped, delayed, oscillators, quadruped
 from cpg_ros.networks.leg_numbers import parted, with_legs
 from cpg_ros.networks.network import Network, Preset
 from cpg_ros.networks.network_check import flaw
 
 GROUP = 'cpg_ros.networks'
+_OWN: list[type[Network]] = [delayed.Delayed, quadruped.Quadruped, biped.Biped,
+                             *oscillators.shipped()]
 #: Those that come with the package.
-SHIPPED: dict[str, type[Network]] = {
-    network.name: network for network in (delayed.Delayed, quadruped.Quadruped, biped.Biped)}
+SHIPPED: dict[str, type[Network]] = {network.name: network for network in _OWN}
 
 Entry = TypeVar('Entry')
 

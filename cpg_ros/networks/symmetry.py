@@ -21,7 +21,7 @@ H/K is cyclic (eq. 2.2). So a gait is a homomorphism from a subgroup H into the 
 """
 
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import cache, cached_property
 from itertools import product
@@ -126,6 +126,8 @@ class Symmetry:
         variables: state variables of each cell.
         odd: whether the network has the symmetry x -> -x, and the gait it with a shift of 1/2:
             every waveform is its own negative half a cycle later.
+        leads: phase of each cell in cycles as the network's parameters state it, where the
+            group tells none: between different waveforms. Not part of what a symmetry is.
 
     """
 
@@ -133,10 +135,11 @@ class Symmetry:
     shifts: tuple[tuple[str, Fraction], ...]
     variables: int = 2
     odd: bool = False
+    leads: tuple[float, ...] = field(default=(), compare=False)
 
     @classmethod
     def of(cls, group: Group, shifts: Mapping[str, Fraction | float], variables: int = 2,
-           odd: bool = False) -> 'Symmetry':
+           odd: bool = False, leads: tuple[float, ...] = ()) -> 'Symmetry':
         """Build from the shifts of elements that generate H.
 
         Raises:
@@ -146,7 +149,12 @@ class Symmetry:
         for name in shifts:
             if name not in group.elements:
                 raise InputError(f"'{name}' is not one of {', '.join(group.elements)}")
-        return _generated(group, tuple(shifts.items()), variables, odd)
+        found = _generated(group, tuple(shifts.items()), variables, odd)
+        return found.led(leads)
+
+    def led(self, leads: tuple[float, ...]) -> 'Symmetry':
+        """Return the same symmetry with other stated phases of the cells."""
+        return self if leads == self.leads else replace(self, leads=leads)
 
     @property
     def h(self) -> tuple[str, ...]:
@@ -193,10 +201,13 @@ class Symmetry:
         """Number of each cell's waveform, from 0, shape (cells,)."""
         return self._orbit_of_cells[0]
 
-    @property
+    @cached_property
     def phases(self) -> np.ndarray:
         """Phase of each cell in cycles, shape (cells,): x_i(t) = u_wave(i)(t + phase_i T)."""
-        return self._orbit_of_cells[1]
+        shifts = self._orbit_of_cells[1]
+        if not self.leads:
+            return shifts
+        return (shifts + np.array(self.leads)[self.first[self.waves]]) % 1.0
 
     @cached_property
     def first(self) -> np.ndarray:

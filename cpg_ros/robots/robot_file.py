@@ -208,13 +208,15 @@ def load_robot(path: str | Path) -> Robot:
         if assignment not in NETWORKS[name].legs:
             raise reader.fail('assignment', f"'{assignment}' is not one of the network {name}: "
                               f'{", ".join(NETWORKS[name].legs)}')
-        if NETWORKS[name].legs[assignment] != first.legs[assignment]:
+        if not _alike(NETWORKS[name].legs[assignment], first.legs[assignment]):
             raise reader.fail('network', f"'{name}' has other legs or cells than '{networks[0]}'")
     harmonics = tree.get('harmonics', HARMONICS)
     if type(harmonics) is not int or not 1 <= harmonics <= 32:
         raise reader.fail('harmonics', f'must be a whole number from 1 to 32, not '
                           f'{shown(harmonics)}')
-    cells = first.legs[assignment]
+    cells = {leg: tuple(cell for cell in own if all(
+        cell in NETWORKS[name].legs[assignment][leg] for name in networks))
+        for leg, own in first.legs[assignment].items()}
     reader.keys(tree['legs'], 'legs', set(cells))
 
     legs: dict[str, tuple[Joint, ...]] = {}
@@ -267,6 +269,11 @@ def load_robot(path: str | Path) -> Robot:
             if leg not in robot.sides:
                 raise reader.fail(f'legs.{leg}.side', 'is missing: steering needs it')
     return robot
+
+
+def _alike(cells: Mapping[str, tuple[int, ...]], others: Mapping[str, tuple[int, ...]]) -> bool:
+    """Whether two networks have the same legs, led by the same cells; others may differ."""
+    return set(cells) == set(others) and all(cells[leg][0] == others[leg][0] for leg in cells)
 
 
 def find_robot(name: str) -> Robot:

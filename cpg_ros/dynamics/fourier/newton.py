@@ -132,7 +132,7 @@ def by_parameter(network: Network, symmetry: Symmetry, point: Point) -> np.ndarr
         slope = np.broadcast_to(slope, (rows // variables, n))
         row = kind.rows[r]
         for wave, cell in enumerate(symmetry.first):
-            name = network.groups[row][cell] if row in network.groups else row
+            name = kind.by_cell[row][cell] if row in kind.by_cell else row
             out[wave * variables + v, :, names.index(name)] -= slope[wave]
     if network.delay_parameter:
         out[..., names.index(network.delay_parameter)] += by_delay

@@ -58,7 +58,7 @@ class Reduced(Field):
         super().__init__(network, symmetry.classes)
         first = self.kept[:self.size]
         blocks = np.arange(network.variables)[:, None]
-        self.symmetry = symmetry
+        self.symmetry = symmetry.led(network.leads)
         self.turn = (symmetry.classes[symmetry.turn[first]] + blocks * self.size).ravel()
 
 

@@ -58,7 +58,7 @@ class MeshOrbit(Orbit):
 
     def _evaluate(self, coefficients: np.ndarray, theta: np.ndarray, order: int, wave: int,
                   variable: int) -> np.ndarray:
-        theta = np.asarray(theta, dtype=float)
+        theta = np.asarray(theta, dtype=float) - self.phases[self.symmetry.first[wave]]
         places = (theta - np.floor(theta)) * self.symmetry.order
         part = np.minimum(places.astype(int), self.symmetry.order - 1)
         places = places - part

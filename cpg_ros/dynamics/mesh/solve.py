@@ -51,16 +51,27 @@ def from_preset(preset: Preset) -> MeshOrbit:
     check_values(network, preset.gait)
     symmetry = network.symmetry(preset.gait)
     if preset.start is None:
-        return _sought(network, preset.gait)
+        return _stated(network, preset.gait) or _sought(network, preset.gait)
     start = np.array(preset.start)
-    run = simulate(network, start, 1.05 * preset.period, network.step, progress=False)
-    orbit = _accepted(from_path(network, symmetry, lambda theta: run(theta * preset.period),
-                                preset.period))
+    orbit = _from_state(network, symmetry, start, preset.period)
     if orbit is None:
         orbit = _by_itself(network, symmetry, start, preset.period)
     if orbit is None:
         raise NoOrbit(f'no {preset.gait} was found from the start given')
     return orbit
+
+
+def _from_state(network: Network, symmetry: Symmetry, start: np.ndarray, period: float
+                ) -> MeshOrbit | None:
+    """Collocate from what a simulation does in a period from a state near the orbit."""
+    run = simulate(network, start, 1.05 * period, network.step, progress=False)
+    return _accepted(from_path(network, symmetry, lambda theta: run(theta * period), period))
+
+
+def _stated(network: Network, gait: str) -> MeshOrbit | None:
+    """The orbit near which the network knows a state; None where it knows none."""
+    known = network.on_orbit(gait)
+    return None if known is None else _from_state(network, network.symmetry(gait), *known)
 
 
 def _sought(network: Network, gait: str) -> MeshOrbit:
@@ -138,6 +149,9 @@ def solve(network: Network, gait: str, near: MeshOrbit | None = None) -> MeshOrb
     """
     symmetry = network.symmetry(gait)
     check_values(network, gait)
+    stated = _stated(network, gait)
+    if stated is not None:
+        return stated
     if near is None:
         known = network.presets().get(gait)
         near = _sought(network, gait) if known is None else from_preset(known)

@@ -1,0 +1,94 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""How steadily legs keep their phases: by how much each is early or late in every stride.
+
+To first order a leg that is early by d cycles moves its joints by d times their slope. So d is
+the least-squares share of the mean cycle's slope in what a stride's samples leave, all joints of
+the leg together, as the cross-correlation that leg phases come from weighs them.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from cpg_ros.gaits.phase_average import Warped
+import numpy as np
+from scipy.stats import t as student
+
+#: Share of a whole stride's slope that a stride must have for its phase to be told.
+ENOUGH = 0.5
+#: Fewest strides from which a scatter is told.
+STRIDES = 3
+
+
+@dataclass(frozen=True)
+class PhaseScatter:
+    """How well the phase of a leg against the first one is known, and kept.
+
+    Attributes:
+        spread: standard deviation of single strides, cycles; nan if there are too few.
+        error: standard error of the mean, cycles; nan as well.
+        half_width: of its 95 % interval (Student), cycles; nan as well.
+        strides: that tell.
+
+    """
+
+    spread: float
+    error: float
+    half_width: float
+    strides: int
+
+
+def phase_scatter(phases: np.ndarray, x: np.ndarray, found: Warped,
+                  legs: Mapping[str, Sequence[str]], names: Sequence[str]
+                  ) -> dict[str, PhaseScatter]:
+    """Find how the phases of the legs against the first one scatter from stride to stride.
+
+    Args:
+        phases: of the samples, cycles, rising, shape (n,).
+        x: rad, nan where missing, shape (n, joints).
+        found: the mean cycles of these samples.
+        legs: leg -> its joints, the first leg first.
+        names: of the joints, in the order of x.
+
+    Returns:
+        Leg -> scatter; of the first leg, which all are told against, zeros.
+
+    """
+    theta = phases - found.zero
+    stride = np.floor(theta - theta[0]).astype(int)
+    count = int(stride[-1]) + 1
+    order = np.arange(len(found.coefficients))[:, None]
+    slopes = Warped(found.zero, 2j * np.pi * order * found.coefficients, found.spread,
+                    found.error, found.counts, found.spikes, found.left).mean(theta).T
+    left = np.where(np.isfinite(x), x - found.mean(theta).T, 0.0)
+    slopes = np.where(np.isfinite(x), slopes, 0.0)
+    early = np.full((len(legs), count), np.nan)
+    for row, joints in zip(early, legs.values(), strict=True):
+        columns = [names.index(name) for name in joints]
+        along, power = (np.bincount(stride, np.sum(one[:, columns] * slopes[:, columns], axis=1),
+                                    count) for one in (left, slopes))
+        told = power > ENOUGH * np.median(power)
+        row[told] = along[told] / power[told]
+    return {leg: _scatter(row - early[0]) for leg, row in zip(legs, early, strict=True)}
+
+
+def _scatter(early: np.ndarray) -> PhaseScatter:
+    told = early[np.isfinite(early)]
+    if told.size < STRIDES:
+        return PhaseScatter(np.nan, np.nan, np.nan, told.size)
+    spread = float(told.std(ddof=1))
+    error = spread / np.sqrt(told.size)
+    return PhaseScatter(spread, error, float(student.ppf(0.975, told.size - 1)) * error,
+                        told.size)

@@ -1,0 +1,188 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Amplitude-controlled phase oscillators, one a leg: any footfall pattern is a gait.
+
+Ijspeert, Crespi, Ryczko & Cabelguen (Science 315, 2007), supporting text, eqs. 1 and 2; with all
+weights equal it is the rhythm of CPG-RL (Bellegarda & Ijspeert 2022, eqs. 1 and 2):
+
+    theta_i' = 2 pi nu + sum_j w r_j sin(theta_j - theta_i - phi_ij),
+    r_i'' = a (a/4 (R - r_i) - r_i').
+
+Every oscillator hears every other one. ``phi_ij = 2 pi (offset_j - offset_i)``, offset_i the
+cycles by which leg i is ahead, so that on the gait all sines vanish: the period is 1/nu, the
+amplitude R and the phases the offsets, exactly. A small disturbance of the phases decays at the
+rate n w R of n legs, the amplitude comes back as fast as it can without overshoot, at a/2.
+
+A cell has x = r cos(theta), y = r sin(theta) and s = r', so that nothing jumps by 2 pi.
+"""
+
+from dataclasses import dataclass
+from functools import cache
+import math
+from typing import Any, ClassVar
+
+from cpg_ros.networks.equations import Cell
+from cpg_ros.networks.leg_numbers import leg_names, places
+from cpg_ros.networks.network import known, Network, Preset, Range
+from cpg_ros.networks.rings import ring_gaits
+from cpg_ros.networks.symmetry import Group, Symmetry
+from cpg_ros.networks.terms import cos, Number, sin, sqrt
+import numpy as np
+
+TURN = 2.0 * math.pi
+#: Keeps the angle of an oscillator at rest from being undefined: r is at least 1e-9.
+LEAST = 1e-18
+
+
+@cache
+def _alone(cells: int) -> Symmetry:
+    """No symmetry at all: the parameters tell every cell's phase."""
+    return Symmetry.of(Group(cells, ()), {}, variables=3)
+
+
+def _stated(legs: int) -> dict[str, Any]:
+    """What the network has for a number of legs; ValueError where there is none such."""
+    names = leg_names(legs)
+    offsets = tuple(f'offset_{leg}' for leg in names)
+    return {
+        'cells': legs, **places(legs), 'offsets': dict(zip(names, offsets, strict=True)),
+        'legs': {'implicit': {leg: (n + 1,) for n, leg in enumerate(names)}},
+        # Of the cell n places further round: offset_j where i + n is j.
+        'own_of_cells': {f'offset{n}': offsets[n:] + offsets[:n] for n in range(legs)},
+        'ranges': {
+            'nu': Range(0.1, 10.0, 'intrinsic frequency of every oscillator [cycles/model time]'),
+            'r': Range(0.01, 10.0, 'amplitude R that every oscillator has in the end'),
+            'a': Range(1.0, 200.0, 'how fast amplitudes come back [1/model time]'),
+            'w': Range(0.0, 50.0, 'weight of every other oscillator [1/model time]'),
+            **{f'offset_{leg}': Range(-1.0, 1.0, f'cycles by which {leg} is ahead')
+               for leg in names}}}
+
+
+@dataclass(frozen=True)
+class PhaseOscillators(Network):
+    """Oscillators of any number of legs; nu in cycles, a and w per model time."""
+
+    nu: float
+    r: float
+    a: float
+    w: float
+
+    #: Gait -> cycles of a stride at which the legs come down, in their order.
+    footfalls: ClassVar[dict[str, tuple[float, ...]]]
+    states: ClassVar[tuple[str, ...]] = ('x', 'y', 's')
+    readout: ClassVar = 'phase'
+    step: ClassVar[float] = 0.0025
+    couplings: ClassVar[tuple[str, ...]] = ('w',)
+    unnamed: ClassVar[str] = 'unnamed'
+    #: The phases are told beforehand, and a readout takes no notice of the others.
+    free: ClassVar[tuple[str, ...]] = ()
+    line: ClassVar[str] = 'w'
+    span: ClassVar[tuple[float, float] | None] = (0.0, 5.0)
+
+    @classmethod
+    def fitted(cls, legs: int) -> dict[str, Any]:
+        """Return what the network has for this many legs; InputError for an odd number."""
+        stated = _stated(legs)
+        gaits: dict[str, tuple[float, ...]] = {'walk': (0.0, 0.5), 'hop': (0.0, 0.0)}
+        if legs > 2:
+            # Leg by leg from behind, left before right; phases of the modes (j, k) of two rings.
+            gaits = {gait: tuple(-(i // 2 * j / legs + i % 2 * k / 2.0) % 1.0
+                                 for i in range(legs))
+                     for gait, (j, k) in ring_gaits(legs).items()}
+        between = tuple(0.5 * (i % 2) + 0.3 * (i // 2) for i in range(legs))
+        return {**stated, 'footfalls': {**gaits, 'unnamed': between},
+                'usual_gait': next(iter(gaits)), 'fields': tuple(stated['offsets'].values()),
+                'usual_robot': {2: 'biped', 6: 'hexapod'}.get(legs, '')}
+
+    @classmethod
+    def equations(cls, cell: Cell, p: Any) -> tuple[Number, ...]:
+        """See the module."""
+        x, y, s = cell.now()
+        r = sqrt(x**2 + y**2 + LEAST)
+        speed: Number = TURN * p.nu
+        for n in range(1, cls.cells):
+            x_j, y_j, _ = cell.now(lambda i, n=n: i + n)
+            phi = TURN * (getattr(p, f'offset{n}') - p.offset0)
+            # r_j sin(theta_j - phi) and r_j cos(theta_j - phi).
+            rise, lead = y_j * cos(phi) - x_j * sin(phi), x_j * cos(phi) + y_j * sin(phi)
+            speed = speed + p.w * (rise * x - lead * y) / r
+        return (s * x / r - speed * y, s * y / r + speed * x,
+                p.a * (p.a / 4.0 * (p.r - r) - s))
+
+    @classmethod
+    def gaits(cls) -> tuple[str, ...]:
+        """Names of the footfall patterns that have one."""
+        return tuple(cls.footfalls)
+
+    def symmetry(self, gait: str) -> Symmetry:
+        """Return what every gait has: no symmetry, and the phases that the offsets state.
+
+        Raises:
+            ValueError: the gait has no name here.
+
+        """
+        known(gait, self.gaits())
+        return _alone(self.cells).led(self.leads)
+
+    def on_orbit(self, gait: str) -> tuple[np.ndarray, float]:
+        """Return the gait's state where the first leg's oscillator peaks, and the period."""
+        angle = TURN * np.array(self.leads)
+        return np.concatenate([self.r * np.cos(angle), self.r * np.sin(angle),
+                               np.zeros(self.cells)]), 1.0 / self.nu
+
+    @classmethod
+    @cache
+    def presets(cls) -> dict[str, Preset]:
+        """One for each footfall pattern, all with a = 20 (Ijspeert et al.) and w = 1."""
+        return {gait: Preset(gait, cls(1.0, 1.0, 20.0, 1.0, *(-fall % 1.0 for fall in falls)))
+                for gait, falls in cls.footfalls.items()}
+
+
+@dataclass(frozen=True)
+class Phase(PhaseOscillators):
+    """Phase oscillators of four legs."""
+
+    offset_lh: float
+    offset_rh: float
+    offset_lf: float
+    offset_rf: float
+
+    name: ClassVar[str] = 'phase'
+    usual_gait: ClassVar[str] = 'trot'
+    usual_robot: ClassVar[str] = 'quadruped'
+    #: Footfalls of LH RH LF RF. Symmetrical gaits by how far a fore foot is behind the hind one
+    #: of its side (Hildebrand, Science 150, 1965): 0 pace, 1/8 amble, 1/4 walk in lateral and
+    #: 3/4 in diagonal sequence, 1/2 trot. Of the others the three beats of the canter, and the
+    #: gallops with a tenth of a cycle between the feet of a pair (Alexander, Int. J. Robotics
+    #: Research 3(2), 1984, as Collins & Stewart 1993 have them); right lead, but the canter.
+    footfalls: ClassVar[dict[str, tuple[float, ...]]] = {
+        'walk': (0.0, 0.5, 0.25, 0.75),
+        'diagonal_walk': (0.0, 0.5, 0.75, 0.25),
+        'amble': (0.0, 0.5, 0.125, 0.625),
+        'trot': (0.0, 0.5, 0.5, 0.0),
+        'pace': (0.0, 0.5, 0.0, 0.5),
+        'canter_left': (1 / 3, 0.0, 2 / 3, 1 / 3),
+        'canter_right': (0.0, 1 / 3, 1 / 3, 2 / 3),
+        'transverse_gallop': (0.0, 0.1, 0.5, 0.6),
+        'rotary_gallop': (0.1, 0.0, 0.5, 0.6),
+        'bound': (0.0, 0.0, 0.5, 0.5),
+        'half_bound': (0.0, 0.0, 0.4, 0.6),
+        'pronk': (0.0, 0.0, 0.0, 0.0),
+        'unnamed': (0.0, 0.5, 0.375, 0.875)}
+
+
+# By the same rule as for other numbers of legs.
+for _name, _value in _stated(4).items():
+    setattr(Phase, _name, _value)
