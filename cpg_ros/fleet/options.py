@@ -1,0 +1,47 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The options that choose where jobs run, alike for all executables that run many."""
+
+from argparse import ArgumentParser, Namespace
+from collections.abc import Callable
+
+from cpg_ros.errors import InputError
+from cpg_ros.fleet.executors import cluster, Fleet, processes
+
+#: More processes than this are a mistake.
+MOST = 1024
+
+
+def add_options(parser: ArgumentParser) -> None:
+    """Add --jobs and --dask."""
+    where = parser.add_mutually_exclusive_group()
+    where.add_argument('--jobs', type=int, default=0, metavar='N', help='worker processes on '
+                       'this machine (default: one a core); the results are the same with any '
+                       'number')
+    where.add_argument('--dask', metavar='ADDRESS', help="scheduler of a dask cluster to work "
+                       "on instead, such as tcp://head:8786 (pip install 'cpg-ros[fleet]')")
+
+
+def chosen_fleet(chosen: Namespace, say: Callable[[str], None]) -> Fleet:
+    """Return the fleet that the options ask for.
+
+    Raises:
+        InputError: a number of processes that cannot be.
+        NoCluster: nothing answers at the address.
+
+    """
+    if not 0 <= chosen.jobs <= MOST:
+        raise InputError(f'argument --jobs: {chosen.jobs} is not between 0 and {MOST}')
+    return cluster(chosen.dask, say) if chosen.dask else processes(chosen.jobs)

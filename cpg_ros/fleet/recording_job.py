@@ -1,0 +1,156 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""One recording inverted, as a job: what comes of it in plain types, or why nothing does."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory
+import time
+import traceback
+from typing import Any
+
+from cpg_ros.errors import CpgError
+from cpg_ros.fleet.recordings_found import digest, TABLES
+from cpg_ros.inversion.parameter_files import robot_file_of, write_fitted
+from cpg_ros.inversion.recording_fit import Inverted, inverted
+from cpg_ros.recordings.bag_reader import read_bag
+from cpg_ros.recordings.csv_reader import read_csv
+from cpg_ros.recordings.recording import Recording
+from cpg_ros.recordings.servo import Servo
+from cpg_ros.robots.robot import Robot
+
+#: Joints that are drawn, points of their mean cycles, and the size of the picture in pixels.
+DRAWN, POINTS, WIDTH, HEIGHT = 4, 32, 120, 36
+
+
+@dataclass(frozen=True)
+class Settings:
+    """How recordings are read and fitted: as the options of the executable ``inversion``."""
+
+    robot: Robot | None = None
+    network: str = ''
+    gait: str = ''
+    preset: str = ''
+    free: tuple[str, ...] = ()
+    order: int = 3
+    starts: tuple[Mapping[str, float], ...] = ({},)
+    topics: tuple[str, ...] = ()
+    joints: tuple[str, ...] = ()
+    unit: str | None = None
+    time: str | None = None
+    servo: Servo | None = None
+
+
+@dataclass(frozen=True)
+class Task:
+    """A recording to invert.
+
+    Attributes:
+        recording: where it is, for workers, too.
+        settings: as for all.
+        known: digest of the contents that were inverted before, or ''.
+        folder: that the fitted file will be in.
+        name: of the fitted file, without its ending.
+
+    """
+
+    recording: Path
+    settings: Settings
+    known: str
+    folder: Path
+    name: str
+
+
+def read(path: Path, settings: Settings) -> Recording:
+    """Read a recording of either kind; errors as of read_bag and read_csv."""
+    if path.is_file() and path.name.endswith(TABLES):
+        return read_csv(path, settings.unit, settings.time, settings.joints, progress=False)
+    robot = settings.robot
+    if robot is None or settings.joints:
+        return read_bag(path, settings.topics, settings.joints, progress=False,
+                        servo=settings.servo)
+    return read_bag(path, settings.topics, [joint.name for joint in robot.joints],
+                    progress=False, some=True, servo=settings.servo)
+
+
+def invert_recording(task: Task) -> dict[str, Any]:
+    """Invert a recording; whatever is wrong with it is in what is returned.
+
+    Returns:
+        ``digest``, and nothing else if that is the known one; otherwise the fields of a row of
+        the table, ``files`` (name -> text) and ``picture`` (SVG).
+
+    """
+    began = time.perf_counter()
+    row: dict[str, Any] = {'digest': '', 'reason': ''}
+    try:
+        row['digest'] = digest(task.recording)
+        if task.known and row['digest'] == task.known:
+            return {'digest': task.known}
+        settings = task.settings
+        found = inverted(read(task.recording, settings), settings.robot, settings.network,
+                         settings.gait, settings.free, settings.order, settings.preset,
+                         settings.starts)
+        row |= {**_facts(found), 'picture': picture(found)}
+        row['files'] = _files(task, found)
+    except (CpgError, OSError) as error:
+        row['reason'] = ' '.join(str(error).split())
+    # A mistake of the program costs one row, too, and is told with its place.
+    except Exception as error:
+        row['reason'] = f'{type(error).__name__}: {" ".join(str(error).split())}'
+        row['traceback'] = traceback.format_exc()
+    row['seconds'] = round(time.perf_counter() - began, 3)
+    return row
+
+
+def _facts(found: Inverted) -> dict[str, Any]:
+    told = found.as_dict()
+    return {'gait': told['gait'], 'recognised': told['recognised'] or '',
+            'frequency': told['frequency'], 'frequency_error': told['frequency_error'],
+            'confidence': told['confidence'], 'cycles': told['cycles'],
+            'begin': told['begin'], 'end': told['end'], 'network': told['network'],
+            'parameters': told['parameters'], 'phases': told['phases'],
+            'rms_share': told['rms_share'],
+            'joints': {name: one['rms'] for name, one in told['joints'].items()},
+            'warnings': told['warnings']}
+
+
+def _files(task: Task, found: Inverted) -> dict[str, str]:
+    """The parameter file and the robot file, as they will be in their folder."""
+    with TemporaryDirectory(prefix='cpg_ros_') as folder:
+        written = write_fitted(Path(folder, f'{task.name}.yaml'), found, task.settings.robot,
+                               robot_file_of(task.folder / f'{task.name}.yaml'))
+        return {path.name: path.read_text() for path in written}
+
+
+def picture(found: Inverted) -> str:
+    """Mean cycles of the joints that move most, recorded and fitted, as a small SVG."""
+    recorded, fitted = found.fit.recorded, found.fit.fitted
+    span = recorded.max(axis=1) - recorded.min(axis=1)
+    largest = sorted(span.argsort()[::-1][:DRAWN])
+    step = max(1, recorded.shape[1] // POINTS)
+    lines = []
+    for k, joint in enumerate(largest):
+        low, size = recorded[joint].min(), max(span[joint], 1e-9)
+        width = WIDTH / len(largest)
+        for kind, row in (('r', recorded[joint]), ('f', fitted[joint])):
+            points = ' '.join(
+                f'{k * width + 0.9 * width * m / len(row[::step]):.0f},'
+                f'{HEIGHT - 3 - (HEIGHT - 6) * (value - low) / size:.0f}'
+                for m, value in enumerate(row[::step]))
+            lines.append(f'<polyline class="{kind}" points="{points}"/>')
+    return (f'<svg width="{WIDTH}" height="{HEIGHT}" role="img" aria-label="mean cycles">'
+            f'{"".join(lines)}</svg>')
