@@ -17,7 +17,7 @@
 Imports every room but ``tools``.
 """
 
-__all__ = ['array_view', 'cells_publisher', 'cmd_vel', 'command_topics', 'deadline_thread',
+__all__ = ['cells_publisher', 'cmd_vel', 'command_topics', 'deadline_thread',
            'diagnostics', 'feedback_loop', 'feedback_parameters', 'feedback_switch', 'generator',
            'generator_parameters', 'inversion_node', 'joint_publishers', 'launch_arguments',
            'lockstep', 'measured_pose', 'message_block', 'message_types', 'node_base',

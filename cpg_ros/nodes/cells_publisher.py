@@ -15,11 +15,9 @@
 """The cells of the network, for whoever looks on: no more often than people can see."""
 
 from cpg_ros.networks.network import Network
-from cpg_ros.nodes.array_view import view_of
+from cpg_ros.nodes.message_block import MessageBlock, Template
 import numpy as np
 from rclpy.node import Node
-from rclpy.qos import QoSProfile
-from rclpy.qos_overriding_options import QoSOverridingOptions
 from std_msgs.msg import Float64MultiArray, MultiArrayDimension
 
 #: At most this many messages a second.
@@ -33,16 +31,14 @@ class Cells:
     """
 
     def __init__(self, node: Node, network: type[Network]) -> None:
-        self._message = Float64MultiArray()
         rows = [*network.states, *(f'd{name}/dt' for name in network.states)]
-        self._view = view_of(self._message, 'data', network.cells * len(rows))
-        self._message.layout.dim = [
-            MultiArrayDimension(label=','.join(rows), size=len(rows),
-                                stride=len(rows) * network.cells),
+        count = len(rows) * network.cells
+        message = Float64MultiArray()
+        message.layout.dim = [
+            MultiArrayDimension(label=','.join(rows), size=len(rows), stride=count),
             MultiArrayDimension(label='cells', size=network.cells, stride=network.cells)]
-        self._publisher = node.create_publisher(
-            Float64MultiArray, '~/cells', QoSProfile(depth=10),
-            qos_overriding_options=QoSOverridingOptions.with_default_policies())
+        self._block = MessageBlock(node, count, [
+            ('~/cells', Template(message, numbers=[(message, 'data', np.arange(count))]))])
         self._elapsed = 1.0 / FASTEST
 
     def publish(self, dt: float, state: np.ndarray) -> None:
@@ -56,5 +52,5 @@ class Cells:
         self._elapsed += dt
         if self._elapsed >= (1.0 - 1e-6) / FASTEST:
             self._elapsed = 0.0
-            self._view[:] = state.ravel()
-            self._publisher.publish(self._message)
+            self._block.values[:] = state.ravel()
+            self._block.publish(0)

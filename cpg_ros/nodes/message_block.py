@@ -83,6 +83,12 @@ class Template:
         return raw, np.concatenate(places), np.concatenate([sources for _, sources in marks])
 
 
+def each(message: object, fields: str, places: np.ndarray
+         ) -> list[tuple[object, str, np.ndarray]]:
+    """Return the numbers of a message whose fields, of one letter, are single ones."""
+    return [(message, field, places[k:k + 1]) for k, field in enumerate(fields)]
+
+
 def _exact(message: Any) -> bytes:
     """Serialise a message, without the room that rclpy's serialiser may leave at the end.
 

@@ -18,7 +18,7 @@ from importlib import import_module, util
 from itertools import pairwise
 
 from cpg_ros.nodes.joint_publishers import joint_state, labelled
-from cpg_ros.nodes.message_block import MessageBlock, Template
+from cpg_ros.nodes.message_block import each, MessageBlock, Template
 from cpg_ros.simulation.body import Body
 from cpg_ros.simulation.inertial_unit import InertialUnit
 from cpg_ros.simulation.robot_model import legs
@@ -47,9 +47,9 @@ class Measurements:
         messages = [
             ('joint_states', joint_state(names, np.arange(n), n, 2 * n)),
             ('odom', Template(odometry, [odometry.header.stamp], numbers=[
-                *_each(pose.position, 'xyz', base), *_each(pose.orientation, 'wxyz', quaternion),
-                *_each(moving.linear, 'xyz', twist[:3]),
-                *_each(moving.angular, 'xyz', twist[3:])])),
+                *each(pose.position, 'xyz', base), *each(pose.orientation, 'wxyz', quaternion),
+                *each(moving.linear, 'xyz', twist[:3]),
+                *each(moving.angular, 'xyz', twist[3:])])),
             ('foot_contacts', labelled(tuple(feet), forces))]
         if util.find_spec('tf2_msgs'):
             transform = TransformStamped(child_frame_id='base')
@@ -57,15 +57,15 @@ class Measurements:
             kind = import_module('tf2_msgs.msg').TFMessage
             messages.append(('/tf', Template(
                 kind(transforms=[transform]), [transform.header.stamp], numbers=[
-                    *_each(transform.transform.translation, 'xyz', base),
-                    *_each(transform.transform.rotation, 'wxyz', quaternion)])))
+                    *each(transform.transform.translation, 'xyz', base),
+                    *each(transform.transform.rotation, 'wxyz', quaternion)])))
         self._block = MessageBlock(node, int(edges[-1]), messages)
         imu = Imu()
         imu.header.frame_id = 'base'
         self._imu = MessageBlock(node, 10, [('imu', Template(imu, [imu.header.stamp], numbers=[
-            *_each(imu.orientation, 'xyzw', np.arange(4)),
-            *_each(imu.angular_velocity, 'xyz', np.arange(4, 7)),
-            *_each(imu.linear_acceleration, 'xyz', np.arange(7, 10))]))])
+            *each(imu.orientation, 'xyzw', np.arange(4)),
+            *each(imu.angular_velocity, 'xyz', np.arange(4, 7)),
+            *each(imu.linear_acceleration, 'xyz', np.arange(7, 10))]))])
 
     def publish(self, stamp: int) -> None:
         """Publish what the body does now; stamp in ns."""
@@ -80,9 +80,3 @@ class Measurements:
                 body.twist), strict=True):
             values[part] = given
         self._block.publish(stamp)
-
-
-def _each(message: object, fields: str, places: np.ndarray
-          ) -> list[tuple[object, str, np.ndarray]]:
-    """Return the numbers of a message whose fields are single ones."""
-    return [(message, field, places[k:k + 1]) for k, field in enumerate(fields)]

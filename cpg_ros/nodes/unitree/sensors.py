@@ -14,20 +14,20 @@
 
 """What a Unitree robot measures, under the topics that robot_sim has, and its health."""
 
-from collections.abc import Callable, Mapping
-from typing import Any
+from collections.abc import Mapping
 
-from cpg_ros.nodes.array_view import view_of
+from cpg_ros.nodes.joint_publishers import joint_state, labelled
+from cpg_ros.nodes.message_block import each, MessageBlock, Template
 from cpg_ros.robots.robot import Robot
 from cpg_ros.unitree.low_state import LowState
 from cpg_ros.unitree.models import JOINTS, PARTS
 from cpg_ros.unitree.settings import places
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+import numpy as np
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
 from rclpy.qos_overriding_options import QoSOverridingOptions
-from sensor_msgs.msg import BatteryState, Imu, JointState
-from std_msgs.msg import Float64MultiArray, MultiArrayDimension
+from sensor_msgs.msg import BatteryState, Imu
 
 #: Unitree's feet are in the order of its legs.
 FEET = tuple(name.partition('_')[0] for name in JOINTS[::len(PARTS)])
@@ -41,45 +41,37 @@ class Sensors:
         self._node, self._robot, self._state = node, robot, state
         names = list(robot.order)
         self._from = [JOINTS.index(name) for name in names]
-        self._joints = JointState(name=names)
-        self._views = [view_of(self._joints, field, len(names))
-                       for field in ('position', 'velocity', 'effort')]
-        self._imu = Imu()
-        self._imu.header.frame_id = 'imu'
         self._feet = [FEET.index(leg[0].name.partition('_')[0]) for leg in robot.legs.values()]
-        self._contacts = Float64MultiArray()
-        self._forces = view_of(self._contacts, 'data', len(self._feet))
-        self._contacts.layout.dim = [MultiArrayDimension(label=','.join(robot.legs), stride=1,
-                                                         size=len(self._feet))]
-
-        def publisher(kind: type, topic: str) -> Callable[[Any], None]:
-            return node.create_publisher(
-                kind, topic, QoSProfile(depth=100),
-                qos_overriding_options=QoSOverridingOptions.with_default_policies()).publish
-
-        self._publish = [(publisher(JointState, 'joint_states'), self._joints),
-                         (publisher(Imu, 'imu'), self._imu),
-                         (publisher(Float64MultiArray, 'foot_contacts'), self._contacts)]
-        self._battery = publisher(BatteryState, 'battery')
+        n = len(names)
+        # The block's numbers: positions, velocities, efforts, orientation, rates, forces.
+        parts = np.split(np.arange(3 * n + 10 + len(self._feet)),
+                         np.cumsum([n, n, n, 4, 3, 3]))
+        self._parts = [slice(part[0], part[-1] + 1) for part in parts]
+        *_, orientation, rates, acceleration, forces = parts
+        imu = Imu()
+        imu.header.frame_id = 'imu'
+        self._block = MessageBlock(node, parts[-1][-1] + 1, [
+            ('joint_states', joint_state(names, np.arange(n), n, 2 * n)),
+            ('imu', Template(imu, [imu.header.stamp], numbers=[
+                *each(imu.orientation, 'wxyz', orientation),
+                *each(imu.angular_velocity, 'xyz', rates),
+                *each(imu.linear_acceleration, 'xyz', acceleration)])),
+            ('foot_contacts', labelled(tuple(robot.legs), forces))])
+        self._battery = node.create_publisher(
+            BatteryState, 'battery', QoSProfile(depth=100),
+            qos_overriding_options=QoSOverridingOptions.with_default_policies())
         self._health = node.create_publisher(DiagnosticArray, '/diagnostics', 10)
         places(robot)
 
     def publish(self, stamp: int) -> None:
         """Publish the state; stamp in ns."""
-        state = self._state
-        for header in (self._joints.header, self._imu.header):
-            header.stamp.sec, header.stamp.nanosec = divmod(stamp, 1_000_000_000)
-        for view, values in zip(self._views, (state.q, state.dq, state.torque), strict=True):
-            view[:] = values[self._from]
-        for part, names, numbers in (
-                (self._imu.orientation, 'wxyz', state.quaternion),
-                (self._imu.angular_velocity, 'xyz', state.gyroscope),
-                (self._imu.linear_acceleration, 'xyz', state.accelerometer)):
-            for name, value in zip(names, numbers.tolist(), strict=True):
-                setattr(part, name, value)
-        self._forces[:] = state.feet[self._feet]
-        for publish, message in self._publish:
-            publish(message)
+        state, values = self._state, self._block.values
+        for part, given in zip(self._parts, (
+                state.q[self._from], state.dq[self._from], state.torque[self._from],
+                state.quaternion, state.gyroscope, state.accelerometer,
+                state.feet[self._feet]), strict=True):
+            values[part] = given
+        self._block.publish(stamp)
 
     def publish_battery(self, stamp: int) -> None:
         """Publish the battery's state; stamp in ns."""
@@ -91,7 +83,7 @@ class Sensors:
             power_supply_status=BatteryState.POWER_SUPPLY_STATUS_DISCHARGING,
             power_supply_technology=BatteryState.POWER_SUPPLY_TECHNOLOGY_LION)
         message.header.stamp.sec, message.header.stamp.nanosec = divmod(stamp, 1_000_000_000)
-        self._battery(message)
+        self._battery.publish(message)
 
     def publish_health(self, level: bytes, text: str, values: Mapping[str, object]) -> None:
         """Publish a status with these values, and temperatures in deg C."""
