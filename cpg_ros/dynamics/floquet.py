@@ -103,7 +103,12 @@ def _sorted(values: np.ndarray) -> np.ndarray:
 
 def attracts_with(orbit: Orbit, gain: float) -> bool:
     """Whether all disturbances decay with a symmetry lock of this gain, 1/model time."""
-    return max(leading_within(orbit), _largest_outside(orbit, gain)) < ATTRACTS
+    if leading_within(orbit) >= ATTRACTS:
+        return False
+    rough = _largest_outside(orbit, gain, ROUGHLY)
+    # Only near the edge does it matter by how much.
+    return (rough if abs(rough - ATTRACTS) > 10.0 * ROUGHLY
+            else _largest_outside(orbit, gain)) < ATTRACTS
 
 
 def _largest_outside(orbit: Orbit, gain: float, exact: float = 1e-10) -> float:
