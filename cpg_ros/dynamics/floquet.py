@@ -68,6 +68,11 @@ class Multipliers:
         return float(np.abs(self.transverse).max(initial=0.0))
 
     @property
+    def error(self) -> float:
+        """How far the trivial multiplier is from 1: the others are no better than that."""
+        return abs(self.trivial - 1.0)
+
+    @property
     def attracts(self) -> bool:
         """Whether all disturbances decay: neutral ones, such as of rings not coupled, do not."""
         return self.leading < ATTRACTS
