@@ -66,6 +66,7 @@ def test_example_1_as_json(capsys):
         assert not one['stable'] and one['stable_with_default_gain']
         assert one['floquet_leading'] < 1.0 < one['floquet_leading_transverse']
         assert 0.0 < one['min_symmetry_gain'] < one['default_symmetry_gain']
+        assert one['floquet_error'] < 1e-6
 
 
 def test_example_1_as_text(capsys):
@@ -114,6 +115,14 @@ def test_gaits_that_are_born_unstable_are_found_and_judged(capsys):
     assert point['unstable_roots'] > point['unstable_transverse_roots']
     assert not said['gaits']['pronk']['exists']
     assert 'critical delay 1.6515' in said['gaits']['pronk']['why']
+
+
+def test_multipliers_that_are_unsure_are_said_to_be(capsys, monkeypatch):
+    # One polynomial for a delay of two periods is far too coarse.
+    monkeypatch.setattr('cpg_ros.dynamics.fourier.floquet.SPAN', 100.0)
+    monkeypatch.setattr('cpg_ros.dynamics.fourier.floquet.HALVINGS', 1)
+    assert main(['--network', 'delayed', '--set', 'tau=3']) == 0
+    assert 'instead of 1; the others are no better' in capsys.readouterr().out
 
 
 def test_what_is_neutral_does_not_attract(capsys):

@@ -118,6 +118,30 @@ def test_it_can_be_driven_on_its_page(tmp_path):
         assert process.returncode == 0 and b'waits to be steered' in output
 
 
+def test_it_can_be_pushed_and_fitted_on_its_page(tmp_path):
+    domain = free_domain()
+    fitting = Process('-p', 'topics:=[joint_states]', domain=domain,
+                      executable=EXECUTABLE.with_name('inversion'))
+    try:
+        with demo(tmp_path, '--gaits', 'trot', '--every', '60', domain=domain) as process:
+            line = until(lambda: re.search(rb'in a browser: (http://\S+)',
+                                           process.stdout.readline()), 'the address')
+            page = Client(line[1].decode()).ready()
+            until(lambda: page.frame.get('time', 0.0) > 8.0, 'strides enough')
+            page.send(do='fit')
+            until(lambda: any('trot' in text for text in page.said), f'a fit, not {page.said}')
+            began, before = page.frame['time'], page.frame['base'][1]
+            page.send(do='push', force=150, direction=90)
+            until(lambda: page.frame['time'] > began + 1.5, 'what comes of it')
+            # It trots on with 5 cm to the side in this time; 150 N for 0.1 s take it to 1 m/s.
+            assert abs(page.frame['base'][1] - before) > 0.12
+            page.end()
+            process.communicate(b'q\n', timeout=60)
+            assert process.returncode == 0
+    finally:
+        fitting.end()
+
+
 def test_what_comes_through_a_pipe_ends_with_it(tmp_path):
     with demo(tmp_path, '--every', '1') as process:
         output, _ = process.communicate(b'\xff\xfe\nwalk\n', timeout=120)

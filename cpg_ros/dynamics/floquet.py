@@ -68,6 +68,11 @@ class Multipliers:
         return float(np.abs(self.transverse).max(initial=0.0))
 
     @property
+    def error(self) -> float:
+        """How far the trivial multiplier is from 1: the others are no better than that."""
+        return abs(self.trivial - 1.0)
+
+    @property
     def attracts(self) -> bool:
         """Whether all disturbances decay: neutral ones, such as of rings not coupled, do not."""
         return self.leading < ATTRACTS
@@ -103,7 +108,12 @@ def _sorted(values: np.ndarray) -> np.ndarray:
 
 def attracts_with(orbit: Orbit, gain: float) -> bool:
     """Whether all disturbances decay with a symmetry lock of this gain, 1/model time."""
-    return max(leading_within(orbit), _largest_outside(orbit, gain)) < ATTRACTS
+    if leading_within(orbit) >= ATTRACTS:
+        return False
+    rough = _largest_outside(orbit, gain, ROUGHLY)
+    # Only near the edge does it matter by how much.
+    return (rough if abs(rough - ATTRACTS) > 10.0 * ROUGHLY
+            else _largest_outside(orbit, gain)) < ATTRACTS
 
 
 def _largest_outside(orbit: Orbit, gain: float, exact: float = 1e-10) -> float:

@@ -105,6 +105,7 @@ class GaitAssessment:
                 'phases': self.phases, 'waveforms': int(self.orbit.waves.max()) + 1,
                 'floquet_leading': self.multipliers.leading_within,
                 'floquet_leading_transverse': self.multipliers.leading_transverse,
+                'floquet_error': self.multipliers.error,
                 'stable': self.stable, 'min_symmetry_gain': self.smallest_gain,
                 'default_symmetry_gain': self.default_gain,
                 'stable_with_default_gain': self.stable_with_default_gain}

@@ -36,6 +36,7 @@ from cpg_ros.nodes.generator_parameters import (
     exclusive,
     gait_spec,
     NETWORK,
+    network_for,
     Planner,
     specs,
 )
@@ -74,6 +75,9 @@ class Generator(StartedNode):
 
         """
         super().__init__(NAME)
+        given = {name: one.value for name, one in self._parameter_overrides.items()}
+        self._parameter_overrides['network'] = Parameter('network', value=network_for(
+            given.get('network', NETWORK.default), given.get('robot')))
         self._declare('network', NETWORK)
         try:
             network = find_network(self._value('network'))

@@ -32,6 +32,9 @@ from cpg_ros.networks.parameter_line import ParameterLine
 from cpg_ros.papers.commentary import COMMENTARIES, Commentary
 import numpy as np
 
+#: From this error of the multiplier along the orbit on, it is said.
+UNSURE = 1e-6
+
 
 def _root(value: complex) -> str:
     """Return a root or a pair of them, without a minus at zero."""
@@ -141,6 +144,9 @@ class Analysis:
                 f'  {line}' for line in table(rows, '<>>' + '>' * len(names) + '>>>>>>')]
         if not self.existing:
             lines = ['No gait at these parameters.']
+        lines += [f'  {one.gait}: the multiplier along the orbit comes out as '
+                  f'{abs(one.multipliers.trivial):.6g} instead of 1; the others are no better'
+                  for one in self.existing if one.multipliers.error > UNSURE]
         missing = [verdict for verdict in self.gaits.values() if verdict.orbit is None]
         return lines + [f'  no {verdict.gait}: {self._reason(verdict)}' for verdict in missing]
 
