@@ -13,6 +13,7 @@ setup(
         ('share/cpg_ros/config', glob('config/*.yaml')),
         ('share/cpg_ros/config/presets', glob('config/presets/*.yaml')),
         ('share/cpg_ros/launch', glob('launch/*.launch.py')),
+        ('share/cpg_ros/models', glob('models/*.xml')),
         ('share/cpg_ros/urdf', glob('urdf/*.urdf')),
         ('share/cpg_ros/rviz', glob('rviz/*.rviz')),
         ('share/cpg_ros/plotjuggler', glob('plotjuggler/*.xml')),

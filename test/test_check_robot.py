@@ -299,7 +299,7 @@ def test_files_that_are_no_urdf_end_in_one_line(tmp_path, capsys, urdf, words):
     (('quadruped', '--urdf', 'URDF', '--make', 'a.yaml'), 'give either'),
     (('quadruped', '--urdf', 'nowhere.urdf'), 'nowhere.urdf: No such file'),
     (('quadruped', '--urdf', '.'), 'Is a directory'),
-    (('hexapod', '--urdf', 'URDF'), "robot 'hexapod' is neither a .yaml file nor one of: biped"),
+    (('octopod', '--urdf', 'URDF'), "robot 'octopod' is neither a .yaml file nor one of: biped"),
     (('nowhere.yaml', '--urdf', 'URDF'), 'nowhere.yaml: No such file'),
     (('quadruped', '--urdf', 'URDF', '--gaits', 'canter'), "'canter' is not one of walk, trot"),
     (('quadruped', '--urdf', 'URDF', '--frequency', 'nan'), '--frequency: nan is not from 0'),

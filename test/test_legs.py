@@ -51,6 +51,34 @@ def test_names_of_particular_robots(name, leg):
     assert legs_of([name, *others])[leg] == (name,)
 
 
+@pytest.mark.parametrize('form', ['{}_coxa', 'joint_{}Coxa', 'coxa_{}', '{}/ThC_pitch'])
+@pytest.mark.parametrize('names', [
+    ('lh', 'rh', 'lm', 'rm', 'lf', 'rf'), ('LH', 'RH', 'LM', 'RM', 'LF', 'RF'),
+    ('RL', 'RR', 'ML', 'MR', 'FL', 'FR'),
+    ('hind_left', 'hind_right', 'middle_left', 'middle_right', 'front_left', 'front_right'),
+    ('left_rear', 'right_rear', 'left_mid', 'right_mid', 'left_front', 'right_front')])
+def test_the_usual_names_of_six_legs(names, form):
+    joints = [form.format(name) for name in names]
+    legs = legs_of(joints)
+    assert tuple(legs) == ('lh', 'rh', 'lm', 'rm', 'lf', 'rf')
+    assert [legs[leg] for leg in legs] == [(joint,) for joint in joints]
+    assert len({role_of(joint) for joint in joints}) == 1
+
+
+@pytest.mark.parametrize(('pairs', 'wanted'), [
+    (3, 'lh rh lm rm lf rf'), (4, 'l4 r4 l3 r3 l2 r2 l1 r1')])
+def test_legs_that_are_counted(pairs, wanted):
+    counted = [f'{side}{pair}' for pair in range(pairs, 0, -1) for side in 'LR']
+    joints = [f'{leg}_{joint}' for leg in counted for joint in ('coxa', 'femur')]
+    legs = legs_of(['abdomen', *joints])
+    assert ' '.join(legs) == wanted and legs.unassigned == ('abdomen',)
+    assert [legs[leg][0] for leg in legs] == [f'{leg}_coxa' for leg in counted]
+    assert {role_of(joint) for joint in joints} == {'coxa', 'femur'}
+    # What is counted is joints, if each number is there once.
+    assert tuple(legs_of([f'L{k}_joint' for k in (1, 2, 3)] + [f'R{k}_joint' for k in (1, 2, 3)])
+                 ) == ('left', 'right')
+
+
 @pytest.mark.parametrize(('names', 'legs'), [
     (('hip_front_lt', 'hip_front_rt', 'hip_hind_lt', 'hip_hind_rt'), ('lf', 'rf', 'lh', 'rh')),
     (('FL_hip', 'FR_hip'), ('left', 'right')), (('RR_hip', 'RL_hip'), ('right', 'left'))])
@@ -86,7 +114,8 @@ def test_arms_of_a_humanoid_are_no_legs_but_shoulders_of_a_dog_are():
     ([], 'no legs can be told'),
     (['FL_hip', 'FR_hip', 'RL_hip'], 'none of rh'),
     (['left_hip', 'left_knee'], "such as 'left_hip'.* none of right"),
-    (['lf_hip', 'lm_hip', 'lh_hip', 'rf_hip', 'rm_hip', 'rh_hip'], "'lm_hip' is of a middle leg"),
+    (['lf_hip', 'lm_hip', 'lh_hip', 'rf_hip', 'rm_hip'], 'none of rh'),
+    (['left_middle_hip', 'right_middle_hip'], 'lm, rm are there .* none of lh, rh, lf, rf'),
     (['shoulder_left', 'shoulder_right'], 'no legs')])
 def test_what_cannot_be_told_is_an_error(joints, message):
     with pytest.raises(LegsError, match=message) as error:

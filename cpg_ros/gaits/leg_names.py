@@ -2,9 +2,10 @@
 
 Quadrupeds: a code of two letters (LF or FL, RF or FR; hind LH, HL, RL, BL, LR and RH, HR, RR,
 BR), or the words left or right with front or fore, hind, rear or back, anywhere in the name and
-in any case: FL_hip_joint, lf_haa, JointPosRR_calf, front_left_knee, hip_hind_right. Bipeds: left,
-right, LT, RT, L or R alone: left_knee, L_hip, hip_rt, LHipPitch. An R after the side is for roll:
-LLEG_HIP_R.
+in any case: FL_hip_joint, lf_haa, JointPosRR_calf, front_left_knee, hip_hind_right. Hexapods:
+besides LM or ML and RM or MR, or middle or mid for front: LMCoxa, left_middle_femur. Three pairs
+or more may be counted from the head on: L1_coxa ... R3_tibia. Bipeds: left, right, LT, RT, L or R
+alone: left_knee, L_hip, hip_rt, LHipPitch. An R after the side is for roll: LLEG_HIP_R.
 """
 
 import re
@@ -12,16 +13,17 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from cpg_ros.errors import CpgError
+from cpg_ros.networks.leg_numbers import leg_names
 
 #: Letters and words of left and right, fore and hind.
 SIDES = {'left': 'l', 'l': 'l', 'lt': 'l', 'right': 'r', 'r': 'r', 'rt': 'r'}
-ENDS = {'front': 'f', 'fore': 'f', 'hind': 'h', 'rear': 'h', 'back': 'h'}
+ENDS = {'front': 'f', 'fore': 'f', 'hind': 'h', 'rear': 'h', 'back': 'h', 'middle': 'm',
+        'mid': 'm'}
 #: Codes of legs; in RL and RR the first letter is that of the rear.
 CODES = {'lf': 'lf', 'fl': 'lf', 'rf': 'rf', 'fr': 'rf',
          'lh': 'lh', 'hl': 'lh', 'rl': 'lh', 'lr': 'lh', 'bl': 'lh', 'lb': 'lh',
-         'rh': 'rh', 'hr': 'rh', 'rr': 'rh', 'br': 'rh', 'rb': 'rh'}
-#: Of legs between fore and hind ones, which no network has.
-MIDDLE = {'lm', 'ml', 'rm', 'mr', 'middle', 'mid'}
+         'rh': 'rh', 'hr': 'rh', 'rr': 'rh', 'br': 'rh', 'rb': 'rh',
+         'lm': 'lm', 'ml': 'lm', 'rm': 'rm', 'mr': 'rm'}
 #: What is not of a leg, whatever its side; a quadruped's fore leg has a shoulder and an elbow.
 OTHER = {'arm', 'neck', 'head', 'torso', 'waist', 'trunk', 'spine', 'tail', 'gripper', 'finger',
          'thumb', 'hand', 'wheel', 'eye', 'ear', 'camera'}
@@ -30,9 +32,11 @@ UPPER = {'shoulder', 'elbow', 'wrist', 'forearm', 'sh', 'el', 'wr'}
 JOINTS = ('hip', 'thigh', 'calf', 'knee', 'ankle', 'abd', 'haa', 'hfe', 'kfe', 'upper', 'lower',
           'shoulder', 'elbow', 'coxa', 'femur', 'tibia', 'foot', 'leg', 'joint', 'hx', 'hy', 'kn')
 #: In the networks' order.
-QUADRUPED, BIPED = ('lh', 'rh', 'lf', 'rf'), ('left', 'right')
+HEXAPOD, QUADRUPED, BIPED = leg_names(6), leg_names(4), leg_names(2)
 
 _WORD = re.compile(r'[A-Z]+(?=[A-Z][a-z])|[A-Z]?[a-z]+|[A-Z]+|\d+')
+#: A leg counted from the head on.
+_COUNTED = re.compile(r'(?<![a-z])([lr])([1-9])(?!\d)', re.IGNORECASE)
 _STUCK = re.compile(rf'(?<![a-z])({"|".join((*CODES, *SIDES, *ENDS))})(?=({"|".join(JOINTS)}))',
                     re.IGNORECASE)
 
@@ -78,7 +82,7 @@ def words_of(name: str) -> list[str]:
 
 
 def _read(words: Sequence[str]) -> tuple[str, str, frozenset[str]]:
-    """Return leg of four, leg of two ('' for none), and the words that told it."""
+    """Return leg of four or six, leg of two ('' for none), and the words that told it."""
     codes = {CODES[word] for word in words if word in CODES}
     sides = {SIDES[word] for word in words if word in SIDES}
     ends = {ENDS[word] for word in words if word in ENDS}
@@ -95,6 +99,9 @@ def _read(words: Sequence[str]) -> tuple[str, str, frozenset[str]]:
 
 def role_of(name: str) -> str:
     """Return a joint's name without what tells its leg: equal for the same joint of each leg."""
+    counted, rest = _COUNTED.findall(name), _COUNTED.sub('', name)
+    if len(counted) == 1 and any(sign.isalpha() for sign in rest):
+        return ' '.join(words_of(rest))
     words = words_of(name)
     told = _read(words)[2]
     return ' '.join(word for word in words if word not in told)
@@ -108,18 +115,21 @@ def legs_of(joints: Sequence[str], whole: bool = False) -> Legs:
         whole: these are all that the robot has, so that one with FL and FR alone is a biped.
 
     Raises:
-        LegsError: no leg, not all of two or four legs, or more than four can be told, or they
-            are of two robots.
+        LegsError: no leg, or not all of two, four or six legs can be told, or they are of two
+            robots.
 
     """
+    counted = _counted(joints)
+    if counted:
+        told = {name: ('', '', frozenset(_COUNTED.findall(name)[0])) for names in counted.values()
+                for name in names}
+        return Legs(counted, _says(counted, told, joints), _rest(counted, joints))
     _refuse_two(joints)
     words = {name: words_of(name) for name in joints}
     read = {name: _read(words[name]) for name in joints}
-    if any(MIDDLE & set(listed) for listed in words.values()):
-        middle = next(name for name in joints if MIDDLE & set(words[name]))
-        raise LegsError(f"'{middle}' is of a middle leg; the networks have two legs or four")
-    # A code is a name's own, an L a hint: first four legs are looked for.
-    for known, column, others in ((QUADRUPED, 0, OTHER), (BIPED, 1, OTHER | UPPER)):
+    # A code is a name's own, an L a hint: first four legs are looked for, or six.
+    more = HEXAPOD if any(read[name][0] in ('lm', 'rm') for name in joints) else QUADRUPED
+    for known, column, others in ((more, 0, OTHER), (BIPED, 1, OTHER | UPPER)):
         found = {leg: tuple(name for name in joints if read[name][column] == leg
                             and not others & set(words[name])) for leg in known}
         there = [leg for leg in known if found[leg]]
@@ -137,6 +147,25 @@ def legs_of(joints: Sequence[str], whole: bool = False) -> Legs:
         raise LegsError(f'no legs can be told from the joint names {_listed(list(joints))}; usual '
                         'ones have LF, RF, LH, RH, front_left ... or left, right in them')
     return Legs(found, _says(found, read, joints), _rest(found, joints))
+
+
+def _counted(joints: Sequence[str]) -> dict[str, tuple[str, ...]]:
+    """Return the joints of legs that are counted, L1 R1 L2 ...; nothing if they are not.
+
+    Of joints that are counted each number is there once; of legs it has the same joints as others.
+    """
+    found: dict[tuple[str, int], list[str]] = {}
+    for name in joints:
+        told = _COUNTED.findall(name)
+        if len(told) == 1:
+            found.setdefault((told[0][0].lower(), int(told[0][1])), []).append(name)
+    pairs = len(found) // 2
+    roles = {tuple(sorted(_COUNTED.sub('', name) for name in names)) for names in found.values()}
+    wanted = {(side, k + 1) for side in 'lr' for k in range(pairs)}
+    if pairs < 3 or set(found) != wanted or len(roles) > 1 or len(next(iter(roles))) < 2:
+        return {}
+    order = [(side, k) for k in range(pairs, 0, -1) for side in 'lr']
+    return {leg: tuple(found[one]) for leg, one in zip(leg_names(2 * pairs), order, strict=True)}
 
 
 def _refuse_two(joints: Sequence[str]) -> None:
@@ -171,7 +200,7 @@ def _listed(names: list[str]) -> str:
 def _missing(there: list[str], known: tuple[str, ...], read: Mapping, joints: Sequence[str]
              ) -> str:
     lacking = ', '.join(leg for leg in known if leg not in there)
-    column = 0 if known == QUADRUPED else 1
+    column = 1 if known == BIPED else 0
     example = next(name for name in joints if read[name][column] in there)
     return (f"joints of the legs {', '.join(there)} are there (such as '{example}'), but none of "
             f'{lacking}')

@@ -8,5 +8,5 @@ from cpg_ros.errors import needed
 # Before any of its modules: one line where numba is missing, not a traceback.
 needed('numba')
 
-__all__ = ['joint_readout', 'pattern', 'phase_readout', 'plan', 'precompile', 'ramp', 'readout',
-           'resumption', 'runnable', 'smoothstep', 'steering', 'track']
+__all__ = ['duty', 'joint_readout', 'pattern', 'phase_readout', 'plan', 'precompile', 'ramp',
+           'readout', 'resumption', 'runnable', 'smoothstep', 'steering', 'told_waveform', 'track']

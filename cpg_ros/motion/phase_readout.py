@@ -22,6 +22,7 @@ import numpy as np
 
 from cpg_ros.dynamics.periodic import Orbit
 from cpg_ros.integration.jit import entry, sources_digest
+from cpg_ros.motion.duty import at_even_phases, maps_of_cells, told
 from cpg_ros.motion.readout import TURN, NoPhase, monomials
 
 #: Points of a cycle in the tables of an orbit: a cell may jump within a hundredth of a cycle.
@@ -43,7 +44,7 @@ def _cached(digest):
 
     @entry
     def observe_phases(now, strides, waves, phases, shape, circles, tables, harmonics, crests,
-                       cells, weights, leg_cells, clocks, angle, rise, legs):
+                       cells, weights, leg_cells, maps, clocks, angle, rise, legs):
         """Let the cells' clocks go on and read joints and legs off them.
 
         Args:
@@ -62,6 +63,8 @@ def _cached(digest):
             cells: the cell behind each joint, shape (joints,).
             weights: readout weights of each joint in rad, shape (joints, 6).
             leg_cells: the cell that gives each leg's phase.
+            maps: what the duty factor makes of each cell's phase, shape (size, 3), see
+                motion.duty.
             clocks: of each cell, shape (10, size): phase (cycles), what its speed (cycles a
                 stride) is above 1 now and at the next look, amplitude, its rate (per stride)
                 now and at the next look; and x, y and their derivatives by the strides.
@@ -116,6 +119,10 @@ def _cached(digest):
                 across = min(max(pull * across / TURN, -MOST), MOST)
                 clocks[2, cell] += share * (across - clocks[2, cell])
                 clocks[5, cell] += share * (pull * along - clocks[5, cell])
+            steep = 1.0
+            if maps[cell, 0] != 1.0:
+                phase, steep, _ = told(phase, maps[cell, 0], maps[cell, 1], maps[cell, 2])
+                c1, s1 = math.cos(TURN * phase), math.sin(TURN * phase)
             terms = harmonics[wave]
             x, y, z = terms[0, 0], 0.0, 0.0
             c, s_ = 1.0, 0.0
@@ -126,7 +133,7 @@ def _cached(digest):
                 x += in_phase
                 y += k * quadrature
                 z -= k * k * in_phase
-            speed, scale, rate = TURN * (1.0 + clocks[1, cell]), 1.0, 0.0
+            speed, scale, rate = steep * TURN * (1.0 + clocks[1, cell]), 1.0, 0.0
             if amount < 1.0:
                 rest = (1.0 - amount * amount) if amount > 0.0 else 1.0
                 scale = 1.0 - rest * rest * rest
@@ -243,8 +250,10 @@ class PhaseReadout:
     """
 
     def __init__(self, orbit: Orbit, cells: np.ndarray, weights: np.ndarray,
-                 leg_cells: np.ndarray, harmonics: int) -> None:
+                 leg_cells: np.ndarray, harmonics: int, maps: np.ndarray | None = None) -> None:
         """Prepare for an orbit; arguments as in WaveReadout, and how many harmonics x has.
+
+        Maps are of the joints, as there; those of a cell have one.
 
         Raises:
             NoPhase: a waveform has hardly any first harmonic.
@@ -253,17 +262,21 @@ class PhaseReadout:
         known = phase_map(orbit, harmonics)
         self._phases = orbit.phases
         self._view = (orbit.waves, orbit.phases, known.shape, known.circles, known.tables,
-                      known.terms, known.crests, cells, weights, leg_cells)
+                      known.terms, known.crests, cells, weights, leg_cells,
+                      maps_of_cells(len(orbit.phases), cells, maps))
         self.start = float((orbit.phases[leg_cells[0]]
                             - known.crests[orbit.waves[leg_cells[0]]]) % 1.0)
         theta = np.arange(512) / 512
         self.angles, self.rises = np.empty((2, len(cells), theta.size))
         for joint, cell in enumerate(cells):
-            x, y, z = (evaluate(known.terms[orbit.waves[cell]], theta, order)
+            phase, steep = theta, np.ones(theta.size)
+            if maps is not None and maps[joint, 0] != 1.0:
+                phase, steep = at_even_phases(maps[joint], theta.size)
+            x, y, z = (evaluate(known.terms[orbit.waves[cell]], phase, order)
                        for order in range(3))
             values, slopes = monomials(x, y, z)
             self.angles[joint] = weights[joint] @ values
-            self.rises[joint] = weights[joint] @ slopes
+            self.rises[joint] = steep * (weights[joint] @ slopes)
 
     def clocks(self, phase: float) -> np.ndarray:
         """Return the cells' clocks where the gait has them at a phase of its orbit in cycles."""

@@ -8,9 +8,10 @@ import numpy as np
 
 from cpg_ros.dynamics.orbit import Orbit, solve_orbit, solve_preset
 from cpg_ros.dynamics.stability import Stability, stability
-from cpg_ros.errors import CpgError
+from cpg_ros.errors import CpgError, InputError
 from cpg_ros.integration.stepper import Stepper
-from cpg_ros.motion.joint_readout import joint_readout
+from cpg_ros.motion.duty import Duty
+from cpg_ros.motion.joint_readout import joint_readout, standing
 from cpg_ros.motion.phase_readout import PhaseReadout
 from cpg_ros.motion.readout import WaveReadout, extremes
 from cpg_ros.motion.runnable import obstacle
@@ -60,6 +61,7 @@ class Program:
         in_place: the same for legs that take strides of length 0.
         span: smallest and largest deviation of each joint from its offset, rad, (2, joints).
         speed: largest speed of each joint, rad/s, shape (joints,).
+        duty: share of the stride that each leg stands, shape (legs,).
 
     """
 
@@ -76,6 +78,7 @@ class Program:
     in_place: WaveReadout | PhaseReadout
     span: np.ndarray
     speed: np.ndarray
+    duty: np.ndarray
 
     @cached_property
     def seed(self) -> Stepper:
@@ -173,7 +176,7 @@ def refusal(orbit: Orbit, gait: str, harmonics: int) -> str:
 
 
 def plan(robot: Robot, name: str, preset: Preset, network: Network, frequency: float = 0.0,
-         amplitude: float = 1.0, gain: float = -1.0) -> Program:
+         amplitude: float = 1.0, gain: float = -1.0, duty: float = 0.0) -> Program:
     """Work out a gait on a robot and check it against the robot's limits.
 
     Args:
@@ -184,6 +187,8 @@ def plan(robot: Robot, name: str, preset: Preset, network: Network, frequency: f
         frequency: strides per second (Hz); 0 takes one model time unit as a second.
         amplitude: factor on every joint's readout weights.
         gain: symmetry lock in 1/model time; negative chooses one that makes the gait attract.
+        duty: share of the stride that legs stand; 0 for the gait's own, which the robot file
+            says or else the network does.
 
     Raises:
         Refused: there is no such orbit, it does not attract, or a joint would leave its limits.
@@ -204,9 +209,11 @@ def plan(robot: Robot, name: str, preset: Preset, network: Network, frequency: f
 
     motion = robot.motion(name, gait)
     shift = robot.shift(motion)
+    stands = _stands(robot, motion, orbit, duty)
+    maps = stands.of_cells(robot.leg_of_joint, robot.cells)
     readout, in_place = (joint_readout(
         orbit, robot.cells, amplitude * robot.weights(motion, at_rest), robot.leg_cells,
-        robot.harmonics) for at_rest in (False, True))
+        robot.harmonics, maps) for at_rest in (False, True))
     strides = frequency if frequency > 0.0 else 1.0 / orbit.period
     swings = [(readout.angles, readout.rises)]
     if motion.steering is not None:
@@ -226,7 +233,20 @@ def plan(robot: Robot, name: str, preset: Preset, network: Network, frequency: f
         raise OutOfLimits(cause, said, excess)
     gain = judged.chosen if gain < 0.0 else gain
     return Program(name, robot, gait, orbit, judged, gain, strides, motion, shift, readout,
-                   in_place, span, speed)
+                   in_place, span, speed, stands.asked)
+
+
+def _stands(robot: Robot, motion: Motion, orbit: Orbit, duty: float) -> Duty:
+    """Return for how much of a stride legs stand, by themselves and as asked for."""
+    begin, own = standing(orbit, robot.leg_cells, robot.harmonics)
+    if motion.stance is not None:
+        begin, own = begin + motion.stance[0], np.full(own.size, motion.stance[1])
+    wanted = duty or motion.duty
+    try:
+        return Duty(orbit, robot.leg_cells, begin, own,
+                    np.full(own.size, wanted) if wanted else own)
+    except InputError as error:
+        raise Refused(str(error)) from error
 
 
 def _beyond(joint: Joint, low: float, high: float, fastest: float

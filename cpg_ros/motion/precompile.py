@@ -9,6 +9,7 @@ from cpg_ros.integration.simulate import simulate
 from cpg_ros.integration.stepper import Stepper
 from cpg_ros.motion.phase_readout import observe_phases
 from cpg_ros.motion.readout import confine, observe
+from cpg_ros.motion.told_waveform import tell
 from cpg_ros.networks.registry import find_network
 
 
@@ -44,13 +45,15 @@ def _run_all(name: str) -> None:
                       symmetry=network.symmetry(preset.gait))
     stepper.advance(2.0 * network.step)
     joints, table, cells = np.zeros(1), np.zeros(4), np.zeros(1, dtype=int)
-    weights = np.zeros((1, 6))
+    weights, one = np.zeros((1, 6)), np.ones((1, 3))
     if network.readout == 'waveform':
         observe(stepper.now, 1.0, 1.0, cells, weights, np.zeros(8), cells, table, table, joints,
                 joints, joints)
+        tell(stepper.now, 1.0, 1.0, cells, weights, np.zeros((4, 2)), np.ones((4, 4)), one, joints,
+             joints)
     else:
         simulate(network, np.zeros(network.components), network.step, network.step)
         observe_phases(stepper.now, 1.0, cells, np.zeros(1), np.ones((1, 4)), np.ones((1, 4)),
                        np.ones((1, 4, 4)), np.zeros((1, 2, 2)), joints, cells, weights, cells,
-                       np.zeros((10, 1)), joints, joints, joints)
+                       one, np.zeros((10, 1)), joints, joints, joints)
     confine(joints, joints, joints, joints, joints, 1.0, joints, joints)

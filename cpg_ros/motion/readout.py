@@ -11,6 +11,8 @@ import numpy as np
 from cpg_ros.dynamics.periodic import Orbit
 from cpg_ros.errors import CpgError
 from cpg_ros.integration.jit import entry, jit, sources_digest
+from cpg_ros.motion.duty import at_even_phases
+from cpg_ros.motion.told_waveform import tables, tell
 
 #: Entries of the tables over one cycle.
 TABLE = 512
@@ -163,7 +165,7 @@ class WaveReadout:
     """
 
     def __init__(self, orbit: Orbit, cells: np.ndarray, weights: np.ndarray,
-                 leg_cells: np.ndarray) -> None:
+                 leg_cells: np.ndarray, maps: np.ndarray | None = None) -> None:
         """Prepare for an orbit.
 
         Args:
@@ -171,6 +173,8 @@ class WaveReadout:
             cells: the cell behind each joint, from 0, shape (joints,).
             weights: in rad, shape (joints, 6).
             leg_cells: the cell that gives each leg's phase, shape (legs,).
+            maps: what the duty factor makes of the phase of each joint's cell, shape (joints,
+                3), see motion.duty; None for nothing.
 
         Raises:
             NoPhase: the waveform does not tell the phase.
@@ -183,8 +187,19 @@ class WaveReadout:
         self._view = (orbit.peak, orbit.period, cells, weights, orbit.phases, leg_cells, x,
                       lead_table(x, y))
         self.start = float(orbit.phases[leg_cells[0]])
-        values, slopes = monomials(x, y, z)
-        self.angles, self.rises = weights @ values, weights @ slopes
+        self._told = None
+        if maps is None or (maps[:, 0] == 1.0).all():
+            values, slopes = monomials(x, y, z)
+            self.angles, self.rises = weights @ values, weights @ slopes
+            return
+        self._told = (orbit.peak, orbit.period, cells, weights, *tables(orbit), maps)
+        self.angles, self.rises = np.empty((2, len(cells), TABLE))
+        for joint, one in enumerate(maps):
+            phase, steep = at_even_phases(one, TABLE)
+            x, y, z = (orbit.waveform(phase, n) / (TURN**n * orbit.peak) for n in range(3))
+            values, slopes = monomials(x, y, z)
+            self.angles[joint] = weights[joint] @ values
+            self.rises[joint] = steep * (weights[joint] @ slopes)
 
     def clocks(self, phase: float) -> np.ndarray:
         """Return nothing: a state tells all by itself."""
@@ -193,7 +208,10 @@ class WaveReadout:
     def look(self, now: np.ndarray, strides: float, clocks: np.ndarray, angle: np.ndarray,
              rise: np.ndarray, legs: np.ndarray) -> float:
         """Read joints and legs off a state, however many strides after the last; see observe."""
-        return observe(now, *self._view, angle, rise, legs)
+        distance: float = observe(now, *self._view, angle, rise, legs)
+        if self._told is not None:
+            tell(now, *self._told, angle, rise)
+        return distance
 
 
 def extremes(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

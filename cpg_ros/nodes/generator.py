@@ -31,6 +31,7 @@ from cpg_ros.nodes.generator_parameters import (
     Planner,
     exclusive,
     gait_spec,
+    network_for,
     specs,
 )
 from cpg_ros.nodes.joint_publishers import Outputs
@@ -61,6 +62,9 @@ class Generator(StartedNode):
 
         """
         super().__init__(NAME)
+        given = {name: one.value for name, one in self._parameter_overrides.items()}
+        self._parameter_overrides['network'] = Parameter('network', value=network_for(
+            given.get('network', NETWORK.default), given.get('robot')))
         self._declare('network', NETWORK)
         try:
             network = find_network(self._value('network'))

@@ -12,15 +12,17 @@ from rclpy.parameter import Parameter
 from cpg_ros.errors import CpgError
 from cpg_ros.motion.plan import Program, Refused, gait_of, plan
 from cpg_ros.networks.network import Network, Preset
-from cpg_ros.networks.registry import NETWORKS
+from cpg_ros.networks.registry import NETWORKS, find_network, with_legs_of
 from cpg_ros.nodes import real_time
 from cpg_ros.nodes.parameter_spec import Spec
 from cpg_ros.robots.robot import Robot
+from cpg_ros.robots.robot_file import find_robot
 
 COMMANDS = ('none', 'joint_trajectory', 'forward_position')
 NETWORK = Spec('delayed', 'network of cells that makes the rhythm', read_only=True,
                constraints='one of: ' + ', '.join(NETWORKS)
-               + ', or the path of a Python file that defines one')
+               + ', or the path of a Python file that defines one; a number after it is that of '
+               'legs (delayed6), and is that of the robot where its file asks for it')
 
 
 def specs(network: type[Network]) -> dict[str, Spec]:
@@ -32,6 +34,8 @@ def specs(network: type[Network]) -> dict[str, Spec]:
         'gait': gait_spec(network, network.presets(), ', and those of the file given by presets'),
         'rate': Spec(100.0, 'messages per second on every output topic [Hz]', 1.0, 2000.0),
         'amplitude': Spec(1.0, "factor on the robot file's joint amplitudes", 0.0, 3.0),
+        'duty': Spec(0.0, "share of the stride that legs stand, from 0.3; 0 for the gait's own",
+                     0.0, 0.9),
         'transition': Spec(1.0, 'duration of a change of gait or parameters [s]; 0 leaves it to '
                            "the network's own dynamics", 0.0, 30.0),
         'ramp': Spec(1.0, 'duration of the ramp between the stand and the gait [s]', 0.0, 30.0),
@@ -50,6 +54,21 @@ def specs(network: type[Network]) -> dict[str, Spec]:
                         read_only=True),
         'cmd_vel_timeout': Spec(0.5, 'a cmd_vel older than this stops the robot [s]', 0.05, 60.0),
         **real_time.SPECS}
+
+
+def network_for(network: Any, robot: Any) -> Any:
+    """Return the name of a network's like for a robot's legs, where its file is for that one.
+
+    What cannot be found is told when it is looked for.
+    """
+    if not (isinstance(network, str) and isinstance(robot, str)):
+        return network
+    with contextlib.suppress(CpgError):
+        kind, found = find_network(network), find_robot(robot)
+        like = with_legs_of(kind, found.legs).name
+        if kind.name not in found.networks and like in found.networks:
+            return like
+    return network
 
 
 def gait_spec(network: type[Network], presets: Iterable[str], further: str = '') -> Spec:
@@ -73,6 +92,7 @@ class Settings:
     frequency: float
     amplitude: float
     symmetry_gain: float
+    duty: float
 
 
 class Planner:
@@ -91,7 +111,7 @@ class Planner:
                  steered: bool = False) -> None:
         self.network, self.presets, self.robot = network, presets, robot
         self.steered = steered
-        self.names = ('gait', 'frequency', 'amplitude', 'symmetry_gain',
+        self.names = ('gait', 'frequency', 'amplitude', 'symmetry_gain', 'duty',
                       *(f'{network.name}.{key}' for key in network.parameters()))
         self.program = functools.lru_cache(maxsize=32)(self._program)
 
@@ -147,7 +167,8 @@ class Planner:
             raise Refused(f'symmetry_gain {gain:g} is neither -1 (chosen) nor at least 0')
         network = self.network(*(values[f'{self.network.name}.{key}']
                                  for key in self.network.parameters()))
-        return Settings(values['gait'], network, values['frequency'], values['amplitude'], gain)
+        return Settings(values['gait'], network, values['frequency'], values['amplitude'], gain,
+                        values['duty'])
 
     def plan(self, values: dict[str, Any]) -> Program:
         """Work out the program that all parameters, by name, ask for.
@@ -166,14 +187,15 @@ class Planner:
 
     def _program(self, settings: Settings) -> Program:
         return plan(self.robot, settings.gait, self.presets[settings.gait], settings.network,
-                    settings.frequency, settings.amplitude, settings.symmetry_gain)
+                    settings.frequency, settings.amplitude, settings.symmetry_gain,
+                    settings.duty)
 
     def complete(self, parameters: list[Parameter], current: dict[str, Any]) -> list[Parameter]:
         """Add to a batch what follows from it.
 
-        The gait's preset, the frequency that the robot file has for it, then what a group sets,
-        then the means of the groups; single parameters in the batch win over all of them. An
-        unknown gait adds nothing; it is refused later.
+        The gait's preset, the frequency that the robot file has for it, its own duty, then what a
+        group sets, then the means of the groups; single parameters in the batch win over all of
+        them. An unknown gait adds nothing; it is refused later.
         """
         prefix = f'{self.network.name}.'
         given = {p.name: p.value for p in parameters}
@@ -184,6 +206,8 @@ class Planner:
         frequency = None if preset is None else self._frequency(str(gait))
         if frequency is not None:
             wanted['frequency'] = frequency
+        if preset is not None:
+            wanted['duty'] = 0.0
         for group, members in self.network.groups.items():
             if isinstance(given.get(prefix + group), float):
                 wanted.update({prefix + key: given[prefix + group] for key in members})

@@ -93,6 +93,9 @@ class Motion:
         frequency: strides per second that it was made for, Hz; None if it does not matter.
         joints: name -> what the gait makes of that joint.
         steering: None if it has not been measured.
+        duty: share of the stride that legs are to stand, None for what they do by themselves.
+        stance: phase of a leg's cell at which it begins to stand by the weights there are, and
+            for which share of the stride, cycles; None if it stands while its cell falls.
         efference: what the base does by itself, None if it has not been measured.
 
     """
@@ -101,6 +104,8 @@ class Motion:
     joints: dict[str, JointMotion] = field(default_factory=dict)
     steering: Steering | None = None
     efference: EfferenceTable | None = None
+    duty: float | None = None
+    stance: tuple[float, float] | None = None
 
 
 @dataclass(frozen=True)

@@ -123,7 +123,7 @@ class _Reader(Reader):
     def motion(self, tree: Any, where: str, joints: Mapping[str, Joint]) -> Motion:
         """Return what a gait makes of the robot with these joints."""
         tree = self.keys(tree, where, set(),
-                         {'frequency', 'joints', 'steering', 'efference'})
+                         {'frequency', 'duty', 'stance', 'joints', 'steering', 'efference'})
         frequency = None
         if 'frequency' in tree:
             frequency = self.number(tree['frequency'], f'{where}.frequency')
@@ -152,7 +152,19 @@ class _Reader(Reader):
         efference = None
         if 'efference' in tree:
             efference = read_efference(self, tree['efference'], f'{where}.efference')
-        return Motion(frequency, moved, steering, efference)
+        duty = None
+        if 'duty' in tree:
+            duty = self.number(tree['duty'], f'{where}.duty')
+            if not 0.3 <= duty <= 0.9:
+                raise self.fail(f'{where}.duty', f'{duty:g} is not from 0.3 to 0.9')
+        stance = None
+        if 'stance' in tree:
+            found = self.numbers(tree['stance'], f'{where}.stance')
+            if len(found) != 2 or not (-1.0 <= found[0] <= 1.0 and 0.05 <= found[1] <= 0.95):
+                raise self.fail(f'{where}.stance', 'takes a phase from -1 to 1 and a share of '
+                                'the stride from 0.05 to 0.95')
+            stance = found[0], found[1]
+        return Motion(frequency, moved, steering, efference, duty, stance)
 
     def steering(self, tree: Any, where: str, fastest: float | None) -> Steering:
         if fastest is None:
@@ -309,6 +321,10 @@ def _motion_tree(motion: Motion) -> dict[str, Any]:
     tree: dict[str, Any] = {}
     if motion.frequency is not None:
         tree['frequency'] = motion.frequency
+    if motion.duty is not None:
+        tree['duty'] = motion.duty
+    if motion.stance is not None:
+        tree['stance'] = list(motion.stance)
     if motion.joints:
         tree['joints'] = {
             name: {'offset': joint.offset, 'weights': list(joint.weights)}

@@ -7,4 +7,4 @@ __all__ = ['batch', 'body', 'camera', 'closed_loop', 'efference_measurement', 'f
            'footfall_diagram', 'gait_design', 'inertia', 'inertial_unit', 'leg_geometry',
            'mesh_files', 'model_indices', 'pattern_batch', 'pattern_follower', 'proprioception',
            'robot_model', 'run_metrics', 'run_recorder', 'scenario', 'servo_gains', 'soft_start',
-           'steering_table', 'terrain', 'tuning', 'urdf_model']
+           'sprawled_leg', 'steering_table', 'terrain', 'tuning', 'urdf_model']

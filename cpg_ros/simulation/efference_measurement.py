@@ -45,6 +45,8 @@ def calibrated(robot: Robot, model: str, gaits: Sequence[str],
                update: Callable[[str], None] = lambda gait: None) -> Robot:
     """Return a robot with the geometry of a model, and with efference copies measured on it.
 
+    Where feedback can displace none of its legs, as none of a hexapod's, it stays as it is.
+
     Args:
         robot: whose first network is used.
         model: as of ``robot_model.load``.
@@ -62,7 +64,10 @@ def calibrated(robot: Robot, model: str, gaits: Sequence[str],
         preset, motion = presets[gait], robot.motion(gait, gait)
         program = plan(robot, gait, preset, preset.network, motion.frequency or 0.0)
         loop = ClosedLoop(model, program)
+        geometry = read_geometry(loop.body, loop.parts)
+        if not geometry.legs:
+            return robot
         motions[gait] = replace(motion, efference=measure_efference(loop).as_table())
-        robot = replace(robot, geometry=read_geometry(loop.body, loop.parts))
+        robot = replace(robot, geometry=geometry)
         update(gait)
     return replace(robot, motions=motions)

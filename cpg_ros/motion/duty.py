@@ -1,0 +1,120 @@
+"""The duty factor: how much of a stride a leg stands, whatever its network does.
+
+A leg stands while its driving signal falls, from peak to trough, which is the network's own share
+of the cycle. Another share D is made by telling the joints another phase: the circle is mapped
+onto itself by
+
+    tan(pi (phase' - own)) = k tan(pi (phase - centre)),  k = tan(pi D0 / 2) / tan(pi D / 2),
+
+a Moebius transformation, smooth and monotonic for every k > 0. The stance's beginning stays where
+it was, an arc of the length D from there goes to that of the length D0, ``centre`` and ``own`` are
+the middles of the two. What joints do over a cycle stays the same, only sooner or later. Where the
+map is steepest, in the middle of the part that is shortened, it is for D0 = 1/2 at most 4 / pi
+times as steep as it has to be.
+"""
+
+import math
+
+import numpy as np
+
+from cpg_ros.dynamics.periodic import Orbit
+from cpg_ros.errors import InputError
+from cpg_ros.integration.jit import jit
+
+#: Shares of a stride that may be asked for.
+LEAST, MOST = 0.3, 0.9
+
+
+@jit
+def told(phase, k, centre, own):
+    """Return the phase that joints are told, its derivative by the phase, and the second one.
+
+    All in cycles; with k = 1 nothing changes.
+    """
+    angle = math.pi * (phase - centre)
+    s, c = math.sin(angle), math.cos(angle)
+    size = c * c + k * k * s * s
+    return (own + math.atan2(k * s, c) / math.pi, k / size,
+            2.0 * math.pi * k * (1.0 - k * k) * s * c / (size * size))
+
+
+def at_even_phases(one: np.ndarray, points: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return what a map (k, centre, own) makes of even phases of a cycle, and its slope there."""
+    rows = [told(n / points, *one)[:2] for n in range(points)]
+    phase, steep = np.array(rows).T
+    return phase, steep
+
+
+def stance(values: np.ndarray, crest: float) -> float:
+    """Return the share of a cycle that a signal falls from its crest to its trough.
+
+    Args:
+        values: on even points of a cycle, shape (m,).
+        crest: phase of the crest, cycles.
+
+    """
+    low = int(values.argmin())
+    before, here, after = (float(values[(low + n) % values.size]) for n in (-1, 0, 1))
+    bend = before - 2.0 * here + after
+    trough = (low + (0.5 * (before - after) / bend if bend > 0.0 else 0.0)) / values.size
+    return (trough - crest) % 1.0
+
+
+class Duty:
+    """The shares of a stride that legs stand, and what has to be told to the joints for it.
+
+    Attributes:
+        asked: shares asked for, shape (legs,).
+
+    """
+
+    def __init__(self, orbit: Orbit, leg_cells: np.ndarray, begin: np.ndarray, own: np.ndarray,
+                 asked: np.ndarray) -> None:
+        """Work out the map of each leg.
+
+        Args:
+            orbit: the gait.
+            leg_cells: the cell that gives each leg's phase, from 0, shape (legs,).
+            begin: phase of that cell at which each leg begins to stand, cycles, shape (legs,).
+            own: shares that legs stand by themselves, shape (legs,).
+            asked: shares that they are to stand, shape (legs,).
+
+        Raises:
+            InputError: a share is not from LEAST to MOST, or not one of a cycle.
+
+        """
+        for share in asked[asked != own]:
+            if not LEAST <= share <= MOST:
+                raise InputError(f'duty {share:g} is not from {LEAST:g} to {MOST:g}')
+        self.asked = asked
+        self._phases, self._leg_cells = orbit.phases, leg_cells
+        k = np.tan(0.5 * math.pi * own) / np.tan(0.5 * math.pi * asked)
+        self._maps = np.stack([np.where(asked == own, 1.0, k), begin + 0.5 * asked,
+                               begin + 0.5 * own], axis=1)
+
+    def of_cells(self, legs: np.ndarray, cells: np.ndarray) -> np.ndarray:
+        """Return k, centre and own for cells by their own phases, shape (n, 3).
+
+        Args:
+            legs: index of the leg that each cell drives, shape (n,).
+            cells: from 0, shape (n,).
+
+        """
+        found = self._maps[legs].copy()
+        found[:, 1:] += (self._phases[cells] - self._phases[self._leg_cells[legs]])[:, None]
+        return found
+
+
+def maps_of_cells(size: int, cells: np.ndarray, maps: np.ndarray | None) -> np.ndarray:
+    """Return the maps of all cells from those of joints, shape (size, 3).
+
+    Args:
+        size: cells there are.
+        cells: the cell behind each joint, from 0, shape (joints,).
+        maps: of the joints, shape (joints, 3), equal for those of a cell; None changes nothing.
+
+    """
+    found = np.tile([1.0, 0.0, 0.0], (size, 1))
+    if maps is not None:
+        found[cells] = maps
+    return found

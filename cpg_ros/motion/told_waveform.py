@@ -1,0 +1,122 @@
+"""Joints that follow a waveform at another time than their cells do: told by the phase.
+
+For a duty factor that is not the network's own. A state (x, y), a cell and its derivative by
+phase over the peak, has a phase theta, that of the orbit at its angle, and a size rho over the
+orbit there. Joints are told rho (X, Y)(phase'), phase' the one that the duty factor makes of
+theta; rates follow by the chain rule from x, x' and x'': they are derivatives also off the orbit.
+"""
+
+import math
+
+import numpy as np
+
+from cpg_ros.dynamics.periodic import Orbit
+from cpg_ros.integration.jit import entry, jit, sources_digest
+from cpg_ros.motion.duty import told
+
+TURN = 2.0 * math.pi
+#: Entries of the tables over one cycle.
+POINTS = 512
+#: Squares of a size below this are those of a cell at rest, which has no phase.
+REST = 1e-12
+
+
+@jit
+def _hermite(table, column, cycles):
+    """Return value and slope per cycle of a periodic table of values and slopes per entry."""
+    place = (cycles - math.floor(cycles)) * table.shape[0]
+    # A comparison that NaN fails, too: it must not become an index.
+    low = int(place) if place >= 0.0 else 0
+    t = place - low
+    low = low if low < table.shape[0] else 0
+    high = low + 1 if low + 1 < table.shape[0] else 0
+    a, b = table[low, column], table[high, column]
+    da, db = table[low, column + 1], table[high, column + 1]
+    gap = b - a
+    value = a + t * (da + t * (3.0 * gap - 2.0 * da - db + t * (da + db - 2.0 * gap)))
+    slope = da + t * (6.0 * gap - 4.0 * da - 2.0 * db + t * (3.0 * (da + db) - 6.0 * gap))
+    return value, slope * table.shape[0]
+
+
+def _cached(digest):
+    """Build the cached entry point; see sources_digest for why it is a closure."""
+
+    @entry
+    def tell(now, peak, period, cells, weights, lead, cycle, maps, angle, rise):
+        """Read joints off a network's state as they are told.
+
+        Args:
+            now: x, x', x'' of the cells, shape (3, cells).
+            peak: largest value of a cell on the gait's orbit.
+            period: of the orbit, model time.
+            cells: the cell behind each joint, shape (joints,).
+            weights: readout weights of each joint in rad, shape (joints, 6).
+            lead: of the orbit over its angle: phase minus angle, cycles, and slope per entry.
+            cycle: of the orbit over its phase: x and its slope per entry, y and the same.
+            maps: k, centre and own of each joint, shape (joints, 3), see motion.duty.
+            angle: filled with the joints' deviation from their offset, rad.
+            rise: filled with its derivative by phase, rad per cycle.
+
+        """
+        digest  # noqa: B018
+        by_phase = period / TURN
+        last, x, y, dx, dy = -1, 0.0, 0.0, 0.0, 0.0
+        for joint in range(cells.shape[0]):
+            cell = cells[joint]
+            if cell != last:
+                last = cell
+                x = now[0, cell] / peak
+                y = now[1, cell] * by_phase / peak
+                z = now[2, cell] * by_phase * by_phase / peak
+                square = x * x + y * y
+                # Derivatives by the phase that goes on evenly, in radians.
+                turning = (y * y - x * z) / square if square > REST else 1.0
+                growing = y * (x + z) / square if square > REST else 0.0
+                turn = math.atan2(-y, x) / TURN
+                ahead, slope = _hermite(lead, 0, turn)
+                theta, going = turn + ahead, (1.0 + slope) * turning
+                own_x, own_y = _hermite(cycle, 0, theta)[0], _hermite(cycle, 2, theta)[0]
+                own_z = _hermite(cycle, 2, theta)[1] / TURN
+                whole = own_x * own_x + own_y * own_y
+                size = math.sqrt(square / whole)
+                growing = size * (growing - going * own_y * (own_x + own_z) / whole)
+                phase, steep, _ = told(theta, maps[joint, 0], maps[joint, 1], maps[joint, 2])
+                unit_x, unit_y = _hermite(cycle, 0, phase)[0], _hermite(cycle, 2, phase)[0]
+                unit_z = _hermite(cycle, 2, phase)[1] / TURN
+                speed = size * steep * going
+                x, y = size * unit_x, size * unit_y
+                dx, dy = speed * unit_y + growing * unit_x, speed * unit_z + growing * unit_y
+            w = weights[joint]
+            angle[joint] = (w[0] * x + w[1] * y + w[2] * x * x + w[3] * x * y
+                            + (w[4] * x + w[5] * y) * x * x)
+            rise[joint] = TURN * ((w[0] + 2.0 * w[2] * x + w[3] * y + 3.0 * w[4] * x * x
+                                   + 2.0 * w[5] * x * y) * dx
+                                  + (w[1] + w[3] * x + w[5] * x * x) * dy)
+
+    return tell
+
+
+tell = _cached(sources_digest())
+
+
+def tables(orbit: Orbit) -> tuple[np.ndarray, np.ndarray]:
+    """Return lead and cycle as ``tell`` takes them; the waveform must tell its phase."""
+    grid = np.arange(POINTS) / POINTS
+
+    def unit(theta: np.ndarray) -> tuple[np.ndarray, ...]:
+        return tuple(orbit.waveform(theta, n) / (TURN**n * orbit.peak) for n in range(3))
+
+    x, y, z = unit(grid)
+    cycle = np.stack([x, y * TURN / POINTS, y, z * TURN / POINTS], axis=1)
+    angle = np.unwrap(np.arctan2(-y, x)) / TURN
+    angle -= np.round(angle[0])
+    # Phases at even angles, by Newton's method from what lies between the entries.
+    theta = np.interp(grid, np.append(angle, angle[0] + 1.0), np.append(grid, 1.0))
+    for _ in range(4):
+        x, y, z = unit(theta)
+        gap = (np.arctan2(-y, x) / TURN - grid + 0.5) % 1.0 - 0.5
+        slope = (y * y - x * z) / (x * x + y * y)
+        theta = theta - gap / slope
+    x, y, z = unit(theta)
+    faster = (x * x + y * y) / (y * y - x * z)
+    return np.stack([theta - grid, (faster - 1.0) / POINTS], axis=1), cycle
