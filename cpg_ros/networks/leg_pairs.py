@@ -80,16 +80,11 @@ def symmetry_of(phases: tuple[Fraction, ...], variables: int = 2, each: int = 1)
 
 @dataclass(frozen=True)
 class LegPairs(Network):
-    """A network with a weight k_FROM_TO between any two of its legs.
+    """A network with a weight k_FROM_TO between any two of its legs."""
 
-    Attributes:
-        each: cells of a leg, one or two antagonists.
-        own_ranges: of the parameters but the weights.
-        most: largest weight.
-
-    """
-
+    #: Cells of a leg: one, or two antagonists.
     each: ClassVar[int] = 1
+    #: Of the parameters but the weights; and the largest weight.
     own_ranges: ClassVar[dict[str, Range]]
     most: ClassVar[float] = 20.0
 
