@@ -18,6 +18,6 @@ Imports ``files``; knows nothing of ROS.
 """
 
 __all__ = ['biped', 'delayed', 'derivation', 'equations', 'field', 'generated', 'hk_theorem',
-           'leg_numbers', 'morris_lecar', 'network', 'network_check', 'oscillators',
+           'leg_numbers', 'leg_pairs', 'morris_lecar', 'network', 'network_check', 'oscillators',
            'parameter_line', 'preset_files', 'quadruped', 'registry', 'rings', 'symmetry',
            'terms']

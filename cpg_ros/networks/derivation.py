@@ -88,6 +88,11 @@ def first(equations: 'Equations') -> str:
                    _function('by_parameter', symbols, [columns]))
 
 
+def _smooth(part: Any) -> Any:
+    """Leave out what derivatives have at a kink alone: they are those beside it."""
+    return part.replace(sympy.DiracDelta, lambda *_: sympy.Integer(0))
+
+
 def higher(equations: 'Equations') -> str:
     """Write second and third derivatives by the arguments, and those by a parameter as well."""
     rates, symbols = expressions(equations)
@@ -95,12 +100,13 @@ def higher(equations: 'Equations') -> str:
     texts, tables = [], []
     for name, order in (('second', 2), ('third', 3)):
         places, entries = _nonzero(
-            ((v, *ks), sympy.diff(rate, *(symbols[k] for k in ks))) for (v, rate), ks
+            ((v, *ks), _smooth(sympy.diff(rate, *(symbols[k] for k in ks)))) for (v, rate), ks
             in product(enumerate(rates), combinations_with_replacement(range(count), order)))
         tables.append(f'{name.upper()} = {places!r}')
         texts.append(_function(name, symbols, [entries]))
     places, entries = _nonzero(
-        ((v, r, k), sympy.diff(rate, symbols[count + r], symbols[k])) for (v, rate), r, k
+        ((v, r, k), _smooth(sympy.diff(rate, symbols[count + r], symbols[k])))
+        for (v, rate), r, k
         in product(enumerate(rates), range(len(equations.rows)), range(count)))
     tables.append(f'MIXED = {places!r}')
     texts.append(_function('mixed', symbols, [entries]))

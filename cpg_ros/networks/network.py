@@ -88,6 +88,7 @@ class Network(ABC):
         groups: name -> parameters that can be set together under it.
         own_of_cells: name in the equations -> the parameter that each cell has for it, where
             they are not to be set together as a group is.
+        kinks: variables at whose zeros the rates have a kink.
         couplings: parameters without which no cell hears another.
         offsets: leg -> the parameter that states by how many cycles it is ahead, where any phases
             are a gait and no symmetry tells them.
@@ -121,6 +122,7 @@ class Network(ABC):
     muscles: ClassVar[dict[str, int]] = {}
     groups: ClassVar[dict[str, tuple[str, ...]]] = {}
     own_of_cells: ClassVar[dict[str, tuple[str, ...]]] = {}
+    kinks: ClassVar[tuple[str, ...]] = ()
     couplings: ClassVar[tuple[str, ...]] = ()
     offsets: ClassVar[dict[str, str]] = {}
     unnamed: ClassVar[str] = ''
@@ -247,10 +249,14 @@ class Network(ABC):
         return replace(self, **wanted) if wanted else self  # type: ignore[type-var]
 
     def on_orbit(self, gait: str) -> tuple[np.ndarray, float] | None:
-        """Return a state on the gait's orbit and its period, where they are known beforehand.
+        """Return a state near the gait's orbit and its period, where they are known beforehand.
 
-        The state is of shape (components,), cell 1 about to peak; the period is in model time.
+        The state is of shape (components,), where cell 1 peaks; the period is in model time.
         """
+        return None
+
+    def at_rest(self) -> np.ndarray | None:
+        """Return the state of every cell at rest, (variables,), where it is known beforehand."""
         return None
 
     @classmethod

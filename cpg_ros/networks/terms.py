@@ -95,3 +95,8 @@ def cos(x: Number) -> Term:
 def sqrt(x: Number) -> Term:
     """Square root."""
     return Term(f'sqrt({_text(x)})')
+
+
+def positive(x: Number) -> Term:
+    """max(0, x): differentiable but at 0, where a network that has it states a kink."""
+    return Term(f'(({_text(x)} + Abs({_text(x)})) / 2)')

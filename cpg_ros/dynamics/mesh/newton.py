@@ -26,6 +26,7 @@ from dataclasses import dataclass
 
 from cpg_ros.dynamics.mesh import collocation
 from cpg_ros.dynamics.mesh.elimination import chained, summed, transfer
+from cpg_ros.dynamics.mesh.kinks import aligned, places_of
 from cpg_ros.dynamics.mesh.orbit import MeshOrbit
 from cpg_ros.dynamics.periodic import NoOrbit
 from cpg_ros.networks.field import Field
@@ -40,6 +41,8 @@ FEWEST, MOST_INTERVALS = 12, 300
 #: Newton stops at steps this small, against the size of the states and the period: what is left
 #: is of the order of their square.
 TOLERANCE = 1e-8
+#: Times that ends of intervals are put on kinks anew.
+ALIGNED = 8
 #: Below this range the orbit has fallen to an equilibrium.
 SMALLEST = 1e-5
 
@@ -246,6 +249,8 @@ def _refined(reduced: Reduced, now: Solution) -> MeshOrbit | None:
             converged = _newton(reduced, now)
         if not converged or np.ptp(now.points[:, :reduced.size]) < SMALLEST:
             return None
+        if not _on_kinks(reduced, now):
+            return None
         try:
             mesh = remeshed(reduced, now, fewest)
             if mesh is None:
@@ -255,6 +260,29 @@ def _refined(reduced: Reduced, now: Solution) -> MeshOrbit | None:
         now = sampled(path_of(reduced, now), mesh, now.length)
         # Finer every time: equal shares of the error alone may stay short of the goal for ever.
         fewest = finer(mesh)
+
+
+def kinks(reduced: Reduced, now: Solution) -> np.ndarray:
+    """Places, 0 to 1, at which the rates of a solution have a kink."""
+    network = reduced.network
+    columns = [variable * reduced.size + k for variable, name in enumerate(network.states)
+               if name in network.kinks for k in range(reduced.size)]
+    return places_of(now.mesh, _coefficients(reduced, now)[..., columns])
+
+
+def _on_kinks(reduced: Reduced, now: Solution) -> bool:
+    """Put ends of intervals on all kinks, in place; tell whether Newton's method converged."""
+    if not reduced.network.kinks:
+        return True
+    for _ in range(ALIGNED):
+        mesh = aligned(now.mesh, kinks(reduced, now))
+        if mesh is None:
+            break
+        moved = sampled(path_of(reduced, now), mesh, now.length)
+        now.mesh, now.points, now.stages = moved.mesh, moved.points, moved.stages
+        if not _newton(reduced, now):
+            return False
+    return True
 
 
 def completed(reduced: Reduced, now: Solution) -> MeshOrbit:

@@ -34,6 +34,9 @@ from cpg_ros.networks.network import Network, Preset
 from cpg_ros.networks.symmetry import Symmetry
 import numpy as np
 
+#: A peak this much lower than the highest, over that, is another one.
+SAME = 1e-6
+
 
 def _accepted(orbit: MeshOrbit | None) -> MeshOrbit | None:
     return orbit if orbit is not None and not richer(orbit) else None
@@ -71,7 +74,14 @@ def _from_state(network: Network, symmetry: Symmetry, start: np.ndarray, period:
 def _stated(network: Network, gait: str) -> MeshOrbit | None:
     """The orbit near which the network knows a state; None where it knows none."""
     known = network.on_orbit(gait)
-    return None if known is None else _from_state(network, network.symmetry(gait), *known)
+    if known is None:
+        return None
+    symmetry = network.symmetry(gait)
+    found = _from_state(network, symmetry, *known)
+    # Phase 0 is the highest peak, to which a state that is only near need not lead.
+    if found is None or found.peak - found.waveform(np.zeros(1))[0] > SAME * found.peak:
+        return _by_itself(network, symmetry, *known)
+    return found
 
 
 def _sought(network: Network, gait: str) -> MeshOrbit:

@@ -1,0 +1,139 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Matsuoka oscillators: two neurons a leg, flexor and extensor, that inhibit each other.
+
+Matsuoka (Biol. Cybern. 52, 1985 and 56, 1987), as legs use them since Taga, Yamaguchi & Shimizu
+(Biol. Cybern. 65, 1991):
+
+    tau u_i' = -u_i - beta v_i - a y_e(i) + c + sum_j k_ij (y_j - y_e(j)),
+    tau_v v_i' = -v_i + y_i,    y_i = max(0, u_i),
+
+u the potential and v the fatigue of a neuron, e(i) the antagonist of neuron i, j the neurons of
+its kind in other legs: what a leg gives out is the difference of its neurons. Two neurons alone
+oscillate for ``1 + tau/tau_v < a < 1 + beta``, all but sinusoidally at the frequency ``omega =
+sqrt(((tau + tau_v) beta - tau a) / (tau a)) / tau_v`` (Matsuoka, Biol. Cybern. 104, 2011, eq. 15).
+"""
+
+from dataclasses import dataclass
+from functools import cache
+from typing import Any, ClassVar
+
+from cpg_ros.networks.equations import Cell
+from cpg_ros.networks.leg_numbers import leg_count
+from cpg_ros.networks.leg_pairs import LegPairs
+from cpg_ros.networks.network import Preset, Range
+from cpg_ros.networks.terms import Number, positive
+import numpy as np
+
+
+@dataclass(frozen=True)
+class MatsuokaOscillators(LegPairs):
+    """Oscillators of any even number of legs; time constants in model time."""
+
+    tau: float
+    tau_v: float
+    beta: float
+    a: float
+    c: float
+
+    states: ClassVar[tuple[str, ...]] = ('u', 'v')
+    each: ClassVar[int] = 2
+    kinks: ClassVar[tuple[str, ...]] = ('u',)
+    most: ClassVar[float] = 2.0
+    readout: ClassVar = 'phase'
+    step: ClassVar[float] = 0.001
+    own_ranges: ClassVar[dict[str, Range]] = {
+        'tau': Range(0.005, 1.0, 'time constant of the potential [model time]'),
+        'tau_v': Range(0.01, 10.0, 'time constant of the fatigue [model time]'),
+        'beta': Range(0.0, 20.0, 'how much fatigue weakens a neuron'),
+        'a': Range(0.0, 20.0, 'how much flexor and extensor inhibit each other'),
+        'c': Range(0.0, 10.0, 'input into every neuron')}
+    free: ClassVar[tuple[str, ...]] = ('beta', 'a')
+    line: ClassVar[str] = 'a'
+    span: ClassVar[tuple[float, float] | None] = (0.0, 4.0)
+    typical_cycle: ClassVar[tuple[tuple[float, float, float], ...]] = (
+        (0.0, 0.5, 0.0), (0.2, 0.1, 0.85))
+
+    @classmethod
+    def equations(cls, cell: Cell, p: Any) -> tuple[Number, ...]:
+        """See the module."""
+        def antagonist(i: int) -> int:
+            return (i + cls.cells // 2) % cls.cells
+
+        u, v = cell.now()
+        u_e, _ = cell.now(antagonist)
+        drive: Number = p.c - p.a * positive(u_e)
+        for kind, sources in cls.heard().items():
+            u_j, _ = cell.now(sources)
+            u_f, _ = cell.now(tuple(antagonist(j) for j in sources))
+            drive = drive + getattr(p, kind) * (positive(u_j) - positive(u_f))
+        return (drive - u - p.beta * v) / p.tau, (positive(u) - v) / p.tau_v
+
+    @property
+    def omega(self) -> float:
+        """Angular frequency of a leg's two neurons alone, nearly: Matsuoka 2011, eq. 15."""
+        square = ((self.tau + self.tau_v) * self.beta - self.tau * self.a) / (self.tau * self.a)
+        return float(np.sqrt(square) / self.tau_v) if square > 0.0 else 0.0
+
+    def on_orbit(self, gait: str) -> tuple[np.ndarray, float] | None:
+        """Return a state near the gait's orbit, and the period of two neurons alone."""
+        if not self.omega:
+            return None
+        phase = np.array([float(one) for one in self.phases(gait)])
+        theta = 2.0 * np.pi * np.concatenate([phase, phase + 0.5])
+        delay = np.arctan(self.omega * self.tau_v)
+        half = 0.3 * self.c
+        return np.concatenate([half * np.cos(theta),
+                               half * (0.3 + 0.2 * np.cos(theta - delay))]), (
+            2.0 * np.pi / self.omega)
+
+    def at_rest(self) -> np.ndarray:
+        """Return u = v = c / (1 + beta + a): what legs hear of one another cancels."""
+        return np.full(2, self.c / (1.0 + self.beta + self.a))
+
+    @classmethod
+    @cache
+    def presets(cls) -> dict[str, Preset]:
+        """One for each gait: a leg's fatigue and weights of about Taga et al."""
+        size = 0.15 / max(leg_count(cls) - 1, 1)
+        return {gait: Preset(gait, cls(0.15, 0.6, 2.5, 2.0, 1.0, **cls.weights(gait, size, 1.0)))
+                for gait in cls.gaits()}
+
+
+@dataclass(frozen=True)
+class Matsuoka(MatsuokaOscillators):
+    """Matsuoka oscillators of four legs."""
+
+    k_rh_lh: float
+    k_lh_rh: float
+    k_rf_lf: float
+    k_lf_rf: float
+    k_lf_lh: float
+    k_rf_rh: float
+    k_lh_lf: float
+    k_rh_rf: float
+    k_rf_lh: float
+    k_lf_rh: float
+    k_rh_lf: float
+    k_lh_rf: float
+
+    name: ClassVar[str] = 'matsuoka'
+    usual_gait: ClassVar[str] = 'trot'
+    usual_robot: ClassVar[str] = 'quadruped'
+
+
+# By the same rule as for other numbers of legs.
+for _name, _value in Matsuoka.stated(4).items():
+    setattr(Matsuoka, _name, _value)
