@@ -226,10 +226,21 @@ def test_a_sidestep_begins_as_far_on_one_side_as_it_ends_on_the_other():
 
 
 def test_pace_quickens_both_ways_up_to_its_most():
-    most = 1.0 + GAINS.pace_most
-    found = [pace.hurry(0.0, v, GAINS) for v in (-5.0, -0.2, 0.0, 0.1, 0.2, 5.0)]
-    assert found == pytest.approx(found[::-1], abs=1e-12) or found[0] == found[-1] == most
-    assert found[2] == found[3] == 1.0 < found[4] < most
+    found = [pace.hurry(v, 0.0, GAINS) for v in (-5.0, -0.2, 0.0, 0.1, 0.2, 5.0)]
+    assert found[0] == found[-1] == GAINS.pace_most
+    assert found[1] == found[4]
+    assert found[2] == found[3] == 0.0 < found[4] < GAINS.pace_most
+
+
+def test_pace_tires_of_what_lasts():
+    """A velocity that stays, hurried or not, is no push: a share 1 / (1 + fatigue) is left."""
+    fatigue = 0.0
+    for k in range(round(8.0 * GAINS.pace_memory / DT)):
+        added = pace.hurry(5.0, fatigue, GAINS)
+        if k * DT < 0.1:
+            assert added > 0.9 * GAINS.pace_most
+        fatigue = pace.tire(fatigue, added, GAINS, DT)
+    assert added == pytest.approx(GAINS.pace_most / (1.0 + GAINS.pace_fatigue), rel=0.01)
 
 
 def test_feet_stand_under_the_body_on_a_slope():
@@ -245,7 +256,8 @@ def test_feet_stand_under_the_body_on_a_slope():
 def test_heading_turns_back_by_the_shorter_way():
     found = [heading.turn(wanted, yaw, GAINS) for wanted, yaw in
              ((0.0, 0.1), (3.1, -3.1), (0.0, -2.0))]
-    assert found == pytest.approx([-0.3, -3.0 * (2 * math.pi - 6.2), GAINS.turn_most])
+    assert found == pytest.approx(
+        [-0.1 * GAINS.turn, -GAINS.turn * (2 * math.pi - 6.2), GAINS.turn_most])
 
 
 def test_strides_lengthen_while_speed_is_missing():
@@ -260,9 +272,9 @@ def test_strides_lengthen_while_speed_is_missing():
     assert speed.longer(0.0, way, GAINS) <= GAINS.speed_most
 
 
-def reflex(built, contact, swinging, progress, height=-0.3, steps=100):
+def reflex(built, contact, swinging, progress, height=-0.3, steps=100, lifted=0.0):
     for _ in range(steps):
-        found = reflexes.advance(built, contact, swinging, progress, height, GAINS, DT)
+        found = reflexes.advance(built, contact, swinging, progress, height, lifted, GAINS, DT)
     return found
 
 
@@ -272,6 +284,12 @@ def test_reflexes_lift_reach_hold_and_fade():
     assert reflex(np.zeros(5), False, False, 0.5, steps=50) == pytest.approx(
         -0.1 * GAINS.reach_rate)
     assert reflex(np.zeros(5), False, False, 0.5, steps=500) == -GAINS.reach_most
+    # A lean has taken this foot from its ground: posture's matter, no hole.
+    assert reflex(np.zeros(5), False, False, 0.5, lifted=0.02) == 0.0
+    stumbled = np.zeros(5)
+    reflex(stumbled, True, True, 0.4)
+    assert reflex(stumbled, False, True, 0.7, steps=1) > 0.8 * GAINS.lift
+    assert reflex(stumbled, False, True, 0.999, steps=1) < 0.01 * GAINS.lift
     landed = np.zeros(5)
     reflex(landed, True, True, 0.8, height=-0.27, steps=1)
     assert reflex(landed, True, True, 0.9, height=-0.30, steps=1) == pytest.approx(0.03)
@@ -339,6 +357,23 @@ def test_a_real_pattern_walks_as_those_of_many_runs(loop, expected):
     assert (np.abs(slopes) <= GO2.column('velocity') * (1.0 + 1e-6)).all()
 
 
+def test_a_drive_taken_in_mid_walk_changes_no_bit():
+    one, other = Pattern(program('trot')), Pattern(program('trot'))
+    for k in range(1500):
+        if k == 700:
+            one.attach(Drive(4))
+        if k == 1000:
+            for pattern in (one, other):
+                pattern.apply(program('walk'), 0.5)
+        for pattern in (one, other):
+            pattern.advance(DT)
+        assert (one.position == other.position).all() and (one.velocity == other.velocity).all()
+    one.steer(np.zeros(4), 1.0)
+    for pattern in (one, other):
+        pattern.advance(DT)
+    assert (one.velocity != other.velocity).any()
+
+
 def test_the_closed_trot_survives_pushes_that_fell_the_open_one(loop, expected):
     trials = [Scenario(push=(22.0 * math.cos(way), 22.0 * math.sin(way)), when=2.0, phase=phase)
               for way, phase in np.random.default_rng(7).uniform(0.0, [2.0 * math.pi, 1.0],
@@ -383,3 +418,6 @@ def test_wishes_switches_and_dull_senses_reach_the_runs(loop, expected):
         late = slice(1500, None)
         assert 0.02 < ran.velocity[0, late, 1].mean() < 0.12
         assert ran.turning[1, late, 2].mean() == pytest.approx(0.3, abs=0.1)
+        # Strides a second are those of the walk, which is not hurried for its own sway.
+        strides = (np.diff(ran.phase[2, -500:]) % 1.0).sum()
+        assert strides == pytest.approx(program('walk').frequency, rel=0.15)

@@ -83,7 +83,7 @@ def spoilt(message, how):
 class Robot:
     """A body whose topics may lie."""
 
-    def __init__(self, monkeypatch, contacts='foot_contacts', **dull):
+    def __init__(self, monkeypatch, contacts='foot_contacts', lag=0, **dull):
         monkeypatch.setattr(senses_input, 'Newest', Wire)
         Wire.wires = {}
         made = program('trot')
@@ -95,7 +95,7 @@ class Robot:
         self.loop.listen(SensesInput(None, GO2, geometry, 'imu', 'measured', contacts,
                                      'foot_contacts'))
         self.loop.wanted = True
-        self.late = {topic: [] for topic in Wire.wires}
+        self.late, self.lag = {topic: [] for topic in Wire.wires}, lag
         self.frozen = {}
         self.stamp = 0
 
@@ -125,6 +125,7 @@ class Robot:
                 spoilt(message, bad)
             data = serialize_message(message)
             self.late[name].append(data)
+            data = self.late[name][-min(1 + self.lag, len(self.late[name]))]
             if bad == 'frozen':
                 # A driver that sends its last measurement again and again, stamped anew.
                 data = self.frozen.setdefault(name, data)
@@ -209,6 +210,19 @@ def test_feet_are_felt_by_their_own_sensors_or_by_the_motors(monkeypatch, contac
     least = robot.loop._least
     agree = ((felt > least) == (true > least)).mean()
     assert agree > (0.97 if contacts == 'wrenches' else 0.55)
+
+
+def test_at_full_speed_strides_are_not_hurried(monkeypatch):
+    """A body that goes as fast as its gait makes it is not pushed, nor are late senses a push."""
+    for lag in (0, 3):
+        robot, strides, before = Robot(monkeypatch, lag=lag), 0.0, 0.0
+        for k in range(round(5.0 / DT)):
+            robot.tick()
+            phase = robot.pattern.phases[0]
+            strides += (phase - before) % 1.0 if k * DT >= 2.0 else 0.0
+            before = phase
+        assert not robot.body.fallen and robot.loop.share == 1.0
+        assert strides / 3.0 == pytest.approx(program('trot').frequency, rel=0.05)
 
 
 def test_the_closed_loop_survives_the_push_that_fells_the_open_one(monkeypatch):

@@ -84,7 +84,7 @@ class Feedback:
 
     def advance(self, senses: Senses, planned: np.ndarray, phase: np.ndarray, gaits: np.ndarray,
                 mix: np.ndarray, wanted: np.ndarray, course: np.ndarray, dt: float,
-                share: float = 1.0) -> np.ndarray:
+                share: float = 1.0, level: float = 1.0) -> np.ndarray:
         """Return the corrected angles, rad, shape (runs, joints), not yet held to any limit.
 
         Args:
@@ -97,11 +97,12 @@ class Feedback:
             course: wanted heading, rad, shape (runs,).
             dt: since the last time, s.
             share: of all corrections, 0 to 1.
+            level: of the pattern: 0 at the stand, 1 in the full gait.
 
         """
         tick(*self._geometry, self.gains, self._tables, self._sides, self.memory, senses.angles,
              senses.rates, senses.loads, senses.lean, senses.turning, senses.push, planned, phase,
-             gaits, mix, wanted, course, dt, share, self.angles)
+             gaits, mix, wanted, course, dt, share * level, level, self.angles)
         return self.angles
 
 
@@ -126,7 +127,7 @@ def close(pattern: Pattern, feedback: Feedback, feel: Callable[[], Senses], want
         old, new, mix[0] = pattern.fading
         gaits[0] = feedback.slot(old), feedback.slot(new)
         found = feedback.advance(feel(), planned[None], pattern.phases[:1], gaits, mix, wanted,
-                                 course, dt, pattern.level)
+                                 course, dt, 1.0, pattern.level)
         pattern.hurry = float(memory.hurry[0])
         if pattern.drive is not None and new.motion.steering is not None:
             asked, pace = new.steer(float(wanted[0, 0]), 0.0)

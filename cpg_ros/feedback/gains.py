@@ -32,9 +32,11 @@ class Gains(NamedTuple):
         step_most: most that a foot is placed elsewhere, m.
         step_decay: rate at which that is given up in stance, 1/s.
         give, give_left: shares of the velocity error that feet in stance yield to.
-        pace_from: velocity error at which strides get faster, m/s.
+        pace_from: velocity error sideways at which strides get faster, m/s.
         pace_gain: share of the frequency per m/s above that.
         pace_most: largest share.
+        pace_fatigue: by how many times its mean of late strides get slower again.
+        pace_memory: time constant of that mean, s.
         lift: of a foot that meets something while it swings forward, m.
         reach_rate, reach_most: of a foot that finds no ground in stance, m/s and m.
         reflex_rate: at which both, and an early landing, are given up, 1/s.
@@ -84,6 +86,8 @@ class Gains(NamedTuple):
     pace_from: float = 0.12
     pace_gain: float = 4.0
     pace_most: float = 0.8
+    pace_fatigue: float = 2.0
+    pace_memory: float = 2.0
 
     lift: float = 0.06
     reach_rate: float = 0.3
@@ -95,7 +99,7 @@ class Gains(NamedTuple):
     slope_filter: float = 0.5
     slope_most: float = 0.1
 
-    turn: float = 3.0
+    turn: float = 1.0
     turn_most: float = 0.6
 
     speed_share: float = 0.5

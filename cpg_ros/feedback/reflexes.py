@@ -23,6 +23,8 @@ from cpg_ros.integration.jit import jit
 STUMBLE, EARLY = 0.2, 0.65
 #: Share of the stance from which on a foot that has no ground reaches for it.
 MISSED = 0.1
+#: A foot that a lean lifts by more has its ground where it was, m.
+LEANS = 0.005
 #: Time in which a foot is lifted over what it hits, s.
 LIFTING = 0.01
 #: What a foot's reflexes have built up: the lift over an obstacle, the reach for the ground and
@@ -31,7 +33,7 @@ LIFT, REACH, HELD, HEIGHT, LANDED = range(5)
 
 
 @jit
-def advance(built, contact, swinging, progress, height, gains, dt):
+def advance(built, contact, swinging, progress, height, lifted, gains, dt):
     """Return how far to draw a foot in, m.
 
     Args:
@@ -40,26 +42,30 @@ def advance(built, contact, swinging, progress, height, gains, dt):
         swinging: whether it is meant to be in the air.
         progress: share of that swing, or else of its stance, that is over.
         height: of the foot that is planned, base's frame, m.
+        lifted: by an unexpected lean, m.
         gains: of the law.
         dt: s.
 
     """
     fade = math.exp(-gains.reflex_rate * dt)
+    late = swinging and progress >= EARLY
     if swinging and contact and STUMBLE < progress < EARLY:
         built[LIFT] = min(built[LIFT] + gains.lift * dt / LIFTING, gains.lift)
-    elif not (swinging and progress < EARLY):
+    elif late:
+        # Back to where the gait lands, or the leg were too short for the body's weight.
+        built[LIFT] = min(built[LIFT], gains.lift * (1.0 - progress) / (1.0 - EARLY))
+    elif not swinging:
         built[LIFT] *= fade
-    if not (swinging or contact) and progress > MISSED:
+    if not (swinging or contact) and progress > MISSED and lifted < LEANS:
         built[REACH] = min(built[REACH] + gains.reach_rate * dt, gains.reach_most)
     elif swinging:
         built[REACH] *= fade
-    late = swinging and progress >= EARLY
     if late and contact and not built[LANDED]:
-        built[HEIGHT], built[LANDED] = height + built[HELD], 1.0
+        built[HEIGHT], built[LANDED] = height + max(built[LIFT], built[HELD]), 1.0
     elif not late:
         built[LANDED] = 0.0
     if built[LANDED]:
         built[HELD] = min(max(built[HEIGHT] - height, 0.0), gains.lift)
     else:
         built[HELD] *= fade
-    return built[LIFT] + built[HELD] - built[REACH]
+    return max(built[LIFT], built[HELD]) - built[REACH]

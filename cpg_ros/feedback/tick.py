@@ -55,6 +55,7 @@ class Memory(NamedTuple):
         missed: integral of the missing speed, m, shape (runs,).
         stride: to be added to each leg's stride, shape (runs, legs).
         hurry: factor of the stride frequency, shape (runs,).
+        fatigue: low-passed share by which it was above 1 for pushes, shape (runs,).
         phase: of the first leg at the last tick, cycles, shape (runs,).
         owed: by the touchdown reset to the phase, cycles, shape (runs,).
         asked: wanted speed forward and to the left as it is approached, m/s, and its rates,
@@ -73,6 +74,7 @@ class Memory(NamedTuple):
     missed: np.ndarray
     stride: np.ndarray
     hurry: np.ndarray
+    fatigue: np.ndarray
     phase: np.ndarray
     owed: np.ndarray
     asked: np.ndarray
@@ -88,7 +90,7 @@ class Memory(NamedTuple):
                    np.zeros((runs, legs, 3)), np.zeros((runs, legs, 2)), np.zeros((runs, legs)),
                    np.zeros((runs, legs, 5)), np.zeros((runs, 2)), np.zeros(runs),
                    np.zeros((runs, legs)), np.ones(runs), np.zeros(runs), np.zeros(runs),
-                   np.zeros((runs, 2, 2)), np.zeros(legs, dtype=bool),
+                   np.zeros(runs), np.zeros((runs, 2, 2)), np.zeros(legs, dtype=bool),
                    np.zeros((legs, 4)), np.zeros((5, 3)), np.zeros(SIGNALS))
 
 
@@ -131,7 +133,8 @@ def _cached(digest):
 
     @entry
     def tick(rows, columns, radius, weight, gains, tables, sides, memory, angles, rates, loads,
-             lean, turning, push, planned, phases, gaits, mix, wanted, course, dt, share, out):
+             lean, turning, push, planned, phases, gaits, mix, wanted, course, dt, share, level,
+             out):
         """Correct planned angles; arguments as of Feedback.advance, out is filled."""
         digest  # noqa: B018
         quick = 1.0 - math.exp(-dt / gains.smooth)
@@ -150,6 +153,8 @@ def _cached(digest):
             expect(tables.speeds[old], tables.expected[old], phase, forward, 1.0 - mix[run], own)
             if mix[run] > 0.0:
                 expect(tables.speeds[new], tables.expected[new], phase, forward, mix[run], own)
+            for k in range(SIGNALS):
+                own[k] *= level
             vx = memory.velocity[run, 0] - own[0]
             vy = memory.velocity[run, 1] - own[1] - left
             wx, wy = turning[run, 0] - own[2], turning[run, 1] - own[3]
@@ -203,7 +208,9 @@ def _cached(digest):
                 if gains.reflexes:
                     z += reflexes.advance(memory.built[run, leg], memory.contact[run, leg],
                                           tables.swinging[slot, now, leg],
-                                          tables.progress[slot, now, leg], foot[2], gains, dt)
+                                          tables.progress[slot, now, leg], foot[2],
+                                          (roll - ground[0]) * foot[1]
+                                          - (pitch - ground[1]) * foot[0], gains, dt)
                 if gains.tegotae:
                     leaning += tegotae.rate(max(loads[run, leg], 0.0) / weight,
                                             tables.swinging[slot, now, leg],
@@ -219,7 +226,9 @@ def _cached(digest):
                 move_foot(rows[leg], columns[leg], out[run], foot, way)
             memory.hurry[run] = 1.0
             if gains.pace:
-                memory.hurry[run] += share * (pace.hurry(vx, vy, gains) - 1.0)
+                memory.hurry[run] += share * pace.hurry(vy, memory.fatigue[run], gains)
+            memory.fatigue[run] = pace.tire(memory.fatigue[run], memory.hurry[run] - 1.0, gains,
+                                            dt)
             frequency = max(strode / dt, 0.1)
             memory.hurry[run] += share * leaning / (2.0 * math.pi * frequency * rows.shape[0])
             if gains.touchdown:

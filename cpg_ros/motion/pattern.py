@@ -129,6 +129,12 @@ class Pattern:
             raise ValueError('this pattern has no drive')
         self.drive.ask(stride, pace, at_once=self._ramp.level == 0.0)
 
+    def attach(self, drive: Drive) -> None:
+        """Take a drive from now on; one that has not been asked for anything changes nothing."""
+        self.drive = drive
+        for track in self._tracks:
+            track.drive = drive
+
     @property
     def program(self) -> Program:
         """The newest program in force."""
@@ -217,6 +223,7 @@ class Pattern:
                 self._absorb()
             elif len(self._tracks) < MOST_TRACKS:
                 how.align(self._tracks[-1].phase)
+                how.drive = self.drive
                 self._tracks.append(how)
             else:
                 # Of those that wait, only the last one matters.

@@ -127,8 +127,9 @@ class FeedbackLoop:
         self._spent = 0.0 if self.share else self._spent + dt
         if self._spent > DIES_OUT and self.faults:
             # Nothing is fed back: what was felt before the gap says nothing after it.
-            self._feedback.reset()
-            self._release()
+            if pattern.correct is not None:
+                self._feedback.reset()
+                self._release()
         else:
             pattern.correct = self._correct
 
@@ -170,7 +171,7 @@ class FeedbackLoop:
         memory = feedback.memory
         found = feedback.advance(inputs.senses, planned[None], self._phase, self._gaits,
                                  self._mix, self._speeds, self._course, self._dt,
-                                 self.share * pattern.level)
+                                 self.share, pattern.level)
         pattern.hurry = float(memory.hurry[0])
         if pattern.drive is not None:
             self._trim[:] = memory.stride[0]

@@ -27,9 +27,9 @@ PREFIX = 'feedback.'
 RANGE = 10.0
 
 
-#: Off unless asked for: over a graph it has not yet been shown to walk as well as in process.
-SWITCH = Spec(False, 'correct the gait by what the robot feels; needs a calibrated robot file and '
-              'the topics below')
+#: Where it cannot be, it is off unless asked for.
+SWITCH = Spec(True, 'correct the gait by what the robot feels; false by default where the robot '
+              "file is not calibrated, or the generator's own joint_states are the measured ones")
 
 #: Topics, read when the feedback is first switched on.
 TOPICS = {

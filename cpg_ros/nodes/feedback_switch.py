@@ -15,6 +15,7 @@
 """Whether the feedback can be on, and on or off as the parameters say."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 import time
 from typing import Any
 
@@ -22,9 +23,11 @@ from cpg_ros.feedback.kinematics import geometry_of
 from cpg_ros.feedback.precompile import precompile
 from cpg_ros.motion.pattern import Pattern
 from cpg_ros.motion.plan import Program
+from cpg_ros.motion.steering import Drive
 from cpg_ros.nodes import feedback_parameters
 from cpg_ros.nodes.feedback_loop import FeedbackLoop, Motion
 from cpg_ros.nodes.feedback_parameters import PREFIX
+from cpg_ros.nodes.parameter_spec import Spec
 from cpg_ros.nodes.senses_input import SensesInput
 from cpg_ros.robots.robot import Robot
 from rclpy.parameter import Parameter
@@ -49,6 +52,20 @@ def shortfalls(robot: Robot) -> list[str]:
             if leg in known else
             f'feedback leaves the leg {leg} alone: the robot file has no geometry of it'
             for leg in robot.legs if leg not in known or len(known[leg].joints) == 2]
+
+
+def usual(node: Any, robot: Robot, combined: str) -> Spec:
+    """Return the switch, on if nothing is in the way.
+
+    Args:
+        node: that has declared the feedback's topics.
+        robot: to be corrected.
+        combined: topic of all joints that the node publishes, or ''.
+
+    """
+    measured = node.get_parameter(f'{PREFIX}joint_states_topic').value
+    own = combined and (node.resolve_topic_name(combined) == node.resolve_topic_name(measured))
+    return replace(feedback_parameters.SWITCH, default=not (own or uncalibrated(robot)))
 
 
 class FeedbackSwitch:
@@ -106,6 +123,9 @@ class FeedbackSwitch:
                 self._node, robot, geometry, self._value('imu_topic'),
                 self._value('joint_states_topic'), self._value('contacts'),
                 self._value('contacts_topic')))
+            if pattern.drive is None:
+                # Speed and heading are closed by the strides.
+                pattern.attach(Drive(len(robot.legs)))
             for line in shortfalls(robot):
                 self._node.get_logger().warning(line)
             self.loop = loop

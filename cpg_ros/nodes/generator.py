@@ -30,7 +30,7 @@ from cpg_ros.nodes.cells_publisher import Cells
 from cpg_ros.nodes.cmd_vel import CmdVel
 from cpg_ros.nodes.deadline_thread import Ticker
 from cpg_ros.nodes.diagnostics import Diagnostics
-from cpg_ros.nodes.feedback_switch import FeedbackSwitch
+from cpg_ros.nodes.feedback_switch import FeedbackSwitch, usual
 from cpg_ros.nodes.generator_parameters import (
     COMMANDS,
     exclusive,
@@ -99,9 +99,9 @@ class Generator(StartedNode):
             raise StartError(f"robot file '{robot.name}' is for the network "
                              f"{' or '.join(robot.networks)}, not '{network.name}'")
         self._planner = Planner(network, presets, robot, self._value('cmd_vel'))
-        self._declare('feedback', feedback_parameters.SWITCH)
         for name, spec in feedback_parameters.SPECS.items():
             self._declare(name, spec)
+        self._declare('feedback', usual(self, robot, self._value('combined_topic')))
         self._one_of('feedback.contacts', CONTACTS)
         self._given_groups()
         for name, spec in self._planner.specs(self._value('gait')).items():
@@ -113,10 +113,8 @@ class Generator(StartedNode):
         self._planner.prepare()
 
         steered, autostart = self._value('cmd_vel'), self._value('autostart')
-        # Feedback closes speed and heading by the strides.
-        driven = steered or self._value('feedback')
         self.pattern = Pattern(program, self._value('ramp'), autostart and not steered,
-                               Drive(len(robot.legs)) if driven else None)
+                               Drive(len(robot.legs)) if steered else None)
         self._cmd_vel = CmdVel(self, self.pattern, program, autostart,
                                lambda: self._value('cmd_vel_timeout'),
                                lambda: self._value('ramp'),

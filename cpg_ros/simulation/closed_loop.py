@@ -143,7 +143,7 @@ class ClosedLoop:
             if gains is not None:
                 angles = feedback.advance(noticed, pattern.planned, pattern.phase, pattern.gaits,
                                           pattern.mix, pattern.wanted, pattern.course, dt,
-                                          pattern.level)
+                                          1.0, pattern.level)
             else:
                 angles = pattern.planned
                 state_of.update(noticed, dt)
