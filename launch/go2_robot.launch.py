@@ -33,22 +33,22 @@ GENERATOR = {
     'network': ('delayed', str, 'delayed or quadruped'),
     'gait': ('trot', str, 'gait to start with'),
     'frequency': ('', float, "strides per second [Hz]; empty for the gait's usual one"),
-    'cmd_vel': ('false', bool, 'walk as cmd_vel (geometry_msgs/Twist) asks'),
+    'cmd_vel': ('false', bool, 'follow the commands on cmd_vel (geometry_msgs/Twist)'),
     'feedback': ('false', bool, 'correct the gait by IMU, joints and feet; tried in simulation '
                  'only'),
 }
 BRIDGE = {
-    'model': ('go2', str, 'what its motors bear: go2, go1 or b2'),
-    'torque_factor': ('1.0', float, 'share of what the motors bear that commands may ask for'),
-    'state_timeout': ('0.02', float, 'longest time without a fresh state before it damps [s]'),
-    'dry_run': ('false', bool, 'compute and log everything, and send nothing'),
-    'autostart': ('true', bool, 'start when launched; else when ~/start is called'),
+    'model': ('go2', str, 'robot model, which determines the torque limits: go2, go1 or b2'),
+    'torque_factor': ('1.0', float, "fraction of the motors' torque limits to use"),
+    'state_timeout': ('0.02', float, 'time without a new state before the robot is damped [s]'),
+    'dry_run': ('false', bool, 'compute and log everything, but send nothing'),
+    'autostart': ('true', bool, 'start the robot at launch; if false, wait for ~/start'),
 }
 OTHERS = {
-    'simulator': ('false', bool, "Unitree's simulator in place of a robot: domain 1, and no "
+    'simulator': ('false', bool, "use Unitree's simulator instead of a robot: domain 1, and no "
                   'motion modes to release'),
-    'domain': ('', int, 'of ROS; empty for 0, or 1 with simulator'),
-    'record': ('', str, 'bag to record what is commanded and measured into; empty for none'),
+    'domain': ('', int, 'ROS domain ID; empty for 0, or 1 with simulator'),
+    'record': ('', str, 'bag in which to record commands and measurements; empty for none'),
 }
 #: Commands of the bridge -> of the generator.
 COMMANDS = {'joint_states': 'none'}

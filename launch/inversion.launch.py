@@ -23,19 +23,19 @@ from launch.actions import OpaqueFunction
 
 ARGUMENTS = {
     'topics': ('[joint_states]', list[str], 'topics of sensor_msgs/JointState to listen to'),
-    'robot': ('', str, "robot file, or a shipped name; empty: legs are told from joints' names"),
-    'window': ('60.0', float, 'how much of the last joint states is fitted [s]; 0 for all'),
-    'every': ('0.0', float, 'time between fits without being asked [s]; 0 for none'),
-    'network': ('', str, "network to fit; empty: the robot's, or by the number of legs"),
-    'gait': ('', str, 'gait to fit; empty: as recognised'),
-    'preset': ('', str, "shipped set for parameters that are not free; empty: the gait's"),
-    'free': ('', list[str], "parameters to fit, as [c, tau]; empty: the network's usual ones"),
+    'robot': ('', str, 'robot file, or a shipped name; empty: legs identified by joint names'),
+    'window': ('60.0', float, 'how much of the latest joint states to fit [s]; 0 for all'),
+    'every': ('0.0', float, 'interval between automatic fits [s]; 0 for none'),
+    'network': ('', str, "network to fit; empty: the robot's, or one for the number of legs"),
+    'gait': ('', str, 'gait to fit; empty: the recognised gait'),
+    'preset': ('', str, "preset for the parameters that are not free; empty: the gait's"),
+    'free': ('', list[str], "parameters to fit, as [c, tau]; empty: the network's default ones"),
     'order': ('3', int, 'order of the readout, 1 to 3'),
-    'kp': ('0.0', float, 'gain of the joints [N m/rad], to fit what they were told; 0 fits what '
-           'they did'),
+    'kp': ('0.0', float, 'gain of the joints [N m/rad], to fit the commands; 0 fits the measured '
+           'positions'),
     'kd': ('0.0', float, 'damping gain of the joints [N m s/rad]'),
     'out': ('', str, 'parameter file to write; empty for none'),
-    'report': ('', str, 'page to write; empty for none'),
+    'report': ('', str, 'HTML report to write; empty for none'),
     'apply_to': ('', str, 'generator to set after a fit, as /cpg_generator; empty for none'),
     'use_sim_time': ('false', bool, 'follow /clock'),
 }

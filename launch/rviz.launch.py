@@ -40,7 +40,7 @@ from launch_ros.parameter_descriptions import ParameterValue
 SHARE = Path(__file__).resolve().parent.parent
 ARGUMENTS = {
     'urdf': (str(SHARE / 'urdf' / 'quadruped.urdf'), 'URDF of the robot'),
-    'rviz': ('true', 'start rviz2; false for robot_state_publisher alone'),
+    'rviz': ('true', 'start rviz2; false for robot_state_publisher only'),
     'rviz_config': (str(SHARE / 'rviz' / 'cpg.rviz'), 'configuration of rviz2'),
 }
 

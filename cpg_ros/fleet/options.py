@@ -28,10 +28,10 @@ def add_options(parser: ArgumentParser) -> None:
     """Add --jobs and --dask."""
     where = parser.add_mutually_exclusive_group()
     where.add_argument('--jobs', type=int, default=0, metavar='N', help='worker processes on '
-                       'this machine (default: one a core); the results are the same with any '
+                       'this machine (default: one per core); the results do not depend on the '
                        'number')
-    where.add_argument('--dask', metavar='ADDRESS', help="scheduler of a dask cluster to work "
-                       "on instead, such as tcp://head:8786 (pip install 'cpg-ros[fleet]')")
+    where.add_argument('--dask', metavar='ADDRESS', help="scheduler of a dask cluster to use "
+                       "instead, such as tcp://head:8786 (pip install 'cpg-ros[fleet]')")
 
 
 def chosen_fleet(chosen: Namespace, say: Callable[[str], None]) -> Fleet:

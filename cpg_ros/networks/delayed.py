@@ -62,7 +62,7 @@ class Delayed(Network):
         'a': Range(-20.0, 20.0, 'linear rate of each cell [1/model time]'),
         'b': Range(-20.0, 20.0, 'weight of each cell on itself [1/model time]'),
         'c': Range(-20.0, 20.0, "weight of the opposite leg's cell, delayed [1/model time]"),
-        'd': Range(-20.0, 20.0, 'weight of the cell before it on the same side [1/model time]'),
+        'd': Range(-20.0, 20.0, 'weight of the preceding cell on the same side [1/model time]'),
         'tau': Range(STEP, MAX_DELAY, 'delay between opposite legs [model time]')}
     couplings: ClassVar[tuple[str, ...]] = ('c', 'd')
     legs: ClassVar[dict[str, dict[str, tuple[int, ...]]]] = {

@@ -60,8 +60,8 @@ class Quadruped(Network):
     ranges: ClassVar[dict[str, Range]] = {
         key: Range(-5.0, 5.0, f'coupling of {variable} from {source}')
         for key, variable, source in (
-            ('alpha', 'v', 'the cell before it on the same side'),
-            ('beta', 'w', 'the cell before it on the same side'),
+            ('alpha', 'v', 'the preceding cell on the same side'),
+            ('beta', 'w', 'the preceding cell on the same side'),
             ('gamma', 'v', 'the opposite cell'), ('delta', 'w', 'the opposite cell'),
             ('xi', 'v', 'the cell across its ring'), ('eta', 'w', 'the cell across its ring'))}
     couplings: ClassVar[tuple[str, ...]] = ('alpha', 'beta', 'gamma', 'delta', 'xi', 'eta')

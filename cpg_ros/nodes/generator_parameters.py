@@ -32,40 +32,42 @@ from cpg_ros.robots.robot_file import find_robot
 from rclpy.parameter import Parameter
 
 COMMANDS = ('none', 'joint_trajectory', 'forward_position')
-NETWORK = Spec('delayed', 'network of cells that makes the rhythm', read_only=True,
+NETWORK = Spec('delayed', 'network of cells that generates the rhythm', read_only=True,
                constraints='one of: ' + ', '.join(NETWORKS)
-               + ', or the path of a Python file that defines one; a number after it is that of '
-               'legs (delayed6), and is that of the robot where its file asks for it')
+               + ', or the path of a Python file that defines one; append a number of legs, as in '
+               "delayed6, for a variant; without one, the robot file's number of legs is used "
+               'where the file asks for that variant')
 
 
 def specs(network: type[Network]) -> dict[str, Spec]:
     """Return the parameters that depend on nothing but the network, in order of declaration."""
     return {
-        'presets': Spec('', 'file with further presets; empty for none', read_only=True),
+        'presets': Spec('', 'file with additional presets; empty for none', read_only=True),
         'robot': Spec(network.usual_robot, 'robot file, or the name of a shipped one',
                       read_only=True, constraints='a shipped name, or the path of a YAML file'),
         'gait': gait_spec(network, network.presets(), ', and those of the file given by presets'),
         'rate': Spec(100.0, 'messages per second on every output topic [Hz]', 1.0, 2000.0),
         'amplitude': Spec(1.0, "factor on the robot file's joint amplitudes", 0.0, 3.0),
-        'duty': Spec(0.0, "share of the stride that legs stand, from 0.3; 0 for the gait's own",
-                     0.0, 0.9),
-        'transition': Spec(1.0, 'duration of a change of gait or parameters [s]; 0 leaves it to '
-                           "the network's own dynamics", 0.0, 30.0),
+        'duty': Spec(0.0, 'duty factor: fraction of the stride that a leg is in stance, from 0.3; '
+                     "0 for the gait's own", 0.0, 0.9),
+        'transition': Spec(1.0, 'duration of a change of gait or parameters [s]; 0 leaves the '
+                           "change to the network's own dynamics", 0.0, 30.0),
         'ramp': Spec(1.0, 'duration of the ramp between the stand and the gait [s]', 0.0, 30.0),
-        'symmetry_gain': Spec(-1.0, 'gain of the symmetry lock [1/model time]; -1 chooses one '
-                              "that makes the gait attract, 0 is the paper's model", -1.0, 200.0),
+        'symmetry_gain': Spec(-1.0, 'gain of the symmetry lock [1/model time]; -1 chooses a gain '
+                              "at which the gait attracts, 0 is the paper's model", -1.0, 200.0),
         'combined_topic': Spec('joint_states', 'topic with all joints in one message; empty for '
                                'none', read_only=True),
         'command': Spec('none', 'command topic for ros2_control', read_only=True,
                         constraints='one of: ' + ', '.join(COMMANDS)),
-        'measured_topic': Spec('joint_states', "the robot's own joint states, from which it is "
-                               'led to the stand if autostart is false; empty for none',
-                               read_only=True),
-        'autostart': Spec(True, 'ramp into the gait at start; false publishes nothing until '
-                          '~/enable', read_only=True),
-        'cmd_vel': Spec(False, 'walk as the topic cmd_vel asks; the robot file must say how',
-                        read_only=True),
-        'cmd_vel_timeout': Spec(0.5, 'a cmd_vel older than this stops the robot [s]', 0.05, 60.0),
+        'measured_topic': Spec('joint_states', "topic of the robot's measured joint states, from "
+                               'which the generator moves it to the stand if autostart is false; '
+                               'empty for none', read_only=True),
+        'autostart': Spec(True, 'ramp into the gait at start; if false, publish nothing until '
+                          '~/enable is called', read_only=True),
+        'cmd_vel': Spec(False, 'follow the commands on cmd_vel; the robot file must have steering '
+                        'tables', read_only=True),
+        'cmd_vel_timeout': Spec(0.5, 'the robot stops if no cmd_vel arrives for this time [s]',
+                                0.05, 60.0),
         **real_time.SPECS}
 
 
@@ -92,7 +94,7 @@ def gait_spec(network: type[Network], presets: Iterable[str], further: str = '')
 
 def exclusive(command: str) -> Spec:
     """Return the parameter whose default depends on whether a robot is commanded."""
-    return Spec(command != 'none', 'do not start where another node publishes on the command or '
+    return Spec(command != 'none', 'refuse to start if another node publishes on the command or '
                 'joint topics', read_only=True)
 
 
@@ -141,14 +143,14 @@ class Planner:
         frequency = self._frequency(preset)
         found = {'frequency': Spec(1.0 if frequency is None else frequency,
                                    "strides per second [Hz]; 0 runs in the model's own time, one "
-                                   'unit a second', 0.0, 10.0)}
+                                   'unit per second', 0.0, 10.0)}
         found |= {f'{network.name}.{key}': Spec(values[key], allowed.text, allowed.low,
                                                 allowed.high)
                   for key, allowed in network.ranges.items()}
         for group, members in network.groups.items():
             allowed = network.ranges[members[0]]
             found[f'{network.name}.{group}'] = Spec(
-                values[group], f'{" ".join(members)}: the mean; setting it sets all of them',
+                values[group], f'mean of {", ".join(members)}; setting it sets all of them',
                 allowed.low, allowed.high)
         return found
 

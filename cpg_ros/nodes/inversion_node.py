@@ -56,22 +56,23 @@ PATIENCE = 3.0
 SPECS = {
     'topics': Spec(['joint_states'], 'topics of type sensor_msgs/JointState to listen to',
                    read_only=True),
-    'robot': Spec('', 'robot file or the name of a shipped one; empty: legs are told from the '
-                  'names of the joints', read_only=True),
-    'window': Spec(60.0, 'how much of the last joint states is kept and fitted [s]; 0 for all',
+    'robot': Spec('', 'robot file, or the name of a shipped one; if empty, legs are identified by '
+                  'the names of the joints', read_only=True),
+    'window': Spec(60.0, 'how much of the latest joint states to keep and fit [s]; 0 for all',
                    0.0, 3600.0),
-    'every': Spec(0.0, 'time between fits without being asked [s]; 0 for none', 0.0, 3600.0),
-    'network': Spec('', "network to fit; empty: the robot's, or by the number of legs"),
-    'gait': Spec('', 'gait to fit; empty: as recognised'),
-    'preset': Spec('', 'shipped set that parameters which are not free are taken from; empty: '
-                   "the gait's"),
+    'every': Spec(0.0, 'interval between automatic fits [s]; 0 for none', 0.0, 3600.0),
+    'network': Spec('', "network to fit; if empty, the robot's, or one for the number of legs"),
+    'gait': Spec('', 'gait to fit; if empty, the recognised gait'),
+    'preset': Spec('', 'shipped preset that supplies the parameters that are not free; if empty, '
+                   "the gait's preset"),
     'order': Spec(3, 'order of the readout', 1, 3),
-    'kp': Spec(0.0, 'gain of the controllers of the joints [N m/rad]: fits what they were told, '
-               'position + (effort + kd velocity) / kp; 0 fits what they did', 0.0, 1e5),
-    'kd': Spec(0.0, 'damping gain of the controllers of the joints [N m s/rad]', 0.0, 1e4),
+    'kp': Spec(0.0, 'proportional gain of the joint controllers [N m/rad], to fit the commands, '
+               'position + (effort + kd velocity) / kp; 0 fits the measured positions', 0.0, 1e5),
+    'kd': Spec(0.0, 'damping gain of the joint controllers [N m s/rad]', 0.0, 1e4),
     'out': Spec('', 'parameter file to write; empty for none'),
-    'report': Spec('', 'page to write; empty for none'),
-    'apply_to': Spec('', 'generator to set after a fit, such as /cpg_generator; empty for none')}
+    'report': Spec('', 'HTML report to write; empty for none'),
+    'apply_to': Spec('', 'generator whose parameters are set after a fit, such as /cpg_generator; '
+                     'empty for none')}
 
 
 class Inversion(StartedNode):
@@ -83,7 +84,7 @@ class Inversion(StartedNode):
             self._declare(name, spec)
         # Not set is not the same as none.
         self.declare_parameter('free', Parameter.Type.STRING_ARRAY, ParameterDescriptor(
-            description="parameters to fit; not set: the network's usual ones"))
+            description="parameters to fit; if not set, the network's default ones"))
         name = self._value('robot')
         self._robot: Robot | None = find_robot(name) if name else None
         if not self.get_parameter_or('topics').value:

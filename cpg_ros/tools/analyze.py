@@ -38,16 +38,16 @@ from cpg_ros.tools.arguments import assignment, interval, number, Parser, say, t
 import numpy as np
 
 DESCRIPTION = """\
-Tell what a parameter set does before it runs on a robot: the rest state and its Hopf points, the
-gaits as exact periodic orbits, and whether each attracts in the full network and with the
-symmetry lock. Works without a ROS graph."""
+Analyse a parameter set before you run it on a robot: the rest state and its Hopf points, the gaits
+as exact periodic orbits, and whether each gait attracts in the full network and with the symmetry
+lock. Works without a ROS graph."""
 EPILOG = """\
 examples:
   analyze --network delayed --set a=-4.5 b=1 c=6.5 d=-2 tau=0.4 --plot branches.png
   analyze --network quadruped --preset pace --along gamma=delta --range -0.6:0.2
   analyze --network biped --set w_a=0.2 current=0.25 --json
 
-exit codes: 0 analysed (also where no gait was found), 2 wrong arguments."""
+exit codes: 0 analysed (even if no gait was found), 2 invalid arguments."""
 #: Delays beyond which no Hopf points are looked for, model time.
 LONGEST = 100.0
 #: No parameter is larger: beyond, the arithmetic breaks down before it tells anything.
@@ -58,22 +58,22 @@ def _parser() -> Parser:
     parser = Parser(prog='analyze', description=DESCRIPTION, epilog=EPILOG,
                     formatter_class=RawDescriptionHelpFormatter)
     parser.add_argument('--network', default='delayed', metavar='NAME',
-                        help=f'{", ".join(SHIPPED)}, or the path of a Python file with one '
-                        '(default: %(default)s)')
-    parser.add_argument('--preset', metavar='NAME', help='shipped set that parameters not set '
-                        'are taken from (default: ' + ', '.join(
+                        help=f'{", ".join(SHIPPED)}, or the path of a Python file that defines '
+                        'one (default: %(default)s)')
+    parser.add_argument('--preset', metavar='NAME', help='shipped preset that supplies the '
+                        'parameters not given by --set (default: ' + ', '.join(
                             f'{name} {kind.usual_gait}' for name, kind in SHIPPED.items()) + ')')
     parser.add_argument('--set', nargs='+', action='extend', default=[], type=assignment,
-                        metavar='PARAMETER=VALUE', help='such as c=6.5 tau=0.4; w_a sets all '
-                        'four weights of the biped')
-    parser.add_argument('--longest-delay', type=number, metavar='TAU', help='Hopf points of the '
-                        'delayed network up to this delay, model time (default: twice tau)')
-    parser.add_argument('--along', metavar='PARAMETERS', help='what moves for the Hopf points of '
-                        'the networks without delay, and for the branches of --plot: gamma, or '
-                        'alpha=beta together, or alpha=-beta (default: ' + '; '.join(
+                        metavar='PARAMETER=VALUE', help='parameter values, such as c=6.5 tau=0.4; '
+                        'w_a sets all four weights of the biped')
+    parser.add_argument('--longest-delay', type=number, metavar='TAU', help='find Hopf points of '
+                        'the delayed network up to this delay, model time (default: twice tau)')
+    parser.add_argument('--along', metavar='PARAMETERS', help='parameters to vary for the Hopf '
+                        'points of networks without delay, and for the branches of --plot: gamma, '
+                        'or alpha=beta together, or alpha=-beta (default: ' + '; '.join(
                             f'{name}: {kind.line}' if kind.span else kind.line
                             for name, kind in SHIPPED.items()) + ')')
-    parser.add_argument('--range', type=interval, metavar='LOW:HIGH', help='how far it moves '
+    parser.add_argument('--range', type=interval, metavar='LOW:HIGH', help='range of --along '
                         '(default: ' + ', '.join(
                             f'{name} {kind.span[0]:g}:{kind.span[1]:g}'
                             for name, kind in SHIPPED.items() if kind.span) + ')')

