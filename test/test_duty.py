@@ -10,6 +10,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from cpg_ros.feedback.kinematics import geometry_of
+from cpg_ros.feedback.timetable import Timetable
 from cpg_ros.motion.duty import Duty, told
 from cpg_ros.motion.pattern import Pattern
 from cpg_ros.motion.plan import Refused, plan
@@ -141,6 +143,15 @@ def test_what_weights_were_made_for_can_be_said(tmp_path):
     ahead, behind = (np.interp(np.array([-0.1, 0.3, 0.7]) % 1.0, grid, made.readout.angles[0]),
                      np.interp(np.array([-0.1, 0.2, 0.5]) % 1.0, grid, one.readout.angles[0]))
     assert np.allclose(ahead, behind, atol=1e-3)
+
+
+@pytest.mark.parametrize('duty', [0.55, 0.684, 0.8])
+def test_feet_of_a_tuned_walk_go_back_for_as_long_as_was_asked(duty):
+    robot = load_robot(CONFIG / 'unitree_go2.yaml')
+    preset = find_network('delayed').presets()['walk']
+    walk = plan(robot, 'walk', preset, preset.network, 1.0, duty=duty)
+    swinging = Timetable(walk, geometry_of(robot)).swinging
+    assert np.abs(1.0 - swinging.mean(axis=0) - duty).max() < 0.01
 
 
 def test_what_is_no_share_of_a_stride_is_refused(tmp_path):

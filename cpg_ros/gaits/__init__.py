@@ -3,6 +3,6 @@
 Imports ``networks`` and ``files``; knows nothing of ROS.
 """
 
-__all__ = ['doubts', 'leg_motion', 'leg_names', 'leg_phases', 'mean_cycle', 'period',
-           'phase_average', 'phase_estimation', 'phase_scatter', 'recognition',
+__all__ = ['doubts', 'insect_legs', 'leg_motion', 'leg_names', 'leg_phases', 'mean_cycle',
+           'period', 'phase_average', 'phase_estimation', 'phase_scatter', 'recognition',
            'steady_stretch', 'stride', 'waveform_comparison']

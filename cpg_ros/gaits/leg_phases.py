@@ -5,7 +5,7 @@ cross-correlation of all of them). An angle may be counted in the opposite sense
 as abduction is; by the mean angles, or by which sense makes the waveforms more alike, that is
 told. Legs with other joints, such as an animal's fore and hind ones, are compared by the first
 harmonic of the joint that moves most: half a cycle is then uncertain, as nothing says which sense
-of an elbow corresponds to that of a knee.
+of an elbow corresponds to that of a knee. Insects' legs are compared by their feet (insect_legs).
 """
 
 from collections.abc import Mapping, Sequence
@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from cpg_ros.gaits.insect_legs import foot_phases
 from cpg_ros.gaits.leg_names import role_of
 from cpg_ros.gaits.recognition import nearest_gait, recognise
 from cpg_ros.networks.network import Network
@@ -120,6 +121,10 @@ def leg_phases(legs: Mapping[str, Sequence[str]], c: Mapping[str, np.ndarray]
         that count angles in the opposite sense of the first leg's.
 
     """
+    feet = foot_phases(legs, c)
+    if feet is not None:
+        return feet, ('phases between legs are those of their feet along the body, by the joints '
+                      'of a fly',), (), ()
     phases: dict[str, float] = {}
     notes: list[str] = []
     opposite: list[str] = []

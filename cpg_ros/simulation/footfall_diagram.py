@@ -26,11 +26,16 @@ def stances(time: np.ndarray, force: np.ndarray, least: float) -> list[tuple[flo
         least: force from which on it stands, N.
 
     """
-    step = time[1] - time[0] if len(time) > 1 else 0.0
+    step = _spacing(time)
     edges = np.diff(np.concatenate(([0], (force > least).astype(int), [0])))
     begins, ends = np.flatnonzero(edges == 1), np.flatnonzero(edges == -1)
     return [(float(time[begin]), float((end - begin) * step))
             for begin, end in zip(begins, ends, strict=True)]
+
+
+def _spacing(time: np.ndarray) -> float:
+    """Return the mean time between samples, s: those of a clock of another rate are not even."""
+    return float(time[-1] - time[0]) / (len(time) - 1) if len(time) > 1 else 0.0
 
 
 def speed(time: np.ndarray, position: np.ndarray) -> np.ndarray:
@@ -41,7 +46,7 @@ def speed(time: np.ndarray, position: np.ndarray) -> np.ndarray:
         position: at them, m, shape (n, 2).
 
     """
-    wide = max(1, min(len(time) - 1, round(SMOOTHING / (time[1] - time[0])))) // 2 + 1
+    wide = max(1, min(len(time) - 1, round(SMOOTHING / _spacing(time)))) // 2 + 1
     low, high = np.arange(len(time)) - wide, np.arange(len(time)) + wide
     low, high = np.maximum(low, 0), np.minimum(high, len(time) - 1)
     return np.linalg.norm(position[high] - position[low], axis=1) / (time[high] - time[low])

@@ -19,7 +19,7 @@ from sphinx.util.docutils import SphinxDirective
 
 import cpg_ros
 from cpg_ros.dynamics.orbit import solve_preset
-from cpg_ros.networks.registry import SHIPPED
+from cpg_ros.networks.registry import SHIPPED, find_network
 from cpg_ros.nodes import feedback_parameters, generator_parameters, inversion_node, robot_sim
 from cpg_ros.nodes.parameter_spec import Spec
 from cpg_ros.nodes.unitree import parameters as unitree_parameters
@@ -99,7 +99,7 @@ def parameters(what: str) -> str:
 def presets(name: str) -> str:
     """Return the gaits and presets of a network with their parameters and exact periods."""
     rows = []
-    for preset_name, preset in SHIPPED[name].presets().items():
+    for preset_name, preset in find_network(name).presets().items():
         symmetry = preset.network.symmetry(preset.gait)
         phases = ', '.join(str(phase) for phase in symmetry.phases)
         values = ', '.join(f'{key} {value:g}' for key, value in preset.network.as_dict().items()
