@@ -132,8 +132,9 @@ def network_of(legs: Iterable[str]) -> str:
                 if wanted <= set(next(iter(kind.legs.values()))))
 
 
-def _legs(recording: Recording, robot: Robot | None) -> tuple[dict[str, tuple[str, ...]], str]:
-    """Which joints each leg has, and how that was read."""
+def leg_joints(recording: Recording, robot: Robot | None
+               ) -> tuple[dict[str, tuple[str, ...]], str]:
+    """Return which joints each leg has, and how that was read."""
     if robot is None:
         found = legs_of(recording.joints)
         return dict(found.joints), found.says
@@ -148,16 +149,16 @@ def _legs(recording: Recording, robot: Robot | None) -> tuple[dict[str, tuple[st
             read + (f'; not recorded: {", ".join(missing)}' if missing else ''))
 
 
-def _networks(robot: Robot | None, legs: Iterable[str]) -> Iterator[type[Network]]:
-    """The networks that drive a robot, or else those shipped that have these legs."""
+def networks_of(robot: Robot | None, legs: Iterable[str]) -> Iterator[type[Network]]:
+    """Yield the networks that drive a robot, or else those shipped that have these legs."""
     wanted = set(legs)
     yield from ((NETWORKS[name] for name in robot.networks) if robot is not None else
                 (kind for kind in numbered(len(wanted))
                  if wanted <= set(next(iter(kind.legs.values())))))
 
 
-def _stride(recording: Recording, legs: Mapping[str, Sequence[str]], kind: type[Network],
-            robot: Robot | None) -> tuple[dict[str, int], Stride]:
+def stride_of(recording: Recording, legs: Mapping[str, Sequence[str]], kind: type[Network],
+              robot: Robot | None) -> tuple[dict[str, int], Stride]:
     """Return joint -> its cell in a network, and the steady stride of the recording."""
     cells = cells_of(robot if robot is not None else legs, kind)
     cells = {name: cell for name, cell in cells.items() if name in recording.joints}
@@ -212,7 +213,7 @@ def inverted(recording: Recording, robot: Robot | None = None, network: str = ''
             gait of the network's, or no orbit (NoOrbit).
 
     """
-    legs, read = _legs(recording, robot)
+    legs, read = leg_joints(recording, robot)
     asked = bool(network)
     if not network:
         network = robot.networks[0] if robot is not None else network_of(legs)
@@ -220,14 +221,14 @@ def inverted(recording: Recording, robot: Robot | None = None, network: str = ''
         kind = with_legs_of(find_network(network), legs)
     except NetworkError as error:
         raise InputError(f'network {error}') from error
-    cells, stride = _stride(recording, legs, kind, robot)
+    cells, stride = stride_of(recording, legs, kind, robot)
     between = ''
     if not (gait or stride.gait or asked or kind.offsets):
         between = _none_of(kind, stride)
-        as_they_are = next((one for one in _networks(robot, legs) if one.offsets), None)
+        as_they_are = next((one for one in networks_of(robot, legs) if one.offsets), None)
         if as_they_are is not None:
             kind = as_they_are
-            cells, stride = _stride(recording, legs, kind, robot)
+            cells, stride = stride_of(recording, legs, kind, robot)
             between += f'; they are fitted as they are, by the network {kind.name}'
     warnings = [*([between] if between else []), *stride.doubts]
     if not gait:

@@ -12,12 +12,12 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Published quantities of the three papers, each beside what our own numerics give for it.
+"""Published quantities of the papers, each beside what our own numerics give for it.
 
 Imports ``inversion``, ``gaits``, ``dynamics`` and what is below; knows nothing of ROS.
 """
 
 __all__ = ['buono_blocks', 'buono_gaits', 'buono_golubitsky', 'buono_groups', 'buono_hopf',
            'buono_tables', 'catalogue', 'cell_constants', 'commentary', 'errata', 'figures',
-           'liu_zhang', 'published_normal_form', 'rashidi', 'reproduction', 'rhythm', 'row',
-           'theorem_4_2']
+           'liu_zhang', 'oscillators', 'published_normal_form', 'rashidi', 'reproduction',
+           'rhythm', 'row', 'theorem_4_2']

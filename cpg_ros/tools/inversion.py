@@ -24,14 +24,15 @@ from collections.abc import Sequence
 from pathlib import Path
 import sys
 
-from cpg_ros.errors import CpgError
+from cpg_ros.errors import CpgError, InputError
 from cpg_ros.files.atomic_write import write_atomically
-from cpg_ros.files.plain_text import as_json
+from cpg_ros.files.plain_text import as_json, table
 from cpg_ros.files.progress_bar import progress_bar
 from cpg_ros.files.yaml_reader import shown
 from cpg_ros.fleet.options import add_options
 from cpg_ros.gaits.leg_names import BIPED, QUADRUPED
 from cpg_ros.gaits.stride import NoSteadyGait
+from cpg_ros.inversion.model_choice import as_rows, Explained, explained
 from cpg_ros.inversion.paper_fit import paper_fits, PaperFit, refuse_others
 from cpg_ros.inversion.parameter_files import write_fitted
 from cpg_ros.inversion.recording_fit import Inverted, inverted, network_of, preset_of
@@ -88,7 +89,8 @@ def _parser() -> Parser:
                         'one, which assigns joints to legs and cells and gives their limits '
                         '(default: legs identified by the names of the joints)')
     parser.add_argument('--network', metavar='NAME', help=f'{", ".join(SHIPPED)}, or the path of '
-                        "a Python file that defines one (default: the robot's first; "
+                        "a Python file that defines one, or auto: all that have the recording's legs, "
+                        "judged on strides that are not fitted (default: the robot's first; "
                         f'four legs: {network_of(QUADRUPED)}, two legs: {network_of(BIPED)})')
     parser.add_argument('--gait', metavar='NAME', help='gait to fit (default: the recognised one)')
     parser.add_argument('--preset', metavar='NAME', help='shipped preset that supplies the '
@@ -194,8 +196,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
             from cpg_ros.tools.inversion_many import run as run_many
             return run_many(chosen, robot)
         recording = _recording(chosen, robot)
+        network, compared = _explained(chosen, recording, robot)
         with progress_bar('fitting', 100) as bar:
-            found = inverted(recording, robot, chosen.network or '', chosen.gait or '',
+            found = inverted(recording, robot, network, chosen.gait or '',
                              chosen.free, chosen.order, chosen.preset or '', starts,
                              done=lambda share: bar(round(100.0 * share)))
         fits = _paper(chosen, found, starts)
@@ -211,15 +214,32 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(f'inversion: stopped{"" if chosen.bags is None else kept}', file=sys.stderr)
         return 130
     if chosen.json:
-        say(as_json({**found.as_dict(), **({'paper': [{
-            'start': one.start, 'end': one.end, 'iterations': one.fit.trial.iterations,
-            'error': one.fit.cost, 'synchronisation_errors': one.errors} for one in fits]}
+        say(as_json({**found.as_dict(), **({'networks': [{
+            key: value for key, value in vars(one).items() if value != float('inf')}
+            for one in compared]} if compared else {}), **({'paper': [{
+                'start': one.start, 'end': one.end, 'iterations': one.fit.trial.iterations,
+                'error': one.fit.cost, 'synchronisation_errors': one.errors} for one in fits]}
             if chosen.paper else {})}))
     else:
         from cpg_ros.inversion.fit_report import as_table, as_text
-        said = '\n'.join([as_text(found), *as_table(fits)])
+        judged = [*table(as_rows(compared), '<<>>>>'), ''] if compared else []
+        said = '\n'.join([*judged, as_text(found), *as_table(fits)])
         say(f'{said}\nwritten: {", ".join(map(str, written))}' if written else said)
     return 0
+
+
+def _explained(chosen: Namespace, recording: Recording, robot: Robot | None
+               ) -> tuple[str, list[Explained]]:
+    """Return the network to fit, and how well others explain the recording where that is asked."""
+    if chosen.network != 'auto':
+        return chosen.network or '', []
+    with progress_bar('comparing networks', 100) as bar:
+        found = explained(recording, robot, chosen.order,
+                          done=lambda share: bar(round(100.0 * share)))
+    if found[0].why:
+        raise InputError(f'{recording.source}: no network has such a gait: ' + '; '.join(
+            f'{one.network}: {one.why}' for one in found))
+    return found[0].network, found
 
 
 def _paper(chosen: Namespace, found: Inverted, starts: list[dict[str, float]]

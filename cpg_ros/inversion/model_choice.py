@@ -1,0 +1,145 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Which network explains a recording? All that have its legs, fitted and judged on other strides.
+
+Every other stride is fitted, and the fit is held against the mean cycle of those left out: a
+network that follows noise gains nothing by it.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+from cpg_ros.errors import CpgError, InputError
+from cpg_ros.gaits.phase_average import warped
+from cpg_ros.gaits.stride import Stride
+from cpg_ros.inversion.given_up import fit_at_all
+from cpg_ros.inversion.recording_fit import leg_joints, networks_of, preset_of, stride_of
+from cpg_ros.inversion.variable_projection import WEIGHTS
+from cpg_ros.recordings.recording import Recording
+from cpg_ros.robots.robot import Robot
+import numpy as np
+
+#: A joint whose mean cycle has a smaller range stands (rad).
+STANDS = 0.01
+
+
+@dataclass(frozen=True)
+class Explained:
+    """How well a network explains a recording.
+
+    Attributes:
+        network: its name.
+        gait: that was fitted, '' if none was.
+        error: mean over the joints of RMS error over range on strides that were left out.
+        fitted: the same on those that were fitted.
+        parameters: numbers of the network that were fitted, or read off the legs' phases.
+        numbers: all numbers, those of the readouts included.
+        why: why nothing was fitted, or ''.
+
+    """
+
+    network: str
+    gait: str
+    error: float = np.inf
+    fitted: float = np.inf
+    parameters: int = 0
+    numbers: int = 0
+    why: str = ''
+
+
+def explained(recording: Recording, robot: Robot | None = None, order: int = 3,
+              done: Callable[[float], None] = lambda share: None) -> list[Explained]:
+    """Fit every network that has the recording's legs; the best on other strides comes first.
+
+    Args:
+        recording: joints over time.
+        robot: whose networks, legs and cells are taken; all shipped ones by default.
+        order: of the readouts, 1 to 3.
+        done: told which share of the work is done, 0 to 1.
+
+    Raises:
+        CpgError: there are no legs or no steady gait, or no network has such legs.
+
+    """
+    legs, _ = leg_joints(recording, robot)
+    kinds, found = list(networks_of(robot, legs)), []
+    if not kinds:
+        raise InputError(f'{recording.source}: no network has {len(legs)} legs')
+    for count, kind in enumerate(kinds):
+        cells, stride = stride_of(recording, legs, kind, robot)
+        gait = stride.gait or kind.unnamed
+        if not gait:
+            found.append(Explained(kind.name, '', why=(
+                f'its nearest gait, {stride.nearest}, is {stride.distance:.3f} of a cycle off')))
+            continue
+        half, others = halves(recording, stride)
+        parameters = preset_of(kind.name, gait).network.with_phases(stride.phases)
+        done(count / len(kinds))
+        try:
+            fit, _ = fit_at_all(half, cells, parameters, gait, (), order, ({},), _unsaid)
+        except CpgError as error:
+            found.append(Explained(kind.name, gait, why=str(error)))
+            continue
+        free = len(fit.parameters) + len(kind.offsets) - bool(kind.offsets)
+        rows = [half.joints.index(name) for name in fit.joints]
+        found.append(Explained(
+            kind.name, gait, _share(fit.fitted - others[rows], others[rows]), fit.mean_rms_share,
+            free, free + len(fit.joints) * (1 + WEIGHTS[fit.order])))
+    done(1.0)
+    return sorted(found, key=lambda one: (one.error, one.numbers))
+
+
+def _unsaid(share: float) -> None:
+    """Tell nobody how far a single fit is."""
+
+
+def halves(recording: Recording, stride: Stride) -> tuple[Stride, np.ndarray]:
+    """Return the stride of every other cycle, and the mean of those between, (joints, m), rad.
+
+    Raises:
+        InputError: there are too few of them.
+
+    """
+    x = recording.positions[:, [recording.joints.index(name) for name in stride.joints]]
+    inside = ((recording.times >= stride.warp.knots[0])
+              & (recording.times <= stride.warp.knots[-1]))
+    phases = stride.warp(recording.times[inside])
+    if stride.cycles < 4:
+        raise InputError(f'{recording.source}: {stride.cycles} strides are too few to fit one '
+                         'half and judge on the other')
+    even = np.floor(phases - phases[0]).astype(int) % 2 == 0
+    means = []
+    for mask in (even, ~even):
+        part = warped(phases[mask], x[inside][mask], stride.theta, range(len(stride.joints)))
+        means.append((part.mean(stride.theta - part.zero), part.error))
+    return replace(stride, mean=means[0][0], error=means[0][1]), means[1][0]
+
+
+def _share(errors: np.ndarray, recorded: np.ndarray) -> float:
+    spans = np.ptp(recorded, axis=1)
+    moving = spans > STANDS
+    if not moving.any():
+        return 0.0
+    return float(np.mean(np.sqrt(np.mean(errors**2, axis=1))[moving] / spans[moving]))
+
+
+def as_rows(found: Sequence[Explained]) -> list[tuple[str, ...]]:
+    """Rows of a table, with a head."""
+    rows: list[tuple[str, ...]] = [('network', 'gait', 'held-out error', 'fitted', 'parameters',
+                                    'all numbers')]
+    return rows + [(one.network, one.gait or 'none', '-', '-', '-', one.why) if one.why else
+                   (one.network, one.gait, f'{100 * one.error:.2f} %',
+                    f'{100 * one.fitted:.2f} %', str(one.parameters), str(one.numbers))
+                   for one in found]
