@@ -11,7 +11,7 @@ from types import FrameType
 PLACES = {'generator': 'nodes.generator', 'robot_sim': 'nodes.robot_sim',
           'unitree_bridge': 'nodes.unitree.bridge', 'panel': 'panel.panel_node', **{
     name: f'tools.{name}' for name in ('inversion', 'cpg', 'demo', 'analyze', 'check_robot',
-                                       'optimize', 'reproduce', 'tune', 'calibrate')}}
+                                       'optimize', 'reproduce', 'tune', 'calibrate', 'atlas')}}
 
 
 def start(name: str) -> int:
@@ -28,4 +28,4 @@ def start(name: str) -> int:
 
 
 (generator, robot_sim, unitree_bridge, panel, inversion, cpg, demo, analyze, check_robot,
- optimize, reproduce, tune, calibrate) = (partial(start, name) for name in PLACES)
+ optimize, reproduce, tune, calibrate, atlas) = (partial(start, name) for name in PLACES)

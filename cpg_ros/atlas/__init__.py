@@ -1,0 +1,7 @@
+"""Maps of where gaits live, over two parameters, with their exact boundaries.
+
+Imports ``fleet``, ``dynamics`` and what is below; knows nothing of ROS.
+"""
+
+__all__ = ['chart', 'hopf_curves', 'map_page', 'map_picture', 'orbit_curves', 'refinement',
+           'row_job', 'stored']
