@@ -16,7 +16,7 @@ from cpg_ros.files.page_style import STYLE
 from cpg_ros.networks.registry import find_network
 
 #: Points of a waveform on the page, and distance on the grid between two that are there.
-POINTS, APART = 33, 4
+POINTS, APART = 32, 4
 #: Numbers of a point that the page has.
 SHOWN = ('period', 'amplitude', 'leading', 'lock', 'basin')
 
@@ -47,8 +47,11 @@ function draw() {
   pen.clearRect(0, 0, map.width, map.height);
   for (let i = 0; i < N; i++) for (let j = 0; j < M; j++) {
     pen.fillStyle = A.colours[g.label[i * M + j]];
-    pen.fillRect(L + W * i / N, 8 + H * (1 - (j + 1) / M), W / N + 1, H / M + 1);
+    pen.fillRect(L + W * (i - 0.5) / (N - 1), 8 + H * (1 - (j + 0.5) / (M - 1)),
+                 W / (N - 1) + 1, H / (M - 1) + 1);
   }
+  pen.clearRect(0, 0, L, map.height); pen.clearRect(0, 8 + H, map.width, B);
+  pen.clearRect(0, 0, map.width, 8); pen.clearRect(L + W, 0, 8, map.height);
   for (const c of A.curves) if (c.gait === pick.value) {
     pen.strokeStyle = A.lines[c.kind]; pen.lineWidth = 1.5; pen.beginPath();
     c.points.forEach((p, k) => pen[k ? 'lineTo' : 'moveTo'](X(p[0]), Y(p[1])));
@@ -58,9 +61,11 @@ function draw() {
   for (let k = 0; k <= 4; k++) {
     const [u, v] = [0, 1].map(a => A.low[a] + (A.high[a] - A.low[a]) * k / 4);
     pen.fillText(+u.toPrecision(3), X(u) - 10, map.height - 18);
-    pen.fillText(+v.toPrecision(3), 14, Y(v) + 4);
+    pen.fillText(+v.toPrecision(3), 18, Y(v) + 4);
   }
-  pen.fillText(A.names[0], L + W / 2, map.height - 4); pen.fillText(A.names[1], 2, 12);
+  pen.fillText(A.names[0], L + W / 2, map.height - 4);
+  pen.save(); pen.translate(11, 8 + H / 2); pen.rotate(-Math.PI / 2);
+  pen.fillText(A.names[1], 0, 0); pen.restore();
   if (at) { pen.strokeStyle = '#000'; pen.strokeRect(X(at[0]) - 4, Y(at[1]) - 4, 8, 8); }
 }
 function wave(g, i, j) {
@@ -134,7 +139,7 @@ def _waves(sheet: Sheet, cells: int) -> list[Any]:
             continue
         seen.add(place)
         x = np.array(wave)[:, :cells]
-        some = x[np.linspace(0, len(x) - 1, POINTS).astype(int)]
+        some = x[::max(1, len(x) // POINTS)]
         found.append([row, column, np.round(some - x.mean(axis=0), 3).T.tolist()])
     return found
 
