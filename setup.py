@@ -59,5 +59,6 @@ setup(
         'optimize = cpg_ros.tools.executables:optimize',
         'reproduce = cpg_ros.tools.executables:reproduce',
         'tune = cpg_ros.tools.executables:tune',
-        'calibrate = cpg_ros.tools.executables:calibrate']},
+        'calibrate = cpg_ros.tools.executables:calibrate',
+        'atlas = cpg_ros.tools.executables:atlas']},
 )

@@ -35,6 +35,11 @@ def slow_square(job):
     return job * job
 
 
+def pause(job):
+    time.sleep(0.1)
+    return job
+
+
 def odd_ones_fail(job):
     if job % 2:
         raise ValueError(f'{job} is odd')
@@ -68,7 +73,8 @@ class Cluster:
         self.port, self.folder = free_port(), folder
         root = Path(cpg_ros.__file__).parents[1]
         self.environment = {**os.environ, 'PYTHONPATH': os.pathsep.join(
-            [str(Path(__file__).parent), str(root), os.environ.get('PYTHONPATH', '')])}
+            [str(Path(__file__).parent), str(root), str(root / 'benchmarks'),
+             os.environ.get('PYTHONPATH', '')])}
         self.address = f'tcp://127.0.0.1:{self.port}'
         self.scheduler = self.start_scheduler()
         self.workers = [self.start_worker() for _ in range(workers)]

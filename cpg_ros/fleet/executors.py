@@ -34,6 +34,7 @@ from typing import Any
 
 import cpg_ros
 from cpg_ros.errors import CpgError, InputError
+from cpg_ros.fleet.tally import Tally
 
 #: Within this many seconds an address answers, or is said not to; and a scheduler that was lost
 #: is waited for so long.
@@ -58,13 +59,14 @@ class Fleet(Executor):
     Attributes:
         inner: that which runs the jobs now.
         room: jobs that are handed to it at the same time.
+        what: the jobs of map are called, where it tells how far they are; '' to tell nothing.
 
     """
 
     def __init__(self, inner: Executor, room: int = 2 * EXPECTED,
                  renew: Callable[[], tuple[Executor, int]] | None = None,
                  close: Callable[[bool], None] | None = None) -> None:
-        self.inner, self.room = inner, room
+        self.inner, self.room, self.what = inner, room, ''
         self._renew, self._close = renew, close
 
     def submit(self, function: Callable[..., Any], /, *arguments: Any, **options: Any
@@ -75,8 +77,13 @@ class Fleet(Executor):
     def map(self, function: Callable[..., Any], *iterables: Any, timeout: float | None = None,
             chunksize: int = 1) -> Iterator[Any]:
         """Yield results in the order of the jobs; jobs of a worker that dies are done again."""
+        # It knows fleets, too.
         from cpg_ros.fleet.outcomes import in_order
-        return in_order(self, function, zip(*iterables, strict=False))
+        jobs = list(zip(*iterables, strict=False))
+        with Tally(self.what, len(jobs), bool(self.what)) as tally:
+            for result in in_order(self, function, jobs, tally.tick):
+                tally.add()
+                yield result
 
     def lost(self, error: BaseException) -> bool:
         """Whether an error tells of the executor and not of the job."""

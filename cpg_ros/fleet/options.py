@@ -15,7 +15,8 @@
 """The options that choose where jobs run, alike for all executables that run many."""
 
 from argparse import ArgumentParser, Namespace
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 
 from cpg_ros.errors import InputError
 from cpg_ros.fleet.executors import cluster, Fleet, processes
@@ -45,3 +46,26 @@ def chosen_fleet(chosen: Namespace, say: Callable[[str], None]) -> Fleet:
     if not 0 <= chosen.jobs <= MOST:
         raise InputError(f'argument --jobs: {chosen.jobs} is not between 0 and {MOST}')
     return cluster(chosen.dask, say) if chosen.dask else processes(chosen.jobs)
+
+
+@contextmanager
+def working(chosen: Namespace, what: str, say: Callable[[str], None]) -> Iterator[Fleet]:
+    """Lend the fleet that the options ask for; an error lets go of it at once.
+
+    Args:
+        chosen: options.
+        what: its jobs are called, in the lines that tell how far they are.
+        say: takes a line when a scheduler is lost.
+
+    Raises:
+        CpgError: as chosen_fleet.
+
+    """
+    fleet = chosen_fleet(chosen, say)
+    fleet.what = what
+    try:
+        yield fleet
+    except BaseException:
+        fleet.shutdown(wait=False)
+        raise
+    fleet.shutdown()

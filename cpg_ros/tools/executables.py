@@ -26,7 +26,7 @@ PLACES = {'generator': 'nodes.generator', 'robot_sim': 'nodes.robot_sim',
           'unitree_bridge': 'nodes.unitree.bridge', 'panel': 'panel.panel_node',
           **{name: f'tools.{name}'
              for name in ('inversion', 'cpg', 'demo', 'analyze', 'check_robot', 'optimize',
-                          'reproduce', 'tune', 'calibrate')}}
+                          'reproduce', 'tune', 'calibrate', 'atlas')}}
 
 
 def start(name: str) -> int:
@@ -43,4 +43,4 @@ def start(name: str) -> int:
 
 
 (generator, robot_sim, unitree_bridge, panel, inversion, cpg, demo, analyze, check_robot,
- optimize, reproduce, tune, calibrate) = (partial(start, name) for name in PLACES)
+ optimize, reproduce, tune, calibrate, atlas) = (partial(start, name) for name in PLACES)

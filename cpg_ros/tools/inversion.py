@@ -89,8 +89,8 @@ def _parser() -> Parser:
                         'one, which assigns joints to legs and cells and gives their limits '
                         '(default: legs identified by the names of the joints)')
     parser.add_argument('--network', metavar='NAME', help=f'{", ".join(SHIPPED)}, or the path of '
-                        "a Python file that defines one, or auto: all that have the recording's legs, "
-                        "judged on strides that are not fitted (default: the robot's first; "
+                        "a Python file that defines one, or auto: all that have the recording's "
+                        "legs, judged on strides that are not fitted (default: the robot's first; "
                         f'four legs: {network_of(QUADRUPED)}, two legs: {network_of(BIPED)})')
     parser.add_argument('--gait', metavar='NAME', help='gait to fit (default: the recognised one)')
     parser.add_argument('--preset', metavar='NAME', help='shipped preset that supplies the '

@@ -18,7 +18,7 @@ from argparse import Namespace
 import sys
 
 from cpg_ros.fleet.many_recordings import Folders, Summary
-from cpg_ros.fleet.options import chosen_fleet
+from cpg_ros.fleet.options import working
 from cpg_ros.fleet.recording_job import Settings
 from cpg_ros.recordings.servo import Servo
 from cpg_ros.robots.robot import Robot
@@ -47,13 +47,8 @@ def run(chosen: Namespace, robot: Robot | None) -> int:
 
     """
     work = Folders(chosen.bags, chosen.out, _settings(chosen, robot))
-    fleet = chosen_fleet(chosen, _note)
-    try:
+    with working(chosen, 'recordings', _note) as fleet:
         summary = work.watch(fleet, _note) if chosen.watch else work.run(fleet)
-    except BaseException:
-        fleet.shutdown(wait=False)
-        raise
-    fleet.shutdown()
     say(_told(summary))
     return 0 if summary.failed < summary.done else 1
 

@@ -20,12 +20,15 @@ Pareto front (``front.csv``, ``front.png``) and a preset file that ``generator``
 
 import argparse
 from collections.abc import Sequence
+from concurrent.futures import Executor
+from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 import re
 import shlex
 import sys
 
 from cpg_ros.errors import CpgError
+from cpg_ros.fleet.options import add_options, working
 from cpg_ros.networks.preset_files import write_presets
 from cpg_ros.search.nsga2 import Front, NothingFound, optimise
 from cpg_ros.search.pareto_front import draw_front, write_front
@@ -76,6 +79,10 @@ def _parser() -> Parser:
                         help='how many (default: %(default)s)')
     parser.add_argument('--seed', type=int, default=0, metavar='N',
                         help='the same seed finds the same (default: %(default)s)')
+    parser.add_argument('--islands', type=int, default=1, metavar='N', help='populations that '
+                        'evolve apart and exchange their best, each a job; what is found depends '
+                        'on their number, not on that of the workers (default: %(default)s)')
+    add_options(parser)
     parser.add_argument('--fix', nargs='+', action='extend', default=[], type=assignment,
                         metavar='VARIABLE=VALUE', help='keep variables at a value, such as '
                         'current=0.229 phi=0.254')
@@ -110,6 +117,17 @@ def table(front: Front) -> str:
                                 for name, value, unit in rows)])
 
 
+def _executor(chosen: argparse.Namespace) -> AbstractContextManager[Executor | None]:
+    """Where the islands are: a single one is in this process, if nothing else is asked for."""
+    if chosen.islands < 2 and not chosen.dask:
+        return nullcontext()
+    return working(chosen, 'epochs of islands', _note)
+
+
+def _note(line: str) -> None:
+    print(f'optimize: {line}', file=sys.stderr)
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the search; return the exit code."""
     arguments = sys.argv[1:] if arguments is None else arguments
@@ -122,9 +140,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         # Now, and not when the work is done.
         chosen.out.mkdir(parents=True, exist_ok=True)
-        front = optimise(chosen.network, chosen.gait, chosen.population, chosen.generations,
-                         chosen.seed, dict(chosen.bounds), dict(chosen.fix),
-                         progress=sys.stderr.isatty())
+        with _executor(chosen) as executor:
+            front = optimise(chosen.network, chosen.gait, chosen.population, chosen.generations,
+                             chosen.seed, dict(chosen.bounds), dict(chosen.fix),
+                             progress=executor is None and sys.stderr.isatty(),
+                             islands=chosen.islands, executor=executor)
         write_front(chosen.out / 'front.csv', front)
         draw_front(chosen.out / 'front.png', front)
         command = shlex.join(['optimize', *arguments])

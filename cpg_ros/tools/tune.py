@@ -20,12 +20,15 @@ upright, measures how to steer them, and writes the robot file with its part ``g
 
 import argparse
 from collections.abc import Sequence
+from concurrent.futures import Executor
+from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 import shlex
 import sys
 
 from cpg_ros.errors import CpgError
 from cpg_ros.files.plain_text import table
+from cpg_ros.fleet.options import add_options, working
 from cpg_ros.networks.registry import NETWORKS
 from cpg_ros.robots.robot import Robot
 from cpg_ros.robots.robot_file import find_robot, LIMITS, write_robot
@@ -64,8 +67,9 @@ def _parser() -> Parser:
                         "N m/rad (default: a Go2's, scaled to the robot's mass)")
     parser.add_argument('--kd', type=number, metavar='NMS', help='damping gain of the joints, '
                         'N m s/rad (default: the same)')
-    parser.add_argument('--jobs', type=int, default=0, metavar='N',
-                        help='cores for the physics (default: all)')
+    parser.add_argument('--seeds', type=int, default=1, metavar='N', help='searches for each '
+                        'gait, from --seed on; the best counts (default: %(default)s)')
+    add_options(parser)
     parser.add_argument('--out', type=Path, required=True, metavar='FILE',
                         help='the robot file to write')
     return parser
@@ -109,6 +113,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
             parser.error(f'argument --{option}: {value:g} is not above 0 and up to 100000')
     if chosen.jobs < 0:
         parser.error(f'argument --jobs: {chosen.jobs} is negative')
+    if chosen.seeds < 1:
+        parser.error(f'argument --seeds: {chosen.seeds} is not positive')
     if name := twice(chosen.gaits or []):
         parser.error(f'argument --gaits: {name} is given twice')
     try:
@@ -121,9 +127,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
             parser.error(f'argument --out: there is no directory {chosen.out.parent}')
         if chosen.out.is_dir():
             parser.error(f'argument --out: {chosen.out} is a directory')
-        robot, found, missing = tune(
-            robot, chosen.model, chosen.gaits, chosen.evaluations, chosen.seed, kp=chosen.kp,
-            kd=chosen.kd, threads=chosen.jobs, say=_note)
+        with _executor(chosen) as executor:
+            robot, found, missing = tune(
+                robot, chosen.model, chosen.gaits, chosen.evaluations, chosen.seed, executor,
+                chosen.seeds, chosen.kp, chosen.kd, 1 if executor else chosen.jobs, _note)
         lines = [*figures(found), *missing, *invented(robot)]
         command = shlex.join(['ros2', 'run', 'cpg_ros', 'tune', *arguments])
         write_robot(chosen.out, robot, '\n'.join([
@@ -144,6 +151,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print('tune: no gait is good', file=sys.stderr)
         return 1
     return 0
+
+
+def _executor(chosen: argparse.Namespace) -> AbstractContextManager[Executor | None]:
+    """Where the searches are: a single one is in this process, and has all cores."""
+    if len(chosen.gaits) * chosen.seeds == 1 and not chosen.dask:
+        return nullcontext()
+    return working(chosen, 'searches', _note)
 
 
 def _note(line: str) -> None:

@@ -1,0 +1,219 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Curves of torus points, period doublings and branch points of a gait in two parameters.
+
+On a curve the modulus of one multiplier is 1. Away from folds orbits are a function of both
+parameters, and so is its logarithm g: the curve g = 0 is followed by steps along its tangent and
+Newton's method normal to it.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from cpg_ros.atlas.chart import Chart, COARSE
+from cpg_ros.atlas.hopf_curves import Curve
+from cpg_ros.atlas.refinement import places, Sheet
+from cpg_ros.atlas.row_job import largest_of, NONE, path_of
+from cpg_ros.dynamics.bifurcation import REAL
+from cpg_ros.dynamics.floquet import ATTRACTS, multipliers
+from cpg_ros.dynamics.fourier.floquet import SPAN, Variation
+from cpg_ros.dynamics.fourier.orbit import FourierOrbit
+from cpg_ros.dynamics.orbit import NoOrbit, Orbit, solve_beside, solve_from_path
+import numpy as np
+from scipy.optimize import brentq
+
+#: Curves of a gait at most, points of each, steps in shares of the ranges.
+CURVES, MOST, STEP, SHORTEST = 6, 120, 0.03, 2e-3
+#: How well g is zero, differences for its slope, and Newton's steps.
+EXACT, DIFFERENCE, NEWTON = 1e-8, 1e-5, 8
+#: The trivial multiplier's error, and halvings of the elements.
+TRIVIAL, HALVINGS = 1e-8, 5
+
+Share = tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Edge:
+    """Two neighbours on the grid between which multipliers cross, as shares of the ranges."""
+
+    here: Share
+    there: Share
+    wave: list[list[float]]
+    period: float
+
+
+def edges(chart: Chart, sheet: Sheet) -> list[Edge]:
+    """Neighbours on the coarse grid whose orbits differ in how many multipliers are outside."""
+    rows, columns = places(chart.first.count, COARSE), places(chart.second.count, COARSE)
+    size = np.array([chart.first.count - 1, chart.second.count - 1])
+    found = []
+    for k, row in enumerate(rows):
+        for m, column in enumerate(columns):
+            for other in ((row, columns[m + 1]) if m + 1 < len(columns) else None,
+                          (rows[k + 1], column) if k + 1 < len(rows) else None):
+                at = (row, column)
+                if other is None or at not in sheet.waves or sheet.label[other] == NONE:
+                    continue
+                if sheet.numbers['unstable'][at] != sheet.numbers['unstable'][other]:
+                    one, two = np.array(at) / size, np.array(other) / size
+                    found.append(Edge((one[0], one[1]), (two[0], two[1]), *sheet.waves[at]))
+    return found
+
+
+def spectrum(orbit: Orbit) -> list[np.ndarray]:
+    """Multipliers of each subspace, largest first; that of the class first, without 1."""
+    if isinstance(orbit, FourierOrbit):
+        n = max(1, int(np.ceil(orbit.network.delay / (SPAN * orbit.period))))
+        for halving in range(HALVINGS):
+            equation = Variation(orbit, n * 2**halving)
+            inside = largest_of(equation, equation.inside, exact=1e-12)
+            if np.abs(inside - 1.0).min() <= TRIVIAL:
+                break
+        parts = [np.delete(inside, np.abs(inside - 1.0).argmin()),
+                 *(largest_of(equation, part, exact=1e-12) for part in equation.outside)]
+    else:
+        told = multipliers(orbit)
+        parts = [told.within, *told.parts]
+    return [part[np.argsort(-np.abs(part), kind='stable')] for part in parts]
+
+
+class _Plane:
+    """Orbits over the plane, each solved beside the last one."""
+
+    def __init__(self, chart: Chart, gait: str) -> None:
+        self.chart, self.gait = chart, gait
+        self.last: Orbit | None = None
+
+    def orbit(self, share: np.ndarray) -> Orbit:
+        axes = (self.chart.first, self.chart.second)
+        one, other = (axis.low + part * (axis.high - axis.low)
+                      for axis, part in zip(axes, share, strict=True))
+        network = self.chart.at(float(one), float(other))
+        assert self.last is not None
+        found = solve_beside(network, self.last)
+        if found.levels[0, 0, 1] < 0.3 * self.last.levels[0, 0, 1]:
+            raise NoOrbit('the orbit has shrunk')
+        return found
+
+
+def orbit_curves(job: tuple[Chart, str, list[Edge]]) -> list[Curve]:
+    """Follow the curves that some edges cross; those that cannot be had are left out."""
+    chart, gait, crossed = job
+    found: list[Curve] = []
+    size = np.array([chart.first.high - chart.first.low, chart.second.high - chart.second.low])
+    low = np.array([chart.first.low, chart.second.low])
+    for edge in crossed:
+        middle = 0.5 * (np.array(edge.here) + edge.there)
+        reach = np.abs(np.array(edge.here) - edge.there).max()
+        known = [(one.points[:, :2] - low) / size for one in found]
+        if any(np.abs(points - middle).max(axis=1).min() < 1.5 * reach for points in known):
+            continue
+        try:
+            found += _through(chart, gait, edge)
+        except (NoOrbit, np.linalg.LinAlgError):
+            continue
+        if len(found) >= CURVES:
+            break
+    return found
+
+
+def _through(chart: Chart, gait: str, edge: Edge) -> Iterator[Curve]:
+    plane = _Plane(chart, gait)
+    one, other = np.array(edge.here), np.array(edge.there)
+    network = chart.at(*(float(axis.low + part * (axis.high - axis.low)) for axis, part in zip(
+        (chart.first, chart.second), one, strict=True)))
+    plane.last = solve_from_path(network, network.symmetry(gait), path_of(edge.wave), edge.period)
+    if plane.last is None:
+        return
+    before, after = spectrum(plane.last), spectrum(plane.orbit(other))
+    for part, (left, right) in enumerate(zip(before, after, strict=True)):
+        counts = [int((np.abs(some) >= ATTRACTS).sum()) for some in (left, right)]
+        if counts[0] == counts[1]:
+            continue
+        rank = min(counts)
+
+        def g(share: np.ndarray, part: int = part, rank: int = rank) -> float:
+            orbit = plane.orbit(share)
+            some = spectrum(orbit)[part]
+            plane.last = orbit
+            return float(np.log(np.abs(some[rank]))) if len(some) > rank else -10.0
+
+        start = plane.last
+        place = brentq(lambda s: g(one + s * (other - one)), 0.0, 1.0, xtol=1e-9)
+        share = one + place * (other - one)
+        crossing = complex(spectrum(plane.orbit(share))[part][rank])
+        kind = ('torus' if abs(crossing.imag) > REAL else
+                'branch point' if crossing.real > 0.0 else 'period doubling')
+        at_share = plane.last
+        ways = []
+        for way in (-1.0, 1.0):
+            plane.last = at_share
+            ways.append(_followed(g, share, way))
+        shares = np.array([*ways[0][::-1], share, *ways[1]])
+        low = np.array([chart.first.low, chart.second.low])
+        size = np.array([chart.first.high, chart.second.high]) - low
+        yield Curve(kind, gait, low + shares * size)
+        plane.last = start
+
+
+def _slope(g: object, share: np.ndarray) -> np.ndarray:
+    assert callable(g)
+    steps = DIFFERENCE * np.eye(2)
+    return np.array([(g(share + step) - g(share - step)) / (2.0 * DIFFERENCE) for step in steps])
+
+
+def _followed(g: object, start: np.ndarray, way: float) -> list[np.ndarray]:
+    """Points of g = 0 from one on, until the plane ends or the orbit is lost."""
+    assert callable(g)
+    found: list[np.ndarray] = []
+    here, step = start, STEP
+    normal = _slope(g, here)
+    tangent = way * np.array([-normal[1], normal[0]]) / np.linalg.norm(normal)
+    while len(found) < MOST and step > SHORTEST:
+        try:
+            new, across = _onto(g, here + step * tangent, normal)
+        except (NoOrbit, np.linalg.LinAlgError):
+            step *= 0.5
+            continue
+        ahead = np.array([-across[1], across[0]]) / np.linalg.norm(across)
+        ahead *= np.sign(ahead @ tangent) or 1.0
+        if ahead @ tangent < 0.8 or np.linalg.norm(new - here) > 2.0 * step:
+            step *= 0.5
+            continue
+        if (new < 0.0).any() or (new > 1.0).any():
+            # Up to the edge, by shorter steps.
+            step *= 0.5
+            continue
+        here, tangent, normal = new, ahead, across
+        found.append(here)
+        step = min(1.5 * step, STEP)
+        if len(found) > 5 and np.linalg.norm(here - start) < 0.5 * STEP:
+            break
+    return found
+
+
+def _onto(g: object, share: np.ndarray, normal: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Newton's method normal to the curve: the point on it, and the slope of g there."""
+    assert callable(g)
+    for _ in range(NEWTON):
+        value = g(share)
+        if abs(value) < EXACT:
+            return share, _slope(g, share)
+        length = np.linalg.norm(normal)
+        unit = normal / length
+        h = DIFFERENCE
+        along = (g(share + h * unit) - value) / h
+        share = share - value / along * unit
+    raise NoOrbit('the curve is lost')

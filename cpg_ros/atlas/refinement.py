@@ -1,0 +1,166 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""From a coarse grid to a fine one: points between neighbours that differ are computed.
+
+Between neighbours that agree for a gait in everything that is named (whether it exists and how
+stable it is) they are filled in, bilinearly. What is computed does not depend on the workers.
+"""
+
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, field
+from itertools import pairwise
+from typing import Any
+
+from cpg_ros.atlas.chart import Chart, COARSE
+from cpg_ros.atlas.row_job import NONE, Row
+import numpy as np
+
+#: Known orbits that a point is reached from, and numbers that are filled in between points that
+#: agree.
+CLOSE = 2
+NUMBERS = ('period', 'amplitude', 'leading', 'leading_within', 'unstable', 'lock', 'basin')
+
+
+@dataclass
+class Sheet:
+    """What is known of one gait on the grid.
+
+    Attributes:
+        label: shape (rows, columns); -1 where nothing is known yet.
+        computed: whether it was computed, the same shape.
+        numbers: name -> values, nan where there are none.
+        waves: (row, column) -> waveforms and period.
+        stride: grid distance of the waves that were computed last.
+
+    """
+
+    shape: tuple[int, int]
+    label: np.ndarray = field(init=False)
+    computed: np.ndarray = field(init=False)
+    numbers: dict[str, np.ndarray] = field(init=False)
+    waves: dict[tuple[int, int], tuple[list[list[float]], float]] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        self.label = np.full(self.shape, -1)
+        self.computed = np.zeros(self.shape, dtype=bool)
+        self.numbers = {name: np.full(self.shape, np.nan) for name in NUMBERS}
+
+    def take(self, points: Iterable[dict[str, Any]]) -> None:
+        """Enter what a job has found."""
+        for one in points:
+            at = one['row'], one['column']
+            self.label[at], self.computed[at] = one['label'], True
+            for name in NUMBERS:
+                if one.get(name) is not None:
+                    self.numbers[name][at] = one[name]
+            if 'wave' in one:
+                self.waves[at] = one['wave'], one['period']
+
+    def fill(self, at: tuple[int, int], corners: list[tuple[int, int]]) -> None:
+        """Fill a point in from some that agree, in the middle of which it is."""
+        self.label[at] = self.label[corners[0]]
+        for values in self.numbers.values():
+            values[at] = np.mean([values[corner] for corner in corners])
+
+
+def places(count: int, stride: int) -> list[int]:
+    """Indices of a grid of this stride, the last one always."""
+    return sorted({*range(0, count, stride), count - 1})
+
+
+def coarse_rows(chart: Chart, gaits: tuple[str, ...]) -> Iterator[Row]:
+    """The jobs of the coarse grid."""
+    columns = tuple(places(chart.second.count, COARSE))
+    for row in places(chart.first.count, COARSE):
+        for gait in gaits:
+            yield Row(chart, gait, row, columns, basin=True)
+
+
+def finer(chart: Chart, gait: str, sheet: Sheet, stride: int) -> list[Row]:
+    """Halve the grid of a stride: fill in what is clear, and return jobs for what is not."""
+    rows, columns = places(chart.first.count, stride), places(chart.second.count, stride)
+    wanted: set[tuple[int, int]] = set()
+    fillable: dict[tuple[int, int], list[tuple[int, int]]] = {}
+    for top, bottom in pairwise(rows):
+        for left, right in pairwise(columns):
+            corners = [(top, left), (top, right), (bottom, left), (bottom, right)]
+            clear = len({int(sheet.label[corner]) for corner in corners}) == 1
+            for at, between in _middles(top, bottom, left, right, corners):
+                if sheet.label[at] >= 0:
+                    continue
+                if clear:
+                    fillable.setdefault(at, between)
+                else:
+                    wanted.add(at)
+    for at, between in fillable.items():
+        if at not in wanted:
+            sheet.fill(at, between)
+    by_row: dict[int, list[int]] = {}
+    for row, column in sorted(wanted):
+        by_row.setdefault(row, []).append(column)
+    return [Row(chart, gait, row, tuple(some), tuple(_near(sheet, row, some, stride)))
+            for row, some in by_row.items()]
+
+
+def _middles(top: int, bottom: int, left: int, right: int, corners: list[tuple[int, int]]
+             ) -> Iterator[tuple[tuple[int, int], list[tuple[int, int]]]]:
+    """Points between the corners of a cell, each with those that it is in the middle of."""
+    row, column = (top + bottom) // 2, (left + right) // 2
+    yield (top, column), corners[:2]
+    yield (bottom, column), corners[2:]
+    yield (row, left), corners[::2]
+    yield (row, right), corners[1::2]
+    yield (row, column), corners
+
+
+def _near(sheet: Sheet, row: int, columns: list[int], stride: int
+          ) -> Iterator[tuple[int, int, list[list[float]], float]]:
+    """Known orbits around the points of a row: of each the closest ones."""
+    seen = set()
+    for column in columns:
+        close = sorted((abs(r - row) + abs(c - column), r, c)
+                       for r in range(max(0, row - stride), row + stride + 1)
+                       for c in range(max(0, column - stride), column + stride + 1)
+                       if (r, c) in sheet.waves)[:CLOSE]
+        for _, r, c in close:
+            if (r, c) not in seen:
+                seen.add((r, c))
+                wave, period = sheet.waves[r, c]
+                yield r, c, wave, period
+
+
+def refined(chart: Chart, gaits: tuple[str, ...], run: Callable[[Iterable[Row], int], Iterable[
+        tuple[Row, list[dict[str, Any]]]]]) -> dict[str, Sheet]:
+    """Fill sheets for all gaits, from the coarse grid to the finest.
+
+    Args:
+        chart: the plane.
+        gaits: of its network.
+        run: does jobs, given with their number.
+
+    """
+    sheets = {gait: Sheet((chart.first.count, chart.second.count)) for gait in gaits}
+    jobs: list[Row] = list(coarse_rows(chart, gaits))
+    stride = COARSE
+    while True:
+        for row, points in run(jobs, len(jobs)):
+            sheets[row.gait].take(points)
+        if stride == 1:
+            break
+        jobs = [job for gait in gaits for job in finer(chart, gait, sheets[gait], stride)]
+        stride //= 2
+    for sheet in sheets.values():
+        assert (sheet.label >= NONE).all()
+    return sheets

@@ -1,0 +1,272 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""A row of an atlas for one gait, as a job: orbits continued from neighbour to neighbour."""
+
+from collections.abc import Iterator
+from contextlib import suppress
+from dataclasses import dataclass
+from typing import Any
+
+from cpg_ros.atlas.chart import Chart
+from cpg_ros.dynamics.continuation import from_hopf
+from cpg_ros.dynamics.equilibrium import NoEquilibrium
+from cpg_ros.dynamics.floquet import ATTRACTS, multipliers
+from cpg_ros.dynamics.fourier import collocation
+from cpg_ros.dynamics.fourier.floquet import SPAN, Variation
+from cpg_ros.dynamics.fourier.orbit import FourierOrbit
+from cpg_ros.dynamics.hopf_search import hopf_points
+from cpg_ros.dynamics.orbit import NoOrbit, Orbit, solve_beside, solve_from_path, solve_orbit
+from cpg_ros.dynamics.periodic import richer
+from cpg_ros.dynamics.stability import RATE, stability
+from cpg_ros.errors import CpgError
+from cpg_ros.integration.simulate import simulate
+from cpg_ros.networks.network import Network
+import numpy as np
+from scipy.sparse.linalg import ArpackError, eigs, LinearOperator
+
+#: What is known of a gait at a point: no orbit, one that its own class leaves, one that attracts
+#: with a symmetry lock, one that attracts by itself.
+NONE, UNSTABLE, LOCKED, STABLE = range(4)
+#: Nodes of a waveform that are kept.
+KEPT = 65
+#: Multipliers of an orbit with a delay are refined until the trivial one is 1 to this, so often.
+TRIVIAL, HALVINGS = 1e-4, 4
+#: Random starts about rest: how many, how far, for how many periods, and how near to the orbit,
+#: over its range, a run has come that ends in it.
+STARTS, SCATTER, PERIODS, NEAR = 8, 1.0, 25, 0.15
+#: Steps that a branch from a Hopf point may have; known orbits that are led to a point, and in
+#: how many steps.
+MOST, TRIED, STEPS = 60, 3, (1, 4)
+
+
+@dataclass(frozen=True)
+class Row:
+    """Points of one gait in a row of the grid.
+
+    Attributes:
+        chart: the plane.
+        gait: of the network.
+        row: which, on the first axis.
+        columns: which points on the second, rising.
+        near: row, column, waveforms (nodes, components) and period of orbits known close by.
+        basin: whether runs from random starts are made.
+
+    """
+
+    chart: Chart
+    gait: str
+    row: int
+    columns: tuple[int, ...]
+    near: tuple[tuple[int, int, list[list[float]], float], ...] = ()
+    basin: bool = False
+
+
+def assess_row(row: Row) -> list[dict[str, Any]]:
+    """Judge the gait at the points of a row: a dictionary of plain types for each."""
+    finder = _Finder(row)
+    return [finder.point(column) for column in row.columns]
+
+
+class _Finder:
+    def __init__(self, row: Row) -> None:
+        self.row = row
+        self.one = float(row.chart.first.values[row.row])
+        self.last: Orbit | None = None
+        self._branches: list[Any] | None = None
+
+    def point(self, column: int) -> dict[str, Any]:
+        value = float(self.row.chart.second.values[column])
+        network = self.row.chart.at(self.one, value)
+        orbit = next(self._orbits(network, column, value), None)
+        self.last = orbit
+        told: dict[str, Any] = {'gait': self.row.gait, 'row': self.row.row, 'column': column,
+                                'label': NONE}
+        if orbit is None:
+            return told
+        within, leading, unstable = leading_multipliers(orbit)
+        attracts = leading < ATTRACTS
+        told |= {'label': STABLE if attracts else LOCKED if within < ATTRACTS else UNSTABLE,
+                 'period': orbit.period, 'amplitude': float(orbit.levels[0, 0, 1]),
+                 'leading': leading, 'leading_within': within, 'unstable': unstable,
+                 'lock': 0.0 if attracts else lock_of(orbit),
+                 'wave': _wave(orbit)}
+        if self.row.basin:
+            told['basin'] = basin(orbit, told['lock'])
+        return told
+
+    def _orbits(self, network: Network, column: int, value: float) -> Iterator[Orbit]:
+        gait = self.row.gait
+        if network.broken(gait):
+            return
+        if self.last is not None:
+            with suppress(NoOrbit):
+                yield from _proper(solve_beside(network, self.last))
+        for near in sorted(self.row.near, key=lambda one: (
+                abs(one[0] - self.row.row) + abs(one[1] - column), one[:2]))[:TRIED]:
+            try:
+                yield from _proper(self._led(near, value))
+            except NoOrbit:
+                continue
+        with suppress(NoOrbit, NoEquilibrium):
+            yield from _proper(solve_orbit(network, gait))
+        # Between points that are known no branch of its own is looked for.
+        for branch in self._from_rest(network) if self.row.basin else ():
+            try:
+                yield from branch.at(value)[::-1]
+            except CpgError:
+                continue
+
+    def _led(self, near: tuple[int, int, list[list[float]], float], value: float) -> Orbit:
+        """The orbit that one close by becomes on the straight way here, in one step or several.
+
+        Raises:
+            NoOrbit: it is lost on the way.
+
+        """
+        chart, (row, column, wave, period) = self.row.chart, near
+        begin = np.array([chart.first.values[row], chart.second.values[column]])
+        end = np.array([self.one, value])
+        network = chart.at(*map(float, begin))
+        orbit = solve_from_path(network, network.symmetry(self.row.gait), path_of(wave), period)
+        if orbit is None:
+            raise NoOrbit('the orbit close by cannot be had')
+        for steps in STEPS:
+            found = orbit
+            try:
+                for k in range(1, steps + 1):
+                    found = solve_beside(chart.at(*map(float, begin + k / steps * (end - begin))),
+                                         found)
+                return found
+            except NoOrbit:
+                if steps == STEPS[-1]:
+                    raise
+        return orbit
+
+    def _from_rest(self, network: Network) -> list[Any]:
+        """Branches of the gait's Hopf points in this row; once, where there is a delay."""
+        line, axis = self.row.chart.second.line, self.row.chart.second
+        if line.names != (network.delay_parameter,):
+            return []
+        if self._branches is None:
+            self._branches = []
+            shifts = set(network.symmetry(self.row.gait).shifts)
+            try:
+                points = hopf_points(network, line, 0.0, axis.high)
+            except CpgError:
+                return []
+            for point in points:
+                if set(point.block.symmetry.shifts) != shifts or point.n:
+                    continue
+                low, high = ((0.9 * point.value, axis.high) if point.normal_form.side > 0
+                             else (axis.low, 1.1 * point.value))
+                try:
+                    self._branches.append(from_hopf(
+                        point.network, point.block.symmetry, point.omega, line, low, high,
+                        rest=point.state, vector=point.eigenvector, most=MOST))
+                except CpgError:
+                    continue
+        return self._branches
+
+
+def _proper(orbit: Orbit) -> Iterator[Orbit]:
+    """The orbit, unless it is another gait's or next to none."""
+    if orbit.levels[0, 0, 1] > 1e-3 and not richer(orbit):
+        yield orbit
+
+
+def _wave(orbit: Orbit) -> list[list[float]]:
+    """States over a cycle at odd many even times, of all components."""
+    theta = np.arange(KEPT) / KEPT
+    return np.round(orbit(theta * orbit.period), 5).tolist()
+
+
+def path_of(wave: list[list[float]]) -> Any:
+    """The states over times in cycles that kept waveforms stand for."""
+    columns = np.array(wave).T
+    return lambda theta: np.array([collocation.evaluate(one, theta) for one in columns]).T
+
+
+def lock_of(orbit: Orbit) -> float:
+    """The gain of the symmetry lock that the generator would choose, 1/model time."""
+    bound = orbit.network.sufficient_gain(RATE)
+    return float(stability(orbit).chosen if bound is None else bound)
+
+
+def leading_multipliers(orbit: Orbit) -> tuple[float, float, int]:
+    """The largest multiplier in the class, the largest of all, and how many lie outside.
+
+    Without the trivial one. With a delay they are computed by Arnoldi's method, six at most of
+    each subspace, which a map does not need more exactly than TRIVIAL.
+    """
+    if not isinstance(orbit, FourierOrbit):
+        told = multipliers(orbit)
+        whole = np.concatenate([told.within, told.transverse])
+        return told.leading_within, told.leading, int((np.abs(whole) >= ATTRACTS).sum())
+    n = max(1, int(np.ceil(orbit.network.delay / (SPAN * orbit.period))))
+    for halving in range(HALVINGS):
+        equation = Variation(orbit, n * 2**halving)
+        inside = largest_of(equation, equation.inside)
+        if np.abs(inside - 1.0).min() <= TRIVIAL:
+            break
+    within = np.delete(inside, np.abs(inside - 1.0).argmin())
+    outside = np.concatenate([largest_of(equation, part) for part in equation.outside])
+    sizes = np.abs(np.concatenate([within, outside]))
+    return (float(np.abs(within).max(initial=0.0)), float(sizes.max(initial=0.0)),
+            int((sizes >= ATTRACTS).sum()))
+
+
+def largest_of(equation: Variation, columns: np.ndarray, many: int = 4, exact: float = 1e-6
+               ) -> np.ndarray:
+    """Largest multipliers in a subspace of the variational equation."""
+    size, later = equation.period_map(columns, 0.0)
+    if size > 3 * many + 24:
+        operator = LinearOperator((size, size), matvec=lambda x: later(x.reshape(-1, 1))[:, 0])
+        start = np.random.default_rng(0).standard_normal(size)
+        try:
+            return eigs(operator, k=many, ncv=20, tol=exact, v0=start, maxiter=15,
+                        return_eigenvectors=False)
+        except ArpackError:
+            pass  # all of them, then
+    return np.linalg.eigvals(later(np.eye(size)))
+
+
+def basin(orbit: Orbit, lock: float) -> float:
+    """Share of random starts that end in an orbit, with the symmetry lock that it needs."""
+    network = orbit.network
+    rng = np.random.default_rng(0)
+    rest = orbit(np.arange(16) / 16 * orbit.period).mean(axis=0)
+    starts = rest + SCATTER * rng.standard_normal((STARTS, network.components)) * max(
+        float(orbit.levels[0, 0, 1]), 0.1)
+    step = network.step
+    run = simulate(network, starts, PERIODS * orbit.period, step,
+                   lock=(lock, orbit.symmetry) if lock else None, progress=False)
+    last = max(2, int(1.2 * orbit.period / step))
+    theta = np.arange(64) / 64
+    wanted = orbit(theta * orbit.period)
+    size = np.ptp(wanted[:, 0])
+    ended = 0
+    for x in run.x:
+        tail = x[-last:]
+        if not np.isfinite(tail).all():
+            continue
+        # Where the last cycle peaks as the orbit does.
+        peak = int(tail[:len(tail) - int(orbit.period / step), 0].argmax()) if len(
+            tail) > orbit.period / step else 0
+        places = peak + np.round(theta * orbit.period / step).astype(int)
+        inside = places < len(tail)
+        seen = tail[places[inside]]
+        gaps = [np.abs(np.roll(wanted, -k, axis=0)[inside] - seen).max() for k in range(64)]
+        ended += bool(min(gaps) < NEAR * size)
+    return float(ended) / STARTS

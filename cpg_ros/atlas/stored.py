@@ -1,0 +1,124 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""An atlas on disk: parts as they are finished, and at last atlas.parquet and boundaries.json."""
+
+from collections.abc import Iterator
+from dataclasses import asdict
+import hashlib
+import json
+from pathlib import Path
+from typing import Any
+
+from cpg_ros.atlas.chart import Chart
+from cpg_ros.atlas.hopf_curves import Curve
+from cpg_ros.atlas.refinement import NUMBERS, Sheet
+from cpg_ros.atlas.row_job import Row
+from cpg_ros.errors import InputError
+from cpg_ros.files.atomic_write import write_atomically
+from cpg_ros.fleet.results_table import library
+import numpy as np
+
+#: The file that a folder with an atlas has, the folder of its parts, and names of the labels.
+MARK, PARTS = 'atlas.json', 'parts'
+LABELS = ('none', 'unstable', 'with lock', 'stable')
+
+
+class Stored:
+    """A folder that an atlas grows in."""
+
+    def __init__(self, folder: Path, chart: Chart, gaits: tuple[str, ...]) -> None:
+        """Begin, or go on where an atlas of the same plane stopped.
+
+        Raises:
+            InputError: the folder holds something else.
+            OSError: it cannot be made.
+
+        """
+        self.folder, self.chart = folder, chart
+        told = json.dumps({**chart.told(), 'gaits': gaits}, indent=1)
+        mark = folder / MARK
+        if mark.exists():
+            if mark.read_text() != told:
+                raise InputError(f'{folder} holds an atlas of another plane')
+        elif folder.exists() and any(folder.iterdir()):
+            raise InputError(f'{folder} is no folder of an atlas: it holds something else')
+        (folder / PARTS).mkdir(parents=True, exist_ok=True)
+        write_atomically(mark, told)
+
+    def _place(self, row: Row) -> Path:
+        told = json.dumps([row.gait, row.row, row.columns, row.near, row.basin])
+        return self.folder / PARTS / f'{hashlib.sha256(told.encode()).hexdigest()[:20]}.json'
+
+    def get(self, row: Row) -> list[dict[str, Any]] | None:
+        """Return what a job found, if it is done."""
+        try:
+            found: list[dict[str, Any]] = json.loads(self._place(row).read_text())
+        except (FileNotFoundError, ValueError):
+            return None
+        return found
+
+    def put(self, row: Row, points: list[dict[str, Any]]) -> list[dict[str, Any]]:
+        """Keep what a job found, and return it as get will."""
+        text = json.dumps(points)
+        write_atomically(self._place(row), text)
+        kept: list[dict[str, Any]] = json.loads(text)
+        return kept
+
+    def curves(self) -> list[Curve] | None:
+        """Return the boundaries, if they are done."""
+        try:
+            told = json.loads((self.folder / 'boundaries.json').read_text())
+        except (FileNotFoundError, ValueError):
+            return None
+        return [Curve(one['kind'], one['gait'], np.array(one['points'])) for one in told]
+
+    def put_curves(self, curves: list[Curve]) -> None:
+        """Keep the boundaries."""
+        write_atomically(self.folder / 'boundaries.json', json.dumps([
+            {**asdict(curve), 'points': curve.points.tolist()} for curve in curves]))
+
+    def write(self, sheets: dict[str, Sheet]) -> Path:
+        """Write atlas.parquet: a row for each point and gait.
+
+        Raises:
+            OSError: it cannot be written.
+
+        """
+        arrow = library()
+        path = self.folder / 'atlas.parquet'
+        beside = path.with_name(f'.{path.name}.part')
+        names = [str(axis.line) for axis in (self.chart.first, self.chart.second)]
+        writer = None
+        try:
+            for gait, table in _tables(self.chart, sheets, names):
+                batch = arrow.table({'gait': [gait] * len(table[names[0]]), **table})
+                writer = writer or arrow.parquet.ParquetWriter(beside, batch.schema)
+                writer.write_table(batch)
+            if writer is not None:
+                writer.close()
+            beside.replace(path)
+        finally:
+            beside.unlink(missing_ok=True)
+        return path
+
+
+def _tables(chart: Chart, sheets: dict[str, Sheet], names: list[str]
+            ) -> Iterator[tuple[str, dict[str, Any]]]:
+    one, other = np.meshgrid(chart.first.values, chart.second.values, indexing='ij')
+    for gait, sheet in sheets.items():
+        label = sheet.label.ravel()
+        yield gait, {names[0]: one.ravel(), names[1]: other.ravel(), 'exists': label > 0,
+                     'state': [LABELS[k] for k in label], 'computed': sheet.computed.ravel(),
+                     **{name: sheet.numbers[name].ravel() for name in NUMBERS}}

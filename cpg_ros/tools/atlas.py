@@ -1,0 +1,189 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Executable ``atlas``: a map of where gaits live, over two parameters.
+
+``atlas --network delayed --over c=2:10 tau=0.2:2 --out atlas/`` computes what a coarse grid and
+its refinement need, follows the exact boundaries, and draws the map.
+"""
+
+import argparse
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
+from pathlib import Path
+import sys
+from typing import Any
+
+from cpg_ros.atlas.chart import Chart, chart_of
+from cpg_ros.atlas.hopf_curves import Curve, hopf_curves
+from cpg_ros.atlas.map_picture import draw_map
+from cpg_ros.atlas.orbit_curves import edges, orbit_curves
+from cpg_ros.atlas.refinement import refined, Sheet
+from cpg_ros.atlas.row_job import assess_row, Row
+from cpg_ros.atlas.stored import Stored
+from cpg_ros.errors import CpgError, InputError
+from cpg_ros.fleet.executors import Fleet
+from cpg_ros.fleet.options import add_options, working
+from cpg_ros.fleet.outcomes import in_order, outcomes
+from cpg_ros.fleet.results_table import library
+from cpg_ros.fleet.tally import Tally
+from cpg_ros.networks.network import known
+from cpg_ros.networks.registry import find_network
+from cpg_ros.tools.arguments import assignment, interval, Parser, say, twice
+
+DESCRIPTION = """\
+Map where a network's gaits live over two parameters: whether each exists and is stable, with what
+symmetry lock, its period, amplitude, leading multiplier and basin. A coarse grid is refined where
+neighbours differ; Hopf points, torus points, period doublings and branch points are followed as
+exact curves and drawn on top."""
+EPILOG = """\
+files: atlas.parquet (a row for each point and gait), boundaries.json, map.png, and index.html
+with --interactive. The same command again goes on where it stopped.
+
+exit codes: 0 drawn, 2 wrong arguments, 130 stopped (what was finished is kept)."""
+
+
+def _over(text: str) -> tuple[str, tuple[float, float]]:
+    line, sign, limits = text.rpartition('=')
+    if not (line and sign and ':' in limits):
+        raise argparse.ArgumentTypeError(f"'{text}' is not of the form parameter=low:high")
+    return line, interval(limits)
+
+
+def _points(text: str) -> tuple[int, int]:
+    one, sign, other = text.partition('x')
+    if not (one.isdecimal() and (other.isdecimal() or not sign)):
+        raise argparse.ArgumentTypeError(f"'{text}' is not of the form 200x200")
+    return int(one), int(other or one)
+
+
+def _parser() -> Parser:
+    parser = Parser(prog='atlas', description=DESCRIPTION, epilog=EPILOG,
+                    formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument('--network', default='delayed', metavar='NAME', help='a shipped network, '
+                        'or the path of a Python file with one (default: %(default)s)')
+    parser.add_argument('--over', nargs=2, required=True, type=_over, metavar='PARAMETER=LOW:HIGH',
+                        help='the two parameters, or lines of them, such as alpha=beta=0:0.5')
+    parser.add_argument('--preset', metavar='NAME', help='shipped set that the other parameters '
+                        "are taken from (default: the usual gait's)")
+    parser.add_argument('--set', nargs='+', action='extend', default=[], type=assignment,
+                        metavar='PARAMETER=VALUE', help='other parameters')
+    parser.add_argument('--gaits', nargs='+', default=[], metavar='GAIT', help='(default: all)')
+    parser.add_argument('--points', type=_points, default=(200, 200), metavar='NxM',
+                        help='of the grid (default: 200x200)')
+    parser.add_argument('--interactive', action='store_true', help='also write index.html: a '
+                        'click on the map shows waveforms, footfalls and the preset to copy')
+    add_options(parser)
+    parser.add_argument('--out', type=Path, default=Path('atlas'), metavar='DIR',
+                        help='where the files go (default: %(default)s)')
+    return parser
+
+
+def _note(line: str) -> None:
+    print(f'atlas: {line}', file=sys.stderr)
+
+
+def _planned(chosen: argparse.Namespace) -> tuple[Chart, tuple[str, ...]]:
+    kind = find_network(chosen.network)
+    presets = kind.presets()
+    preset = chosen.preset or kind.usual_gait
+    if preset not in presets:
+        raise InputError(f"'{preset}' is not one of the presets {', '.join(presets)}")
+    base = presets[preset].network
+    for name, value in chosen.set:
+        if name not in base.parameters():
+            raise InputError(f"'{name}' is not one of {', '.join(base.parameters())}")
+        base = replace(base, **{name: value})  # type: ignore[type-var]
+    for gait in chosen.gaits:
+        known(gait, kind.gaits())
+    return (chart_of(chosen.network, base, chosen.over, chosen.points),
+            tuple(chosen.gaits or kind.gaits()))
+
+
+def drawn(chart: Chart, gaits: tuple[str, ...], fleet: Fleet, folder: Path
+          ) -> tuple[dict[str, Sheet], list[Curve], list[Path]]:
+    """Compute an atlas on a fleet, and write its table and its map.
+
+    Raises:
+        InputError: the folder holds something else.
+        OSError: a file cannot be written.
+
+    """
+    stored = Stored(folder, chart, gaits)
+
+    def run(jobs: Iterable[Row], count: int) -> Iterator[tuple[Row, list[dict[str, Any]]]]:
+        with Tally('rows', count) as tally:
+            left = []
+            for row in jobs:
+                done = stored.get(row)
+                if done is None:
+                    left.append(row)
+                else:
+                    tally.add(kept=True)
+                    yield row, done
+            for told in outcomes(fleet, assess_row, left, tally.tick):
+                if told.error is not None:
+                    raise told.error
+                tally.add()
+                yield told.job, stored.put(told.job, told.value)
+
+    sheets = refined(chart, gaits, run)
+    curves = stored.curves()
+    if curves is None:
+        fleet.what = 'boundaries'
+        jobs: list[tuple[Any, ...]] = [(hopf_curves, (chart, gaits)), *(
+            (orbit_curves, (chart, gait, edges(chart, sheet))) for gait, sheet in sheets.items())]
+        curves = [curve for some in in_order(fleet, _called, jobs) for curve in some]
+        stored.put_curves(curves)
+    table, picture = stored.write(sheets), folder / 'map.png'
+    draw_map(picture, chart, sheets, curves)
+    return sheets, curves, [table, folder / 'boundaries.json', picture]
+
+
+def _called(function: Any, job: Any) -> Any:
+    return function(job)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Draw an atlas; return the exit code."""
+    parser = _parser()
+    chosen = parser.parse_args(sys.argv[1:] if arguments is None else arguments)
+    if name := twice([name for name, _ in chosen.set]) or twice(chosen.gaits):
+        parser.error(f'{name} is given twice')
+    try:
+        library()
+        chart, gaits = _planned(chosen)
+        with working(chosen, '', _note) as fleet:
+            sheets, curves, written = drawn(chart, gaits, fleet, chosen.out)
+        if chosen.interactive:
+            # Only pages need it.
+            from cpg_ros.atlas.map_page import write_page
+            written.append(write_page(chosen.out / 'index.html', chart, sheets, curves))
+    except (CpgError, OSError) as error:
+        print(f'atlas: {error}', file=sys.stderr)
+        return 2
+    except KeyboardInterrupt:
+        print('atlas: stopped; what was finished is kept, and the same command goes on from '
+              'there', file=sys.stderr)
+        return 130
+    counted = ', '.join(f'{gait} {100 * (sheet.label > 0).mean():.0f} %'
+                        for gait, sheet in sheets.items())
+    say(f'share of the plane in which each gait exists: {counted}\n'
+        f'boundaries: {", ".join(f"{c.kind} of {c.gait}" for c in curves) or "none"}\n'
+        f'written: {", ".join(map(str, written))}')
+    return 0
+
+
+if __name__ == '__main__':
+    sys.exit(main())

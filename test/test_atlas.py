@@ -1,0 +1,144 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Maps of gaits: against the Hopf formula, against other ways to the same, resumed and drawn."""
+
+from dataclasses import replace
+import json
+
+from cpg_ros.atlas import orbit_curves as curves
+from cpg_ros.atlas.chart import chart_of
+from cpg_ros.atlas.hopf_curves import hopf_curves
+from cpg_ros.atlas.row_job import assess_row, leading_multipliers, LOCKED, NONE, Row
+from cpg_ros.dynamics.floquet import multipliers
+from cpg_ros.dynamics.orbit import solve_orbit
+from cpg_ros.errors import InputError
+from cpg_ros.networks.registry import PRESETS
+from cpg_ros.networks.symmetry import GAITS
+from cpg_ros.tools import atlas
+import numpy as np
+import pytest
+
+parquet = pytest.importorskip('pyarrow.parquet')
+TROT = PRESETS['delayed']['trot'].network
+OVER = [('c', (4.0, 8.0)), ('tau', (0.2, 1.2))]
+
+
+def critical(c, j, k, fast, n):
+    """Omega and tau_n of the class (j, k) at a, b, d of the trot."""
+    real = TROT.a + TROT.b + (TROT.d * 1j**-j).real
+    imaginary = (TROT.d * 1j**-j).imag
+    omega = imaginary + (1 if fast else -1) * np.sqrt(c * c - real * real)
+    z = (1j * omega - complex(real, imaginary)) / (c * (-1)**k)
+    return omega, ((-np.angle(z)) % (2 * np.pi) + 2 * np.pi * n) / omega
+
+
+def test_curves_of_hopf_points_are_those_of_the_formula():
+    found = hopf_curves((chart_of('delayed', TROT, OVER, (9, 9)), TROT.gaits()))
+    assert {curve.gait for curve in found} >= {'trot', 'walk', 'pace', 'jump', 'bound'}
+    for curve in found:
+        assert len(curve.points) > 5
+        j, k = GAITS[curve.gait]
+        for c, tau, omega in curve.points[::7]:
+            gaps = [abs(critical(c, mode, k, fast, n)[1] - tau)
+                    for mode in ({1, 3} if j == 1 else {j}) for fast in (True, False)
+                    for n in range(4) if abs(critical(c, mode, k, fast, n)[0] - omega) < 1e-6]
+            assert min(gaps) < 1e-8
+
+
+def test_a_row_is_where_the_formula_says_and_as_orbits_alone_are():
+    chart = chart_of('delayed', TROT, OVER, (9, 33))
+    found = assess_row(Row(chart, 'trot', 5, tuple(range(0, 33, 4))))
+    for one in found:
+        tau = chart.second.values[one['column']]
+        assert (one['label'] != NONE) == (tau > critical(6.5, 2, 1, True, 0)[1])
+    one = found[4]
+    orbit = solve_orbit(replace(TROT, c=6.5, tau=float(chart.second.values[16])), 'trot')
+    judged = multipliers(orbit)
+    assert one['label'] == LOCKED
+    assert one['period'] == pytest.approx(orbit.period, rel=1e-9)
+    assert one['leading'] == pytest.approx(judged.leading, rel=1e-4)
+    assert leading_multipliers(orbit)[2] == (np.abs(judged.transverse) >= 1.0).sum()
+
+
+def test_a_torus_curve_has_a_pair_on_the_unit_circle(monkeypatch):
+    monkeypatch.setattr(curves, 'MOST', 2)
+    chart = chart_of('delayed', TROT, OVER, (9, 9))
+    found = curves.orbit_curves((chart, 'walk', [curves.Edge(
+        (5 / 8, 0.3), (5 / 8, 0.5), *_wave(chart, 0.3))]))
+    for curve in found:
+        for c, tau in curve.points:
+            judged = multipliers(solve_orbit(replace(TROT, c=float(c), tau=float(tau)), 'walk'))
+            sizes = np.abs(np.concatenate([judged.within, judged.transverse]))
+            assert np.abs(sizes - 1.0).min() < 1e-6
+    assert [curve.kind for curve in found] == ['torus']
+
+
+def _wave(chart, share):
+    tau = chart.second.low + share * (chart.second.high - chart.second.low)
+    orbit = solve_orbit(replace(TROT, c=6.5, tau=tau), 'walk')
+    return orbit(np.arange(65) / 65 * orbit.period).tolist(), orbit.period
+
+
+@pytest.fixture(scope='module')
+def drawn(tmp_path_factory):
+    out = tmp_path_factory.mktemp('atlas') / 'out'
+    words = ['--over', 'c=4:8', 'tau=0.2:0.8', '--points', '9x17', '--gaits', 'trot', 'pace',
+             '--jobs', '1', '--interactive', '--out', str(out)]
+    assert atlas.main(words) == 0
+    return out, words
+
+
+def test_the_table_agrees_with_the_formula_everywhere(drawn):
+    table = parquet.read_table(drawn[0] / 'atlas.parquet').to_pylist()
+    assert len(table) == 2 * 9 * 17
+    for row in table:
+        j, k = GAITS[row['gait']]
+        real = abs(TROT.a + TROT.b + (TROT.d * 1j**-j).real)
+        threshold = critical(row['c'], j, k, True, 0)[1] if row['c'] > real else np.inf
+        if abs(row['tau'] - threshold) > 0.02:
+            assert row['exists'] == (row['tau'] > threshold), row
+    assert 0 < sum(row['computed'] for row in table) < len(table)
+
+
+def test_it_goes_on_where_it_stopped_and_ends_with_the_same(drawn):
+    out, words = drawn
+    before = (out / 'atlas.parquet').read_bytes()
+    parts = sorted((out / 'parts').iterdir())
+    for part in parts[::2]:
+        part.unlink()
+    assert atlas.main(words) == 0
+    assert (out / 'atlas.parquet').read_bytes() == before
+    assert sorted((out / 'parts').iterdir()) == parts
+    assert atlas.main([*words, '--set', 'a=-4']) == 2
+
+
+def test_the_page_is_one_file_with_everything_in_it(drawn):
+    page = (drawn[0] / 'index.html').read_text()
+    assert 'src=' not in page
+    assert 'href=' not in page
+    told = json.loads(page.split('id="atlas">')[1].split('</script>')[0])
+    assert told['counts'] == [9, 17]
+    assert set(told['gaits']) == {'trot', 'pace'}
+    assert told['gaits']['trot']['waves']
+
+
+@pytest.mark.parametrize(('over', 'said'), [
+    ([('c', (4.0, 4.0)), ('tau', (0.2, 1.0))], 'c: 4 is not below 4'),
+    ([('c', (4.0, 50.0)), ('tau', (0.2, 1.0))], 'c: 50 is not within -20 to 20'),
+    ([('e', (4.0, 5.0)), ('tau', (0.2, 1.0))], "'e' is not one of"),
+    ([('c', (4.0, 5.0)), ('c', (0.2, 1.0))], 'c and c move the same parameter')])
+def test_planes_that_cannot_be(over, said):
+    with pytest.raises(InputError, match=said):
+        chart_of('delayed', TROT, over, (9, 9))
