@@ -279,12 +279,12 @@ REFUSED = [
     ('', 'no element found'),
     (URDF[:-200], 'line '),
     (URDF.replace('<link name="base"/>', '<link name="base">'), 'mismatched tag'),
-    ('<mujoco/>', 'its root is <mujoco>, not <robot>: this is no URDF'),
+    ('<mujoco/>', 'its root is <mujoco>, not <robot>: this is not a URDF'),
     ('<sdf version="1.9"/>', 'its root is <sdf>'),
-    ('<robot name="a"><link name="b"/></robot>', 'there is no joint in it'),
+    ('<robot name="a"><link name="b"/></robot>', 'it has no joints'),
     ('<robot name="a" xmlns:xacro="x"><xacro:macro name="leg"/></robot>',
      'it is xacro, expand it first (xacro my.urdf > robot.urdf)'),
-    (robot_of(joint_of('a'), joint_of('a')), "the joint 'a' is there twice"),
+    (robot_of(joint_of('a'), joint_of('a')), "the joint 'a' appears twice"),
     (robot_of(joint_of('a').replace(' name="a"', '')), 'a joint has no name'),
     (robot_of(joint_of('a').replace(' type="revolute"', '')), "the joint 'a' has no type"),
     (robot_of(joint_of('a', limit='lower="low"')), 'limit lower="low" is not a number'),
@@ -317,13 +317,13 @@ def test_files_that_are_no_urdf_end_in_one_line(tmp_path, capsys, urdf, words):
     (('quadruped', '--urdf', 'URDF', '--gaits', 'canter'), "'canter' is not one of walk, trot"),
     (('quadruped', '--urdf', 'URDF', '--frequency', 'nan'), '--frequency: nan is not from 0'),
     (('quadruped', '--urdf', 'URDF', '--amplitude', '-1'), '--amplitude: -1 is not from 0 to 3'),
-    (('--urdf', 'URDF', '--make', 'a.txt'), 'a.txt is not called .yaml'),
-    (('--urdf', 'URDF', '--make', 'URDF.yaml'), 'is there already'),
+    (('--urdf', 'URDF', '--make', 'a.txt'), 'a.txt does not end in .yaml'),
+    (('--urdf', 'URDF', '--make', 'URDF.yaml'), 'already exists'),
     (('--urdf', 'URDF', '--make', 'nowhere/a.yaml'), 'No such file or directory'),
-    (('--urdf', 'NAMELESS', '--make', 'a.yaml'), 'no legs can be told from the joint names'),
+    (('--urdf', 'NAMELESS', '--make', 'a.yaml'), 'cannot identify legs from the joint names'),
     (('--urdf', 'SIDEWAYS', '--make', 'a.yaml'), 'nothing would swing it'),
     (('--urdf', 'STIFF', '--make', 'a.yaml'), 'no room to move'),
-    (('--urdf', 'ROUND', '--make', 'a.yaml'), 'go round in a circle')])
+    (('--urdf', 'ROUND', '--make', 'a.yaml'), 'form a loop')])
 def test_nonsense_ends_in_one_line(tmp_path, capsys, monkeypatch, arguments, words):
     monkeypatch.chdir(tmp_path)
     for name, content in {

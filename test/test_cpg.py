@@ -98,7 +98,7 @@ def test_what_is_recorded_is_what_the_generator_publishes(running, tmp_path):
     assert len(recording.joints) == 12
     assert np.ptp(recording.positions, axis=0).max() > 0.1
     assert ask(domain, 'record', str(tmp_path / 'bag'))[::2] == (
-        1, f'cpg: {tmp_path / "bag"}: there is something already')
+        1, f'cpg: {tmp_path / "bag"}: already exists')
 
 
 def test_a_bag_is_played_message_by_message(tmp_path):
@@ -128,7 +128,7 @@ def test_run_starts_every_executable():
 @pytest.mark.parametrize(('words', 'code', 'said'), [
     (['--wait', '0.2', 'param', 'get', 'gait'], 1, '/cpg_generator does not answer'),
     (['--wait', '0.2', 'topic', 'echo', 'joint_states'], 1, 'nobody publishes on /joint_states'),
-    (['param', 'set', 'gait', '{a: 1}'], 2, "'{a: 1}' is no value of a parameter"),
+    (['param', 'set', 'gait', '{a: 1}'], 2, "'{a: 1}' is not a parameter value"),
     (['--node', 'a b', 'gait', 'walk'], 2, 'Invalid service name'),
     (['topic', 'echo', 'a b'], 2, 'topic name must not contain'),
     (['play', '/nowhere'], 1, '/nowhere: no such bag'),

@@ -49,7 +49,7 @@ def test_one_that_commands_does_not_start_beside_another(start, command):
     two = start('-p', f'command:={command}', domain=one.domain, watch=False)
     assert two.wait() == 1
     assert 'FATAL' in two.lines[-1] and 'is published by /cpg_generator, too' in two.lines[-1]
-    assert two.lines[-1].endswith('give the topic another name, or set exclusive to false')
+    assert two.lines[-1].endswith('rename the topic, or set exclusive to false')
     assert 'publishing' not in two.log and 'Traceback' not in two.log
     # In another namespace, or told to, it does.
     for more in (('-r', '__ns:=/b'), ('-p', 'exclusive:=false')):

@@ -78,8 +78,8 @@ def test_geometry_and_efference_are_read_as_they_were_written(tmp_path):
 @pytest.mark.parametrize(('wrong', 'right', 'says'), [
     ('mass: 15.2', 'mass: -15.2', 'geometry.mass: '),
     ('[RL_hip_joint, RL_thigh_joint, RL_calf_joint]', '[RL_hip_joint, RL_thigh_joint, spine]',
-     "geometry.legs.lh.joints[2]: 'spine' is no joint of this leg"),
-    ('turns: [1.0, 1.0, 1.0]', 'turns: [1.0, 0.5, 1.0]', 'turns[1]: 0.5 is neither 1 nor -1')])
+     "geometry.legs.lh.joints[2]: 'spine' is not a joint of this leg"),
+    ('turns: [1.0, 1.0, 1.0]', 'turns: [1.0, 0.5, 1.0]', 'turns[1]: 0.5 must be 1 or -1')])
 def test_a_mistake_in_the_geometry_is_named(tmp_path, wrong, right, says):
     text = FILE.read_text()
     assert wrong in text

@@ -123,13 +123,13 @@ def test_arms_of_a_humanoid_are_no_legs_but_shoulders_of_a_dog_are():
 
 
 @pytest.mark.parametrize(('joints', 'message'), [
-    (['joint_1', 'joint_2'], 'no legs can be told from the joint names joint_1, joint_2'),
-    ([], 'no legs can be told'),
+    (['joint_1', 'joint_2'], 'cannot identify legs from the joint names joint_1, joint_2'),
+    ([], 'cannot identify legs'),
     (['FL_hip', 'FR_hip', 'RL_hip'], 'none of rh'),
     (['left_hip', 'left_knee'], "such as 'left_hip'.* none of right"),
     (['lf_hip', 'lm_hip', 'lh_hip', 'rf_hip', 'rm_hip'], 'none of rh'),
     (['left_middle_hip', 'right_middle_hip'], 'lm, rm are there .* none of lh, rh, lf, rf'),
-    (['shoulder_left', 'shoulder_right'], 'no legs')])
+    (['shoulder_left', 'shoulder_right'], 'cannot identify legs')])
 def test_what_cannot_be_told_is_an_error(joints, message):
     with pytest.raises(LegsError, match=message) as error:
         legs_of(joints)

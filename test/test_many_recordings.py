@@ -151,10 +151,10 @@ def test_folders_that_will_not_do(folder, tmp_path):
     with pytest.raises(InputError, match='there is no such folder'):
         Folders([tmp_path / 'nowhere'], tmp_path / 'out', QUICK)
     assert not (tmp_path / 'out').exists()
-    with pytest.raises(InputError, match='it holds something else'):
+    with pytest.raises(InputError, match='it contains other files'):
         Folders([folder], folder, QUICK)
     (tmp_path / 'bare').mkdir()
-    with pytest.raises(InputError, match='no bag and no table'):
+    with pytest.raises(InputError, match='no bags or tables'):
         invert(tmp_path / 'bare', tmp_path / 'out')
 
 

@@ -148,7 +148,7 @@ def test_a_two_wave_gait_and_its_picture(tmp_path, capsys):
     (('--gait', 'skip', '--fix', 'w_12=0.5', 'w_21=0.4'), 'is the same as w_12'),
     (('--gait', 'walk', '--fix', 'phi=0.2', 'phi=0.3'), 'phi is given twice'),
     (('--gait', 'walk', '--fix', 'w_a=0', 'w_b=0', 'w_c=0', *(f'{k}={v}' for k, v in
-                                                              FIXED.items())), 'nothing to look'),
+                                                              FIXED.items())), 'nothing is left'),
     (('--gait', 'walk', '--population', '2'), 'at least 4'),
     (('--gait', 'walk', '--generations', '0'), 'at least 1'),
     (('--gait', 'walk', '--seed', '-1'), 'must not be negative'),

@@ -155,7 +155,7 @@ def test_the_users_urdf_comes_first_and_what_is_wrong_with_it_is_said(tmp_path):
     said = []
     shape = shape_source.find(shape_source.Known(urdf=str(tmp_path / 'bad.urdf'), robot='goat'),
                               said.append)
-    assert 'this is no URDF' in said[0] and shape.source == "stick figure of 'goat'"
+    assert 'this is not a URDF' in said[0] and shape.source == "stick figure of 'goat'"
     text = (share() / 'urdf' / 'quadruped.urdf').read_text()
     shape = shape_source.find(shape_source.Known(description=text, robot='goat'), said.append)
     assert shape.source == 'robot_description' and shape.feet == {}

@@ -240,7 +240,7 @@ def test_other_packages_offer_networks(tmp_path, offered):
 
 @pytest.mark.parametrize(('name', 'value', 'words'), [
     ('lent', 'gone:Twin', "entry point 'lent = gone:Twin': ModuleNotFoundError"),
-    ('lent', 'lent:PRESETS', 'it is no class of networks'),
+    ('lent', 'lent:PRESETS', 'it is not a network class'),
     ('borrowed', 'lent:Twin', "its network has the name 'lent'")])
 def test_an_offer_of_no_use_harms_itself_alone(offered, name, value, words):
     places = offered(name, value)

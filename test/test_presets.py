@@ -135,7 +135,7 @@ def test_bad_values(tmp_path, keys, value, where, why):
 
 @pytest.mark.parametrize(('content', 'words'), [
     (b'network: [biped\npresets:', 'line 2'), (b'\xff\xfe\x00', 'decode'), (b'', 'not nothing'),
-    (b'network: biped\nnetwork: biped\n', "'network' is there twice"), (b'- 1\n', 'a mapping'),
+    (b'network: biped\nnetwork: biped\n', "'network' appears twice"), (b'- 1\n', 'a mapping'),
     (b'network: biped\npresets:\n  1: {}\n', 'the key 1 is not a name'),
     (b'a: !!python/object:os.system {}\n', 'line 1'), (b'a: \x07\n', 'file')])
 def test_files_of_other_kinds(tmp_path, content, words):

@@ -152,7 +152,7 @@ def test_a_week_of_nanoseconds_rises_strictly():
     ([(np.array([5, 6]), ('a',), np.ones((2, 2)))], (),
      'live: 1 names and positions of shape (2, 2) for stamps of shape (2,)'),
     ([(np.array([0.5, 0.6]), ('a',), np.ones((2, 1)))], (),
-     'live: stamps are whole nanoseconds, not float64'),
+     'live: stamps must be whole nanoseconds, not float64'),
     ([(np.array([0, 2**62 + 2**61]), ('a',), np.ones((2, 1)))], (),
      'live: stamp of 6.91753e+09 s'),
 ])

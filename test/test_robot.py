@@ -93,7 +93,7 @@ def test_without_an_order_joints_come_as_in_the_file(tmp_path):
      "legs.rf.joints[1].name: 'lh_toe_joint' is also the name of legs.lh.joints[1]"),
     ('legs.lh.joints.1', DROP, "joint_order[1]: joint 'lh_toe_joint' is missing"),
     ('joint_order.1', 'tail', "joint_order[1]: joint 'tail' is missing from the legs"),
-    ('joint_order.1', 'lh_tarsal_joint', "joint_order[1]: 'lh_tarsal_joint' is there twice"),
+    ('joint_order.1', 'lh_tarsal_joint', "joint_order[1]: 'lh_tarsal_joint' appears twice"),
     ('joint_order.7', DROP, "joint_order: joint 'rf_pastern_joint' of legs.rf.joints[1] is"),
     ('joint_order.0', 4, 'joint_order[0]: must be a name, not 4'),
     ('joint_order', 'all', "joint_order: must be a list with at least one entry, not 'all'")])
@@ -130,7 +130,7 @@ def test_broken_joints(tmp_path, changes, words):
 
 @pytest.mark.parametrize(('content', 'words'), [
     (b'', 'must be a mapping, not nothing'), (b'- 1', 'file: must be a mapping, not [1]'),
-    (b'network: delayed\nnetwork: delayed\n', "line 2: the key 'network' is there twice"),
+    (b'network: delayed\nnetwork: delayed\n', "line 2: the key 'network' appears twice"),
     (b'legs: [1, 2\n', 'line 2'), (b'a: b: c', 'line 1'), (b'\tnetwork: x', 'line 1'),
     (b'? [1, 2]\n: 3\n', 'key'), (b'--- {}\n--- {}\n', 'line 2'), (b'!!python/none x', 'line 1'),
     (b'\x89PNG\r\n\x1a\n\x00\x00', 'file'), (b'\x00\x01\x02', 'file'), (b'\xff\xfe\x00', 'file')])

@@ -169,8 +169,8 @@ def test_many_lines_are_read_in_parts(write):
     ('time,knee\n0,1\n2,1\n\n1,1\n', ", line 5, column 'time': time goes back from 2 to 1 s"),
     ('time,knee\n0,1\n,1\n', ", line 3, column 'time': no time"),
     ('time,knee\n0,1\ninf,1\n', ", line 3, column 'time': no time"),
-    ('time,knee\n1700000000000,1\n', ", line 2, column 'time': 1.7e+12 s is no time; if it is in "
-                                     'ms, us or ns, declare it'),
+    ('time,knee\n1700000000000,1\n', ", line 2, column 'time': 1.7e+12 s is not a plausible "
+                                     'time; if it is in ms, us or ns, declare the unit'),
     ('time,knee\n0,0.1\n', ': 1 sample, all at stamp 0.000000000 s: no time passes'),
     ('time,knee\n3,0.1\n3,0.2\n', ': 2 samples, all at stamp 3.000000000 s: no time passes'),
     ('time,hip,knee\n0,1,\n1,1,nan\n', ": no finite position of joint 'knee' in 2 samples; name "

@@ -75,8 +75,8 @@ def efference_from(recording: WalkRecording, robot: Robot, gait: str | None = No
                                      for leg, joints in robot.legs.items()}, network)
     gait = gait or stride.gait
     if gait not in network.presets():
-        raise InputError(f'{recording.source}: no gait can be told from the legs (nearest: '
-                         f'{stride.nearest}): name it (--gait)')
+        raise InputError(f'{recording.source}: cannot recognise a gait from the legs (nearest: '
+                         f'{stride.nearest}): name it with --gait')
     preset, motion = network.presets()[gait], robot.motion(gait, gait)
     program = plan(robot, gait, preset, preset.network, motion.frequency or 0.0)
     columns = [recording.joints.index(name) for name in stride.joints]

@@ -196,6 +196,6 @@ def classes(network: Network) -> tuple[Symmetry, ...]:
     values = network.as_dict()
     for family in network.families(found[0]):
         if len({values[name] for name in family}) > 1:
-            raise InputError(f'{", ".join(family)} differ: the network has not the symmetry of '
-                             'its gaits')
+            raise InputError(f'{", ".join(family)} differ: the network does not have the '
+                             'symmetry of its gaits')
     return found

@@ -35,7 +35,7 @@ class _UniqueKeys(yaml.SafeLoader):
                     None, None, f'the key {shown(key)} is not a name', key_node.start_mark)
             if key in seen:
                 raise yaml.constructor.ConstructorError(
-                    None, None, f"the key '{key}' is there twice", key_node.start_mark)
+                    None, None, f"the key '{key}' appears twice", key_node.start_mark)
             seen.add(key)
         return super().construct_mapping(node, deep)
 

@@ -173,7 +173,7 @@ def cluster(address: str, say: Callable[[str], None] = lambda line: None) -> Fle
         raise NotInstalled("--dask needs dask and distributed: pip install 'cpg-ros[fleet]'"
                            ) from error
     if '://' not in address:
-        raise InputError(f"'{address}' is no address of a scheduler, such as tcp://host:8786")
+        raise InputError(f"'{address}' is not the address of a scheduler, such as tcp://host:8786")
     # What happens is said here, in a line.
     for name in ('distributed', 'distributed.core', 'distributed.client', 'distributed.comm'):
         logging.getLogger(name).setLevel(logging.CRITICAL)

@@ -101,7 +101,7 @@ class Folders:
 
         """
         if not self.recordings:
-            raise InputError('no bag and no table in '
+            raise InputError('no bags or tables in '
                              + ', '.join(str(folder) for folder in self.folders))
         tally = Tally('recordings', len(self.recordings), self.progress)
         try:

@@ -56,7 +56,7 @@ class Results:
         self.folder, self.settings = folder, settings
         mark = folder / RESULTS
         if folder.exists() and not mark.exists() and any(folder.iterdir()):
-            raise InputError(f'{folder} is no folder of results: it holds something else')
+            raise InputError(f'{folder} is not a results folder: it contains other files')
         for one in (ROWS, FITTED):
             (folder / one).mkdir(parents=True, exist_ok=True)
         write_atomically(mark, json.dumps({'made by': 'inversion --bags'}) + '\n')

@@ -158,8 +158,8 @@ def legs_of(joints: Sequence[str], whole: bool = False) -> Legs:
     else:
         if there:
             raise LegsError(_missing(there, known, read, joints))
-        raise LegsError(f'no legs can be told from the joint names {_listed(list(joints))}; usual '
-                        'ones have LF, RF, LH, RH, front_left ... or left, right in them')
+        raise LegsError(f'cannot identify legs from the joint names {_listed(list(joints))}; they '
+                        'usually contain LF, RF, LH, RH, front_left ... or left, right')
     return Legs(found, _says(found, read, joints), _rest(found, joints))
 
 

@@ -183,7 +183,7 @@ def _of_entry_point(point: EntryPoint) -> type[Network]:
     source = f"entry point '{point.name} = {point.value}'"
     network = _usable(source, point.load)
     if not (isinstance(network, type) and issubclass(network, Network)):
-        raise NetworkError(f'{source}: it is no class of networks')
+        raise NetworkError(f'{source}: it is not a network class')
     if network.name != point.name:
         raise NetworkError(f"{source}: its network has the name '{network.name}'")
     return _checked(source, network)
@@ -195,7 +195,7 @@ def _of_file(path: Path) -> type[Network]:
     name = f'cpg_ros_network_{path.stem}_{crc32(bytes(path)):x}'
     spec = importlib.util.spec_from_file_location(name, path)
     if spec is None or spec.loader is None:
-        raise NetworkError(f'{path}: it is no Python file')
+        raise NetworkError(f'{path}: it is not a Python file')
     module = sys.modules[name] = importlib.util.module_from_spec(spec)
     loader = spec.loader
     try:

@@ -147,8 +147,8 @@ class Generator(StartedNode):
         if self._value('exclusive'):
             time.sleep(DISCOVERY)
             if self._rivals.look():
-                raise StartError(f'{self._rivals.text}: end what publishes there, give the topic '
-                                 'another name, or set exclusive to false')
+                raise StartError(f'{self._rivals.text}: stop that publisher, rename the topic, '
+                                 'or set exclusive to false')
 
     # -- parameters -----------------------------------------------------------------------
 

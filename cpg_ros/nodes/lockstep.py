@@ -86,7 +86,7 @@ class Lockstep(threading.Thread):
                 return
             if not told:
                 told = True
-                logger.info('waiting for somebody who listens to /clock and publishes '
+                logger.info('waiting for a node that listens to /clock and publishes '
                             + ', '.join(self._commands.topics))
         period = round(1e9 / self.rate)
         now, every, since, patience = 0, 1, 0, PATIENCE

@@ -123,11 +123,11 @@ class RobotSim(StartedNode):
         self._rate, timestep, factor = map(self._value, ('rate', 'timestep', 'real_time_factor'))
         self._steps = round(1.0 / (self._rate * timestep))
         if abs(self._steps * self._rate * timestep - 1.0) > 1e-6:
-            raise StartError(f'rate {self._rate:g} Hz and timestep {timestep:g} s do not fit: '
+            raise StartError(f'rate {self._rate:g} Hz and timestep {timestep:g} s do not match: '
                              f'a period of {1.0 / self._rate:g} s must hold a whole number '
                              'of time steps')
         if 0.0 < factor < SLOWEST:
-            raise StartError(f'real_time_factor {factor:g} is neither 0 nor from {SLOWEST:g} on')
+            raise StartError(f'real_time_factor {factor:g} must be 0 or at least {SLOWEST:g}')
         film, footfalls = (Path(name).expanduser() if name else None
                            for name in map(self._value, ('film', 'footfalls')))
         try:
@@ -268,7 +268,7 @@ class RobotSim(StartedNode):
             # Bouncing is part of the fall.
             self._upright_from = self._now + self._rate * BOUNCE
         elif self._fallen and self._now > self._upright_from:
-            self.get_logger().info('the robot has come upright again')
+            self.get_logger().info('the robot is upright again')
         self._fallen = body.fallen or self._now <= self._upright_from
         if self._now == self._last:
             self.stop.set()

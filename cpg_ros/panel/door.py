@@ -47,7 +47,7 @@ class Door:
         """
         if not is_loopback(host) and not token:
             raise DoorError(f"host '{host}' can be reached from other machines: set the parameter "
-                            'token, without which nobody comes in')
+                            'token to protect it')
         self._token = token.encode()
 
     def refuses(self, path: str, host: str, origin: str) -> str:

@@ -128,8 +128,8 @@ class Panel(StartedNode):
         shown = f'[{shown}]' if ':' in shown else shown
         self.get_logger().info(f'watch and drive it in a browser: http://{shown}:{port}/{token}')
         if not is_loopback(host):
-            self.get_logger().warning('the page is open to this network for whoever has the '
-                                      'token, and nothing is encrypted')
+            self.get_logger().warning('anyone on this network who has the token can '
+                                      'open the page, and nothing is encrypted')
         loop = asyncio.get_running_loop()
         due, looked = loop.time(), -LOOK
         while not self.stop.is_set():
@@ -204,7 +204,7 @@ class Panel(StartedNode):
         if view is None:
             raise RequestError(f"there is no generator '{name}'")
         if page.waiting() > SLOW:
-            raise RequestError('the page has not taken yet what it was sent')
+            raise RequestError('the page has not yet processed what it was sent')
         self._gone(page)
         page.node = name
         self._pages.send([page], {'type': 'chosen', 'node': name})

@@ -85,7 +85,7 @@ class Recorder:
             with contextlib.suppress(UnknownType):  # of a package that is not installed here
                 known.append((name, kind, message_class(kind), message_fields(kind)))
         if not known:
-            raise RecordingError('there is nothing to record')
+            raise RecordingError('there are no topics to record')
         bag = time.strftime('panel_%Y%m%d_%H%M%S')
         try:
             self._folder.mkdir(parents=True, exist_ok=True)
@@ -144,7 +144,7 @@ class Recorder:
         path = self._folder / bag
         # Only what this recorder makes: no name leads out of the folder.
         if not bag.startswith('panel_') or not bag[6:].replace('_', '').isdigit():
-            raise RecordingError('this is no recording')
+            raise RecordingError('this is not a recording')
         if self.running and bag == self.bag:
             raise RecordingError(f'{bag} is still being recorded')
         if not path.is_dir():

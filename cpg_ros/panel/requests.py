@@ -85,7 +85,7 @@ ACTIONS: dict[str, dict[str, Callable[[Any], Any]]] = {
 
 
 def _constant(name: str) -> float:
-    raise RequestError(f'{name} is no number')
+    raise RequestError(f'{name} is not a number')
 
 
 def read(text: str | bytes) -> Request:

@@ -65,7 +65,7 @@ def from_file(path: Path, said: Callable[[str], None], source: str = '') -> Shap
         below.setdefault(joint.parent, []).append(joint)
     for index, link in enumerate(shape.links):  # which grows
         if len(shape.links) > len(joints) + 1:
-            raise UrdfError(f'URDF {source or path}: the links go round in a circle')
+            raise UrdfError(f'URDF {source or path}: the links form a loop')
         for joint in below.get(link.name, ()):
             shape.links.append(_held(joint, index))
         for visual in visuals.get(link.name, ()):
@@ -120,7 +120,7 @@ def _triangles(solid: Xml.Element, folder: Path) -> np.ndarray:
     if solid.tag == 'capsule':
         return solids.capsule(radius, 0.5 * length)
     if solid.tag != 'mesh':
-        raise mesh_files.MeshError(f'<{solid.tag}> is no solid that a URDF has')
+        raise mesh_files.MeshError(f'<{solid.tag}> is not a URDF shape')
     found = mesh_files.read(_path(solid.get('filename', ''), folder))
     return mesh_files.coarse(found * _numbers(solid.get('scale'), '1 1 1'))
 

@@ -129,7 +129,7 @@ def _files(path: Path) -> list[Path]:
         return [path]
     files = [file for file in path.iterdir() if file.suffix in STORAGES and file.is_file()]
     if not files and not (path / 'metadata.yaml').exists():
-        raise RecordingError(f'{path}: no bag: it has neither metadata.yaml nor a storage file '
+        raise RecordingError(f'{path}: not a bag: it has neither metadata.yaml nor a storage file '
                              f'({", ".join(STORAGES)})')
     return sorted(files, key=lambda file: (len(file.name), file.name))
 

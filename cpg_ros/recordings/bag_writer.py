@@ -45,7 +45,7 @@ class BagWriter:
 
         """
         if path.exists():
-            raise BagError(f'{path}: there is something already')
+            raise BagError(f'{path}: already exists')
         self.path, self.size = path, 0
         self._beside = path.with_name(f'.{path.name}.unfinished')
         self._store = get_typestore(Stores.ROS2_JAZZY)

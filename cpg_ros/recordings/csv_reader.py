@@ -301,8 +301,8 @@ class _Table:
             if not np.isfinite(value):
                 raise RecordingError(where + 'no time')
             if abs(value) >= LATEST:
-                raise RecordingError(where + f'{value:.6g} s is no time; if it is in ms, us or '
-                                     'ns, declare it')
+                raise RecordingError(where + f'{value:.6g} s is not a plausible time; if it is in '
+                                     'ms, us or ns, declare the unit')
             raise RecordingError(where + f'time goes back from {before[row]:.9g} to '
                                  f'{value:.9g} s')
         if len(seconds):

@@ -77,7 +77,7 @@ class Recording:
                 f'{len(self.times)} times and {len(self.joints)} joints')
         if len(self.times) < 2:
             raise RecordingError(f'{self.source}: {counted(len(self.times), "sample")}; '
-                                 'a movement takes two at least')
+                                 'a movement needs at least two')
         if self.times[0] != 0.0 or not (np.diff(self.times) > 0.0).all():
             raise RecordingError(f'{self.source}: times do not rise strictly from 0')
 
@@ -211,7 +211,7 @@ def _groups(chunks: Iterable[Chunk], source: str
         if not stamps.size or not len(names):
             continue
         if not np.issubdtype(stamps.dtype, np.integer):
-            raise RecordingError(f'{source}: stamps are whole nanoseconds, not {stamps.dtype}')
+            raise RecordingError(f'{source}: stamps must be whole nanoseconds, not {stamps.dtype}')
         far = np.abs(stamps.astype(float)) > LATEST * 1e9
         if far.any():
             raise RecordingError(f'{source}: stamp of {float(stamps[far][0]) / 1e9:.6g} s')

@@ -124,15 +124,15 @@ def _leg(reader: Reader, tree: Any, where: str, known: set[str]) -> LegGeometry:
     joints = tuple(reader.text(name, f'{where}.joints[{k}]') for k, name
                    in enumerate(reader.items(tree['joints'], f'{where}.joints')))
     if len(joints) not in (2, 3) or len(set(joints)) < len(joints):
-        raise reader.fail(f'{where}.joints', 'takes the names of hip, thigh and calf, or of '
+        raise reader.fail(f'{where}.joints', 'must name hip, thigh and calf, or of '
                           'thigh and calf')
     for k, name in enumerate(joints):
         if name not in known:
-            raise reader.fail(f'{where}.joints[{k}]', f"'{name}' is no joint of this leg")
+            raise reader.fail(f'{where}.joints[{k}]', f"'{name}' is not a joint of this leg")
     turns = _numbers(reader, tree['turns'], f'{where}.turns', len(joints))
     for k, turn in enumerate(turns):
         if turn not in (1.0, -1.0):
-            raise reader.fail(f'{where}.turns[{k}]', f'{turn:g} is neither 1 nor -1')
+            raise reader.fail(f'{where}.turns[{k}]', f'{turn:g} must be 1 or -1')
     found = [_numbers(reader, tree[key], f'{where}.{key}', 3) for key in places]
     for key, (x, _, z) in zip(places[2:], found[2:], strict=True):
         if x == z == 0.0:
@@ -177,7 +177,7 @@ def _row(reader: Reader, value: Any, where: str) -> tuple[float, ...]:
     try:
         return tuple(reader.number(float(word), where) for word in words)
     except ValueError as error:
-        raise reader.fail(where, f'has something that is no number: {error}') from error
+        raise reader.fail(where, f'contains something that is not a number: {error}') from error
 
 
 def geometry_tree(geometry: BodyGeometry) -> dict[str, Any]:

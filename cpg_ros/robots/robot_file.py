@@ -260,7 +260,7 @@ def load_robot(path: str | Path) -> Robot:
             if name not in seen:
                 raise reader.fail(f'joint_order[{k}]', f"joint '{name}' is missing from the legs")
             if name in order[:k]:
-                raise reader.fail(f'joint_order[{k}]', f"'{name}' is there twice")
+                raise reader.fail(f'joint_order[{k}]', f"'{name}' appears twice")
         for name, place in seen.items():
             if name not in order:
                 raise reader.fail('joint_order', f"joint '{name}' of {place} is missing")

@@ -89,7 +89,7 @@ class _Document:
                             f'{self.path.name} > robot.urdf)')
         name = tag.rpartition(':')[2]
         if not self._open and name != 'robot':
-            raise self.fail(f'its root is <{name}>, not <robot>: this is no URDF')
+            raise self.fail(f'its root is <{name}>, not <robot>: this is not a URDF')
         self._open.append(name)
         if self._open == ['robot', 'joint']:
             self._parts = {'joint': attributes}
@@ -100,7 +100,7 @@ class _Document:
         if self._open == ['robot', 'joint']:
             joint = self._joint()
             if joint.name in self.joints:
-                raise self.fail(f"the joint '{joint.name}' is there twice")
+                raise self.fail(f"the joint '{joint.name}' appears twice")
             self.joints[joint.name] = joint
         self._open.pop()
 
@@ -169,7 +169,7 @@ def load_urdf(path: str | Path) -> dict[str, UrdfJoint]:
     except (ValueError, LookupError) as error:
         raise document.fail(str(error)) from error
     if not document.joints:
-        raise document.fail('there is no joint in it')
+        raise document.fail('it has no joints')
     return document.joints
 
 
@@ -192,7 +192,7 @@ def chain(joints: dict[str, UrdfJoint], name: str) -> list[UrdfJoint]:
     """Return the joints from the root to one joint, which is the last.
 
     Raises:
-        UrdfError: the links go round in a circle.
+        UrdfError: the links form a loop.
 
     """
     above = {joint.child: joint for joint in joints.values()}
@@ -200,7 +200,7 @@ def chain(joints: dict[str, UrdfJoint], name: str) -> list[UrdfJoint]:
     while found[0].parent in above:
         found.insert(0, above[found[0].parent])
         if len(found) > len(joints):
-            raise UrdfError(f"the links above the joint '{name}' go round in a circle")
+            raise UrdfError(f"the links above the joint '{name}' form a loop")
     return found
 
 
@@ -208,7 +208,7 @@ def direction(joints: dict[str, UrdfJoint], name: str) -> np.ndarray:
     """Return the axis of a joint in the frame of the root with all joints at 0, a unit vector.
 
     Raises:
-        UrdfError: the axis is zero, or the links go round in a circle.
+        UrdfError: the axis is zero, or the links form a loop.
 
     """
     turned = np.eye(3)

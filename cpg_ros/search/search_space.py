@@ -146,5 +146,5 @@ def search_space(network_name: str, gait: str, bounds: Mapping[str, tuple[float,
         variables[place] = Variable(old.name, low, high, old.members)
     space = Space(network, gait, tuple(variables))
     if not space.free:
-        raise InputError('every variable is fixed: there is nothing to look for')
+        raise InputError('every variable is fixed: nothing is left to search')
     return space

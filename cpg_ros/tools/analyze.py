@@ -118,7 +118,7 @@ def parameters(name: str, preset: str | None, changes: list[tuple[str, float]]) 
         raise InputError(f'--set: {delay} is {network.delay:g}, a delay must be positive')
     if network.delay > kind.longest_delay > 0.0:
         raise InputError(f'--set: {delay} is {network.delay:g}, delays go up to '
-                         f'{kind.longest_delay:g}: take another unit of time')
+                         f'{kind.longest_delay:g}: use another unit of time')
     for key, lost in kind.needed.items():
         if network.as_dict()[key] == 0.0:
             raise InputError(f'--set: {key} is 0: {lost}')

@@ -101,7 +101,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         parser.error(f'argument --gait: {len(chosen.gait)} gaits for {len(chosen.bags)} bags')
     out = chosen.out or Path(chosen.robot)
     if out.suffix not in ('.yaml', '.yml'):
-        parser.error(f'argument --out: {out} is not called .yaml')
+        parser.error(f'argument --out: {out} does not end in .yaml')
     try:
         robot = find_robot(chosen.robot)
         rows: list[tuple[str, ...]] = [('from', 'gait', 'speed [m/s]', 'strides')]
@@ -118,7 +118,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(f'calibrate: {error}', file=sys.stderr)
         return 1 if type(error).__name__ in ('NoSteadyGait', 'Refused') else 2
     except KeyboardInterrupt:
-        print('calibrate: stopped, nothing is written', file=sys.stderr)
+        print('calibrate: stopped, nothing written', file=sys.stderr)
         return 130
     say('\n'.join([*table(rows, '<<><'), f'written: {out}']))
     return 0

@@ -93,9 +93,9 @@ def _checked(chosen: Namespace) -> RobotCheck:
 
 def _made(chosen: Namespace, urdf: dict[str, UrdfJoint]) -> Robot:
     if chosen.make.suffix not in ('.yaml', '.yml'):
-        raise InputError(f'--make: {chosen.make} is not called .yaml')
+        raise InputError(f'--make: {chosen.make} does not end in .yaml')
     if chosen.make.exists():
-        raise InputError(f'--make: {chosen.make} is there already')
+        raise InputError(f'--make: {chosen.make} already exists')
     robot, says = robot_from(urdf, chosen.make.stem)
     geometry, said = geometry_from(robot, urdf, load_links(chosen.urdf))
     robot, says = replace(robot, geometry=geometry), f'{says}\n{said}'

@@ -124,7 +124,7 @@ def parameter_value(text: str) -> Any:
         value = yaml.safe_load(text)
         Parameter('one', value=value)
     except (yaml.YAMLError, TypeError):
-        raise ArgumentTypeError(f"'{text}' is no value of a parameter") from None
+        raise ArgumentTypeError(f"'{text}' is not a parameter value") from None
     return value
 
 

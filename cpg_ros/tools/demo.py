@@ -92,7 +92,7 @@ class Operator(Node):
         """
         for topic, who in (('lh/joint_states', 'generator'), ('odom', 'robot')):
             if self.count_publishers(topic) > 1:
-                raise DemoError(f'there is another {who} in this ROS domain: end it, or set '
+                raise DemoError(f'there is another {who} in this ROS domain: stop it, or set '
                                 'another ROS_DOMAIN_ID')
 
     def switch(self, gait: str) -> str:

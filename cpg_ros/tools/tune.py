@@ -143,7 +143,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(f'tune: {error}', file=sys.stderr)
         return 2
     except KeyboardInterrupt:
-        print('tune: stopped, nothing is written', file=sys.stderr)
+        print('tune: stopped, nothing written', file=sys.stderr)
         return 130
     say('\n'.join([f'{LONG:g} s from the stand in simulation:', *lines,
                    f'written: {chosen.out}']))

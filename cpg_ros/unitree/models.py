@@ -64,7 +64,7 @@ def each(values: list[float], what: str, most: float) -> np.ndarray:
 
     """
     if len(values) not in (1, len(PARTS), len(JOINTS)):
-        raise InputError(f'{what} has {len(values)} numbers: one for all joints, three for '
+        raise InputError(f'{what} has {len(values)} numbers: give one for all joints, three for '
                          f'{", ".join(PARTS)}, or {len(JOINTS)}, for {", ".join(JOINTS)}')
     for value in values:
         if not 0.0 <= value <= most:

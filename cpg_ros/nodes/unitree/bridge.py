@@ -250,8 +250,8 @@ class UnitreeBridge(StartedNode):
         """See whether somebody else commands the robot, or would crash its software."""
         if (found := self._announcements.look()) and not self._harmful:
             self._harmful = found
-            self.get_logger().error(f'{found} is on this network: it crashes the 0.10 of '
-                                    "Unitree's firmware; end it")
+            self.get_logger().error(f'{found} is on this network: it crashes the 0.10 in '
+                                    "Unitree's firmware; stop it")
         if self._supervisor.phase in DRIVEN and (found := self._others.found()):
             reason = f'the robot is commanded by {found}, too'
             self._requests.append(lambda now: self._supervisor.sit(now, reason))

@@ -161,8 +161,8 @@ class Start(threading.Thread):
 
     def _look_for_others(self) -> None:
         if found := self._harmful():
-            raise Refused(f"{found} is on this network: it crashes the 0.10 of Unitree's "
-                          'firmware; end it')
+            raise Refused(f"{found} is on this network: it crashes the 0.10 in Unitree's "
+                          'firmware; stop it')
         end, told = time.monotonic() + FORGOTTEN, False
         while found := self._others.found():
             if not found.endswith(f'/{BRIDGE}') or ',' in found:
