@@ -25,6 +25,7 @@ class Sheet:
     """What is known of one gait on the grid.
 
     Attributes:
+        shape: rows and columns.
         label: shape (rows, columns); -1 where nothing is known yet.
         computed: whether it was computed, the same shape.
         numbers: name -> values, nan where there are none.
