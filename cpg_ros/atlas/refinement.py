@@ -30,7 +30,6 @@ class Sheet:
         computed: whether it was computed, the same shape.
         numbers: name -> values, nan where there are none.
         waves: (row, column) -> waveforms and period.
-        stride: grid distance of the waves that were computed last.
 
     """
 
