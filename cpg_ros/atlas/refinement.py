@@ -38,11 +38,11 @@ class Sheet:
     """What is known of one gait on the grid.
 
     Attributes:
+        shape: rows and columns.
         label: shape (rows, columns); -1 where nothing is known yet.
         computed: whether it was computed, the same shape.
         numbers: name -> values, nan where there are none.
         waves: (row, column) -> waveforms and period.
-        stride: grid distance of the waves that were computed last.
 
     """
 
