@@ -21,7 +21,7 @@ GENERATOR = {
     'gait': ('trot', str, 'gait to start with'),
     'frequency': ('', float, "strides per second [Hz]; empty for the gait's usual one"),
     'cmd_vel': ('false', bool, 'walk as cmd_vel (geometry_msgs/Twist) asks'),
-    'feedback': ('false', bool, 'correct the gait by IMU, joints and feet; needs a calibrated '
+    'feedback': ('true', bool, 'correct the gait by IMU, joints and feet; needs a calibrated '
                  'robot file'),
 }
 SIMULATION = {
