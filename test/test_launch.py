@@ -257,7 +257,7 @@ def test_go2_speaks_one_command_and_takes_turns(described, given, command, monke
     assert set(to_generator) - {'network', 'use_sim_time'} <= set(known)
     assert to_generator == {'network': 'delayed', 'gait': 'walk', 'robot': 'unitree_go2',
                             'rate': 500.0, 'combined_topic': '', 'cmd_vel': True,
-                            'feedback': False, 'command': command, 'use_sim_time': True}
+                            'command': command, 'use_sim_time': True}
     to_simulation = parameters(found, simulation)
     assert to_simulation == {
         'lockstep': True, 'robot': 'unitree_go2', 'model': 'go2', 'film': '~/films/a.gif',

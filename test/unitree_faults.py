@@ -59,7 +59,8 @@ class Walk:
 
     def start_generator(self):
         self.generator = Process(*(word for name in (
-            'robot:=unitree_go2', 'rate:=500.0', "combined_topic:=''", 'gait:=trot',
+            'robot:=unitree_go2', 'rate:=500.0', "combined_topic:=''",
+            'feedback:=false', 'gait:=trot',
             'command:=forward_position', 'exclusive:=false') for word in ('-p', name)),
             domain=self.domain)
 

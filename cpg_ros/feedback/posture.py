@@ -22,8 +22,8 @@ def in_stance(x, y, roll, pitch, roll_rate, pitch_rate, gains):
     """Return how far to draw a foot in, m.
 
     Args:
-        x: where it is, forward of the base, m.
-        y: to the left of it, m.
+        x: where it is, forward of the middle of all feet that stand, m.
+        y: to the left of that, m.
         roll: beyond what is expected, rad.
         pitch: the same.
         roll_rate: the same, rad/s.

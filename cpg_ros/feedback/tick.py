@@ -138,7 +138,7 @@ def _cached(digest):
         """Correct planned angles; arguments as of Feedback.advance, out is filled."""
         digest  # noqa: B018
         quick = 1.0 - math.exp(-dt / gains.smooth)
-        own, foot = memory.own, memory.scratch[0]
+        own, foot, feet = memory.own, memory.scratch[0], memory.seen
         for run in range(planned.shape[0]):
             memory.landed[:] = memory.contact[run]
             update(rows, columns, radius, weight, angles[run], rates[run], loads[run], lean[run],
@@ -173,11 +173,17 @@ def _cached(digest):
             row = int((phase + LEAD) % 1.0 * POINTS) % POINTS
             now = int(phase % 1.0 * POINTS) % POINTS
             out[run] = planned[run]
-            leaning = 0.0
+            leaning, standing, mean_x, mean_y = 0.0, 0, 0.0, 0.0
             for leg in range(rows.shape[0]):
                 hip, thigh, calf = columns[leg, 0], columns[leg, 1], columns[leg, 2]
-                foot[0], foot[1], foot[2] = foot_of(rows[leg], planned[run, hip],
-                                                    planned[run, thigh], planned[run, calf])
+                feet[leg, 0], feet[leg, 1], feet[leg, 2] = foot_of(
+                    rows[leg], planned[run, hip], planned[run, thigh], planned[run, calf])
+                if not tables.swinging[slot, row, leg]:
+                    standing, mean_x, mean_y = (standing + 1, mean_x + feet[leg, 0],
+                                                mean_y + feet[leg, 1])
+            mean_x, mean_y = mean_x / max(standing, 1), mean_y / max(standing, 1)
+            for leg in range(rows.shape[0]):
+                foot[0], foot[1], foot[2] = feet[leg, 0], feet[leg, 1], feet[leg, 2]
                 swinging = tables.swinging[slot, row, leg]
                 x, y, z = uphill_x, uphill_y, 0.0
                 if gains.posture:
@@ -185,7 +191,9 @@ def _cached(digest):
                         z = posture.in_swing(foot[0], foot[1], roll - ground[0],
                                              pitch - ground[1], gains)
                     else:
-                        z = posture.in_stance(foot[0], foot[1], roll, pitch, wx, wy, gains)
+                        # About the middle of the feet that stand: the body is tilted, not raised.
+                        z = posture.in_stance(foot[0] - mean_x, foot[1] - mean_y, roll, pitch, wx,
+                                              wy, gains)
                 if gains.placement:
                     stepped = memory.stepped[run, leg]
                     if swinging:
