@@ -20,6 +20,7 @@ import json
 from cpg_ros.atlas import orbit_curves as curves
 from cpg_ros.atlas.chart import chart_of
 from cpg_ros.atlas.hopf_curves import hopf_curves
+from cpg_ros.atlas.refinement import places, refined
 from cpg_ros.atlas.row_job import assess_row, leading_multipliers, LOCKED, NONE, Row
 from cpg_ros.dynamics.floquet import multipliers
 from cpg_ros.dynamics.orbit import solve_orbit
@@ -132,6 +133,19 @@ def test_the_page_is_one_file_with_everything_in_it(drawn):
     assert told['counts'] == [9, 17]
     assert set(told['gaits']) == {'trot', 'pace'}
     assert told['gaits']['trot']['waves']
+
+
+@pytest.mark.parametrize('count', [2, 3, 9, 12, 20, 200])
+def test_a_grid_of_any_size_is_halved_until_it_is_whole(count):
+    assert places(count, 1) == list(range(count))
+    chart = chart_of('delayed', TROT, OVER, (count, 9))
+
+    def run(jobs, number):
+        for row in jobs:
+            yield row, [{'row': row.row, 'column': column, 'label': int(3 * row.row > count)}
+                        for column in row.columns]
+    (sheet,) = refined(chart, ('trot',), run).values()
+    assert (sheet.label == (3 * np.arange(count) > count)[:, None]).all()
 
 
 @pytest.mark.parametrize(('over', 'said'), [

@@ -76,8 +76,12 @@ class Sheet:
 
 
 def places(count: int, stride: int) -> list[int]:
-    """Indices of a grid of this stride, the last one always."""
-    return sorted({*range(0, count, stride), count - 1})
+    """Indices of a grid of this stride: the coarse one, the last index in it, and halvings."""
+    found, halved = sorted({*range(0, count, COARSE), count - 1}), COARSE
+    while halved > stride:
+        found = sorted({*found, *((one + other) // 2 for one, other in pairwise(found))})
+        halved //= 2
+    return found
 
 
 def coarse_rows(chart: Chart, gaits: tuple[str, ...]) -> Iterator[Row]:
