@@ -24,6 +24,7 @@ from feedback_figures import (
     switches,
     wander,
 )
+from tqdm import tqdm
 
 from cpg_ros.simulation.scenario import Noise
 
@@ -118,8 +119,9 @@ def main() -> int:
               and job[0] in (arguments.gaits or [job[0]])]
     began, found = time.perf_counter(), {}
     with ProcessPoolExecutor(arguments.processes) as pool:
-        for (gait, figure, closed), one in pool.map(
-                measure, [(*job, seed, arguments.quick) for job in chosen]):
+        waiting = [(*job, seed, arguments.quick) for job in chosen]
+        for (gait, figure, closed), one in tqdm(pool.map(measure, waiting), total=len(waiting),
+                                                unit='figure', disable=None):
             ways = found.setdefault(gait, {'open': {}, 'closed': {}})
             ways['closed' if closed else 'open'][figure] = one
     whole = not (arguments.only or arguments.gaits)
