@@ -39,6 +39,7 @@ from feedback_figures import (
     switches,
     wander,
 )
+from tqdm import tqdm
 
 ROBOT = ROOT / 'config' / 'unitree_go2.yaml'
 OPEN, CLOSED = (12.0, 16.0, 20.0, 24.0), (24.0, 30.0, 34.0, 38.0, 42.0)
@@ -131,8 +132,9 @@ def main() -> int:
               and job[0] in (arguments.gaits or [job[0]])]
     began, found = time.perf_counter(), {}
     with ProcessPoolExecutor(arguments.processes) as pool:
-        for (gait, figure, closed), one in pool.map(
-                measure, [(*job, seed, arguments.quick) for job in chosen]):
+        waiting = [(*job, seed, arguments.quick) for job in chosen]
+        for (gait, figure, closed), one in tqdm(pool.map(measure, waiting), total=len(waiting),
+                                                unit='figure', disable=None):
             ways = found.setdefault(gait, {'open': {}, 'closed': {}})
             ways['closed' if closed else 'open'][figure] = one
     whole = not (arguments.only or arguments.gaits)

@@ -109,8 +109,18 @@ def pushes(one: Subject, impulses: Sequence[float]) -> dict[str, object]:
     for low, high in itertools.pairwise(shares):
         if shares[low] >= 0.5 > shares[high]:
             half = float(np.interp(0.5, [shares[high], shares[low]], [high, low]))
+    count = directions * phases
     return {'survived': {f'{impulse:g}': share for impulse, share in shares.items()},
+            'interval_95': {f'{impulse:g}': interval(share, count)
+                            for impulse, share in shares.items()},
             'half_survive_N_s': half}
+
+
+def interval(share: float, count: int) -> tuple[float, float]:
+    """Return the 95 % confidence interval of a share of so many runs (Wilson 1927)."""
+    z = 1.96 / math.sqrt(count)
+    middle, half = share + z**2 / 2.0, z * math.sqrt(share * (1.0 - share) + z**2 / 4.0)
+    return (round((middle - half) / (1.0 + z**2), 3), round((middle + half) / (1.0 + z**2), 3))
 
 
 def ground(one: Subject) -> dict[str, object]:

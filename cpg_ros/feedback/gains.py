@@ -80,7 +80,7 @@ class Gains(NamedTuple):
     step_filter: float = 0.032
     step_most: float = 0.17
     step_decay: float = 3.1
-    give: float = 0.3
+    give: float = 0.0
     give_left: float = 0.8
 
     pace_from: float = 0.12
@@ -106,7 +106,7 @@ class Gains(NamedTuple):
     speed_rate: float = 0.3
     speed_most: float = 0.3
 
-    sidestep_share: float = 1.0
+    sidestep_share: float = 1.1
     sidestep_most: float = 0.08
 
     touchdown_gain: float = 0.5
