@@ -19,8 +19,8 @@ from launch import LaunchDescription
 from launch.actions import OpaqueFunction
 
 ARGUMENTS = {
-    'network': ('delayed', str, 'delayed, quadruped, biped, or the path of a Python file with '
-                'one'),
+    'network': ('delayed', str, 'delayed, quadruped, biped, phase, hopf, matsuoka, one of them '
+                'with a number of legs such as phase6, or the path of a Python file with one'),
     'gait': ('', str, "gait, or the name of a preset; empty for the network's usual one"),
     'presets': ('', str, 'file with additional presets; empty for none'),
     'robot': ('', str, "robot file, or a shipped name; empty for the network's usual one"),

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Executable ``reproduce``: computes every number that the three papers print.
+"""Executable ``reproduce``: computes every number that the papers print.
 
 ``reproduce`` prints a row for each: paper, place, quantity, published, computed, and whether they
 agree or which erratum says why not.
@@ -32,7 +32,7 @@ from cpg_ros.tools.arguments import Parser, say
 from cpg_ros.tools.reproduction_report import as_html, as_json, table
 
 DESCRIPTION = """\
-Compute every quantity printed in the three papers and compare it with the printed value. A row
+Compute every quantity printed in the papers and compare it with the printed value. A row
 that differs names the erratum that explains it; otherwise it fails."""
 EPILOG = 'exit codes: 0 nothing fails, 1 a row fails, 2 invalid arguments.'
 

@@ -92,8 +92,8 @@ def as_html(found: Reproduction) -> str:
     head = ''.join(f'<th>{name}</th>' for name in (
         'place', 'quantity', 'published', 'computed', 'verdict', 'note; how compared'))
     parts = ['<!DOCTYPE html>', '<html lang="en"><head><meta charset="utf-8">',
-             '<title>Three papers reproduced</title>', f'<style>{STYLE}</style></head><body>',
-             '<h1>Three papers reproduced</h1>', f'<p>{escape(found.summary)}.</p>']
+             '<title>The papers reproduced</title>', f'<style>{STYLE}</style></head><body>',
+             '<h1>The papers reproduced</h1>', f'<p>{escape(found.summary)}.</p>']
     for paper in found.papers:
         parts += [f'<h2>{escape(paper.reference)}</h2>', f'<table><thead><tr>{head}</tr></thead>'
                   '<tbody>', *(_line(row) for row in found.rows if row.paper == paper.authors),
