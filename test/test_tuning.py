@@ -20,6 +20,7 @@ import importlib.util
 import math
 import re
 
+from cpg_ros.fleet.executors import Fleet
 from cpg_ros.motion.pattern import Pattern
 from cpg_ros.motion.plan import gait_of, plan
 from cpg_ros.motion.steering import Drive
@@ -343,7 +344,7 @@ def test_a_search_that_is_stopped_leaves_nothing(error, code, tmp_path, monkeypa
     def stop(*_):
         raise error
 
-    monkeypatch.setattr(Tuner, 'tune', stop)
+    monkeypatch.setattr(Fleet, 'map', stop)
     assert tool.main(['--robot', str(FILE), '--model', 'go2', '--out', str(out)]) == code
     assert [file.name for file in tmp_path.iterdir()] == ['a.yaml']
     assert out.read_text() == 'as it was' and capsys.readouterr().err.startswith('tune: ')
