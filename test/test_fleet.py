@@ -98,7 +98,7 @@ def test_workers_end_with_a_client_that_is_killed():
 
 
 @pytest.mark.parametrize(('address', 'said'), [
-    ('head', "'head' is no address"), ('tcp://head', 'missing port number'),
+    ('head', "'head' is not the address"), ('tcp://head', 'missing port number'),
     ('xyz://head:1', "unknown address scheme 'xyz'")])
 def test_what_is_no_address_is_said_to_be_none(address, said):
     pytest.importorskip('distributed')
