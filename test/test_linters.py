@@ -37,7 +37,7 @@ def test_every_source_file_begins_with_copyright_and_licence():
     head = Path(__file__).read_text().split('"""')[0]
     assert 'Apache License, Version 2.0' in head
     files = [file for name in FOLDERS for file in (ROOT / name).rglob('*.py')
-             if '_build' not in file.parts]
+             if not {'_build', '__pycache__'} & set(file.parts)]
     assert len(files) > 300
     lacking = [str(file.relative_to(ROOT)) for file in files
                if file.read_text() and not file.read_text().removeprefix(
