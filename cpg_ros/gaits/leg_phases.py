@@ -208,8 +208,10 @@ def _symmetry(network: type[Network], gait: str) -> Any:
 def _reversed(network: type[Network], gait: str, symmetry: Any) -> bool:
     """Tell whether the gait with all shifts turned round is another one of the network's."""
     turned = {name: -shift % 1 for name, shift in symmetry.shifts}
-    return any(dict(_symmetry(network, other).shifts) == turned for other in network.gaits()
-               if other != gait)
+    others = [_symmetry(network, other) for other in network.gaits() if other != gait]
+    # Of another group it has names of its own for what shifts: by the phases, then.
+    return any(dict(other.shifts) == turned if other.group == symmetry.group
+               else np.allclose(other.phases, -symmetry.phases % 1.0) for other in others)
 
 
 def _apart(phases: np.ndarray, wanted: np.ndarray, waves: np.ndarray) -> float:

@@ -1,0 +1,133 @@
+"""Curves of folds of a gait's orbits in two parameters.
+
+At a fold the second parameter turns round along the branch: its component of the tangent is zero.
+From a fold the next one is found by holding the unknowns in the plane normal to the last tangent
+while the first parameter moves a step, and then going along the branch to where it turns.
+"""
+
+from dataclasses import replace
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from scipy.optimize import brentq
+
+from cpg_ros.atlas.chart import COARSE, Chart
+from cpg_ros.atlas.hopf_curves import Curve
+from cpg_ros.atlas.orbit_curves import Edge
+from cpg_ros.atlas.refinement import Sheet, places
+from cpg_ros.atlas.row_job import NONE, path_of
+from cpg_ros.dynamics.arclength import Place, along, resolved
+from cpg_ros.dynamics.continuation import follow
+from cpg_ros.dynamics.orbit import NoOrbit, solve_from_path
+from cpg_ros.errors import CpgError
+
+#: Steps of the first parameter in shares of its range, and how far along a branch its turn is
+#: looked for.
+STEP, SHORTEST, REACHES = 1.0 / 24.0, 1.0 / 800.0, (0.01, 0.03, 0.1, 0.3)
+#: Edges that are tried for a gait, points of a branch, and curves this close, in shares, are one.
+TRIED, MOST, SAME = 8, 80, 0.02
+
+
+def lost_edges(chart: Chart, sheet: Sheet) -> list[Edge]:
+    """Neighbours on the coarse grid, along the second axis, of which one has no orbit."""
+    columns = places(chart.second.count, COARSE)
+    size = np.array([chart.first.count - 1, chart.second.count - 1])
+    found = []
+    for row in places(chart.first.count, COARSE):
+        for one, other in pairwise(columns):
+            for at, there in (((row, one), (row, other)), ((row, other), (row, one))):
+                if at in sheet.waves and sheet.label[there] == NONE:
+                    here, away = np.array(at) / size, np.array(there) / size
+                    found.append(Edge((here[0], here[1]), (away[0], away[1]), *sheet.waves[at]))
+    return found
+
+
+def fold_curves(job: tuple[Chart, str, list[Edge]]) -> list[Curve]:
+    """Follow the folds at which a gait is lost over some edges; most are lost at Hopf points."""
+    chart, gait, edges = job
+    found: list[Curve] = []
+    size = np.array([chart.first.high - chart.first.low, chart.second.high - chart.second.low])
+    for edge in edges[::max(1, len(edges) // TRIED)]:
+        try:
+            folds = _folds(chart, gait, edge)
+        except (CpgError, np.linalg.LinAlgError):
+            continue
+        one = chart.first.low + edge.here[0] * size[0]
+        for fold in folds:
+            if any((np.abs(curve.points - (one, fold.value)) / size).max(axis=1).min() < SAME
+                   for curve in found):
+                continue
+            back, ahead = (followed(chart, fold, one, way) for way in (-1.0, 1.0))
+            found.append(Curve('fold', gait, np.array(
+                [*back[::-1], (one, fold.value), *ahead])))
+    return found
+
+
+def _folds(chart: Chart, gait: str, edge: Edge) -> list[Place]:
+    """Folds of the branch in the row of an edge."""
+    one, other = (float(axis.low + part * (axis.high - axis.low)) for axis, part in zip(
+        (chart.first, chart.second), edge.here, strict=True))
+    network = chart.at(one, other)
+    orbit = solve_from_path(network, network.symmetry(gait), path_of(edge.wave), edge.period)
+    if orbit is None:
+        raise NoOrbit('the orbit cannot be had')
+    branch = follow(orbit, chart.second.line, chart.second.low, chart.second.high, most=MOST)
+    return [point.place for point in branch.folds]
+
+
+def followed(chart: Chart, fold: Place, one: float, way: float) -> list[tuple[float, float]]:
+    """Folds from one on while the first parameter moves a way, as values on both axes.
+
+    Args:
+        chart: the plane.
+        fold: a fold along the second axis.
+        one: value on the first axis there.
+        way: 1 or -1.
+
+    """
+    found: list[tuple[float, float]] = []
+    size, step = chart.first.high - chart.first.low, STEP
+    before: tuple[Any, float] | None = None
+    while step >= SHORTEST:
+        new = one + way * step * size
+        guess = fold.z
+        if before is not None and before[0].size == fold.z.size:
+            guess = fold.z + (fold.z - before[0]) * (new - one) / (one - before[1])
+        ahead = None
+        if chart.first.low <= new <= chart.first.high:
+            ahead = _next(chart, fold, new, guess)
+        if ahead is None:
+            # Beyond the edge, too: up to it.
+            step *= 0.5
+            continue
+        if not chart.second.low <= ahead.value <= chart.second.high:
+            break
+        before = fold.z, one
+        fold, one = ahead, new
+        found.append((one, ahead.value))
+        step = min(STEP, 1.5 * step)
+    return found
+
+
+def _next(chart: Chart, fold: Place, new: float, guess: np.ndarray) -> Place | None:
+    """The fold at a value of the first parameter, from one nearby; None if it is not found."""
+    curve: Any = fold.curve
+    moved = replace(curve, network=chart.at(new, fold.value))
+    try:
+        near = resolved(moved, guess, fold.tangent)
+        if near is None:
+            return None
+
+        def rate(step: float) -> float:
+            place = along(near, step)
+            if place is None:
+                raise np.linalg.LinAlgError('no point')
+            return place.rate
+
+        for reach in REACHES:
+            if rate(-reach) * rate(reach) < 0.0:
+                return along(near, brentq(rate, -reach, reach, xtol=1e-11))
+    except (NoOrbit, np.linalg.LinAlgError):
+        return None
+    return None

@@ -1,0 +1,69 @@
+"""Recordings whose phases are none of a network's gaits; which network explains a recording."""
+
+import json
+
+import numpy as np
+import pytest
+from motion import Driven, noisy, stamps
+
+from cpg_ros.errors import InputError
+from cpg_ros.inversion.model_choice import explained
+from cpg_ros.inversion.recording_fit import inverted
+from cpg_ros.networks.registry import NETWORKS
+from cpg_ros.recordings.csv_reader import read_csv
+from cpg_ros.tools import inversion
+
+
+def recorded(path, gait, seed=0):
+    """Write a CSV file of a gait of the phase network, 14 s at 1.7 Hz; return its truth."""
+    driven, rng = Driven('phase', gait), np.random.default_rng(seed)
+    t = stamps(rng, 14.0, 200.0)
+    x = noisy(rng, driven(1.7 * t), 0.01)
+    np.savetxt(path, np.column_stack([t, x]), delimiter=',', comments='',
+               header=','.join(['time', *driven.joints]))
+    return dict(zip(driven.by_leg, driven.orbit.phases, strict=True))
+
+
+@pytest.mark.parametrize('gait', ['canter_left', 'unnamed'])
+def test_phases_of_no_gait_are_fitted_as_they_are(tmp_path, gait):
+    truth = recorded(tmp_path / 'own.csv', gait)
+    found = inverted(read_csv(tmp_path / 'own.csv'))
+    assert found.fit.network.name == 'phase' and found.fit.gait == gait
+    said = next(line for line in found.warnings if 'none of the gaits of the network delayed' in
+                line)
+    assert 'fitted as they are, by the network phase' in said
+    assert f'rf {found.stride.phases["rf"]:.3f} +- ' in said
+    for leg in ('rh', 'lf', 'rf'):
+        one = found.fit.parameters[f'offset_{leg}']
+        error = (one.value - truth[leg] + 0.5) % 1.0 - 0.5
+        # Three intervals of 95 %, with room for chance.
+        assert abs(error) <= 2.0 * (one.high - one.value) < 0.01
+        assert 0.0 < one.stderr < found.stride.scatter[leg].spread
+    # What was asked for by name is not exchanged.
+    with pytest.raises(InputError, match='none of the gaits of the network delayed') as caught:
+        inverted(read_csv(tmp_path / 'own.csv'), network='delayed')
+    assert 'how far single strides are off them: lh 0.000, rh ' in str(caught.value)
+
+
+def test_the_network_that_explains_a_canter(tmp_path, capsys):
+    recorded(tmp_path / 'canter.csv', 'canter_right')
+    found = explained(read_csv(tmp_path / 'canter.csv'))
+    assert found[0].network == 'phase' and found[0].gait == 'canter_right'
+    assert 0.0 < found[0].fitted <= 1.2 * found[0].error < 0.02
+    # Three phases; an offset and six weights for each of eight joints.
+    assert (found[0].parameters, found[0].numbers) == (3, 3 + 8 * 7)
+    assert {one.network for one in found[1:]} == {'delayed', 'quadruped', 'hopf', 'matsuoka'}
+    assert all('of a cycle off' in one.why and one.error == np.inf for one in found[1:])
+    code = inversion.main(['--csv', str(tmp_path / 'canter.csv'), '--network', 'auto', '--json'])
+    told = json.loads(capsys.readouterr().out)
+    assert code == 0 and told['network'] == 'phase'
+    assert told['networks'][0]['error'] == pytest.approx(found[0].error)
+
+
+def test_phases_of_a_network_are_those_of_its_legs():
+    network = NETWORKS['phase6'].presets()['unnamed'].network
+    other = network.with_phases({'lh': 0.25, 'rm': 0.9, 'tail': 0.5})
+    assert (other.offset_lh, other.offset_rm) == pytest.approx((0.25, -0.1))
+    assert other.leads[3] == pytest.approx(0.65) and other.offset_lf == network.offset_lf
+    delayed = NETWORKS['delayed'].presets()['trot'].network
+    assert delayed.with_phases({'lh': 0.25}) is delayed and delayed.leads == ()
