@@ -28,17 +28,24 @@ import numpy as np
 sys.path.append(str(ROOT / 'test'))
 
 from cpg_ros.dynamics.orbit import solve_preset  # noqa: E402, I100
+from cpg_ros.gaits.stride import find_stride  # noqa: E402
 from cpg_ros.inversion.invert import invert  # noqa: E402
-from cpg_ros.networks.registry import PRESETS  # noqa: E402
+from cpg_ros.networks.registry import NETWORKS, PRESETS  # noqa: E402
 from made_up import record, weights_of  # noqa: E402
+from motion import Driven, noisy, Recorded, stamps  # noqa: E402
 
 SEEDS, GOAL = 100, 0.9
 #: Network, gait, order of the readouts, cells of the joints, and how far off each start is.
 QUADRUPED, BIPED = (1, 1, 7, 2, 2, 8, 3, 3, 5, 4, 4, 6), (1, 1, 3, 2, 2, 4)
+LEGS = (1, 1, 1, 2, 2, 2, 3, 3, 3, 4, 4, 4)
 CASES = (('delayed', 'trot', 3, QUADRUPED, {'c': 1.05, 'tau': 1.1}),
          ('delayed', 'walk', 2, QUADRUPED, {'c': 0.95, 'tau': 1.1}),
          ('quadruped', 'trot', 3, QUADRUPED, {'alpha': 0.97, 'beta': 1.03}),
-         ('biped', 'walk', 3, BIPED, {'current': 1.03, 'phi': 0.95, 'w_a': 0.95}))
+         ('biped', 'walk', 3, BIPED, {'current': 1.03, 'phi': 0.95, 'w_a': 0.95}),
+         ('hopf', 'trot', 3, LEGS, {'duty': 0.95}),
+         ('matsuoka', 'trot', 3, LEGS, {'beta': 1.05}))
+#: Gaits whose phases are read off the legs, recorded for so long (s) at so many strides a second.
+STATED, LASTING, STRIDES = (('phase', 'canter_left'), ('phase', 'unnamed')), 14.0, 1.7
 
 
 def covered(name: str, gait: str, order: int, cells: tuple[int, ...], off: dict[str, float]
@@ -64,8 +71,30 @@ def covered(name: str, gait: str, order: int, cells: tuple[int, ...], off: dict[
             'median_ms': float(np.median(spent))}
 
 
+def phases_covered(name: str, gait: str) -> dict[str, object]:
+    """Legs' phases of whole recordings within the intervals that the scatter of strides gives."""
+    driven, rng = Driven(name, gait), np.random.default_rng(0)
+    legs = list(driven.by_leg)
+    truth = dict(zip(legs, driven.orbit.phases, strict=True))
+    inside, off = dict.fromkeys(legs[1:], 0), {leg: [] for leg in legs[1:]}
+    for _ in range(SEEDS):
+        t = stamps(rng, LASTING, 200.0)
+        told = t + 5e-4 * rng.standard_normal(t.size)
+        seen = Recorded(tuple(driven.joints), told, noisy(rng, driven(0.3 + STRIDES * t)))
+        stride = find_stride(seen, driven.by_leg, NETWORKS[name], driven.cells, driven.gains)
+        for leg in inside:
+            error = (stride.phases[leg] - truth[leg] + 0.5) % 1.0 - 0.5
+            inside[leg] += abs(error) <= stride.scatter[leg].half_width
+            off[leg].append(error / stride.scatter[leg].error)
+    log(f'{name} {gait} phases: {inside} of {SEEDS} inside')
+    return {'inside': {leg: count / SEEDS for leg, count in inside.items()},
+            'error_over_stderr': {leg: float(np.sqrt(np.mean(np.square(each))))
+                                  for leg, each in off.items()}}
+
+
 def main() -> None:
     found = {f'{case[0]} {case[1]} order {case[2]}': covered(*case) for case in CASES}
+    found |= {f'{name} {gait} phases': phases_covered(name, gait) for name, gait in STATED}
     worst = min(share for case in found.values() for share in case['inside'].values())
     emit(benchmark='truth', seeds=SEEDS, cases=found, worst=worst, target=GOAL,
          passed=worst >= GOAL)

@@ -1,10 +1,20 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Recordings whose phases are none of a network's gaits; which network explains a recording."""
 
 import json
-
-import numpy as np
-import pytest
-from motion import Driven, noisy, stamps
 
 from cpg_ros.errors import InputError
 from cpg_ros.inversion.model_choice import explained
@@ -12,6 +22,9 @@ from cpg_ros.inversion.recording_fit import inverted
 from cpg_ros.networks.registry import NETWORKS
 from cpg_ros.recordings.csv_reader import read_csv
 from cpg_ros.tools import inversion
+from motion import Driven, noisy, stamps
+import numpy as np
+import pytest
 
 
 def recorded(path, gait, seed=0):

@@ -211,3 +211,14 @@ def test_the_zig_zag_assignment_drives_a_leg_by_two_cells(tmp_path, start):
     process = start('-p', 'network:=quadruped', '-p', f'robot:={path}', watch=False)
     assert process.wait() == 1
     assert "leg 'lh' has the cells 1 and 6, not 5" in process.log
+
+
+@pytest.mark.parametrize('network', ['phase', 'hopf', 'matsuoka'])
+def test_oscillators_switch_between_all_ordered_pairs(start, network):
+    _, watcher = start('-p', f'network:={network}', '-p', 'rate:=200.0', '-p', 'frequency:=3.0',
+                       '-p', 'transition:=0.25')
+    robot = load_robot(CONFIG / 'quadruped.yaml')
+    programs = {name: plan(robot, name, preset, preset.network, 3.0)
+                for name, preset in PRESETS[network].items()}
+    phases = {name: program.orbit.phases[:4] for name, program in programs.items()}
+    check_all_switches(watcher, robot, programs, phases, 0.5)

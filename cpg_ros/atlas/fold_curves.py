@@ -1,3 +1,17 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
 """Curves of folds of a gait's orbits in two parameters.
 
 At a fold the second parameter turns round along the branch: its component of the tangent is zero.
@@ -9,18 +23,17 @@ from dataclasses import replace
 from itertools import pairwise
 from typing import Any
 
-import numpy as np
-from scipy.optimize import brentq
-
-from cpg_ros.atlas.chart import COARSE, Chart
+from cpg_ros.atlas.chart import Chart, COARSE
 from cpg_ros.atlas.hopf_curves import Curve
 from cpg_ros.atlas.orbit_curves import Edge
-from cpg_ros.atlas.refinement import Sheet, places
+from cpg_ros.atlas.refinement import places, Sheet
 from cpg_ros.atlas.row_job import NONE, path_of
-from cpg_ros.dynamics.arclength import Place, along, resolved
+from cpg_ros.dynamics.arclength import along, Place, resolved
 from cpg_ros.dynamics.continuation import follow
 from cpg_ros.dynamics.orbit import NoOrbit, solve_from_path
 from cpg_ros.errors import CpgError
+import numpy as np
+from scipy.optimize import brentq
 
 #: Steps of the first parameter in shares of its range, and how far along a branch its turn is
 #: looked for.

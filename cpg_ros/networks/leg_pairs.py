@@ -101,6 +101,9 @@ class LegPairs(Network):
     #: Of the parameters but the weights; and the largest weight.
     own_ranges: ClassVar[dict[str, Range]]
     most: ClassVar[float] = 20.0
+    #: The parameters but the weights of all presets, and how large weights are usually looked for.
+    usual: ClassVar[dict[str, float]]
+    looked_for: ClassVar[float] = 2.0
 
     @classmethod
     def stated(cls, legs: int) -> dict[str, Any]:
@@ -114,6 +117,8 @@ class LegPairs(Network):
             'own_of_cells': {kind: cls.each * members for kind, members in groups.items()},
             'legs': {'implicit': {leg: tuple(1 + n + m * legs for m in range(cls.each))
                                   for n, leg in enumerate(names)}},
+            'searched': {**{name: (value, value) for name, value in cls.usual.items()},
+                         **dict.fromkeys(groups, (-cls.looked_for, cls.looked_for))},
             'ranges': {**cls.own_ranges, **{name: Range(
                 -cls.most, cls.most, 'weight from {1} to {2}'.format(*name.split('_')))
                 for name in weights}}}

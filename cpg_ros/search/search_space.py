@@ -90,12 +90,14 @@ def _variables(network: type[Network], gait: str) -> list[Variable]:
     # A family that is a whole group has the group's name.
     names = {frozenset(members): group for group, members in network.groups.items()}
     families = network.families(network.presets()[gait].network.symmetry(gait))
+    stated = {member: (name, limits) for name, limits in network.searched.items()
+              for member in network.groups.get(name, (name,))}
     found = []
-    for name, limits in network.searched.items():
-        within = network.groups.get(name, (name,))
-        found += [(name not in network.groups, Variable(
-            names.get(frozenset(family), min(family)), *limits, tuple(sorted(family))))
-            for family in families if set(family) <= set(within)]
+    for family in families:
+        # Its members have the same bounds, whatever groups they are of.
+        name, limits = stated[min(family)]
+        found.append((name not in network.groups, Variable(
+            names.get(frozenset(family), min(family)), *limits, tuple(sorted(family)))))
     return [variable for _, variable in sorted(
         found, key=lambda one: (one[0], () if one[0] else one[1].members))]
 

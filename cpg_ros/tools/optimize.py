@@ -44,7 +44,8 @@ noise."""
 EPILOG = """\
 variables: biped, primary gaits: w_a w_b w_c current phi; secondary gaits: six directed weights
 such as w_12 (from cell 1 to cell 2), each with its partner under the gait's symmetry, current and
-phi; quadruped: alpha beta gamma delta, and xi and eta if --bounds are given for them.
+phi; quadruped: alpha beta gamma delta, and xi and eta if --bounds are given for them; hopf and
+matsuoka: k_side k_girdle k_diagonal, or on walks the weights that come round to one another.
 
 files: front.csv, front.png and preset.yaml, for
   ros2 run cpg_ros generator --ros-args -p network:=... -p presets:=FILE -p gait:=NAME

@@ -60,6 +60,8 @@ class HopfOscillators(LegPairs):
         'b': Range(0.0, 100.0, 'how sharply stance gives way to swing'),
         'nu': Range(0.1, 10.0, 'strides of an oscillator alone [cycles/model time]'),
         'duty': Range(0.1, 0.95, 'share of the stride in stance')}
+    usual: ClassVar[dict[str, float]] = {
+        'alpha': 5.0, 'beta': 50.0, 'mu': 1.0, 'b': 20.0, 'nu': 1.0, 'duty': 0.6}
     free: ClassVar[tuple[str, ...]] = ('duty',)
     line: ClassVar[str] = 'mu'
     span: ClassVar[tuple[float, float] | None] = (-2.0, 2.0)
@@ -97,7 +99,7 @@ class HopfOscillators(LegPairs):
     @cache
     def presets(cls) -> dict[str, Preset]:
         """One for each gait: alpha, beta and mu of the paper, duty 0.6."""
-        return {gait: Preset(gait, cls(5.0, 50.0, 1.0, 20.0, 1.0, 0.6, **cls.weights(gait)))
+        return {gait: Preset(gait, cls(**cls.usual, **cls.weights(gait)))
                 for gait in cls.gaits()}
 
 

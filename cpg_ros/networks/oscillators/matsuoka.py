@@ -60,6 +60,9 @@ class MatsuokaOscillators(LegPairs):
         'beta': Range(0.0, 20.0, 'how much fatigue weakens a neuron'),
         'a': Range(0.0, 20.0, 'how much flexor and extensor inhibit each other'),
         'c': Range(0.0, 10.0, 'input into every neuron')}
+    usual: ClassVar[dict[str, float]] = {
+        'tau': 0.15, 'tau_v': 0.6, 'beta': 2.5, 'a': 2.0, 'c': 1.0}
+    looked_for: ClassVar[float] = 0.1
     free: ClassVar[tuple[str, ...]] = ('beta', 'a')
     line: ClassVar[str] = 'a'
     span: ClassVar[tuple[float, float] | None] = (0.0, 4.0)
@@ -108,7 +111,7 @@ class MatsuokaOscillators(LegPairs):
     def presets(cls) -> dict[str, Preset]:
         """One for each gait: a leg's fatigue and weights of about Taga et al."""
         size = 0.15 / max(leg_count(cls) - 1, 1)
-        return {gait: Preset(gait, cls(0.15, 0.6, 2.5, 2.0, 1.0, **cls.weights(gait, size, 1.0)))
+        return {gait: Preset(gait, cls(**cls.usual, **cls.weights(gait, size, 1.0)))
                 for gait in cls.gaits()}
 
 
