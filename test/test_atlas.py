@@ -17,14 +17,17 @@
 from dataclasses import replace
 import json
 
+from cpg_ros.atlas import fold_curves
 from cpg_ros.atlas import orbit_curves as curves
 from cpg_ros.atlas.chart import chart_of
 from cpg_ros.atlas.hopf_curves import hopf_curves
 from cpg_ros.atlas.refinement import places, refined
 from cpg_ros.atlas.row_job import assess_row, leading_multipliers, LOCKED, NONE, Row
+from cpg_ros.dynamics.continuation import follow
 from cpg_ros.dynamics.floquet import multipliers
-from cpg_ros.dynamics.orbit import solve_orbit
+from cpg_ros.dynamics.orbit import solve_orbit, solve_preset
 from cpg_ros.errors import InputError
+from cpg_ros.networks.parameter_line import ParameterLine
 from cpg_ros.networks.registry import PRESETS
 from cpg_ros.networks.symmetry import GAITS
 from cpg_ros.tools import atlas
@@ -84,6 +87,28 @@ def test_a_torus_curve_has_a_pair_on_the_unit_circle(monkeypatch):
             sizes = np.abs(np.concatenate([judged.within, judged.transverse]))
             assert np.abs(sizes - 1.0).min() < 1e-6
     assert [curve.kind for curve in found] == ['torus']
+
+
+def test_a_curve_of_folds_is_where_branches_turn(monkeypatch):
+    preset = PRESETS['quadruped']['pace']
+    line = ParameterLine.parse('alpha=beta', type(preset.network))
+
+    def fold_of(orbit):
+        (fold,) = follow(orbit, line, 0.1, 0.2, most=40, first_step=0.1).folds
+        return fold
+
+    first = fold_of(solve_preset(preset))
+    # AUTO-07p's.
+    assert first.value == pytest.approx(0.1367076463, abs=1e-9)
+    chart = chart_of('quadruped', preset.network, [('xi', (-0.05, 0.05)),
+                                                   ('alpha=beta', (0.1, 0.2))], (9, 9))
+    monkeypatch.setattr(fold_curves, 'SHORTEST', 0.02)
+    found = fold_curves.followed(chart, first.place, 0.0, 1.0)
+    assert len(found) >= 10
+    xi, value = found[3]
+    network = replace(preset.network, xi=xi)
+    assert fold_of(solve_orbit(network, 'pace', solve_preset(preset))).value == pytest.approx(
+        value, abs=1e-9)
 
 
 def _wave(chart, share):

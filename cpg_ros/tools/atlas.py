@@ -26,6 +26,7 @@ import sys
 from typing import Any
 
 from cpg_ros.atlas.chart import Chart, chart_of
+from cpg_ros.atlas.fold_curves import fold_curves, lost_edges
 from cpg_ros.atlas.hopf_curves import Curve, hopf_curves
 from cpg_ros.atlas.map_picture import draw_map
 from cpg_ros.atlas.orbit_curves import edges, orbit_curves
@@ -45,8 +46,8 @@ from cpg_ros.tools.arguments import assignment, interval, Parser, say, twice
 DESCRIPTION = """\
 Map where a network's gaits live over two parameters: whether each exists and is stable, with what
 symmetry lock, its period, amplitude, leading multiplier and basin. A coarse grid is refined where
-neighbours differ; Hopf points, torus points, period doublings and branch points are followed as
-exact curves and drawn on top."""
+neighbours differ; Hopf points, folds, torus points, period doublings and branch points are
+followed as exact curves and drawn on top."""
 EPILOG = """\
 files: atlas.parquet (a row for each point and gait), boundaries.json, map.png, and index.html
 with --interactive. The same command again goes on where it stopped.
@@ -143,7 +144,9 @@ def drawn(chart: Chart, gaits: tuple[str, ...], fleet: Fleet, folder: Path
     if curves is None:
         fleet.what = 'boundaries'
         jobs: list[tuple[Any, ...]] = [(hopf_curves, (chart, gaits)), *(
-            (orbit_curves, (chart, gait, edges(chart, sheet))) for gait, sheet in sheets.items())]
+            (orbit_curves, (chart, gait, edges(chart, sheet))) for gait, sheet in sheets.items()),
+            *((fold_curves, (chart, gait, lost_edges(chart, sheet)))
+              for gait, sheet in sheets.items())]
         curves = [curve for some in in_order(fleet, _called, jobs) for curve in some]
         stored.put_curves(curves)
     table, picture = stored.write(sheets), folder / 'map.png'
