@@ -41,13 +41,15 @@ PATIENCE = 60.0
 #: Which of the processes that share the tests this one is, and how many there are.
 WORKER = int(os.environ.get('PYTEST_XDIST_WORKER', 'gw0')[2:])
 WORKERS = int(os.environ.get('PYTEST_XDIST_WORKER_COUNT', '1'))
+#: Those whose ports the system gives to nobody else, without that of make.
+DOMAINS = [domain for domain in range(1, 101) if domain != 42]
 _domains = itertools.count(WORKER, WORKERS)
 
 
 def free_domain() -> int:
     """Give every test a ROS domain of its own, apart from other test runs on the machine."""
     run = os.getpid() if WORKERS == 1 else os.getppid()
-    return 100 + (next(_domains) + 7 * run) % 130
+    return DOMAINS[(next(_domains) + 7 * run) % len(DOMAINS)]
 
 
 class Process:

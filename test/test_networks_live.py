@@ -15,6 +15,7 @@
 """The Morris-Lecar networks in the generator: as the delayed one, by the same services."""
 
 from pathlib import Path
+import re
 
 from ament_index_python.packages import get_package_share_directory
 from cpg_ros.motion.plan import plan
@@ -50,6 +51,11 @@ class Twin(Delayed):
                 for name, one in PRESETS.items()}
 """
 DEFAULT = {'quadruped': 'trot', 'biped': 'walk'}
+
+
+def for_network(text, network):
+    """Return the text of a robot file with another network."""
+    return re.sub('^network: .*$', f'network: {network}', text, flags=re.M)
 
 
 @pytest.fixture(scope='module', params=['quadruped', 'biped'])
@@ -157,7 +163,7 @@ def test_a_group_of_weights_is_set_together():
 def test_a_network_in_a_file_has_parameters_of_its_own(tmp_path, start):
     (path := tmp_path / 'twin.py').write_text(TWIN)
     text = (CONFIG / 'quadruped.yaml').read_text()
-    (robot := tmp_path / 'robot.yaml').write_text(text.replace('[delayed, quadruped]', 'twin'))
+    (robot := tmp_path / 'robot.yaml').write_text(for_network(text, 'twin'))
     _, watcher = start('-p', f'network:={path}', '-p', f'robot:={robot}', '-p', 'twin.c:=6.0')
     assert watcher.get('network', 'gait', 'twin.c', 'twin.tau') == [str(path), 'trot', 6.0, 0.4]
     assert watcher.set(gait='walk', **{'twin.c': 6.2})[0].successful
@@ -197,8 +203,7 @@ def test_nonsense_at_start_ends_in_one_line(start, arguments, words):
 
 def test_the_zig_zag_assignment_drives_a_leg_by_two_cells(tmp_path, start):
     text = (CONFIG / 'quadruped.yaml').read_text()
-    text = text.replace('network: [delayed, quadruped]', 'network: quadruped\n'
-                        'assignment: zigzag')
+    text = for_network(text, 'quadruped\nassignment: zigzag')
     for leg, cells in {'lh': (1, 5), 'rh': (2, 6), 'lf': (3, 7), 'rf': (4, 8)}.items():
         text = text.replace(f'{leg}_calf_joint, cell: {cells[0]}',
                             f'{leg}_calf_joint, cell: {cells[1]}')

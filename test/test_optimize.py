@@ -135,7 +135,8 @@ def test_a_two_wave_gait_and_its_picture(tmp_path, capsys):
 @pytest.mark.parametrize('arguments, message', [
     (('--gait', 'moonwalk'), "'moonwalk' is not one of walk, run"),
     (('--gait', 'trot'), "'trot' is not one of"),
-    (('--network', 'delayed', '--gait', 'trot'), "'delayed' is not one of biped, quadruped"),
+    (('--network', 'delayed', '--gait', 'trot'),
+     "'delayed' is not one of biped, hopf, matsuoka, quadruped"),
     ((), 'required: --gait'),
     (('--gait', 'walk', '--bounds', 'w_a=0.5:-0.5'), 'is not below the upper bound'),
     (('--gait', 'walk', '--bounds', 'w_a=0.5'), 'name=low:high'),

@@ -142,7 +142,9 @@ def test_on_the_way_back_to_the_orbit(network, rate):
     for k, program in enumerate(programs(network)):
         orbit, rng = program.orbit, np.random.default_rng([20, k])
         middle = orbit(np.arange(64) / 64 * orbit.period).mean(axis=0)
-        factor = 1.0 + 0.2 * rng.uniform(-1.0, 1.0, middle.size)
+        # Where swing is a fifth of the stride, legs that far out of step are out of the gait.
+        most = 0.1 if network == 'hopf' else 0.2
+        factor = 1.0 + most * rng.uniform(-1.0, 1.0, middle.size)
         pattern = Pattern(program, 0.2)
         # Every component comes with a size of its own.
         pattern._tracks[0].stepper = Stepper(

@@ -41,6 +41,8 @@ MOST_TRACKS = 4
 ABSORB = 0.3
 #: A joint may cover the shift between the stand and a gait at this many times it a second.
 SHIFTING = 2.0
+#: Share of the bound on speed to keep to at a substep, so that none is passed between two.
+SHORT_OF = 0.997
 
 
 class Pattern:
@@ -311,7 +313,7 @@ class Pattern:
             wanted, rate = wanted + left * found, rate + left_rate * found
         if moving:
             # The pattern slows where it would outrun the gaits at the next substep.
-            bound = np.minimum(np.max([t.program.speed + SHIFTING * (
+            bound = SHORT_OF * np.minimum(np.max([t.program.speed + SHIFTING * (
                 np.abs(t.program.shift) + np.abs(found)) for t in tracks], axis=0), self._limit)
             ahead = rate if self._last_rate is None else 2.0 * rate - self._last_rate
             self._last_rate = rate

@@ -60,8 +60,9 @@ from std_srvs.srv import SetBool
 NAME = 'cpg_generator'
 #: On SIGINT or SIGTERM the ramp takes this long, and the node ends by the later time, s.
 LAST_RAMP, LAST_DEADLINE = 0.5, 0.8
-#: Two that start at once know of one another after this time, s.
-DISCOVERY = 0.5
+#: Two nodes know of one another this long after the later one joined the graph, s: they are
+#: announced every 3 s, and the first announcements of a busy machine are lost at times.
+DISCOVERY = 3.5
 
 
 class Generator(StartedNode):
@@ -75,6 +76,7 @@ class Generator(StartedNode):
 
         """
         super().__init__(NAME)
+        joined = time.monotonic()
         given = {name: one.value for name, one in self._parameter_overrides.items()}
         self._parameter_overrides['network'] = Parameter('network', value=network_for(
             given.get('network', NETWORK.default), given.get('robot')))
@@ -144,11 +146,9 @@ class Generator(StartedNode):
         self.add_on_set_parameters_callback(self._judge)
         self.add_post_set_parameters_callback(self._apply)
         self._warn_of_unknown()
-        if self._value('exclusive'):
-            time.sleep(DISCOVERY)
-            if self._rivals.look():
-                raise StartError(f'{self._rivals.text}: stop that publisher, rename the topic, '
-                                 'or set exclusive to false')
+        if self._value('exclusive') and self._rivals.seek(joined + DISCOVERY - time.monotonic()):
+            raise StartError(f'{self._rivals.text}: stop that publisher, rename the topic, '
+                             'or set exclusive to false')
 
     # -- parameters -----------------------------------------------------------------------
 
