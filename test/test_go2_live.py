@@ -38,7 +38,7 @@ def robot():
         body = Process('-p', 'real_time_factor:=0.0', '-p', f'rate:={RATE}',
                        executable=EXECUTABLE.with_name('robot_sim'))
         ending.append(body)
-        body.wait_for('waiting for somebody')
+        body.wait_for('waiting for a node')
         # Whoever hears the beginning hears all of it.
         track = Track(body.domain)
         ending.append(track)

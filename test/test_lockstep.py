@@ -59,7 +59,7 @@ def lockstep():
 
 def test_time_begins_with_the_generator(lockstep):
     body, watcher, generator = lockstep('-p', 'duration:=2.0')
-    body.wait_for('waiting for somebody')
+    body.wait_for('waiting for a node')
     # Longer than it is to last.
     time.sleep(3.0)
     assert body.alive and not watcher.rows

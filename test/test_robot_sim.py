@@ -107,7 +107,7 @@ def test_it_walks_in_lockstep_whatever_it_is_commanded_by(graph, tmp_path, comma
     steps = tmp_path / 'steps.png'
     files = [f'footfalls:={steps}'] if command == 'joint_states' else []
     process = sim('real_time_factor:=0.0', 'duration:=2.0', f'command:={command}', *files)
-    process.wait_for('waiting for somebody')
+    process.wait_for('waiting for a node')
     watcher = watch(process.domain)
     until(lambda: all(watcher.node.count_publishers(topic) for topic in (
         '/clock', 'joint_states', 'odom')), 'its publishers')
@@ -335,7 +335,7 @@ def test_without_opengl_there_is_no_film_but_all_the_rest(graph, tmp_path):
 def test_a_generator_that_goes_away_does_not_stop_it(graph):
     sim, _, generator = graph
     process = sim('real_time_factor:=0.0', 'duration:=1.0', 'rate:=100.0')
-    process.wait_for('waiting for somebody')
+    process.wait_for('waiting for a node')
     # Half the rate: every other period brings no command.
     slow = generator(process.domain, 'use_sim_time:=true', 'rate:=50.0')
     process.wait_for('no command for the time 0')
