@@ -249,8 +249,8 @@ def recorded(streams: Sequence[Stream], joints: Sequence[str], source: str,
         if stream.servo:
             _refuse_lacking(f'{source}{stream.topic}', 'effort but 0',
                             sorted(stream.taken - stream.pulled))
-            notes.append(f'{stream.topic}: what the joints were told, by kp {stream.servo.kp:g} '
-                         f'and kd {stream.servo.kd:g}')
+            notes.append(f'{stream.topic}: commands of the joints, computed with kp '
+                         f'{stream.servo.kp:g} and kd {stream.servo.kd:g}')
         notes += stream.notes(headers)
     chunks = (chunk for stream in read for chunk in stream.chunks(headers))
     recording = merged(chunks, whole, joints)
