@@ -205,7 +205,7 @@ def test_messages_of_another_type_under_the_name_of_joint_states(tmp_path):
     path = write_bag(tmp_path / 'walk', [
         ('/joint_states', START, b'\0\1\0\0' + b'\7' * 40)])
     assert refused(path).startswith(
-        f'{path}, /joint_states: message 1 is no {JOINT_STATE}: ')
+        f'{path}, /joint_states: message 1 is not a {JOINT_STATE}: ')
 
 
 def test_joints_that_are_not_there(tmp_path):

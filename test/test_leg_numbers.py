@@ -52,7 +52,7 @@ def test_four_legs_are_the_network_itself():
 
 
 @pytest.mark.parametrize(('name', 'message'), [
-    ('delayed5', 'not an even number'), ('delayed2', 'no two rings'), ('delayed34', 'to 32'),
+    ('delayed5', 'not an even number'), ('delayed2', 'too few for two'), ('delayed34', 'to 32'),
     ('biped6', 'has 2 legs, not 6'), ('nothing6', 'is not one of delayed')])
 def test_a_number_of_legs_that_a_network_does_not_take_is_refused(name, message):
     with pytest.raises(CpgError, match=message) as error:

@@ -186,7 +186,7 @@ def spoiled(index, value):
     ({'t': GOOD_T[:, None]}, 'shape'), ({'t': GOOD_T[::-1]}, 'does not increase: 4 is followed'),
     ({'t': np.round(GOOD_T, 1)}, 'does not increase'),
     ({'t': GOOD_T[:6], 'signals': GOOD[:6]}, '6 samples are not enough'),
-    ({'gaits': {}}, 'gaits is empty'), ({'gaits': QUADRUPED}, "'pronk' is one of another group"),
+    ({'gaits': {}}, 'gaits is empty'), ({'gaits': QUADRUPED}, "'pronk' belongs to another group"),
     ({'tolerance': 0.0}, 'tolerance is 0.0'), ({'tolerance': np.nan}, 'tolerance is nan')])
 def test_refusals(change, words):
     arguments = {'t': GOOD_T, 'signals': GOOD, 'group': D2, 'gaits': BIPED}

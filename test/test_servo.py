@@ -58,7 +58,8 @@ def test_a_bag_tells_what_the_joints_were_told(tmp_path):
     bag = write_bag(tmp_path / 'walk', recorded)
     recording = read_bag(bag, servo=Servo(40.0, 1.5))
     assert recording.positions == pytest.approx(told(t), abs=1e-9)
-    assert recording.notes == ('/joint_states: what the joints were told, by kp 40 and kd 1.5',)
+    assert recording.notes == (
+        '/joint_states: commands of the joints, computed with kp 40 and kd 1.5',)
     assert np.abs(read_bag(bag).positions - told(t)).max() > 0.2
 
 

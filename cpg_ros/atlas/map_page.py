@@ -192,9 +192,9 @@ def write_page(path: Path, chart: Chart, sheets: dict[str, Sheet], curves: list[
     write_atomically(path, f"""<!DOCTYPE html>
 <html lang="en"><head><meta charset="utf-8"><title>{title}</title>
 <style>{STYLE}{MORE}</style></head><body><h1>{title}</h1>
-<p>Gait <select id="gait" aria-label="gait"></select>. A click on the map shows what runs there:
-waveforms of each leg's first cell over two cycles, where they are below their mean (bars), and the
-parameters.</p><p class="key">{key}</p>
+<p>Gait <select id="gait" aria-label="gait"></select>. Click the map to see what the network
+does there: the waveform of each leg's first cell over two cycles, with bars where it is below its
+mean, and the parameters.</p><p class="key">{key}</p>
 <main><canvas id="map" width="760" height="600"></canvas>
 <aside><table id="told"></table><canvas id="waves" width="480" height="280"></canvas>
 <p><button id="copy">Copy the preset</button></p><pre id="preset"></pre></aside></main>

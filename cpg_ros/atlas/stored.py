@@ -51,9 +51,9 @@ class Stored:
         mark = folder / MARK
         if mark.exists():
             if mark.read_text() != told:
-                raise InputError(f'{folder} holds an atlas of another plane')
+                raise InputError(f'{folder} holds an atlas of other parameters or gaits')
         elif folder.exists() and any(folder.iterdir()):
-            raise InputError(f'{folder} is no folder of an atlas: it holds something else')
+            raise InputError(f'{folder} is not the folder of an atlas: it contains other files')
         (folder / PARTS).mkdir(parents=True, exist_ok=True)
         write_atomically(mark, told)
 

@@ -71,7 +71,7 @@ def switched(bifurcation: Bifurcation, along: ParameterLine, low: float, high: f
             continue
         if not richer(found.points[0].orbit):
             return found
-    raise NoOrbit(f'no orbit was found beside the {bifurcation.kind} at {along} '
+    raise NoOrbit(f'no orbit was found near the {bifurcation.kind} at {along} '
                   f'{bifurcation.value:g}')
 
 

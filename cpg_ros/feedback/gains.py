@@ -20,39 +20,61 @@ from typing import NamedTuple
 class Gains(NamedTuple):
     """Which laws are on, and their gains; SI units, found on a simulated Go2.
 
+    The first ten are switches, and their texts say what each law does.
+
     Attributes:
-        posture, placement, pace, reflexes, slope, heading, speed, sidestep: whether the law is on.
-        touchdown, tegotae: the same of two laws of the phase, see their files.
-        roll, roll_rate: metres a foot is drawn in per metre to the left and rad, or rad/s.
-        pitch, pitch_rate: the same of pitch, by metres to the front.
-        posture_most: most that posture moves a foot in stance, m.
-        step, step_left: s, by which a velocity error forward or sideways makes a longer step.
-        step_pitch_rate, step_roll_rate: m per rad/s, forward and sideways.
-        step_filter: time constant, s.
-        step_most: most that a foot is placed elsewhere, m.
-        step_decay: rate at which that is given up in stance, 1/s.
-        give, give_left: shares of the velocity error that feet in stance yield to.
-        pace_from: velocity error sideways at which strides get faster, m/s.
-        pace_gain: share of the frequency per m/s above that.
-        pace_most: largest share.
-        pace_fatigue: by how many times its mean of late strides get slower again.
-        pace_memory: time constant of that mean, s.
-        lift: of a foot that meets something while it swings forward, m.
-        reach_rate, reach_most: of a foot that finds no ground in stance, m/s and m.
-        reflex_rate: at which both, and an early landing, are given up, 1/s.
-        slope_share: of the way by which gravity's line through the body misses its feet.
-        slope_height: of the body above its feet, m.
-        slope_filter: time constant of the angles of the ground, s.
-        slope_most: most that feet are moved for it, m.
-        turn: yaw rate wanted per heading error, 1/s.
-        turn_most: largest one, rad/s.
-        speed_share, speed_rate: stride per m/s of missing speed, and per m of missing way.
-        speed_most: most that strides are changed for it.
-        sidestep_share: of the wanted way.
-        sidestep_most: most that a foot is carried sideways, m.
-        touchdown_gain: share of a landing's error that phases are changed by.
-        tegotae_gain: rad/s for the whole weight on a leg.
-        smooth: time constant of every displacement, s.
+        posture: keep the body level, through the legs in stance and the height of feet in swing.
+        placement: put feet down further in the direction in which the body is too fast.
+        pace: take faster strides for a while when the body is pushed sideways.
+        reflexes: lift feet over obstacles, and reach for ground that is missing.
+        slope: move the feet under the centre of mass on slopes.
+        heading: hold the heading, by strides that differ between left and right.
+        speed: hold the speed, through the length of the strides.
+        sidestep: follow the sideways speed of cmd_vel.
+        touchdown: begin a leg's stance when its foot lands.
+        tegotae: keep a leg that bears load in its stance.
+        roll: how far posture draws a foot in, per metre to the left and rad of roll [1/rad].
+        roll_rate: how far posture draws a foot in, per metre to the left and rad/s of roll rate
+            [s/rad].
+        pitch: how far posture lets a foot out, per metre to the front and rad of pitch [1/rad].
+        pitch_rate: how far posture lets a foot out, per metre to the front and rad/s of pitch
+            rate [s/rad].
+        posture_most: the most that posture moves a foot in stance [m].
+        step: how much further a foot is put forward per m/s of forward velocity error [s].
+        step_left: how much further a foot is put sideways per m/s of sideways velocity error [s].
+        step_pitch_rate: how much further a foot is put forward per rad/s of pitch rate error
+            [m s/rad].
+        step_roll_rate: how much further a foot is put sideways per rad/s of roll rate error
+            [m s/rad].
+        step_filter: time constant with which a foot in swing is moved [s].
+        step_most: the most that placement moves a foot [m].
+        step_decay: rate at which placement's displacement decays in stance [1/s].
+        give: share of the forward velocity error to which feet in stance yield.
+        give_left: share of the sideways velocity error to which feet in stance yield.
+        pace_from: sideways velocity error above which strides become faster [m/s].
+        pace_gain: relative increase of the stride frequency per m/s above pace_from [s/m].
+        pace_most: largest relative increase of the stride frequency.
+        pace_fatigue: how many times the mean of recent increases is subtracted from a new one.
+        pace_memory: time constant of the mean of recent increases [s].
+        lift: how far a foot is lifted when it hits something in swing [m].
+        reach_rate: speed at which a foot that finds no ground in stance reaches for it [m/s].
+        reach_most: the most that a foot without ground reaches for it [m].
+        reflex_rate: rate at which the lift, the reach and the height held after an early landing
+            decay [1/s].
+        slope_share: share of the way to the vertical through the body by which feet are moved.
+        slope_height: height of the body above its feet [m].
+        slope_filter: time constant of the filter on the angles of the ground [s].
+        slope_most: the most that slope moves the feet [m].
+        turn: yaw rate asked for per rad of heading error [1/s].
+        turn_most: the largest yaw rate asked for [rad/s].
+        speed_share: how much longer strides become per m/s of missing speed [s/m].
+        speed_rate: how much longer strides become per metre of missing distance [1/m].
+        speed_most: the most by which speed changes the length of strides.
+        sidestep_share: share of the commanded sideways motion that feet carry out.
+        sidestep_most: the most that a foot is carried sideways [m].
+        touchdown_gain: share of a landing's phase error that is corrected.
+        tegotae_gain: largest change of the phase's rate when a leg bears the whole weight [rad/s].
+        smooth: time constant with which every displacement is smoothed [s].
 
     """
 

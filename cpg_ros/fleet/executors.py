@@ -242,9 +242,9 @@ def _answers(address: str, seconds: float) -> None:
         raise InputError(f'{address}: {" ".join(str(error).split())}') from error
     # What speaks another language is taken for a message of any length.
     except MemoryError as error:
-        raise NoCluster(f'what answers at {address} is no dask scheduler') from error
+        raise NoCluster(f'what answers at {address} is not a dask scheduler') from error
     if not isinstance(found, dict) or found.get('type') != 'Scheduler':
-        raise NoCluster(f'what answers at {address} is no dask scheduler')
+        raise NoCluster(f'what answers at {address} is not a dask scheduler')
 
 
 def _leave(held: list[Any]) -> None:

@@ -140,7 +140,7 @@ class Folders:
                 seen = now
                 if ready:
                     for one in ready:
-                        say(f'taken: {one}')
+                        say(f'new recording: {one}')
                     with Tally('recordings', len(ready), self.progress) as tally:
                         self._through(executor, ready, tally)
                     done |= {one: now[one] for one in ready}

@@ -118,7 +118,7 @@ class _Stream(Generic[Job]):
             job, deaths = self.alone
             self.alone = None
             if died and deaths + 1 >= DEATHS:
-                yield Outcome(job, None, WorkerDied('the process that worked on it died'))
+                yield Outcome(job, None, WorkerDied('the process that worked on this job died'))
             else:
                 self.suspects.appendleft((job, deaths + died))
         elif died:

@@ -51,7 +51,7 @@ document.querySelector('input').addEventListener('input', event => {
   for (const row of body.rows) row.hidden = !row.textContent.toLowerCase().includes(wanted);
 });
 """
-HEADS = ('file', 'gait', 'frequency [Hz]', 'confidence', 'left of range [%]', 'parameters',
+HEADS = ('file', 'gait', 'frequency [Hz]', 'confidence', 'residual / range [%]', 'parameters',
          'mean cycles', 'remarks', 'seconds')
 
 
@@ -91,13 +91,13 @@ def write_page(path: Path, rows: Iterable[dict[str, Any]], done: int, failed: in
 
     """
     beside = path.with_name(f'.{path.name}.part')
-    title = f'{done} recordings inverted, {failed} of them not'
+    title = f'{done} recordings, {done - failed} fitted, {failed} not'
     try:
         with beside.open('w', encoding='utf-8') as out:
             out.write(f'<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8">'
                       f'<title>{title}</title><style>{STYLE}{MORE}</style></head><body>\n'
-                      f'<h1>{title}</h1>\n<p><input placeholder="show only what has this in it" '
-                      'aria-label="filter"> A click on a head sorts. Grey: recorded; blue: '
+                      f'<h1>{title}</h1>\n<p><input placeholder="show rows that contain this" '
+                      'aria-label="filter"> Click a column head to sort. Grey: recorded; blue: '
                       'fitted.</p>\n<table><thead><tr>'
                       + ''.join(f'<th>{escape(head)}</th>' for head in HEADS)
                       + '</tr></thead><tbody>\n')

@@ -151,7 +151,7 @@ def _checked(t: np.ndarray, signals: np.ndarray, group: Group, gaits: Mapping[st
         raise ValueError('gaits is empty')
     for name, gait in gaits.items():
         if gait.group != group:
-            raise ValueError(f'the gait {name!r} is one of another group')
+            raise ValueError(f'the gait {name!r} belongs to another group')
     if not (np.isfinite(tolerance) and tolerance > 0.0):
         raise InputError(f'tolerance is {tolerance}, it must be positive')
     if period is not None and not (np.isfinite(period) and period > 0.0):

@@ -61,13 +61,13 @@ def findings(free: Sequence[Free], estimates: Mapping[str, Estimate], known: Spr
             found.append(
                 f'{name} is badly determined: anything from {one.low:.4g} to {one.high:.4g} fits '
                 'as well' + ('' if one.bounded else ', and there is no orbit or a bound beyond')
-                + '; with a free readout it shows only in the shape of the waveform')
+                + '; with a free readout, it affects only the shape of the waveform')
     errors = known.correlation
     for k in range(len(free)):
         for other in range(k):
             if abs(errors[k, other]) > TOGETHER:
-                found.append(f'{free[other].name} and {free[k].name} are told apart badly: their '
-                             f'correlation is {errors[k, other]:.3f}')
+                found.append(f'{free[other].name} and {free[k].name} are hard to tell apart: '
+                             f'their correlation is {errors[k, other]:.3f}')
     if not best.converged:
         found.append(f'the trust region was stopped after {best.evaluations} evaluations, '
                      'before it had converged')

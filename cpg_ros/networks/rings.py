@@ -91,7 +91,7 @@ def ring_legs(legs: int) -> dict[str, dict[str, tuple[int, int]]]:
     names = leg_names(legs)
     count = len(names)
     if count < 4:
-        raise InputError(f'{legs} legs make no two rings: at least 4 do')
+        raise InputError(f'{legs} legs are too few for two rings, which need at least 4')
     first = {leg: 1 + i for i, leg in enumerate(names)}
     back = {leg: 1 + count + (count - 2 - (i - i % 2)) + i % 2 for i, leg in enumerate(names)}
     return {'implicit': {leg: (first[leg], back[leg]) for leg in names},

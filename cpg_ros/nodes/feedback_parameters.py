@@ -28,22 +28,26 @@ RANGE = 10.0
 
 
 #: Where it cannot be, it is off unless asked for.
-SWITCH = Spec(True, 'correct the gait by what the robot feels; false by default where the robot '
-              "file is not calibrated, or the generator's own joint_states are the measured ones")
+SWITCH = Spec(True, "correct the gait by the robot's sensors; false by default if the robot file "
+              'is not calibrated, or if the generator itself publishes the topic joint_states '
+              'that it would measure from')
 
 #: Topics, read when the feedback is first switched on.
 TOPICS = {
-    f'{PREFIX}imu_topic': Spec('imu', "the robot's sensor_msgs/Imu, with its orientation",
+    f'{PREFIX}imu_topic': Spec('imu', "topic of the robot's sensor_msgs/Imu, which must have an "
+                               'orientation',
                                read_only=True),
-    f'{PREFIX}joint_states_topic': Spec('joint_states', 'its measured sensor_msgs/JointState, '
-                                        'with velocities', read_only=True),
-    f'{PREFIX}contacts': Spec('foot_contacts', "where the feet's loads are from: one message "
-                              'with all of them, a geometry_msgs/WrenchStamped of each leg, or '
-                              "the measured joints' efforts", read_only=True,
+    f'{PREFIX}joint_states_topic': Spec('joint_states', "topic of the robot's measured "
+                                        'sensor_msgs/JointState, which must have velocities',
+                                        read_only=True),
+    f'{PREFIX}contacts': Spec('foot_contacts', 'source of the loads on the feet: one message '
+                              'with all of them, a geometry_msgs/WrenchStamped for each leg, or '
+                              'the efforts of the measured joints', read_only=True,
                               constraints='one of: ' + ', '.join(CONTACTS)),
     f'{PREFIX}contacts_topic': Spec('foot_contacts', 'topic of the std_msgs/Float64MultiArray '
-                                    "with the feet's loads [N]; with wrenches, its name below "
-                                    'each leg, as in lh/foot_contacts', read_only=True)}
+                                    'with the loads on the feet in N; with wrenches, the name of '
+                                    "each leg's own topic, as in lh/foot_contacts",
+                                    read_only=True)}
 
 
 def _texts() -> dict[str, str]:
@@ -56,17 +60,13 @@ def _texts() -> dict[str, str]:
     return texts
 
 
-def _law(name: str, default: bool) -> Spec:
-    return Spec(default, f'the law {name}')
-
-
-def _gain(name: str, default: float, text: str) -> Spec:
+def _gain(default: float, text: str) -> Spec:
     return Spec(default, text, 0.0, round(RANGE * default, 6) or 1.0)
 
 
 #: Laws and gains, all of which can be set at any time.
-GAINS = {f'{PREFIX}{name}': _law(name, default) if isinstance(default, bool)
-         else _gain(name, default, _texts().get(name, ''))
+GAINS = {f'{PREFIX}{name}': Spec(default, _texts()[name]) if isinstance(default, bool)
+         else _gain(default, _texts()[name])
          for name, default in Gains._field_defaults.items()}
 SPECS = {**TOPICS, **GAINS}
 

@@ -61,7 +61,7 @@ class Door:
         """
         # Another site's page, open in the same browser, must not move the robot.
         if origin and urlsplit(origin).netloc != host:
-            return 'asked by a page of another site'
+            return 'the request comes from a page of another site'
         if self._token:
             given = parse_qs(urlsplit(path).query).get('token', [''])[0]
             if not hmac.compare_digest(given.encode(errors='replace'), self._token):

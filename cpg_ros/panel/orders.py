@@ -59,8 +59,8 @@ class Orders:
             view.controls.set(values['name'], values['value'])
         elif action == 'steer':
             if view.controls.value('cmd_vel') is not True:
-                raise OrderError(f'{view.name} does not listen to cmd_vel: start it with '
-                                 'cmd_vel:=true')
+                raise OrderError(f'{view.name} ignores cmd_vel; start it with cmd_vel:=true to '
+                                 'steer')
             view.steering.hold(page, asyncio.get_running_loop().time(), values['speed'],
                                values['turn'])
         elif action == 'stop':
@@ -79,7 +79,7 @@ class Orders:
                            'fit': (view.graph.inversions, 'inversion node')}[action]
             node = view.graph.beside(view.name, nodes)
             if not node:
-                raise OrderError(f'there is no {what} beside {view.name}')
+                raise OrderError(f'there is no {what} for {view.name}')
             await self._call(page, Trigger, f'{node}/{action}', Trigger.Request(), FIT)
 
     async def _call(self, page: Page, kind: Any, service: str, request: Any,

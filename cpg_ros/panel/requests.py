@@ -42,7 +42,7 @@ class Request:
 
 def _text(value: Any) -> str:
     if not isinstance(value, str) or len(value) > LONGEST or not value.isprintable():
-        raise RequestError(f'must be a text of at most {LONGEST} characters')
+        raise RequestError(f'must be text of at most {LONGEST} characters')
     return value
 
 
@@ -72,7 +72,7 @@ def _setting(value: Any) -> bool | int | float | str:
         return value
     if isinstance(value, float) and math.isfinite(value):
         return value
-    raise RequestError('must be true or false, a text or a finite number')
+    raise RequestError('must be true or false, text or a finite number')
 
 
 #: Action -> what it needs, and how that is checked. A direction is in degrees to the left.
@@ -96,15 +96,15 @@ def read(text: str | bytes) -> Request:
 
     """
     if not isinstance(text, str):
-        raise RequestError('requests are texts')
+        raise RequestError('a request must be text')
     try:
         found = json.loads(text, parse_constant=_constant)
     except RequestError:
         raise
     except (ValueError, RecursionError) as error:
-        raise RequestError('this is not JSON') from error
+        raise RequestError('the request is not JSON') from error
     if not isinstance(found, dict):
-        raise RequestError('a request is a JSON object')
+        raise RequestError('a request must be a JSON object')
     action = found.pop('do', None)
     if not isinstance(action, str) or action not in ACTIONS:
         raise RequestError(f"'do' is not one of {', '.join(ACTIONS)}")

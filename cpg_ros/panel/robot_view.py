@@ -224,7 +224,7 @@ class RobotView:
         """
         simulation = self.graph.beside(self.name, self.graph.simulations)
         if not simulation:
-            raise CallError(f'there is no simulated robot beside {self.name}')
+            raise CallError(f'there is no simulated robot for {self.name}')
         if self._pushes is None:
             self._pushes = self._node.create_publisher(Wrench, f'{simulation}/push', 10)
         end = time.monotonic() + 1.0

@@ -100,8 +100,8 @@ class Stream:
                 self._keep(block, received[block.rows])
         except UndecodableError as error:
             raise RecordingError(
-                f'{source}{self.topic}: message {self.count + error.index + 1} is no '
-                f'{JOINT_STATE}: {line(error)}') from error
+                f'{source}{self.topic}: message {self.count + error.index + 1} is not '
+                f'a {JOINT_STATE}: {line(error)}') from error
         self.count += len(self.messages)
         self.messages, self.received = [], []
 
@@ -243,14 +243,14 @@ def recorded(streams: Sequence[Stream], joints: Sequence[str], source: str,
     elif len({stream.dated for stream in read}) > 1:
         headers = False
         other = [stream.topic for stream in read if not stream.dated]
-        notes.append(f'{few(other)}: stamps of another clock than on the other topics, such as a '
-                     "simulation's: the times are those of receipt")
+        notes.append(f'{few(other)}: the stamps come from a different clock than on the '
+                     "other topics, such as a simulation's: the times are those of receipt")
     for stream in read:
         if stream.servo:
             _refuse_lacking(f'{source}{stream.topic}', 'effort but 0',
                             sorted(stream.taken - stream.pulled))
-            notes.append(f'{stream.topic}: what the joints were told, by kp {stream.servo.kp:g} '
-                         f'and kd {stream.servo.kd:g}')
+            notes.append(f'{stream.topic}: commands of the joints, computed with kp '
+                         f'{stream.servo.kp:g} and kd {stream.servo.kd:g}')
         notes += stream.notes(headers)
     chunks = (chunk for stream in read for chunk in stream.chunks(headers))
     recording = merged(chunks, whole, joints)

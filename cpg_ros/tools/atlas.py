@@ -50,9 +50,9 @@ neighbours differ; Hopf points, folds, torus points, period doublings and branch
 followed as exact curves and drawn on top."""
 EPILOG = """\
 files: atlas.parquet (a row for each point and gait), boundaries.json, map.png, and index.html
-with --interactive. The same command again goes on where it stopped.
+with --interactive. Run the same command again to continue where it stopped.
 
-exit codes: 0 drawn, 2 wrong arguments, 130 stopped (what was finished is kept)."""
+exit codes: 0 drawn, 2 invalid arguments, 130 stopped (finished parts are kept)."""
 
 
 def _over(text: str) -> tuple[str, tuple[float, float]]:
@@ -76,18 +76,19 @@ def _parser() -> Parser:
                         'or the path of a Python file with one (default: %(default)s)')
     parser.add_argument('--over', nargs=2, required=True, type=_over, metavar='PARAMETER=LOW:HIGH',
                         help='the two parameters, or lines of them, such as alpha=beta=0:0.5')
-    parser.add_argument('--preset', metavar='NAME', help='shipped set that the other parameters '
-                        "are taken from (default: the usual gait's)")
+    parser.add_argument('--preset', metavar='NAME', help='shipped preset that supplies the other '
+                        "parameters (default: the usual gait's)")
     parser.add_argument('--set', nargs='+', action='extend', default=[], type=assignment,
-                        metavar='PARAMETER=VALUE', help='other parameters')
-    parser.add_argument('--gaits', nargs='+', default=[], metavar='GAIT', help='(default: all)')
+                        metavar='PARAMETER=VALUE', help='values of other parameters')
+    parser.add_argument('--gaits', nargs='+', default=[], metavar='GAIT',
+                        help='gaits to map (default: all)')
     parser.add_argument('--points', type=_points, default=(200, 200), metavar='NxM',
-                        help='of the grid (default: 200x200)')
-    parser.add_argument('--interactive', action='store_true', help='also write index.html: a '
-                        'click on the map shows waveforms, footfalls and the preset to copy')
+                        help='points of the grid (default: 200x200)')
+    parser.add_argument('--interactive', action='store_true', help='also write index.html, '
+                        'where a click on the map shows waveforms, footfalls and a preset to copy')
     add_options(parser)
     parser.add_argument('--out', type=Path, default=Path('atlas'), metavar='DIR',
-                        help='where the files go (default: %(default)s)')
+                        help='folder for the files (default: %(default)s)')
     return parser
 
 
@@ -177,7 +178,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(f'atlas: {error}', file=sys.stderr)
         return 2
     except KeyboardInterrupt:
-        print('atlas: stopped; what was finished is kept, and the same command goes on from '
+        print('atlas: stopped; what was finished is kept, and the same command continues from '
               'there', file=sys.stderr)
         return 130
     counted = ', '.join(f'{gait} {100 * (sheet.label > 0).mean():.0f} %'

@@ -89,16 +89,17 @@ def _parser() -> Parser:
                         'one, which assigns joints to legs and cells and gives their limits '
                         '(default: legs identified by the names of the joints)')
     parser.add_argument('--network', metavar='NAME', help=f'{", ".join(SHIPPED)}, or the path of '
-                        "a Python file that defines one, or auto: all that have the recording's "
-                        "legs, judged on strides that are not fitted (default: the robot's first; "
-                        f'four legs: {network_of(QUADRUPED)}, two legs: {network_of(BIPED)})')
+                        'a Python file that defines one, or auto, which compares all networks '
+                        "with the recording's legs on strides held back from the fit (default: "
+                        f"the robot's first; four legs: {network_of(QUADRUPED)}, two legs: "
+                        f'{network_of(BIPED)})')
     parser.add_argument('--gait', metavar='NAME', help='gait to fit (default: the recognised one)')
     parser.add_argument('--preset', metavar='NAME', help='shipped preset that supplies the '
                         "parameters that are not free (default: the gait's)")
     parser.add_argument('--free', nargs='+', default=[], metavar='PARAMETER',
                         help='parameters to fit (default: ' + ', '.join(
-                            f'{name} {" ".join(kind.free)}' for name, kind in SHIPPED.items())
-                        + ')')
+                            f'{name} {" ".join(kind.free) or "none"}'
+                            for name, kind in SHIPPED.items()) + ')')
     parser.add_argument('--order', type=int, choices=(1, 2, 3), default=3, metavar='N',
                         help='order of the readout, 1 to 3 (default: %(default)s)')
     parser.add_argument('--start', nargs='+', action='append', default=[], type=assignment,
@@ -210,7 +211,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(f'inversion: {error}', file=sys.stderr)
         return 2
     except KeyboardInterrupt:
-        kept = '; what was finished is kept, and the same command goes on from there'
+        kept = '; what was finished is kept, and the same command continues from there'
         print(f'inversion: stopped{"" if chosen.bags is None else kept}', file=sys.stderr)
         return 130
     if chosen.json:

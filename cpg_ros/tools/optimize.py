@@ -45,7 +45,7 @@ EPILOG = """\
 variables: biped, primary gaits: w_a w_b w_c current phi; secondary gaits: six directed weights
 such as w_12 (from cell 1 to cell 2), each with its partner under the gait's symmetry, current and
 phi; quadruped: alpha beta gamma delta, and xi and eta if --bounds are given for them; hopf and
-matsuoka: k_side k_girdle k_diagonal, or on walks the weights that come round to one another.
+matsuoka: k_side k_girdle k_diagonal, or for walks the weights that the symmetry makes equal.
 
 files: front.csv, front.png and preset.yaml, for
   ros2 run cpg_ros generator --ros-args -p network:=... -p presets:=FILE -p gait:=NAME
@@ -70,19 +70,21 @@ def _parser() -> Parser:
     parser = Parser(prog='optimize', description=DESCRIPTION, epilog=EPILOG,
                     formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument('--network', default='biped', metavar='NAME',
-                        help=f'{" or ".join(SEARCHED)}, or the path of a Python file with a '
+                        help=f'{", ".join(SEARCHED)}, or the path of a Python file with a '
                         'network (default: %(default)s)')
     parser.add_argument('--gait', required=True, metavar='NAME', help='; '.join(
         f'{name}: {" ".join(network.gaits())}' for name, network in SEARCHED.items()))
     parser.add_argument('--population', type=int, default=60, metavar='N',
                         help='parameter sets per generation (default: %(default)s)')
     parser.add_argument('--generations', type=int, default=12, metavar='N',
-                        help='how many (default: %(default)s)')
+                        help='number of generations (default: %(default)s)')
     parser.add_argument('--seed', type=int, default=0, metavar='N',
-                        help='the same seed finds the same (default: %(default)s)')
-    parser.add_argument('--islands', type=int, default=1, metavar='N', help='populations that '
-                        'evolve apart and exchange their best, each a job; what is found depends '
-                        'on their number, not on that of the workers (default: %(default)s)')
+                        help='seed of the search; the same seed gives the same result '
+                        '(default: %(default)s)')
+    parser.add_argument('--islands', type=int, default=1, metavar='N', help='number of '
+                        'populations that evolve separately and exchange their best members, one '
+                        'job each; the result depends on this number, but not on the number of '
+                        'workers (default: %(default)s)')
     add_options(parser)
     parser.add_argument('--fix', nargs='+', action='extend', default=[], type=assignment,
                         metavar='VARIABLE=VALUE', help='keep variables at a value, such as '
@@ -92,8 +94,8 @@ def _parser() -> Parser:
                         'such as w_a=-0.5:0.5')
     parser.add_argument('--out', type=Path, default=Path('out'), metavar='DIR',
                         help='folder for the files (default: %(default)s)')
-    parser.add_argument('--name', type=_name, help='name of the preset (default: that of the gait '
-                        'with _optimised)')
+    parser.add_argument('--name', type=_name, help="name of the preset (default: the gait's, "
+                        'followed by _optimised)')
     return parser
 
 

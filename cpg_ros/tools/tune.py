@@ -62,13 +62,15 @@ def _parser() -> Parser:
     parser.add_argument('--evaluations', type=int, default=240, metavar='N',
                         help='designs to try for each gait (default: %(default)s)')
     parser.add_argument('--seed', type=int, default=0, metavar='N',
-                        help='the same seed finds the same (default: %(default)s)')
+                        help='seed of the search; the same seed gives the same result '
+                        '(default: %(default)s)')
     parser.add_argument('--kp', type=number, metavar='NM', help='proportional gain of the joints, '
                         "N m/rad (default: a Go2's, scaled to the robot's mass)")
     parser.add_argument('--kd', type=number, metavar='NMS', help='damping gain of the joints, '
                         'N m s/rad (default: the same)')
-    parser.add_argument('--seeds', type=int, default=1, metavar='N', help='searches for each '
-                        'gait, from --seed on; the best counts (default: %(default)s)')
+    parser.add_argument('--seeds', type=int, default=1, metavar='N', help='number of '
+                        'searches for each gait, with seeds from --seed on; the best result is '
+                        'kept (default: %(default)s)')
     add_options(parser)
     parser.add_argument('--out', type=Path, required=True, metavar='FILE',
                         help='the robot file to write')

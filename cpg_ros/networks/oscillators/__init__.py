@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Networks of oscillators that drive legs, each a file of its own: every file here is found.
+"""Networks of oscillators that drive legs, one per file; every file in this folder is found.
 
 Imports ``networks``; knows nothing of ROS.
 """
@@ -27,7 +27,7 @@ __all__ = ['hopf', 'matsuoka', 'phase', 'shipped']
 
 
 def shipped() -> list[type[Network]]:
-    """Return the networks of all files of this folder, in the order in which they stand there."""
+    """Return the networks of all files in this folder, in the order in which they are defined."""
     modules = [import_module(f'{__name__}.{module.name}') for module in iter_modules(__path__)]
     return [value for module in modules for value in vars(module).values()
             if isinstance(value, type) and issubclass(value, Network)

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Coupled Hopf oscillators, one a leg, that stand and swing at frequencies of their own.
+"""Coupled Hopf oscillators, one per leg, with different frequencies in stance and swing.
 
 Righetti & Ijspeert (ICRA 2008), without feedback:
 
@@ -20,9 +20,9 @@ Righetti & Ijspeert (ICRA 2008), without feedback:
     y_i' = beta (mu - r_i^2) y_i + omega_i x_i + sum_j k_ij y_j,
     omega_i = omega_stance / (exp(-b y_i) + 1) + omega_swing / (exp(b y_i) + 1).
 
-While x falls, for y > 0, the leg stands. With ``omega_stance = pi nu / duty`` and ``omega_swing =
-pi nu / (1 - duty)`` an oscillator alone has, for steep b, the period 1/nu, of which duty is
-stance. The weights k_ij choose the gait.
+The leg is in stance while x falls, for y > 0. With ``omega_stance = pi nu / duty`` and
+``omega_swing = pi nu / (1 - duty)``, an uncoupled oscillator has, for large b, the period 1/nu, of
+which the share duty is stance. The weights k_ij choose the gait.
 """
 
 from dataclasses import dataclass
@@ -41,7 +41,7 @@ TURN = 2.0 * math.pi
 
 @dataclass(frozen=True)
 class HopfOscillators(LegPairs):
-    """Oscillators of any even number of legs; rates per model time, nu in cycles."""
+    """Hopf oscillators for any even number of legs; rates per model time, nu in cycles."""
 
     alpha: float
     beta: float
@@ -54,12 +54,12 @@ class HopfOscillators(LegPairs):
     readout: ClassVar = 'phase'
     step: ClassVar[float] = 0.001
     own_ranges: ClassVar[dict[str, Range]] = {
-        'alpha': Range(0.1, 100.0, 'how fast x comes back to its amplitude [1/model time]'),
-        'beta': Range(0.1, 100.0, 'how fast y comes back to its amplitude [1/model time]'),
-        'mu': Range(-10.0, 10.0, 'square of the amplitude of an oscillator alone'),
-        'b': Range(0.0, 100.0, 'how sharply stance gives way to swing'),
-        'nu': Range(0.1, 10.0, 'strides of an oscillator alone [cycles/model time]'),
-        'duty': Range(0.1, 0.95, 'share of the stride in stance')}
+        'alpha': Range(0.1, 100.0, 'how fast x returns to its amplitude [1/model time]'),
+        'beta': Range(0.1, 100.0, 'how fast y returns to its amplitude [1/model time]'),
+        'mu': Range(-10.0, 10.0, 'square of the amplitude of an uncoupled oscillator'),
+        'b': Range(0.0, 100.0, 'how sharply stance changes to swing'),
+        'nu': Range(0.1, 10.0, 'frequency of an uncoupled oscillator [cycles/model time]'),
+        'duty': Range(0.1, 0.95, 'duty factor: share of the stride in stance')}
     usual: ClassVar[dict[str, float]] = {
         'alpha': 5.0, 'beta': 50.0, 'mu': 1.0, 'b': 20.0, 'nu': 1.0, 'duty': 0.6}
     free: ClassVar[tuple[str, ...]] = ('duty',)
@@ -70,7 +70,7 @@ class HopfOscillators(LegPairs):
 
     @classmethod
     def equations(cls, cell: Cell, p: Any) -> tuple[Number, ...]:
-        """See the module; the logistic functions by tanh."""
+        """Return the rates of x and y, as in the module; logistic functions as tanh."""
         x, y = cell.now()
         stance = 0.5 + 0.5 * tanh(0.5 * p.b * y)
         omega = math.pi * p.nu * (stance / p.duty + (1.0 - stance) / (1.0 - p.duty))
@@ -82,7 +82,7 @@ class HopfOscillators(LegPairs):
         return dx, dy
 
     def on_orbit(self, gait: str) -> tuple[np.ndarray, float] | None:
-        """Return a state near the gait's orbit, and the period of an oscillator alone."""
+        """Return a state near the gait's orbit, and the period of an uncoupled oscillator."""
         if self.mu <= 0.0:
             return None
         phase = np.array([float(one) for one in self.phases(gait)])
@@ -92,20 +92,20 @@ class HopfOscillators(LegPairs):
         return np.concatenate([size * np.cos(angle), size * np.sin(angle)]), 1.0 / self.nu
 
     def at_rest(self) -> np.ndarray:
-        """Return 0, where all oscillators are born."""
+        """Return 0, from which all oscillations emerge."""
         return np.zeros(2)
 
     @classmethod
     @cache
     def presets(cls) -> dict[str, Preset]:
-        """One for each gait: alpha, beta and mu of the paper, duty 0.6."""
+        """Return one for each gait: alpha, beta and mu of the paper, duty 0.6."""
         return {gait: Preset(gait, cls(**cls.usual, **cls.weights(gait)))
                 for gait in cls.gaits()}
 
 
 @dataclass(frozen=True)
 class Hopf(HopfOscillators):
-    """Hopf oscillators of four legs."""
+    """Hopf oscillators for four legs."""
 
     k_rh_lh: float
     k_lh_rh: float

@@ -12,18 +12,19 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Matsuoka oscillators: two neurons a leg, flexor and extensor, that inhibit each other.
+"""Matsuoka oscillators: two neurons per leg, flexor and extensor, that inhibit each other.
 
-Matsuoka (Biol. Cybern. 52, 1985 and 56, 1987), as legs use them since Taga, Yamaguchi & Shimizu
+Matsuoka (Biol. Cybern. 52, 1985 and 56, 1987), as used for legs since Taga, Yamaguchi & Shimizu
 (Biol. Cybern. 65, 1991):
 
     tau u_i' = -u_i - beta v_i - a y_e(i) + c + sum_j k_ij (y_j - y_e(j)),
     tau_v v_i' = -v_i + y_i,    y_i = max(0, u_i),
 
-u the potential and v the fatigue of a neuron, e(i) the antagonist of neuron i, j the neurons of
-its kind in other legs: what a leg gives out is the difference of its neurons. Two neurons alone
-oscillate for ``1 + tau/tau_v < a < 1 + beta``, all but sinusoidally at the frequency ``omega =
-sqrt(((tau + tau_v) beta - tau a) / (tau a)) / tau_v`` (Matsuoka, Biol. Cybern. 104, 2011, eq. 15).
+where u is the potential and v the fatigue of a neuron, e(i) is the antagonist of neuron i, and j
+runs over the neurons of the same kind in other legs: the output of a leg is the difference of its
+neurons. Two neurons on their own oscillate for ``1 + tau/tau_v < a < 1 + beta``, almost
+sinusoidally, at the frequency ``omega = sqrt(((tau + tau_v) beta - tau a) / (tau a)) / tau_v``
+(Matsuoka, Biol. Cybern. 104, 2011, eq. 15).
 """
 
 from dataclasses import dataclass
@@ -40,7 +41,7 @@ import numpy as np
 
 @dataclass(frozen=True)
 class MatsuokaOscillators(LegPairs):
-    """Oscillators of any even number of legs; time constants in model time."""
+    """Matsuoka oscillators for any even number of legs; time constants in model time."""
 
     tau: float
     tau_v: float
@@ -57,9 +58,9 @@ class MatsuokaOscillators(LegPairs):
     own_ranges: ClassVar[dict[str, Range]] = {
         'tau': Range(0.005, 1.0, 'time constant of the potential [model time]'),
         'tau_v': Range(0.01, 10.0, 'time constant of the fatigue [model time]'),
-        'beta': Range(0.0, 20.0, 'how much fatigue weakens a neuron'),
-        'a': Range(0.0, 20.0, 'how much flexor and extensor inhibit each other'),
-        'c': Range(0.0, 10.0, 'input into every neuron')}
+        'beta': Range(0.0, 20.0, 'how strongly fatigue inhibits a neuron'),
+        'a': Range(0.0, 20.0, 'how strongly flexor and extensor inhibit each other'),
+        'c': Range(0.0, 10.0, 'constant input to every neuron')}
     usual: ClassVar[dict[str, float]] = {
         'tau': 0.15, 'tau_v': 0.6, 'beta': 2.5, 'a': 2.0, 'c': 1.0}
     looked_for: ClassVar[float] = 0.1
@@ -71,7 +72,7 @@ class MatsuokaOscillators(LegPairs):
 
     @classmethod
     def equations(cls, cell: Cell, p: Any) -> tuple[Number, ...]:
-        """See the module."""
+        """Return the rates of u and v, as in the module."""
         def antagonist(i: int) -> int:
             return (i + cls.cells // 2) % cls.cells
 
@@ -86,7 +87,7 @@ class MatsuokaOscillators(LegPairs):
 
     @property
     def omega(self) -> float:
-        """Angular frequency of a leg's two neurons alone, nearly: Matsuoka 2011, eq. 15."""
+        """Approximate angular frequency of a leg's two neurons alone (Matsuoka 2011, eq. 15)."""
         square = ((self.tau + self.tau_v) * self.beta - self.tau * self.a) / (self.tau * self.a)
         return float(np.sqrt(square) / self.tau_v) if square > 0.0 else 0.0
 
@@ -103,13 +104,13 @@ class MatsuokaOscillators(LegPairs):
             2.0 * np.pi / self.omega)
 
     def at_rest(self) -> np.ndarray:
-        """Return u = v = c / (1 + beta + a): what legs hear of one another cancels."""
+        """Return u = v = c / (1 + beta + a), where the inputs between legs cancel."""
         return np.full(2, self.c / (1.0 + self.beta + self.a))
 
     @classmethod
     @cache
     def presets(cls) -> dict[str, Preset]:
-        """One for each gait: a leg's fatigue and weights of about Taga et al."""
+        """Return one for each gait, with fatigue and weights close to those of Taga et al."""
         size = 0.15 / max(leg_count(cls) - 1, 1)
         return {gait: Preset(gait, cls(**cls.usual, **cls.weights(gait, size, 1.0)))
                 for gait in cls.gaits()}
@@ -117,7 +118,7 @@ class MatsuokaOscillators(LegPairs):
 
 @dataclass(frozen=True)
 class Matsuoka(MatsuokaOscillators):
-    """Matsuoka oscillators of four legs."""
+    """Matsuoka oscillators for four legs."""
 
     k_rh_lh: float
     k_lh_rh: float

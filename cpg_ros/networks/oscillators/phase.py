@@ -12,20 +12,21 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Amplitude-controlled phase oscillators, one a leg: any footfall pattern is a gait.
+"""Amplitude-controlled phase oscillators, one per leg: any footfall pattern is a gait.
 
 Ijspeert, Crespi, Ryczko & Cabelguen (Science 315, 2007), supporting text, eqs. 1 and 2; with all
-weights equal it is the rhythm of CPG-RL (Bellegarda & Ijspeert 2022, eqs. 1 and 2):
+weights equal, this is the rhythm generator of CPG-RL (Bellegarda & Ijspeert 2022, eqs. 1 and 2):
 
     theta_i' = 2 pi nu + sum_j w r_j sin(theta_j - theta_i - phi_ij),
     r_i'' = a (a/4 (R - r_i) - r_i').
 
-Every oscillator hears every other one. ``phi_ij = 2 pi (offset_j - offset_i)``, offset_i the
-cycles by which leg i is ahead, so that on the gait all sines vanish: the period is 1/nu, the
-amplitude R and the phases the offsets, exactly. A small disturbance of the phases decays at the
-rate n w R of n legs, the amplitude comes back as fast as it can without overshoot, at a/2.
+Every oscillator receives input from every other one. ``phi_ij = 2 pi (offset_j - offset_i)``,
+where offset_i is the number of cycles by which leg i is ahead. All sines therefore vanish on the
+gait: the period is exactly 1/nu, the amplitude R, and the phases are the offsets. With n legs, a
+small disturbance of the phases decays at the rate n w R. The amplitude is critically damped and
+converges at the rate a/2.
 
-A cell has x = r cos(theta), y = r sin(theta) and s = r', so that nothing jumps by 2 pi.
+A cell has the variables x = r cos(theta), y = r sin(theta) and s = r', so nothing jumps by 2 pi.
 """
 
 from dataclasses import dataclass
@@ -48,12 +49,12 @@ LEAST = 1e-18
 
 @cache
 def _alone(cells: int) -> Symmetry:
-    """No symmetry at all: the parameters tell every cell's phase."""
+    """Return the trivial symmetry: the parameters state every cell's phase."""
     return Symmetry.of(Group(cells, ()), {}, variables=3)
 
 
 def _stated(legs: int) -> dict[str, Any]:
-    """What the network has for a number of legs; ValueError where there is none such."""
+    """Return what the network has for a number of legs; InputError for an odd number."""
     names = leg_names(legs)
     offsets = tuple(f'offset_{leg}' for leg in names)
     return {
@@ -63,30 +64,30 @@ def _stated(legs: int) -> dict[str, Any]:
         'own_of_cells': {f'offset{n}': offsets[n:] + offsets[:n] for n in range(legs)},
         'ranges': {
             'nu': Range(0.1, 10.0, 'intrinsic frequency of every oscillator [cycles/model time]'),
-            'r': Range(0.01, 10.0, 'amplitude R that every oscillator has in the end'),
-            'a': Range(1.0, 200.0, 'how fast amplitudes come back [1/model time]'),
+            'r': Range(0.01, 10.0, 'amplitude R to which every oscillator converges'),
+            'a': Range(1.0, 200.0, 'how fast amplitudes converge [1/model time]'),
             'w': Range(0.0, 50.0, 'weight of every other oscillator [1/model time]'),
-            **{f'offset_{leg}': Range(-1.0, 1.0, f'cycles by which {leg} is ahead')
+            **{f'offset_{leg}': Range(-1.0, 1.0, f'cycles by which the leg {leg} is ahead')
                for leg in names}}}
 
 
 @dataclass(frozen=True)
 class PhaseOscillators(Network):
-    """Oscillators of any number of legs; nu in cycles, a and w per model time."""
+    """Phase oscillators for any even number of legs; nu in cycles, a and w per model time."""
 
     nu: float
     r: float
     a: float
     w: float
 
-    #: Gait -> cycles of a stride at which the legs come down, in their order.
+    #: Gait -> cycles of a stride at which the legs touch down, in their order.
     footfalls: ClassVar[dict[str, tuple[float, ...]]]
     states: ClassVar[tuple[str, ...]] = ('x', 'y', 's')
     readout: ClassVar = 'phase'
     step: ClassVar[float] = 0.0025
     couplings: ClassVar[tuple[str, ...]] = ('w',)
     unnamed: ClassVar[str] = 'unnamed'
-    #: The phases are told beforehand, and a readout takes no notice of the others.
+    #: The phases are given, and a readout does not depend on the other parameters.
     free: ClassVar[tuple[str, ...]] = ()
     line: ClassVar[str] = 'w'
     span: ClassVar[tuple[float, float] | None] = (0.0, 5.0)
@@ -108,7 +109,7 @@ class PhaseOscillators(Network):
 
     @classmethod
     def equations(cls, cell: Cell, p: Any) -> tuple[Number, ...]:
-        """See the module."""
+        """Return the rates of x, y and s, as in the module."""
         x, y, s = cell.now()
         r = sqrt(x**2 + y**2 + LEAST)
         speed: Number = TURN * p.nu
@@ -123,14 +124,14 @@ class PhaseOscillators(Network):
 
     @classmethod
     def gaits(cls) -> tuple[str, ...]:
-        """Names of the footfall patterns that have one."""
+        """Return the names of the footfall patterns."""
         return tuple(cls.footfalls)
 
     def symmetry(self, gait: str) -> Symmetry:
-        """Return what every gait has: no symmetry, and the phases that the offsets state.
+        """Return the same for every gait: no symmetry, and the phases that the offsets state.
 
         Raises:
-            ValueError: the gait has no name here.
+            ValueError: there is no gait of this name.
 
         """
         known(gait, self.gaits())
@@ -145,14 +146,14 @@ class PhaseOscillators(Network):
     @classmethod
     @cache
     def presets(cls) -> dict[str, Preset]:
-        """One for each footfall pattern, all with a = 20 (Ijspeert et al.) and w = 1."""
+        """Return one for each footfall pattern, all with a = 20 (Ijspeert et al.) and w = 1."""
         return {gait: Preset(gait, cls(1.0, 1.0, 20.0, 1.0, *(-fall % 1.0 for fall in falls)))
                 for gait, falls in cls.footfalls.items()}
 
 
 @dataclass(frozen=True)
 class Phase(PhaseOscillators):
-    """Phase oscillators of four legs."""
+    """Phase oscillators for four legs."""
 
     offset_lh: float
     offset_rh: float
@@ -162,11 +163,12 @@ class Phase(PhaseOscillators):
     name: ClassVar[str] = 'phase'
     usual_gait: ClassVar[str] = 'trot'
     usual_robot: ClassVar[str] = 'quadruped'
-    #: Footfalls of LH RH LF RF. Symmetrical gaits by how far a fore foot is behind the hind one
-    #: of its side (Hildebrand, Science 150, 1965): 0 pace, 1/8 amble, 1/4 walk in lateral and
-    #: 3/4 in diagonal sequence, 1/2 trot. Of the others the three beats of the canter, and the
-    #: gallops with a tenth of a cycle between the feet of a pair (Alexander, Int. J. Robotics
-    #: Research 3(2), 1984, as Collins & Stewart 1993 have them); right lead, but the canter.
+    #: Footfalls of LH RH LF RF. The symmetrical gaits are ordered by how far a fore foot is behind
+    #: the hind foot on its side (Hildebrand, Science 150, 1965): 0 pace, 1/8 amble, 1/4 walk in
+    #: lateral and 3/4 in diagonal sequence, 1/2 trot. Of the others, the canter has three beats,
+    #: and the gallops have a tenth of a cycle between the feet of a pair (Alexander, Int. J.
+    #: Robotics Research 3(2), 1984, as in Collins & Stewart 1993); right lead, except in
+    #: the left canter.
     footfalls: ClassVar[dict[str, tuple[float, ...]]] = {
         'walk': (0.0, 0.5, 0.25, 0.75),
         'diagonal_walk': (0.0, 0.5, 0.75, 0.25),

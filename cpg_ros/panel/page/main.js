@@ -1,4 +1,4 @@
-// The page: what the node tells goes to its parts, what people do goes to the node.
+// The page: messages from the node go to its parts, and user actions go to the node.
 import { Body } from './body.js';
 import { Parameters } from './parameters.js';
 import { Plots } from './plots.js';
@@ -69,7 +69,7 @@ function beside() {
   const steered = parameters.known.cmd_vel?.value === true;
   steering.enable(steered);
   at('steered').textContent = steered ? `up to ${state.fastest[0]} m/s and ${state.fastest[1]} rad/s`
-    : 'this generator does not listen to cmd_vel: start it with cmd_vel:=true';
+    : 'this generator ignores cmd_vel; start it with cmd_vel:=true to steer';
 }
 
 const takes = {
@@ -82,13 +82,13 @@ const takes = {
     at('download').hidden = message.recording || !message.bag;
     at('download').href = `bags/${message.bag}.zip${token ? `?token=${encodeURIComponent(token)}`
       : ''}`;
-    if (!message.generators.length) chip(at('now'), 'no generator yet: start one');
+    if (!message.generators.length) chip(at('now'), 'no generator found; start one');
     beside();
   },
   chosen(message) {
     if (view.node && view.node !== message.node && state.generators?.includes(view.node)
         && !takes.wanted) {
-      // The address names another one than the node offers first.
+      // The address names a generator other than the one that the node offers first.
       takes.wanted = true;
       send({ do: 'choose', node: view.node });
       return;
@@ -170,8 +170,8 @@ function connect() {
   };
   socket.onclose = () => {
     steering.release();
-    chip(at('link-state'), opened ? 'the panel is gone: trying again'
-      : 'no way in: is the token in the address right, and does the panel run?', 'error');
+    chip(at('link-state'), opened ? 'the panel is gone; reconnecting'
+      : 'cannot connect: is the panel running, and is the token in the address right?', 'error');
     setTimeout(connect, 1000);
   };
 }
@@ -200,7 +200,7 @@ setInterval(() => {
   at('time').textContent = digits(last.time == null ? null : last.time % 1e5, 's');
 }, 150);
 setInterval(() => {
-  at('updates').textContent = `${((frames - counted) / 2).toFixed(0)} a second`;
+  at('updates').textContent = `${((frames - counted) / 2).toFixed(0)} per second`;
   counted = frames;
 }, 2000);
 
@@ -226,10 +226,10 @@ at('theme').onclick = () => {
 };
 at('copy').onclick = () => {
   remember();
-  navigator.clipboard?.writeText(location.href).then(() => say('copied', 'told'),
+  navigator.clipboard?.writeText(location.href).then(() => say('link copied', 'told'),
     () => say(location.href, 'told')) ?? say(location.href, 'told');
 };
-const side = (degrees) => degrees === 0 ? 'ahead' : Math.abs(degrees) === 180 ? 'back'
+const side = (degrees) => degrees === 0 ? 'forward' : Math.abs(degrees) === 180 ? 'backward'
   : `${Math.abs(degrees)}° ${degrees > 0 ? 'left' : 'right'}`;
 for (const [id, text] of [['force', (value) => `${value} N`], ['direction', (value) => side(+value)]]) {
   const show = () => { at(`${id}-is`).textContent = text(at(id).value); };

@@ -31,7 +31,7 @@ export class Parameters {
     this.place.replaceChildren(
       ...Object.entries(groups).map(([name, members]) => make('details', { open: true },
         make('summary', { textContent: name }), ...members.map((one) => this.control(one)))),
-      make('details', {}, make('summary', { textContent: 'fixed while the node runs' }),
+      make('details', {}, make('summary', { textContent: 'read-only while the node runs' }),
         ...fixed.map((one) => make('div', { className: 'parameter' },
           make('div', { className: 'name' }, make('span', { textContent: one.name }),
             make('output', { textContent: String(one.value) || '–' })),
@@ -113,7 +113,7 @@ export class Parameters {
     }
   }
 
-  // After a refusal everything shows what the node has.
+  // After a refusal, every control shows the node's own value again.
   restore() {
     for (const [name, show] of Object.entries(this.shown)) show(this.known[name].value);
   }

@@ -75,7 +75,7 @@ export class Plots {
 
   footfalls(chart, shown, times, axis) {
     const felt = shown.at(-1).forces, legs = felt ? this.names.forces : this.names.phases;
-    if (!legs) return chart.say('no foot_contacts and no phases');
+    if (!legs) return chart.say('neither foot_contacts nor phases are published');
     const down = (frame, k) => felt ? frame.forces?.[k] > STANDS : frame.phases?.[k] < 0.5;
     const rows = legs.length;
     chart.begin(axis, [-0.5, rows - 0.5, ''], legs.map((leg, k) => [rows - 1 - k, leg]));
@@ -95,7 +95,7 @@ export class Plots {
 
   phase(chart, shown) {
     const cell = this.cellNames?.indexOf(this.portrait.value) ?? -1;
-    if (cell < 0 || !shown.at(-1).cells) return chart.say('the generator publishes no ~/cells');
+    if (cell < 0 || !shown.at(-1).cells) return chart.say('the generator does not publish ~/cells');
     const [x, y] = this.states;
     const [xs, ys] = [cell, this.cellCount + cell].map((k) =>
       shown.map((frame) => frame.cells?.[k]));
@@ -111,7 +111,7 @@ export class Plots {
   }
 
   cells(chart, shown, times, axis) {
-    if (!shown.at(-1).cells) return chart.say('the generator publishes no ~/cells');
+    if (!shown.at(-1).cells) return chart.say('the generator does not publish ~/cells');
     const count = this.cellCount, values = shown.map((frame) => frame.cells || []);
     let largest = 1e-6;
     for (const row of values)
@@ -127,7 +127,7 @@ export class Plots {
     const legs = this.legs(), { joints } = this.names;
     const chosen = legs.map((leg, k) => leg === (this.leg.value || 'all') ? k : -1)
       .filter((k) => k >= 0);
-    if (!chosen.length || !shown.at(-1).angles) return chart.say('no joint states');
+    if (!chosen.length || !shown.at(-1).angles) return chart.say('no joint states received');
     const rows = chosen.map((k) => shown.map((frame) => frame.angles?.[k]));
     const known = rows.flat().filter((value) => value != null);
     const low = Math.min(...known), high = Math.max(...known), rim = 0.12 * (high - low) + 0.02;
@@ -148,7 +148,7 @@ export class Plots {
 
   limits(chart, shown) {
     const { joints } = this.names, angles = shown.at(-1).angles;
-    if (!joints || !angles) return chart.say('no joint states');
+    if (!joints || !angles) return chart.say('no joint states received');
     const rows = joints.length, of = this.legs(), legs = Object.keys(this.shape?.feet || {});
     const spans = joints.map((joint) => this.shape?.limits[joint] || [null, null]);
     const ends = [...spans.flat(), ...angles].filter((value) => value != null);
@@ -172,7 +172,7 @@ export class Plots {
   }
 
   speeds(chart, shown, times, axis) {
-    if (!shown.at(-1).speed) return chart.say('nobody publishes odom');
+    if (!shown.at(-1).speed) return chart.say('no node publishes odom');
     const rows = [0, 1].map((k) => shown.map((frame) => frame.speed?.[k]));
     const known = rows.flat().filter((value) => value != null);
     chart.begin(axis, [Math.min(-0.2, ...known), 0.1 + Math.max(1, ...known), 'speed [m/s]']);

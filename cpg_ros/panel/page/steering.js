@@ -57,7 +57,7 @@ export class Steering {
     });
     for (const kind of ['pointerup', 'pointercancel', 'lostpointercapture'])
       pad.addEventListener(kind, () => this.release());
-    // A dead man: who does not see the robot does not steer it.
+    // Dead man's switch: whoever cannot see the robot cannot steer it.
     document.addEventListener('visibilitychange', () => document.hidden && this.release());
     window.addEventListener('pagehide', () => this.release());
     window.addEventListener('blur', () => this.release());
