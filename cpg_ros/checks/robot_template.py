@@ -32,8 +32,8 @@ from cpg_ros.robots.robot_file import LARGEST, LIMITS
 from cpg_ros.robots.urdf import chain, direction, UrdfError, UrdfJoint
 import numpy as np
 
-#: How far the knees are bent at the stand, rad, by the number of legs.
-BEND = {2: 0.5, 4: 1.4}
+#: How far the knees are bent at the stand, rad, on two legs and on more.
+UPRIGHT, CROUCHED = 0.5, 1.4
 #: How far legs swing and knees bend at first, rad.
 SWING, LIFT = 0.15, 0.15
 #: Angles and speeds where the URDF has no limits, rad and rad/s.
@@ -123,10 +123,9 @@ def _inside(joint: UrdfJoint, angle: float) -> float:
 def _bend(knee: UrdfJoint, way: float, legs: int) -> float:
     """Return how far about y a knee is bent at the stand: the way that its limits leave room."""
     middle = 0.5 * way * sum(_range(knee))
-    if abs(middle) > 0.1:
-        return copysign(BEND[legs], middle)
-    # Where both ways do, the end of the leg goes forward on four legs and backward on two.
-    return -BEND[legs] if legs == 4 else BEND[legs]
+    # Where both ways do, the end of the leg goes backward on two legs and forward on more.
+    usual = UPRIGHT if legs == 2 else -CROUCHED
+    return copysign(usual, middle) if abs(middle) > 0.1 else usual
 
 
 def _fitting(robot: Robot) -> Robot:
