@@ -61,7 +61,10 @@ def draw_map(path: Path, chart: Chart, sheets: dict[str, Sheet], curves: list[Cu
         panel.set_ylim(chart.second.low, chart.second.high)
     for panel in panels[len(sheets):]:
         panel.set_visible(False)
-    figure.supxlabel(str(chart.first.line))
+    for panel in panels[len(sheets) - wide:len(sheets)]:
+        # The panel below it may be an empty one.
+        panel.xaxis.set_tick_params(labelbottom=True)
+        panel.set_xlabel(str(chart.first.line))
     figure.supylabel(str(chart.second.line))
     kinds = [kind for kind in LINES if any(curve.kind == kind for curve in curves)]
     figure.legend(handles=[
