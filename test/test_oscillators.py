@@ -49,7 +49,7 @@ TURN = 2.0 * np.pi
 
 
 def polar(network):
-    """Eqs. 1 and 2 of Ijspeert et al. 2007 for any number of legs, x = r cos(theta)."""
+    """The equations of Ijspeert et al. 2007 for any number of legs, x = r cos(theta)."""
     offsets = np.array([getattr(network, name) for name in type(network).offsets.values()])
 
     def rates(t, state):

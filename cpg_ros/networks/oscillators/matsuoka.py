@@ -23,7 +23,7 @@ Matsuoka (Biol. Cybern. 52, 1985 and 56, 1987), as legs use them since Taga, Yam
 u the potential and v the fatigue of a neuron, e(i) the antagonist of neuron i, j the neurons of
 its kind in other legs: what a leg gives out is the difference of its neurons. Two neurons alone
 oscillate for ``1 + tau/tau_v < a < 1 + beta``, all but sinusoidally at the frequency ``omega =
-sqrt(((tau + tau_v) beta - tau a) / (tau a)) / tau_v`` (Matsuoka, Biol. Cybern. 104, 2011, eq. 15).
+sqrt(((tau + tau_v) beta - tau a) / (tau a)) / tau_v`` (Matsuoka, Biol. Cybern. 104, 2011).
 """
 
 from dataclasses import dataclass
@@ -86,7 +86,7 @@ class MatsuokaOscillators(LegPairs):
 
     @property
     def omega(self) -> float:
-        """Angular frequency of a leg's two neurons alone, nearly: Matsuoka 2011, eq. 15."""
+        """Angular frequency of a leg's two neurons alone, nearly (Matsuoka 2011)."""
         square = ((self.tau + self.tau_v) * self.beta - self.tau * self.a) / (self.tau * self.a)
         return float(np.sqrt(square) / self.tau_v) if square > 0.0 else 0.0
 
