@@ -43,7 +43,8 @@ CASES = (('delayed', 'trot', 3, QUADRUPED, {'c': 1.05, 'tau': 1.1}),
          ('quadruped', 'trot', 3, QUADRUPED, {'alpha': 0.97, 'beta': 1.03}),
          ('biped', 'walk', 3, BIPED, {'current': 1.03, 'phi': 0.95, 'w_a': 0.95}),
          ('hopf', 'trot', 3, LEGS, {'duty': 0.95}),
-         ('matsuoka', 'trot', 3, LEGS, {'beta': 1.05}))
+         ('matsuoka', 'trot', 3, LEGS, {'beta': 1.05}),
+         ('matsuoka', 'walk', 3, LEGS, {'beta': 1.05, 'a': 0.97}))
 #: Gaits whose phases are read off the legs, recorded for so long (s) at so many strides a second.
 STATED, LASTING, STRIDES = (('phase', 'canter_left'), ('phase', 'unnamed')), 14.0, 1.7
 

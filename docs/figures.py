@@ -34,6 +34,8 @@ FIGURES = {
     'quadruped': ('gait_diagram', ['OUT', '--network', 'quadruped']),
     'biped': ('gait_diagram', ['OUT', '--network', 'biped']),
     'phase': ('gait_diagram', ['OUT', '--network', 'phase']),
+    'hopf': ('gait_diagram', ['OUT', '--network', 'hopf']),
+    'matsuoka': ('gait_diagram', ['OUT', '--network', 'matsuoka']),
     'branches': ('analyze', ['--network', 'delayed', '--set', 'a=-4.5', 'b=1', 'c=6.5', 'd=-2',
                              'tau=0.4', '--plot', 'OUT']),
     'branches_quadruped': ('analyze', ['--network', 'quadruped', '--preset', 'pace', '--along',

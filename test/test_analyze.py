@@ -14,12 +14,15 @@
 
 """The executable analyze: what it says, as text, JSON and pictures, and what it refuses."""
 
+from dataclasses import replace
 import json
 import re
 import subprocess
 import sys
 
+from cpg_ros.dynamics.orbit import solve_orbit
 from cpg_ros.networks.quadruped import Quadruped
+from cpg_ros.networks.registry import PRESETS
 from cpg_ros.tools.analyze import main
 import numpy as np
 import pytest
@@ -163,6 +166,31 @@ def test_a_biped_set_with_weights_of_its_own(capsys):
     assert said['gaits']['skip']['exists'] and said['gaits']['skip']['waveforms'] == 2
     assert 'to be equal' in said['gaits']['walk']['why']
     assert said['hopf'] == [] and said['rest']['why']
+
+
+def test_hopf_points_of_linear_rates_have_no_normal_form(capsys, monkeypatch):
+    """Matsuoka's neurons: orbits are born with the size at which a potential reaches 0."""
+    monkeypatch.setattr('cpg_ros.tools.analyze.verdicts', lambda network, bar: {})
+    monkeypatch.setattr('cpg_ros.dynamics.hopf_search.GRID', 25)
+    chosen = ('--network', 'matsuoka', '--range', '0.5:1.2')
+    (point,) = as_json(capsys, *chosen)['hopf']
+    # 1 + tau/tau_v, less the three weights of 0.05 in phase and out of phase alike, twice.
+    assert (point['gait'], point['value']) == ('trot', pytest.approx(0.95, abs=1e-9))
+    assert point['degenerate'] and {point[key] for key in (
+        'k2', 'lyapunov', 'supercritical', 'stable_on_centre_manifold')} == {None}
+    assert main(list(chosen)) == 0
+    text = capsys.readouterr().out
+    assert 'critical' not in text and 'So there is no normal form' in text
+    assert re.search(r' trot .* - +- +degenerate +- +0 +0\n', text)
+    for beyond in (1e-4, 1e-6):
+        network = replace(PRESETS['matsuoka']['trot'].network, a=point['value'] + beyond)
+        orbit = solve_orbit(network, 'trot')
+        assert orbit.period == pytest.approx(2.0 * np.pi / point['omega'], rel=beyond)
+        half = 0.5 * np.ptp(orbit.waveform(np.linspace(0.0, 1.0, 401)))
+        assert half == pytest.approx(1.0 / (1.0 + 2.5 + point['value']), rel=0.5 * beyond**0.5)
+    # Without input the stand is on the kink itself.
+    assert 'on a kink' in as_json(capsys, *chosen, '--set', 'c=0')['rest']['why']
+    assert as_json(capsys, '--network', 'hopf', '--range=-1:1')['hopf'][0]['degenerate'] is False
 
 
 @pytest.mark.parametrize(('arguments', 'words'), [

@@ -159,7 +159,7 @@ def test_oscillations_grow_in_simulation_as_the_pair_says(line):
 
 
 def planar(point):
-    """Re k2 by Guckenheimer & Holmes, eq. 3.4.11, from a polynomial fit to an uncoupled cell.
+    """Re k2 by Guckenheimer & Holmes, section 3.4, from a polynomial fit to an uncoupled cell.
 
     With ``x = stand + Re(q) x1 - Im(q) x2`` and z = (x1 + i x2)/2, their a is Re k2 / 4.
     """

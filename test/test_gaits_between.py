@@ -14,14 +14,17 @@
 
 """Recordings whose phases are none of a network's gaits; which network explains a recording."""
 
+from dataclasses import replace
 import json
 
+from cpg_ros.dynamics.orbit import solve_orbit
 from cpg_ros.errors import InputError
-from cpg_ros.inversion.model_choice import explained
+from cpg_ros.inversion.model_choice import as_rows, explained, undecided
 from cpg_ros.inversion.recording_fit import inverted
-from cpg_ros.networks.registry import NETWORKS
+from cpg_ros.networks.registry import NETWORKS, PRESETS
 from cpg_ros.recordings.csv_reader import read_csv
 from cpg_ros.tools import inversion
+from made_up import joint_angles
 from motion import Driven, noisy, stamps
 import numpy as np
 import pytest
@@ -71,6 +74,34 @@ def test_the_network_that_explains_a_canter(tmp_path, capsys):
     told = json.loads(capsys.readouterr().out)
     assert code == 0 and told['network'] == 'phase'
     assert told['networks'][0]['error'] == pytest.approx(found[0].error)
+
+
+def made(path, network, gait, rows, **changes):
+    """Write 14 s at 1.7 Hz of joints read off a gait, as a generator does, with 2 % of noise."""
+    orbit = solve_orbit(replace(PRESETS[network][gait].network, **changes), gait)
+    legs, rng = next(iter(NETWORKS[network].legs.values())), np.random.default_rng(0)
+    t = stamps(rng, 14.0, 200.0)
+    x = joint_angles(orbit, [own[0] for own in legs.values() for _ in rows],
+                     np.tile(rows, (len(legs), 1)), 1.7 * t).T
+    names = ['time', *(f'{leg}_{joint}' for leg in legs for joint in ('hip', 'knee'))]
+    np.savetxt(path, np.column_stack([t, noisy(rng, x)]), delimiter=',', comments='',
+               header=','.join(names))
+
+
+def test_the_network_that_made_a_trot_explains_it(tmp_path, monkeypatch):
+    made(tmp_path / 'own.csv', 'hopf', 'trot', [[0.4, 0.1, 0, 0, 0, 0], [0.25, -0.2, 0, 0, 0, 0]],
+         duty=0.7)
+    # The others take longer to fit.
+    monkeypatch.setattr('cpg_ros.inversion.model_choice.networks_of', lambda *_: [
+        NETWORKS[name] for name in ('delayed', 'phase', 'hopf')])
+    plain, shaped = (explained(read_csv(tmp_path / 'own.csv'), order=order) for order in (1, 3))
+    assert plain[0].network == 'hopf' and plain[0].error < 0.005
+    assert [one.alike for one in plain] == [True, False, False]
+    assert plain[1].error > 5.0 * plain[0].error and undecided(plain, 1) == ''
+    # Readouts of order 3 make such a waveform of several: the fewest numbers come first.
+    assert shaped[0].network == 'hopf' and shaped[1].alike and shaped[0].numbers == 1 + 8 * 7
+    assert 'does not tell hopf' in undecided(shaped, 3) and '--order 1' in undecided(shaped, 3)
+    assert sorted(row[-1] for row in as_rows(plain)) == ['', 'told from the least', 'yes', 'yes']
 
 
 def test_phases_of_a_network_are_those_of_its_legs():

@@ -303,6 +303,19 @@ def test_gaits_that_cannot_be_had_are_named_beside_those_that_can(monkeypatch):
         tuning.tune(GO2, 'go2', ['jump'], 5, 0)
 
 
+def test_a_gait_is_judged_by_the_networks_that_have_it(quick, monkeypatch):
+    """Hopf oscillators have no jump."""
+    robot, alone = (replace(GO2, networks=names) for names in (
+        ('delayed', 'hopf', 'matsuoka'), ('delayed',)))
+    prices = [Tuner(one, 'go2').prices('jump', [AIMS['jump'].start]) for one in (robot, alone)]
+    assert prices[0] == prices[1] < REFUSED
+    said = []
+    monkeypatch.setattr(Tuner, 'tune', lambda self, gait, *_: refused(gait))
+    with pytest.raises(SimulationError, match='jump: too fast'):
+        tuning.tune(robot, 'go2', ['jump', 'trot'], 5, 0, say=said.append)
+    assert said[1:] == ['jump is judged with delayed only: hopf and matsuoka have no such gait']
+
+
 def refused(gait):
     raise NoDesign(f'{gait}: too fast')
 

@@ -169,7 +169,7 @@ class _Finder:
             for point in points:
                 if set(point.block.symmetry.shifts) != shifts or point.n:
                     continue
-                low, high = ((0.9 * point.value, axis.high) if point.normal_form.side > 0
+                low, high = ((0.9 * point.value, axis.high) if point.normal_form.side >= 0
                              else (axis.low, 1.1 * point.value))
                 try:
                     self._branches.append(from_hopf(

@@ -90,7 +90,7 @@ def _branches(a: complex, b: complex, tau: float, n: np.ndarray) -> np.ndarray:
     exponent = -a * tau
     if abs(exponent.real) <= LARGEST:
         return lambertw(b * tau * np.exp(exponent), n)
-    # W_n(z) = L - log L + ... with L = log z + 2 pi i n large (Corless et al. 1996, eq. 4.18);
+    # W_n(z) = L - log L + ... with L = log z + 2 pi i n large (Corless et al. 1996);
     # Newton's method on w + log w = L, whatever the sheet of the logarithm.
     argument = np.angle(b * np.exp(1j * exponent.imag))
     wanted = np.log(abs(b) * tau) + exponent.real + 1j * (argument + 2.0 * np.pi * n)

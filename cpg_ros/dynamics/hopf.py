@@ -17,7 +17,7 @@
 On the centre manifold ``x = rest + z q + conj(z q) + ...`` with the eigenvector q of the class,
 the same for every cell but for the character chi. B(x, y) of two classes lies in the class of the
 product of their characters, so the reduction needs the characteristic matrices Delta of the
-classes 1 and chi^2 only (Kuznetsov, *Elements of Applied Bifurcation Theory*, eq. 5.62; with a
+classes 1 and chi^2 only (Kuznetsov, *Elements of Applied Bifurcation Theory*, chapter 5; with a
 delay Diekmann et al., *Delay Equations*, chapter IX)::
 
     k2 = <p, C(q, q, q*) + 2 B(q, Delta_1(0)^-1 B(q, q*))
@@ -181,7 +181,7 @@ class HopfPoint:
 
     @property
     def lyapunov(self) -> float:
-        """First Lyapunov coefficient l1 = Re k2 / omega (Kuznetsov, eq. 3.20; <q, q> = 1)."""
+        """First Lyapunov coefficient l1 = Re k2 / omega (Kuznetsov, section 3.5; <q, q> = 1)."""
         return self.normal_form.k2.real / self.omega
 
     def _but_critical(self, block: Block, roots: np.ndarray) -> np.ndarray:

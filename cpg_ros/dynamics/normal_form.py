@@ -16,6 +16,9 @@
 
 With ``z = r exp(i theta)``: ``r' = Re k1 mu r + Re k2 r^3`` and
 ``theta' = omega + Im k1 mu + Im k2 r^2``, mu the distance of the parameter from the bifurcation.
+Where Re k2 is 0 terms of third order decide nothing. So it is where the rates are linear about the
+equilibrium, their kinks away from it: there all of a disc of states oscillates at mu = 0, and the
+orbits beyond begin with the size at which they reach a kink.
 """
 
 from dataclasses import dataclass
@@ -38,6 +41,11 @@ class NormalForm:
     k2: complex
 
     @property
+    def degenerate(self) -> bool:
+        """Whether there is no term of third order to tell anything about orbits: Re k2 = 0."""
+        return self.k2.real == 0.0
+
+    @property
     def supercritical(self) -> bool:
         """Whether the orbits attract on the centre manifold: k2 < 0.
 
@@ -48,16 +56,20 @@ class NormalForm:
 
     @property
     def side(self) -> int:
-        """1 if the orbits lie where mu > 0 (k1 k2 < 0), -1 if where mu < 0."""
+        """1 if the orbits lie where mu > 0 (k1 k2 < 0), -1 if where mu < 0, 0 if degenerate."""
+        if self.degenerate:
+            return 0
         return 1 if self.k1.real * self.k2.real < 0.0 else -1
 
     def radius(self, mu: float) -> float:
         """Radius of the orbit at a distance mu of the parameter, ``sqrt(-k1 mu / k2)``.
 
         Raises:
-            ValueError: on this side there is no orbit.
+            NoOrbit: on this side there is none, or it is degenerate.
 
         """
+        if self.degenerate:
+            raise NoOrbit('the normal form is degenerate: it has no term of third order')
         square = -self.k1.real * mu / self.k2.real
         if square < 0.0:
             raise NoOrbit(f'at mu {mu:g} the normal form has no orbit')

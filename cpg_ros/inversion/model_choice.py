@@ -15,11 +15,13 @@
 """Which network explains a recording? All that have its legs, fitted and judged on other strides.
 
 Every other stride is fitted, and the fit is held against the mean cycle of those left out: a
-network that follows noise gains nothing by it.
+network that follows noise gains nothing by it. Networks whose errors a recording does not tell
+apart, joint by joint, are ranked by how few numbers they take: readouts of order 3 make many a
+waveform of one that is nearly sinusoidal.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 from cpg_ros.errors import CpgError, InputError
 from cpg_ros.gaits.phase_average import warped
@@ -31,6 +33,8 @@ from cpg_ros.recordings.recording import Recording
 from cpg_ros.robots.robot import Robot
 import numpy as np
 
+#: Networks are told apart where their errors differ by so many standard errors of the difference.
+TOLD = 2.0
 #: A joint whose mean cycle has a smaller range stands (rad).
 STANDS = 0.01
 
@@ -47,6 +51,8 @@ class Explained:
         parameters: numbers of the network that were fitted, or read off the legs' phases.
         numbers: all numbers, those of the readouts included.
         why: why nothing was fitted, or ''.
+        by_joint: error of each joint that moves.
+        alike: whether the recording does not tell it from the network of the least error.
 
     """
 
@@ -57,11 +63,15 @@ class Explained:
     parameters: int = 0
     numbers: int = 0
     why: str = ''
+    by_joint: dict[str, float] = field(default_factory=dict)
+    alike: bool = False
 
 
 def explained(recording: Recording, robot: Robot | None = None, order: int = 3,
               done: Callable[[float], None] = lambda share: None) -> list[Explained]:
-    """Fit every network that has the recording's legs; the best on other strides comes first.
+    """Fit every network that has the recording's legs; the best on other strides come first.
+
+    Of several that the recording does not tell apart the one with the fewest numbers is first.
 
     Args:
         recording: joints over time.
@@ -94,11 +104,25 @@ def explained(recording: Recording, robot: Robot | None = None, order: int = 3,
             continue
         free = len(fit.parameters) + len(kind.offsets) - bool(kind.offsets)
         rows = [half.joints.index(name) for name in fit.joints]
+        shares = _shares(fit.joints, fit.fitted - others[rows], others[rows])
         found.append(Explained(
-            kind.name, gait, _share(fit.fitted - others[rows], others[rows]), fit.mean_rms_share,
-            free, free + len(fit.joints) * (1 + WEIGHTS[fit.order])))
+            kind.name, gait, float(np.mean(list(shares.values()) or [0.0])), fit.mean_rms_share,
+            free, free + len(fit.joints) * (1 + WEIGHTS[fit.order]), by_joint=shares))
     done(1.0)
-    return sorted(found, key=lambda one: (one.error, one.numbers))
+    least = min(found, key=lambda one: (one.error, one.numbers))
+    found = [replace(one, alike=not one.why and not _told_apart(one, least)) for one in found]
+    return sorted(found, key=lambda one: (not one.alike, one.numbers if one.alike else one.error))
+
+
+def _told_apart(one: Explained, least: Explained) -> bool:
+    """Whether a network's errors are larger than the least ones, beyond their own scatter."""
+    if one is least:
+        return False
+    more = np.array([error - least.by_joint[name] for name, error in one.by_joint.items()
+                     if name in least.by_joint])
+    if more.size < 2:
+        return one.error > least.error
+    return bool(more.mean() > TOLD * more.std(ddof=1) / np.sqrt(more.size))
 
 
 def _unsaid(share: float) -> None:
@@ -127,19 +151,34 @@ def halves(recording: Recording, stride: Stride) -> tuple[Stride, np.ndarray]:
     return replace(stride, mean=means[0][0], error=means[0][1]), means[1][0]
 
 
-def _share(errors: np.ndarray, recorded: np.ndarray) -> float:
-    spans = np.ptp(recorded, axis=1)
-    moving = spans > STANDS
-    if not moving.any():
-        return 0.0
-    return float(np.mean(np.sqrt(np.mean(errors**2, axis=1))[moving] / spans[moving]))
+def _shares(joints: Sequence[str], errors: np.ndarray, recorded: np.ndarray
+            ) -> dict[str, float]:
+    """RMS errors of the joints that move over their ranges."""
+    spans, sizes = np.ptp(recorded, axis=1), np.sqrt(np.mean(errors**2, axis=1))
+    return {name: float(size / span) for name, size, span in
+            zip(joints, sizes, spans, strict=True) if span > STANDS}
+
+
+def undecided(found: Sequence[Explained], order: int) -> str:
+    """Say which networks a recording does not tell apart by readouts of an order, if any."""
+    alike = [one.network for one in found if one.alike]
+    if len(alike) < 2:
+        return ''
+    said = (f'the recording does not tell {", ".join(alike[:-1])} and {alike[-1]} apart; the one '
+            'with the fewest numbers is fitted')
+    return said if order == 1 else f'{said}; readouts of a lower order (--order 1) tell more apart'
 
 
 def as_rows(found: Sequence[Explained]) -> list[tuple[str, ...]]:
     """Rows of a table, with a head."""
     rows: list[tuple[str, ...]] = [('network', 'gait', 'held-out error', 'fitted', 'parameters',
-                                    'all numbers')]
-    return rows + [(one.network, one.gait or 'none', '-', '-', '-', one.why) if one.why else
-                   (one.network, one.gait, f'{100 * one.error:.2f} %',
-                    f'{100 * one.fitted:.2f} %', str(one.parameters), str(one.numbers))
-                   for one in found]
+                                    'all numbers', 'told from the least')]
+    least = min((one.error for one in found), default=np.inf)
+    for one in found:
+        if one.why:
+            rows.append((one.network, one.gait or 'none', '-', '-', '-', '-', one.why))
+            continue
+        rows.append((one.network, one.gait, f'{100 * one.error:.2f} %',
+                     f'{100 * one.fitted:.2f} %', str(one.parameters), str(one.numbers),
+                     '' if one.error == least else 'no' if one.alike else 'yes'))
+    return rows

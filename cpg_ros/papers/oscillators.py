@@ -38,7 +38,7 @@ TURN = 2.0 * np.pi
 
 def synchronisation() -> Iterator[Row]:
     """Phases, frequency and amplitudes of coupled phase oscillators."""
-    cite = Citation(IJSPEERT, 'eq. 1')
+    cite = Citation(IJSPEERT, 'phases')
     for gait, preset in Phase.presets().items():
         if gait == Phase.unnamed:
             continue
@@ -57,7 +57,7 @@ def synchronisation() -> Iterator[Row]:
 
 def amplitudes() -> Iterator[Row]:
     """Amplitudes are critically damped."""
-    cite = Citation(IJSPEERT, 'eq. 2')
+    cite = Citation(IJSPEERT, 'amplitudes')
     network: Any = Phase.presets()['trot'].network
     angle = TURN * np.array(network.leads)
     state = np.concatenate([0.5 * np.cos(angle), 0.5 * np.sin(angle), np.zeros(4)])
@@ -71,7 +71,7 @@ def amplitudes() -> Iterator[Row]:
 
 def stance_and_swing() -> Iterator[Row]:
     """Durations of stance and swing of a Hopf oscillator alone."""
-    cite = Citation(RIGHETTI, 'eq. 3')
+    cite = Citation(RIGHETTI, 'oscillator')
     for duty in (0.5, 0.6, 0.75):
         known: Any = Hopf.presets()['trot'].network
         network = _alone(replace(known, duty=duty, b=50.0))

@@ -190,6 +190,10 @@ class Robot:
         """Return the motion of a preset, or else of its gait, or else an empty one."""
         return self.motions.get(preset) or self.motions.get(gait) or Motion()
 
+    def networks_with(self, gait: str) -> tuple[str, ...]:
+        """Names of those of its networks that have a gait or preset."""
+        return tuple(name for name in self.networks if gait in NETWORKS[name].presets())
+
     def shift(self, motion: Motion) -> np.ndarray:
         """Difference between a motion's offsets and those of the stand, rad, shape (joints,)."""
         return np.array([motion.joints[joint.name].offset - joint.offset

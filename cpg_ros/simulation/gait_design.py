@@ -19,14 +19,18 @@ go with that length, times and speeds with its square root, as for pendulums.
 """
 
 from dataclasses import astuple, dataclass, replace
+import math
 
 from cpg_ros.simulation.foot_path import Path
+from cpg_ros.simulation.run_metrics import RunMetrics
 import numpy as np
 
 #: Of a leg in the stand, m.
 LENGTH = 0.2664
 #: Share by which strides of the gentlest start are shorter.
 SHORTER = 0.5
+#: Height that feet are to have for a tenth of the time, m.
+CLEAR = 0.02
 
 
 @dataclass(frozen=True)
@@ -145,3 +149,24 @@ AIMS = {
                  (0.7, 0.22, 0.82, 0.10, 0.266, 0.04, 0.0, 0.0, 0.0, 0.0, 1.0),
                  (1.1, 0.34, 0.86, 0.18, 0.31, 0.12, 0.08, 0.08, 0.04, 0.04, 2.0))}
 AIMS |= {f'reverse_{gait}': AIMS[gait] for gait in ('ripple', 'wave')}
+
+
+def price(trial: RunMetrics, aim: Aim, duration: float, scale: float = 1.0) -> float:
+    """Weigh a run's figures; 0 would be perfect.
+
+    Slower or much faster than wanted, fewer hops or, where none are wanted, bobbing, turning,
+    leaning, dragging feet, drifting, sliding, torques at their limit and work all cost; a fall
+    costs most. Lengths are weighed by the robot's scale.
+    """
+    fall = 0.0 if trial.upright else 15.0 + 25.0 * (1.0 - trial.fell / duration)
+    share = trial.speed / aim.speed
+    speed = 12.0 * max(0.0, 1.0 - share) + 3.0 * max(0.0, share - 1.2)
+    turning = (0.15 * min(abs(math.degrees(trial.turn)) / 0.5, 8.0)**2
+               + 0.1 * min(abs(trial.heading) / 4.0, 8.0)**2)
+    leaning = (trial.sway / 5.0)**1.5
+    dragging = 6.0 * max(0.0, 1.0 - trial.lift / (CLEAR * scale))
+    restless = 0.5 * trial.bob / (0.01 * scale)
+    if aim.hops:
+        restless = 5.0 * max(0.0, 1.0 - trial.hops / (0.85 * aim.hops * duration))
+    return (fall + speed + turning + leaning + dragging + restless + 0.3 * (trial.drift / 0.4)**2
+            + 2.0 * min(trial.slip, 3.0) + 20.0 * trial.saturation + 0.6 * min(trial.cost, 5.0))

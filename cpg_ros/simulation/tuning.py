@@ -33,7 +33,7 @@ from cpg_ros.robots.robot import Motion, Robot, Steering
 from cpg_ros.simulation.batch import Batch, Scenario, targets
 from cpg_ros.simulation.efference_measurement import calibrated
 from cpg_ros.simulation.foot_path import Feet, OWN
-from cpg_ros.simulation.gait_design import Aim, AIMS, Design, LENGTH
+from cpg_ros.simulation.gait_design import AIMS, Design, LENGTH, price
 from cpg_ros.simulation.robot_model import SimulationError
 from cpg_ros.simulation.run_metrics import RunMetrics
 from cpg_ros.simulation.steering_table import measure, STRIDES
@@ -47,8 +47,6 @@ SCENARIOS = (Scenario(), Scenario(0.9),
              Scenario(0.8, 0.95, ((3.0, -50.0, 0.0), (4.5, 0.0, -50.0))))
 #: Mass that these pushes are for, kg; others have pushes that make them as fast.
 MASS = 15.2
-#: Height that feet are to have for a tenth of the time, m.
-CLEAR = 0.02
 #: Price of a design that the joints cannot follow, and what each unit beyond a limit adds.
 REFUSED, BEYOND = 1000.0, 100.0
 #: Generations after which a search that has met no other design ends.
@@ -101,27 +99,6 @@ class Tuned:
         return f'{"good" if self.good else "poor"}: {self.trial.speed:.2f} m/s'
 
 
-def price(trial: RunMetrics, aim: Aim, duration: float, scale: float = 1.0) -> float:
-    """Weigh a run's figures; 0 would be perfect.
-
-    Slower or much faster than wanted, fewer hops or, where none are wanted, bobbing, turning,
-    leaning, dragging feet, drifting, sliding, torques at their limit and work all cost; a fall
-    costs most. Lengths are weighed by the robot's scale.
-    """
-    fall = 0.0 if trial.upright else 15.0 + 25.0 * (1.0 - trial.fell / duration)
-    share = trial.speed / aim.speed
-    speed = 12.0 * max(0.0, 1.0 - share) + 3.0 * max(0.0, share - 1.2)
-    turning = (0.15 * min(abs(math.degrees(trial.turn)) / 0.5, 8.0)**2
-               + 0.1 * min(abs(trial.heading) / 4.0, 8.0)**2)
-    leaning = (trial.sway / 5.0)**1.5
-    dragging = 6.0 * max(0.0, 1.0 - trial.lift / (CLEAR * scale))
-    restless = 0.5 * trial.bob / (0.01 * scale)
-    if aim.hops:
-        restless = 5.0 * max(0.0, 1.0 - trial.hops / (0.85 * aim.hops * duration))
-    return (fall + speed + turning + leaning + dragging + restless + 0.3 * (trial.drift / 0.4)**2
-            + 2.0 * min(trial.slip, 3.0) + 20.0 * trial.saturation + 0.6 * min(trial.cost, 5.0))
-
-
 class Tuner:
     """Tunes one robot's gaits, one after the other."""
 
@@ -163,9 +140,9 @@ class Tuner:
                       self.feet.joints(gait_of(preset, preset.network)[0], paths),
                       duty=design.duty, stance=(-design.lead, OWN))
 
-    def program(self, gait: str, motion: Motion, network: int = 0) -> Program:
-        """Plan a gait with a motion on one of the robot's networks; errors as of plan."""
-        preset = NETWORKS[self.robot.networks[network]].presets()[gait]
+    def program(self, gait: str, motion: Motion, network: str = '') -> Program:
+        """Plan a gait on one of the robot's networks or the first; errors as of plan."""
+        preset = NETWORKS[network or self.robot.networks[0]].presets()[gait]
         if motion.steering is None and not AIMS[gait].hops:
             # To be steered: the joints must be able to follow strides of -1, too.
             one = (1.0,)
@@ -176,7 +153,7 @@ class Tuner:
     def prices(self, gait: str, designs: Sequence[Design]) -> np.ndarray:
         """Return the price of each design: of its mean and its worst run.
 
-        The runs take the robot's networks by turns.
+        The runs take by turns those of the robot's networks that have the gait.
         """
         aim = AIMS[gait]
         aim = replace(aim, speed=aim.speed * math.sqrt(self.scale),
@@ -186,7 +163,7 @@ class Tuner:
             motion = self.motion(gait, design)
             try:
                 angles = [targets(self.program(gait, motion, network), SHORT, self.batch.timestep)
-                          for network in range(len(self.robot.networks))]
+                          for network in self.robot.networks_with(gait)]
             except OutOfLimits as error:
                 found[k] += BEYOND * error.excess
                 if self._nearest is None or error.excess < self._nearest.excess:
@@ -319,6 +296,10 @@ def tune(robot: Robot, model: str, gaits: Sequence[str], evaluations: int, seed:
     for gait in gaits:
         if gait not in known:
             raise SimulationError(f'the network {robot.networks[0]} has no gait {gait}')
+        have = robot.networks_with(gait)
+        if lacking := [name for name in robot.networks if name not in have]:
+            say(f'{gait} is judged with {" and ".join(have)} only: {" and ".join(lacking)} '
+                f'{"has" if len(lacking) == 1 else "have"} no such gait')
     file = Path(model)
     # Workers may have another folder for theirs.
     place = str(file.resolve()) if file.is_file() else model

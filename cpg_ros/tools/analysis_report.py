@@ -34,6 +34,8 @@ import numpy as np
 
 #: From this error of the multiplier along the orbit on, it is said.
 UNSURE = 1e-6
+#: A variable so close to 0 at the stand is on the kink there.
+ON_KINK = 1e-12
 
 
 def _root(value: complex) -> str:
@@ -49,6 +51,25 @@ def _state(network: Network, rest: np.ndarray) -> str:
 
 def _yes(value: bool) -> str:
     return 'yes' if value else 'no'
+
+
+def _kind(point: HopfPoint) -> tuple[str, str]:
+    """Type of a Hopf point, and on which side of it its orbits lie."""
+    if point.normal_form.degenerate:
+        return 'degenerate', '-'
+    return ('supercritical' if point.supercritical else 'subcritical',
+            'above' if point.normal_form.side > 0 else 'below')
+
+
+def _degenerate(network: Network) -> list[str]:
+    """Why there is no normal form, in lines."""
+    if not network.kinks:
+        return ['degenerate: the term of third order vanishes, so the normal form does not tell '
+                'on which side', 'orbits lie, nor whether they attract.']
+    return ['degenerate: the rates are linear about the stand, up to their kinks where '
+            f'{" or ".join(network.kinks)} passes 0.', 'So there is no normal form: at the point '
+            'itself waves of any size up to the kinks neither grow nor', 'decay, and orbits start '
+            'with the size at which they reach a kink, not with size 0.']
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,6 +98,12 @@ class Analysis:
         """Hopf points, blocks and equilibrium; or why there are none."""
         try:
             rest = equilibrium(self.network)
+            on = [name for name in self.network.kinks
+                  if abs(named(self.network, rest)[name]) < ON_KINK]
+            if on:
+                return [], (), np.array([]), (f'it lies on a kink of the rates, where '
+                                              f'{" and ".join(on)} is 0: they have no '
+                                              'linearisation, and there are no Hopf points')
             parts = blocks(self.network, rest)
             span = (0.0, self.longest) if self.delay else self.span
             points = hopf_points(self.network, self.line, *span) if span[0] < span[1] else []
@@ -219,10 +246,8 @@ class Analysis:
                        **self._form(point), **said.numbers(point)}
             rows.append((
                 point.gait, point.wave, f'{point.value:.4f}',
-                *(f'{number:.4f}' for number in numbers.values()),
-                'supercritical' if point.supercritical else 'subcritical',
-                'above' if point.normal_form.side > 0 else 'below', str(point.unstable_roots),
-                str(point.unstable_transverse_roots)))
+                *('-' if number is None else f'{number:.4f}' for number in numbers.values()),
+                *_kind(point), str(point.unstable_roots), str(point.unstable_transverse_roots)))
         explained = (
             f'{self.delay} and period in model time; omega in rad per model time; '
             f'{said.explained}others: further roots with positive real part, transverse: of them '
@@ -234,14 +259,18 @@ class Analysis:
                  *(f'  {line}' for line in table(rows, '<<' + '>' * middle + '<<>>'))]
         remarks = [f'  {self.line} {point.value:.4f}: {remark}' for point in self.hopf
                    if (remark := said.remark(point)[0])]
+        if any(point.normal_form.degenerate for point in self.hopf):
+            lines += [f'  {line}' for line in _degenerate(self.network)]
         return [*lines, '', said.title, *remarks] if remarks else lines
 
-    def _form(self, point: HopfPoint) -> dict[str, float]:
+    def _form(self, point: HopfPoint) -> dict[str, float | None]:
         """Coefficients of the normal form; with a delay in time over the delay."""
+        form, none = point.normal_form, point.normal_form.degenerate
         if self.delay:
-            return {'k1': point.in_delays.k1.real, 'k2': point.in_delays.k2.real}
-        return {'k1': point.normal_form.k1.real, 'k2': point.normal_form.k2.real,
-                'lyapunov': point.lyapunov}
+            form = point.in_delays
+            return {'k1': form.k1.real, 'k2': None if none else form.k2.real}
+        return {'k1': form.k1.real, 'k2': None if none else form.k2.real,
+                'lyapunov': None if none else point.lyapunov}
 
     def as_dict(self) -> dict[str, Any]:
         """Everything in plain types."""
@@ -254,8 +283,10 @@ class Analysis:
             **({'n': point.n, 'omega': point.omega, self.delay: point.value} if self.delay else
                {'along': str(self.along), 'value': point.value, 'omega': point.omega}),
             **self._form(point), **self._commentary.numbers(point),
-            'direction': point.direction, 'supercritical': point.supercritical,
-            'stable_on_centre_manifold': point.supercritical,
+            'direction': point.direction,
+            **dict.fromkeys(('supercritical', 'stable_on_centre_manifold'),
+                            None if point.normal_form.degenerate else point.supercritical),
+            'degenerate': point.normal_form.degenerate,
             'unstable_roots': point.unstable_roots,
             'unstable_transverse_roots': point.unstable_transverse_roots,
             **self._commentary.remark(point)[1]} for point in self.hopf]

@@ -32,7 +32,7 @@ from cpg_ros.files.yaml_reader import shown
 from cpg_ros.fleet.options import add_options
 from cpg_ros.gaits.leg_names import BIPED, QUADRUPED
 from cpg_ros.gaits.stride import NoSteadyGait
-from cpg_ros.inversion.model_choice import as_rows, Explained, explained
+from cpg_ros.inversion.model_choice import as_rows, Explained, explained, undecided
 from cpg_ros.inversion.paper_fit import paper_fits, PaperFit, refuse_others
 from cpg_ros.inversion.parameter_files import write_fitted
 from cpg_ros.inversion.recording_fit import Inverted, inverted, network_of, preset_of
@@ -223,7 +223,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
             if chosen.paper else {})}))
     else:
         from cpg_ros.inversion.fit_report import as_table, as_text
-        judged = [*table(as_rows(compared), '<<>>>>'), ''] if compared else []
+        judged = [*table(as_rows(compared), '<<>>>><'), '',
+                  *([one, ''] if (one := undecided(compared, chosen.order)) else [])
+                  ] if compared else []
         said = '\n'.join([*judged, as_text(found), *as_table(fits)])
         say(f'{said}\nwritten: {", ".join(map(str, written))}' if written else said)
     return 0

@@ -24,7 +24,7 @@ where u is the potential and v the fatigue of a neuron, e(i) is the antagonist o
 runs over the neurons of the same kind in other legs: the output of a leg is the difference of its
 neurons. Two neurons on their own oscillate for ``1 + tau/tau_v < a < 1 + beta``, almost
 sinusoidally, at the frequency ``omega = sqrt(((tau + tau_v) beta - tau a) / (tau a)) / tau_v``
-(Matsuoka, Biol. Cybern. 104, 2011, eq. 15).
+(Matsuoka, Biol. Cybern. 104, 2011).
 """
 
 from dataclasses import dataclass
@@ -87,7 +87,7 @@ class MatsuokaOscillators(LegPairs):
 
     @property
     def omega(self) -> float:
-        """Approximate angular frequency of a leg's two neurons alone (Matsuoka 2011, eq. 15)."""
+        """Approximate angular frequency of a leg's two neurons alone (Matsuoka 2011)."""
         square = ((self.tau + self.tau_v) * self.beta - self.tau * self.a) / (self.tau * self.a)
         return float(np.sqrt(square) / self.tau_v) if square > 0.0 else 0.0
 

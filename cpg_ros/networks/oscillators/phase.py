@@ -14,8 +14,8 @@
 
 """Amplitude-controlled phase oscillators, one per leg: any footfall pattern is a gait.
 
-Ijspeert, Crespi, Ryczko & Cabelguen (Science 315, 2007), supporting text, eqs. 1 and 2; with all
-weights equal, this is the rhythm generator of CPG-RL (Bellegarda & Ijspeert 2022, eqs. 1 and 2):
+Ijspeert, Crespi, Ryczko & Cabelguen (Science 315, 2007), supporting text; with all
+weights equal, this is the rhythm generator of CPG-RL (Bellegarda & Ijspeert 2022):
 
     theta_i' = 2 pi nu + sum_j w r_j sin(theta_j - theta_i - phi_ij),
     r_i'' = a (a/4 (R - r_i) - r_i').
