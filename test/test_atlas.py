@@ -169,7 +169,7 @@ def test_a_grid_of_any_size_is_halved_until_it_is_whole(count):
         for row in jobs:
             yield row, [{'row': row.row, 'column': column, 'label': int(3 * row.row > count)}
                         for column in row.columns]
-    (sheet,) = refined(chart, ('trot',), run).values()
+    (sheet,) = refined(chart, ('trot',), (), run).values()
     assert (sheet.label == (3 * np.arange(count) > count)[:, None]).all()
 
 

@@ -20,10 +20,11 @@ stable it is) they are filled in, bilinearly. What is computed does not depend o
 
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
-from itertools import pairwise
+import itertools
 from typing import Any
 
 from cpg_ros.atlas.chart import Chart, COARSE
+from cpg_ros.atlas.hopf_curves import Curve
 from cpg_ros.atlas.row_job import NONE, Row
 import numpy as np
 
@@ -58,9 +59,11 @@ class Sheet:
         self.numbers = {name: np.full(self.shape, np.nan) for name in NUMBERS}
 
     def take(self, points: Iterable[dict[str, Any]]) -> None:
-        """Enter what a job has found."""
+        """Enter what a job has found, where it is better than what was known."""
         for one in points:
             at = one['row'], one['column']
+            if self.computed[at] and one['label'] <= self.label[at]:
+                continue
             self.label[at], self.computed[at] = one['label'], True
             for name in NUMBERS:
                 if one.get(name) is not None:
@@ -79,17 +82,56 @@ def places(count: int, stride: int) -> list[int]:
     """Indices of a grid of this stride: the coarse one, the last index in it, and halvings."""
     found, halved = sorted({*range(0, count, COARSE), count - 1}), COARSE
     while halved > stride:
-        found = sorted({*found, *((one + other) // 2 for one, other in pairwise(found))})
+        found = sorted({*found, *((one + other) // 2 for one, other in itertools.pairwise(found))})
         halved //= 2
     return found
 
 
-def coarse_rows(chart: Chart, gaits: tuple[str, ...]) -> Iterator[Row]:
-    """The jobs of the coarse grid."""
+def coarse_rows(chart: Chart, gaits: tuple[str, ...], curves: Iterable[Curve]) -> Iterator[Row]:
+    """The jobs of the coarse grid, and of rows that cross curves of Hopf points between its own.
+
+    Branches are looked for in rows: a steep curve that lies between two would have none.
+    """
     columns = tuple(places(chart.second.count, COARSE))
-    for row in places(chart.first.count, COARSE):
+    rows = {gait: set(places(chart.first.count, COARSE)) for gait in gaits}
+    for curve in curves:
+        low, high = np.interp([curve.points[:, 0].min(), curve.points[:, 0].max()],
+                              chart.first.values, np.arange(chart.first.count))
+        if high - low < 2 * COARSE:
+            rows[curve.gait].add(round(0.5 * (low + high)))
+    for row in sorted(set().union(*rows.values())):
         for gait in gaits:
-            yield Row(chart, gait, row, columns, basin=True)
+            if row in rows[gait]:
+                yield Row(chart, gait, row, columns, basin=True)
+
+
+def again(chart: Chart, gait: str, sheet: Sheet, before: np.ndarray) -> list[Row]:
+    """Return jobs for points of the coarse grid that are worse than one beside them.
+
+    An orbit may reach where no branch from a Hopf point of its row does.
+
+    Args:
+        chart: the plane.
+        gait: whose.
+        sheet: what is known now.
+        before: labels when this was asked last; what has not changed is not tried again.
+
+    """
+    jobs = []
+    new = [at for at in sheet.waves if sheet.label[at] != before[at]]
+    for row in places(chart.first.count, COARSE):
+        some: list[int] = []
+        near: set[tuple[int, int]] = set()
+        for column in places(chart.second.count, COARSE):
+            close = {at for at in new if max(abs(at[0] - row), abs(at[1] - column)) <= COARSE
+                     and sheet.label[at] > sheet.label[row, column]}
+            if close:
+                some.append(column)
+                near |= close
+        if some:
+            jobs.append(Row(chart, gait, row, tuple(some), tuple(
+                (*at, *sheet.waves[at]) for at in sorted(near)), basin=True, again=True))
+    return jobs
 
 
 def finer(chart: Chart, gait: str, sheet: Sheet, stride: int) -> list[Row]:
@@ -97,8 +139,8 @@ def finer(chart: Chart, gait: str, sheet: Sheet, stride: int) -> list[Row]:
     rows, columns = places(chart.first.count, stride), places(chart.second.count, stride)
     wanted: set[tuple[int, int]] = set()
     fillable: dict[tuple[int, int], list[tuple[int, int]]] = {}
-    for top, bottom in pairwise(rows):
-        for left, right in pairwise(columns):
+    for top, bottom in itertools.pairwise(rows):
+        for left, right in itertools.pairwise(columns):
             corners = [(top, left), (top, right), (bottom, left), (bottom, right)]
             clear = len({int(sheet.label[corner]) for corner in corners}) == 1
             for at, between in _middles(top, bottom, left, right, corners):
@@ -145,22 +187,31 @@ def _near(sheet: Sheet, row: int, columns: list[int], stride: int
                 yield r, c, wave, period
 
 
-def refined(chart: Chart, gaits: tuple[str, ...], run: Callable[[Iterable[Row], int], Iterable[
-        tuple[Row, list[dict[str, Any]]]]]) -> dict[str, Sheet]:
+def refined(chart: Chart, gaits: tuple[str, ...], curves: Iterable[Curve],
+            run: Callable[[Iterable[Row], int], Iterable[tuple[Row, list[dict[str, Any]]]]]
+            ) -> dict[str, Sheet]:
     """Fill sheets for all gaits, from the coarse grid to the finest.
 
     Args:
         chart: the plane.
         gaits: of its network.
+        curves: of their Hopf points.
         run: does jobs, given with their number.
 
     """
     sheets = {gait: Sheet((chart.first.count, chart.second.count)) for gait in gaits}
-    jobs: list[Row] = list(coarse_rows(chart, gaits))
+    jobs: list[Row] = list(coarse_rows(chart, gaits, curves))
+    before = {gait: np.full_like(sheet.label, -1) for gait, sheet in sheets.items()}
     stride = COARSE
     while True:
         for row, points in run(jobs, len(jobs)):
             sheets[row.gait].take(points)
+        if stride == COARSE:
+            jobs = [job for gait in gaits for job in again(chart, gait, sheets[gait],
+                                                           before[gait])]
+            before = {gait: sheet.label.copy() for gait, sheet in sheets.items()}
+            if jobs:
+                continue
         if stride == 1:
             break
         jobs = [job for gait in gaits for job in finer(chart, gait, sheets[gait], stride)]

@@ -62,6 +62,7 @@ class Row:
         columns: which points on the second, rising.
         near: row, column, waveforms (nodes, components) and period of orbits known close by.
         basin: whether runs from random starts are made.
+        again: whether all else has been tried: orbits are only led here from those close by.
 
     """
 
@@ -71,10 +72,14 @@ class Row:
     columns: tuple[int, ...]
     near: tuple[tuple[int, int, list[list[float]], float], ...] = ()
     basin: bool = False
+    again: bool = False
 
 
 def assess_row(row: Row) -> list[dict[str, Any]]:
-    """Judge the gait at the points of a row: a dictionary of plain types for each."""
+    """Judge the gait at the points of a row: a dictionary of plain types for each.
+
+    Where several orbits are found it is the first that attracts, if only with a lock.
+    """
     finder = _Finder(row)
     return [finder.point(column) for column in row.columns]
 
@@ -89,21 +94,25 @@ class _Finder:
     def point(self, column: int) -> dict[str, Any]:
         value = float(self.row.chart.second.values[column])
         network = self.row.chart.at(self.one, value)
-        orbit = next(self._orbits(network, column, value), None)
-        self.last = orbit
+        best: tuple[Orbit, dict[str, Any]] | None = None
+        periods: list[float] = []
+        for orbit in self._orbits(network, column, value):
+            if np.isclose(orbit.period, periods, rtol=1e-6).any():
+                continue
+            periods.append(orbit.period)
+            judged = _judged(orbit)
+            if best is None or judged['label'] > best[1]['label']:
+                best = orbit, judged
+            if best[1]['label'] >= LOCKED:
+                break
         told: dict[str, Any] = {'gait': self.row.gait, 'row': self.row.row, 'column': column,
                                 'label': NONE}
-        if orbit is None:
-            return told
-        within, leading, unstable = leading_multipliers(orbit)
-        attracts = leading < ATTRACTS
-        told |= {'label': STABLE if attracts else LOCKED if within < ATTRACTS else UNSTABLE,
-                 'period': orbit.period, 'amplitude': float(orbit.levels[0, 0, 1]),
-                 'leading': leading, 'leading_within': within, 'unstable': unstable,
-                 'lock': 0.0 if attracts else lock_of(orbit),
-                 'wave': _wave(orbit)}
-        if self.row.basin:
-            told['basin'] = basin(orbit, told['lock'])
+        self.last = best[0] if best else None
+        if best:
+            orbit, judged = best
+            told |= judged | {'wave': _wave(orbit)}
+            if self.row.basin:
+                told['basin'] = basin(orbit, told['lock'])
         return told
 
     def _orbits(self, network: Network, column: int, value: float) -> Iterator[Orbit]:
@@ -119,6 +128,8 @@ class _Finder:
                 yield from _proper(self._led(near, value))
             except NoOrbit:
                 continue
+        if self.row.again:
+            return
         with suppress(NoOrbit, NoEquilibrium):
             yield from _proper(solve_orbit(network, gait))
         # Between points that are known no branch of its own is looked for.
@@ -178,6 +189,16 @@ class _Finder:
                 except CpgError:
                     continue
         return self._branches
+
+
+def _judged(orbit: Orbit) -> dict[str, Any]:
+    """How stable an orbit is, and its numbers."""
+    within, leading, unstable = leading_multipliers(orbit)
+    attracts = leading < ATTRACTS
+    return {'label': STABLE if attracts else LOCKED if within < ATTRACTS else UNSTABLE,
+            'period': orbit.period, 'amplitude': float(orbit.levels[0, 0, 1]),
+            'leading': leading, 'leading_within': within, 'unstable': unstable,
+            'lock': 0.0 if attracts else lock_of(orbit)}
 
 
 def _proper(orbit: Orbit) -> Iterator[Orbit]:

@@ -140,15 +140,18 @@ def drawn(chart: Chart, gaits: tuple[str, ...], fleet: Fleet, folder: Path
                 tally.add()
                 yield told.job, stored.put(told.job, told.value)
 
-    sheets = refined(chart, gaits, run)
     curves = stored.curves()
+    hopf = ([curve for curve in curves if curve.kind == 'Hopf'] if curves is not None
+            else hopf_curves((chart, gaits)))
+    sheets = refined(chart, gaits, hopf, run)
     if curves is None:
         fleet.what = 'boundaries'
-        jobs: list[tuple[Any, ...]] = [(hopf_curves, (chart, gaits)), *(
-            (orbit_curves, (chart, gait, edges(chart, sheet))) for gait, sheet in sheets.items()),
+        jobs: list[tuple[Any, ...]] = [
+            *((orbit_curves, (chart, gait, edges(chart, sheet)))
+              for gait, sheet in sheets.items()),
             *((fold_curves, (chart, gait, lost_edges(chart, sheet)))
               for gait, sheet in sheets.items())]
-        curves = [curve for some in in_order(fleet, _called, jobs) for curve in some]
+        curves = [*hopf, *(curve for some in in_order(fleet, _called, jobs) for curve in some)]
         stored.put_curves(curves)
     table, picture = stored.write(sheets), folder / 'map.png'
     draw_map(picture, chart, sheets, curves)
