@@ -33,6 +33,7 @@ from cpg_ros.networks.symmetry import GAITS
 from cpg_ros.tools import atlas
 import numpy as np
 import pytest
+from scipy.optimize import brentq
 
 parquet = pytest.importorskip('pyarrow.parquet')
 TROT = PRESETS['delayed']['trot'].network
@@ -171,6 +172,20 @@ def test_a_grid_of_any_size_is_halved_until_it_is_whole(count):
                         for column in row.columns]
     (sheet,) = refined(chart, ('trot',), (), run).values()
     assert (sheet.label == (3 * np.arange(count) > count)[:, None]).all()
+
+
+def test_a_gait_that_is_born_on_a_steep_curve_is_found_beside_it():
+    """Which no row of the coarse grid meets: from c = 3.6 at tau = 0.2 to 3.74 at 0.5."""
+    chart = chart_of('delayed', TROT, [('c', (3.0, 5.0)), ('tau', (0.2, 0.5))], (17, 5))
+
+    def run(jobs, number):
+        for row in jobs:
+            yield row, assess_row(row)
+    (sheet,) = refined(chart, ('jump',), hopf_curves((chart, ('jump',))), run).values()
+    for k, tau in enumerate(chart.second.values):
+        # The slow wave of the class, where its delay is the first critical one at this c.
+        born = brentq(lambda c, tau=tau: critical(c, 1, 0, False, 0)[1] - tau, 3.55, 3.9)
+        assert ((sheet.label[:, k] != NONE) == (chart.first.values > born)).all()
 
 
 @pytest.mark.parametrize(('over', 'said'), [
