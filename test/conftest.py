@@ -21,9 +21,9 @@ from graph import EXECUTABLE, Process, Watcher  # noqa: E402
 import pytest  # noqa: E402
 
 #: Files whose tests measure against the clock on the wall: beside others they would fail.
-ALONE = ('test_clock', 'test_closed_loop', 'test_demo', 'test_go2_live', 'test_lockstep',
-         'test_robot_sim', 'test_stalls', 'test_stop_paths', 'test_switching', 'test_topics',
-         'test_unitree_live')
+ALONE = ('test_clock', 'test_closed_loop', 'test_demo', 'test_go2_live', 'test_inversion_live',
+         'test_lockstep', 'test_robot_sim', 'test_stalls', 'test_stop_paths', 'test_switching',
+         'test_topics', 'test_unitree_live')
 
 
 def pytest_collection_modifyitems(items):

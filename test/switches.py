@@ -68,7 +68,9 @@ def check_all_switches(watcher, robot, programs, phases, lasting, slack=1e-5):
         assert off_grid(times, 0.005) < 1e-3
         speed = np.maximum(programs[old].speed, programs[new].speed)
         steps = np.abs(np.diff(positions, axis=0))
-        assert (steps <= 0.005 * speed * 1.001 + 1e-9).all(), (old, new)
+        # A period that a busy machine leaves out gives the step more time.
+        periods = np.maximum(np.round(np.diff(times) / 0.005), 1.0)[:, None]
+        assert (steps <= 0.005 * periods * speed * 1.001 + 1e-9).all(), (old, new)
         low = np.minimum(programs[old].span[0], programs[new].span[0]) + offset
         high = np.maximum(programs[old].span[1], programs[new].span[1]) + offset
         assert (positions >= low - slack).all() and (positions <= high + slack).all(), (old, new)
