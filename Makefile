@@ -49,10 +49,11 @@ docs: install/.built unitree
 figures: install/.built
 	@$(ENTER); $(VENV)/bin/python docs/figures.py $(ARGS)
 
-# Of what needs no graph, branches included; compiled code is not seen by it. The tree is imported, not
-# the installed copy, which is another file to the tool.
+# Of what needs no graph, branches included; compiled code is not seen by it. The tree is imported,
+# not the installed copy, which is another file to the tool.
 coverage: install/.built
-	@$(ENTER); export PYTHONPATH=$(CURDIR):$$PYTHONPATH; $(VENV)/bin/pytest test -n auto -m 'not live' --cov=cpg_ros --cov-branch \
+	@$(ENTER); export PYTHONPATH=$(CURDIR):$$PYTHONPATH; \
+		$(VENV)/bin/pytest test -n auto -m 'not live' --cov=cpg_ros --cov-branch \
 		--cov-report=term --cov-report=html:out/coverage $(ARGS)
 
 test: install/.built docs

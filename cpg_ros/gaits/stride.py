@@ -333,10 +333,7 @@ def _told(warp: Warp, found: Warped, names: Sequence[str]) -> list[str]:
 
 def _cell_signals(c: Mapping[str, np.ndarray], cells: Mapping[str, int],
                   gains: Mapping[str, complex], network: type[Network]) -> np.ndarray | None:
-    """Return the coefficients of every cell's signal, None unless every cell has a joint.
-
-    Of several joints the one that moves most stands for the cell.
-    """
+    """Return the coefficients of every cell's signal, None unless every cell has a joint."""
     known = {name: cell for name, cell in cells.items()
              if name in c and abs(gains.get(name, 0.0)) > 0.0}
     signals = []
@@ -344,6 +341,7 @@ def _cell_signals(c: Mapping[str, np.ndarray], cells: Mapping[str, int],
         names = [name for name, one in known.items() if one == cell]
         if not names:
             return None
+        # The joint that moves most stands for the cell.
         name = max(names, key=lambda one: float(np.abs(c[one][1])))
         gain, n = complex(gains[name]), np.arange(c[name].size)
         signals.append(np.where(n > 0, c[name], 0.0)

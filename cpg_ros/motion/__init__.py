@@ -22,5 +22,6 @@ from cpg_ros.errors import needed
 # Before any of its modules: one line where numba is missing, not a traceback.
 needed('numba')
 
-__all__ = ['duty', 'joint_readout', 'pattern', 'phase_readout', 'plan', 'precompile', 'ramp',
-           'readout', 'resumption', 'runnable', 'smoothstep', 'steering', 'told_waveform', 'track']
+__all__ = ['absorption', 'duty', 'joint_readout', 'pattern', 'phase_readout', 'plan', 'precompile',
+           'ramp', 'readout', 'resumption', 'runnable', 'smoothstep', 'steering', 'told_waveform',
+           'track']

@@ -24,6 +24,7 @@ from collections import deque
 from collections.abc import Callable
 import math
 
+from cpg_ros.motion.absorption import Absorption
 from cpg_ros.motion.plan import Program
 from cpg_ros.motion.ramp import Ramp
 from cpg_ros.motion.readout import confine
@@ -37,8 +38,6 @@ import numpy as np
 SUBSTEP = 1e-3
 #: Most gaits fading into one another at once; a further one waits for a place.
 MOST_TRACKS = 4
-#: Jumps of the network's output are absorbed over this time (s).
-ABSORB = 0.3
 #: A joint may cover the shift between the stand and a gait at this many times it a second.
 SHIFTING = 2.0
 #: Share of the bound on speed to keep to at a substep, so that none is passed between two.
@@ -84,8 +83,7 @@ class Pattern:
         self.position, self.velocity = self._offset.copy(), np.zeros_like(self._offset)
         self._wanted, self._rate = self.position.copy(), self.velocity.copy()
         self._corrected = np.zeros_like(self._offset)
-        self._jump: tuple[np.ndarray, np.ndarray] | None = None
-        self._absorbed = ABSORB
+        self._absorption = Absorption()
         self._recovering = False
         self._slowing = self._slower = 1.0
         self._frequency = newest.program.frequency
@@ -178,7 +176,7 @@ class Pattern:
     @property
     def recovering(self) -> bool:
         """Tell whether a fault is still being got over."""
-        return self._recovering and self._absorbed < ABSORB
+        return self._recovering and self._absorption.active
 
     # -- the tick --------------------------------------------------------------------------
 
@@ -190,7 +188,7 @@ class Pattern:
         clock, share = slow.advance(dt) if slow.active else (dt, 1.0)
         clock, share = self.hurry * clock, self.hurry * share
         calm = (len(self._tracks) == 1 and not (self._ramp.active or self._leading)
-                and self._absorbed >= ABSORB)
+                and not self._absorption.active)
         if not (calm and self._cruise(clock)):
             parts = max(1, math.ceil(clock / SUBSTEP - 1e-9))
             for _ in range(parts):
@@ -222,7 +220,7 @@ class Pattern:
             elif how is None:
                 del self._tracks[:-1]
                 self._tracks[0].drift_to(what)
-                self._absorb()
+                self._absorption.begin()
             elif len(self._tracks) < MOST_TRACKS:
                 how.align(self._tracks[-1].phase)
                 how.drive = self.drive
@@ -231,10 +229,6 @@ class Pattern:
                 # Of those that wait, only the last one matters.
                 waiting = [(what, how)]
         self._requests.extend(waiting)
-
-    def _absorb(self) -> None:
-        """Take note that the network's output jumps here; the next ``_step`` smooths it."""
-        self._jump, self._absorbed = None, 0.0
 
     def _cruise(self, dt: float) -> bool:
         """One gait, at the stand or in full swing: nothing to mix, nothing to allocate.
@@ -265,7 +259,7 @@ class Pattern:
         self.faults += 1
         self._recovering = True
         track.reseed()
-        self._absorb()
+        self._absorption.begin()
 
     def _step(self, dt: float) -> None:
         # Slowing and frequency run linearly from tick to tick, as the velocities say.
@@ -322,9 +316,10 @@ class Pattern:
         else:
             self._slowing, self._slower, self._last_rate = 1.0, 1.0, None
 
-        if self._absorbed < ABSORB:
-            wanted, rate = self._smooth(wanted + self._offset, rate, dt)
-            self._wanted[:], self._rate[:] = wanted, rate
+        if self._absorption.active:
+            self._wanted[:], self._rate[:] = self._absorption.smooth(
+                wanted + self._offset, rate, dt, (self._wanted, self._rate))
+            self._recovering = self.recovering
         else:
             self._wanted[:] = wanted
             self._wanted += self._offset
@@ -345,19 +340,3 @@ class Pattern:
             return 0.0, 0.0
         share, share_rate = smoothstep(s)
         return 1.0 - share, -share_rate / self._leading
-
-    def _smooth(self, wanted: np.ndarray, rate: np.ndarray, dt: float
-                ) -> tuple[np.ndarray, np.ndarray]:
-        """Add a difference that starts where the output was and dies out."""
-        if self._jump is None:
-            self._jump = (self._wanted + dt * self._rate - wanted, self._rate - rate)
-        else:
-            self._absorbed += dt
-        s = min(1.0, self._absorbed / ABSORB)
-        share, share_rate = smoothstep(s)
-        gap, gap_rate = self._jump
-        wanted = wanted + (1.0 - share) * gap + s * (1.0 - s) ** 2 * ABSORB * gap_rate
-        rate = rate - share_rate / ABSORB * gap + (1.0 - s) * (1.0 - 3.0 * s) * gap_rate
-        if s >= 1.0:
-            self._jump, self._recovering = None, False
-        return wanted, rate

@@ -20,7 +20,6 @@ import time
 
 from cpg_ros.motion.pattern import Pattern
 from cpg_ros.motion.plan import Refused
-from cpg_ros.motion.precompile import precompile
 from cpg_ros.motion.steering import Drive
 from cpg_ros.networks.network import Network, Preset
 from cpg_ros.networks.preset_files import PresetError, read_presets
@@ -41,6 +40,7 @@ from cpg_ros.nodes.generator_parameters import (
     specs,
 )
 from cpg_ros.nodes.joint_publishers import Outputs
+from cpg_ros.nodes.kernels import compile_kernels
 from cpg_ros.nodes.measured_pose import MeasuredPose
 from cpg_ros.nodes.node_base import asked_for_help, run, StartedNode, StartError
 from cpg_ros.nodes.parameter_spec import as_doubles
@@ -50,7 +50,6 @@ from cpg_ros.nodes.senses_input import CONTACTS
 from cpg_ros.robots.robot import Robot
 from cpg_ros.robots.robot_file import find_robot, RobotError
 from rcl_interfaces.msg import ParameterType, SetParametersResult
-from rclpy.logging import get_logger
 from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from rclpy.qos_overriding_options import QoSOverridingOptions
@@ -85,7 +84,7 @@ class Generator(StartedNode):
             network = find_network(self._value('network'))
         except NetworkError as error:
             raise StartError(f'network {error}') from error
-        compile_kernels(self._value('network'))
+        compile_kernels(self._value('network'), self.get_logger())
         for name, spec in specs(network).items():
             self._declare(name, spec)
         self._declare('exclusive', exclusive(self._value('command')))
@@ -327,22 +326,6 @@ class Generator(StartedNode):
         self.ticker.end()
         if self.ticker.is_alive():
             self.ticker.join(timeout=0.2)
-
-
-def compile_kernels(network: str) -> None:
-    """Compile or load the numerical kernels, saying so if they are compiled."""
-    logger, began = get_logger(NAME), time.monotonic()
-    said: list[str] = []
-
-    def compiling() -> None:
-        if not said:
-            said.append('compiling the numerical kernels; only the very first start needs this '
-                        '(10 to 20 s)')
-            logger.info(said[0])
-
-    precompile(network, compiling)
-    if said:
-        logger.info(f'compiled in {time.monotonic() - began:.1f} s')
 
 
 def main(args: list[str] | None = None) -> int:

@@ -25,8 +25,8 @@ from rclpy.node import Node
 LOOK = 0.25
 #: What somebody publishes may be known this long before who it is, s.
 NAMING = 1.0
-#: What stands for the node of a publisher that is not known to belong to one.
-UNKNOWN = '_NODE_NAME_UNKNOWN_'
+#: The graph's name of a node that is not known, and ours.
+UNKNOWN, NAMELESS = '_NODE_NAME_UNKNOWN_', 'a node of unknown name'
 
 
 class Rivals:
@@ -40,43 +40,42 @@ class Rivals:
     def __init__(self, node: Node, topics: Sequence[str]) -> None:
         """Look after the topics, resolved names on each of which the node publishes once."""
         self._node, self._topics = node, topics
-        self.text = ''
-        self._nameless = 0.0
+        self.text = self._warned = ''
+        self._since = 0.0
         self._timer = node.create_timer(LOOK, self.look,
                                         clock=Clock(clock_type=ClockType.STEADY_TIME))
 
     def seek(self, seconds: float) -> str:
         """Look for them until one is found, or for some time in s; return the text."""
         end = time.monotonic() + seconds
-        while not self.look() and (self._nameless or time.monotonic() < end):
+        while not self.look() and time.monotonic() < end:
             time.sleep(LOOK / 5)
+        while NAMELESS in self.text and time.monotonic() < self._since + NAMING:
+            time.sleep(LOOK / 5)
+            self.look()
         return self.text
 
     def look(self) -> str:
-        """Look for them now; return the text."""
-        found, nameless = self._found()
-        now = time.monotonic()
-        if nameless and now - (self._nameless or now) < NAMING:
-            self._nameless = self._nameless or now
-            return self.text
-        self._nameless = 0.0
+        """Look for them now; return the text. The warning waits a little for a name."""
         text = '; '.join(f'{topic} is published by {names}, too'
-                         for topic, names in found.items())
-        if text and text != self.text:
-            self._node.get_logger().warning(text)
-        self.text = text
+                         for topic in self._topics if (names := self._others(topic)))
+        if text != self.text:
+            self.text, self._since = text, time.monotonic()
+        if text != self._warned and (NAMELESS not in text
+                                     or time.monotonic() >= self._since + NAMING):
+            self._warned = text
+            if text:
+                self._node.get_logger().warning(text)
         return text
 
-    def _found(self) -> tuple[dict[str, str], bool]:
-        """Return the names by topic, and whether one is not known."""
-        own, found, nameless = self._node.get_fully_qualified_name(), {}, False
-        for topic in self._topics:
-            if self._node.count_publishers(topic) > 1:
-                known = [one for one in self._node.get_publishers_info_by_topic(topic)
-                         if one.node_name != UNKNOWN]
-                names = [f'{one.node_namespace.rstrip("/")}/{one.node_name}' for one in known]
-                if own in names:
-                    names.remove(own)
-                nameless |= not names
-                found[topic] = ', '.join(sorted(names)) or 'one that is no ROS node'
-        return found, nameless
+    def _others(self, topic: str) -> str:
+        """Return the names of the others that publish on a topic, or ''."""
+        if self._node.count_publishers(topic) < 2:
+            return ''
+        own = self._node.get_fully_qualified_name()
+        names = [NAMELESS if one.node_name == UNKNOWN
+                 else f'{one.node_namespace.rstrip("/")}/{one.node_name}'
+                 for one in self._node.get_publishers_info_by_topic(topic)]
+        if own in names:
+            names.remove(own)
+        return ', '.join(sorted(names))

@@ -21,6 +21,7 @@ its refinement need, follows the exact boundaries, and draws the map.
 import argparse
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
+from itertools import chain
 from pathlib import Path
 import sys
 from typing import Any
@@ -36,7 +37,7 @@ from cpg_ros.atlas.stored import Stored
 from cpg_ros.errors import CpgError, InputError
 from cpg_ros.fleet.executors import Fleet
 from cpg_ros.fleet.options import add_options, working
-from cpg_ros.fleet.outcomes import in_order, outcomes
+from cpg_ros.fleet.outcomes import outcomes
 from cpg_ros.fleet.results_table import library
 from cpg_ros.fleet.tally import Tally
 from cpg_ros.networks.network import known
@@ -141,8 +142,11 @@ def drawn(chart: Chart, gaits: tuple[str, ...], fleet: Fleet, folder: Path
                 yield told.job, stored.put(told.job, told.value)
 
     curves = stored.curves()
-    hopf = ([curve for curve in curves if curve.kind == 'Hopf'] if curves is not None
-            else hopf_curves((chart, gaits)))
+    if curves is None:
+        fleet.what = 'gaits'
+        hopf = [*chain(*fleet.map(hopf_curves, [(chart, (gait,)) for gait in gaits]))]
+    else:
+        hopf = [curve for curve in curves if curve.kind == 'Hopf']
     sheets = refined(chart, gaits, hopf, run)
     if curves is None:
         fleet.what = 'boundaries'
@@ -151,15 +155,16 @@ def drawn(chart: Chart, gaits: tuple[str, ...], fleet: Fleet, folder: Path
               for gait, sheet in sheets.items()),
             *((fold_curves, (chart, gait, lost_edges(chart, sheet)))
               for gait, sheet in sheets.items())]
-        curves = [*hopf, *(curve for some in in_order(fleet, _called, jobs) for curve in some)]
+        curves = [*hopf, *chain(*fleet.map(_called, jobs))]
         stored.put_curves(curves)
     table, picture = stored.write(sheets), folder / 'map.png'
     draw_map(picture, chart, sheets, curves)
     return sheets, curves, [table, folder / 'boundaries.json', picture]
 
 
-def _called(function: Any, job: Any) -> Any:
-    return function(job)
+def _called(job: tuple[Any, ...]) -> Any:
+    function, told = job
+    return function(told)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
