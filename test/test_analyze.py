@@ -233,7 +233,9 @@ def test_as_a_process():
     assert bad.returncode == 2 and 'Traceback' not in bad.stderr and bad.stderr.count('\n') == 1
     with subprocess.Popen([*command], stdout=subprocess.PIPE, stderr=subprocess.PIPE) as left:
         left.stdout.close()
-        assert left.stderr.read() == b'' and left.wait(120) == 0
+        # A slow machine also says how far it is.
+        said = left.stderr.read()
+        assert left.wait(120) == 0 and b'Error' not in said and b'Traceback' not in said
 
 
 @pytest.mark.parametrize(('name', 'head'), [

@@ -22,7 +22,10 @@ from cpg_ros.dynamics.floquet import multipliers
 from cpg_ros.dynamics.mesh.newton import collocate
 from cpg_ros.dynamics.orbit import solve_preset
 from cpg_ros.dynamics.switching import switched
+from cpg_ros.errors import InputError
+from cpg_ros.integration.simulate import simulate
 from cpg_ros.networks.biped import Biped
+from cpg_ros.networks.delayed import Delayed
 from cpg_ros.networks.parameter_line import ParameterLine
 from cpg_ros.networks.quadruped import Quadruped
 from cpg_ros.networks.registry import PRESETS
@@ -75,3 +78,54 @@ def test_the_hop_doubles_its_period_where_the_walk_ends():
     assert dict(leaving.points[0].orbit.symmetry.shifts) == dict(
         last.network.symmetry('walk').shifts)
     assert leaving.points[0].orbit.period == pytest.approx(2.0 * hop.period, rel=1e-3)
+
+
+def delayed_residual(orbit):
+    # Equation 1.1 of Liu & Zhang written out, at instants that are no nodes.
+    a, b, c, d, tau = orbit.network.as_dict().values()
+    times = (np.arange(501) + np.sqrt(0.5)) * (orbit.period / 501)
+    x, past = orbit(times), orbit(times - tau)
+    rates = (a * x + b * np.tanh(x) + d * np.tanh(np.roll(x, 2, axis=1))
+             + c * np.tanh(past[:, [1, 0, 3, 2, 5, 4, 7, 6]]))
+    return np.abs(orbit.derivative(times) - rates).max()
+
+
+def unevenness(orbit):
+    # How far a cycle is from being its own negative half a cycle later.
+    times = np.arange(128) / 128 * orbit.period
+    return np.sqrt(np.mean((orbit(times) + orbit(times + 0.5 * orbit.period))**2))
+
+
+@pytest.mark.parametrize('preset, name', [('walk', 'tau'), ('liu2024_pace', 'd')])
+def test_a_branch_leaves_a_gait_with_a_delay(preset, name):
+    line = ParameterLine.parse(name, Delayed)
+    branch = follow(solve_preset(PRESETS['delayed'][preset]), line, 0.2, 4.0, most=30)
+    point = next(one for one in bifurcations(branch) if one.kind == 'branch point'
+                 and one.value > 0.3)
+    leaving = switched(point, line, 0.2, 4.0, most=6)
+    near, far = (one.orbit for one in leaving.points[1:3])
+    assert max(map(delayed_residual, (near, far))) < 1e-9
+    # A pitchfork: what breaks the symmetry x -> -x grows by the square root of the way.
+    assert unevenness(point.point.orbit) < 1e-9 < 1e-3 < unevenness(near)
+    assert not near.symmetry.odd
+    values = leaving.values[1:3]
+    squares = np.array([unevenness(near), unevenness(far)])**2
+    begin = values[0] - squares[0] * np.diff(values)[0] / np.diff(squares)[0]
+    assert begin == pytest.approx(point.value, abs=0.05 * abs(values[0] - point.value))
+
+
+def test_a_simulation_keeps_to_the_branch_that_leaves():
+    line = ParameterLine.parse('tau', Delayed)
+    branch = follow(solve_preset(PRESETS['delayed']['liu2024_pace']), line, 0.58, 0.8, most=30)
+    point = next(one for one in bifurcations(branch) if one.kind == 'branch point')
+    orbit = switched(point, line, 0.58, 0.8, most=6).points[-1].orbit
+    run = simulate(orbit.network, orbit, orbit.period, orbit.network.delay / 400, progress=False)
+    # Disturbances grow three times in a period: errors of the method stay small.
+    assert run.x == pytest.approx(orbit(run.t), abs=1e-7)
+
+
+def test_no_branch_of_orbits_leaves_at_a_torus_point():
+    branch, found = pace()
+    torus = next(one for one in found if one.kind == 'torus')
+    with pytest.raises(InputError, match='torus point at alpha=beta'):
+        switched(torus, branch.along, 0.05, 0.52)

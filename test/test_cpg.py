@@ -78,9 +78,10 @@ def test_parameters_and_topics_of_a_running_generator(running):
 def test_a_shell_completes_actions_gaits_parameters_and_topics(running):
     domain = running[0].domain
     assert {'run', 'gait', 'param', 'record'} <= completed(domain, 'cpg ')
-    assert completed(domain, 'cpg gait tr') == {'trot'}
-    assert completed(domain, 'cpg param set delayed.ta') == {'delayed.tau'}
     # A loaded machine takes longer to find the graph than who types wants to wait.
+    until(lambda: completed(domain, 'cpg gait tr') == {'trot'}, 'the gait')
+    until(lambda: completed(domain, 'cpg param set delayed.ta') == {'delayed.tau'},
+          'the parameter')
     until(lambda: '/joint_states' in completed(domain, 'cpg topic hz /joint'), 'the topic')
 
 

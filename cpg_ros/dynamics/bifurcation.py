@@ -63,8 +63,8 @@ class Bifurcation:
         return self.point.value
 
 
-def bifurcations(branch: Branch, judged: Sequence[Multipliers] | None = None
-                 ) -> tuple[Bifurcation, ...]:
+def bifurcations(branch: Branch, judged: Sequence[Multipliers] | None = None,
+                 exact: float = EXACT) -> tuple[Bifurcation, ...]:
     """Locate all crossings of the unit circle between the points of a branch, in its order.
 
     Two that lie between the same points in one subspace and take each other back are not seen.
@@ -72,20 +72,26 @@ def bifurcations(branch: Branch, judged: Sequence[Multipliers] | None = None
     Args:
         branch: of orbits.
         judged: multipliers of its points, where they are known already.
+        exact: share of the way between two points to which a crossing is located.
 
     """
     spectra = [_parts(one) for one in judged or (multipliers(point.orbit)
                                                  for point in branch.points)]
     found: list[Bifurcation] = []
+    gaps: dict[int, _Gap] = {}
     for k, part, rank in _crossings(branch, spectra):
+        gap = gaps.setdefault(k, _Gap(branch.points[k:k + 2], spectra[k:k + 2]))
         try:
-            one = _located(branch.points[k], branch.points[k + 1], part, rank)
+            one = _located(gap, part, rank, exact)
         except NoOrbit:
             # Two curves that cross are hard to tell apart right there.
             continue
+        # Both of a pair cross, and what symmetry makes alike crosses in several subspaces.
         if one is not None and not any(
-                one.kind == other.kind and np.isclose(one.value, other.value, 1e-7, 1e-9)
-                and np.isclose(one.point.orbit.period, other.point.orbit.period, 1e-5)
+                one.kind == other.kind
+                and np.isclose(one.value, other.value, 1e-7, max(1e-9, exact * gap.width))
+                and np.isclose(one.point.orbit.period, other.point.orbit.period,
+                               max(1e-5, exact))
                 for other in found):
             found.append(one)
     return tuple(found)
@@ -130,27 +136,40 @@ def _between(left: Place, right: Place, share: float) -> Place | None:
     return arclength.resolved(near.curve, z, arclength.held(z.size, which))
 
 
-def _located(left: BranchPoint, right: BranchPoint, part: int, rank: int) -> Bifurcation | None:
-    """Return the crossing between two points of a multiplier with so many that are larger."""
-    tried: dict[float, tuple[BranchPoint, complex]] = {}
+class _Gap:
+    """The curve between two neighbouring points of a branch, solved once at each place."""
 
+    def __init__(self, ends: Sequence[BranchPoint], spectra: Sequence[list[np.ndarray]]) -> None:
+        self._left, self._right = (one.place for one in ends)
+        self._known = dict(zip((0.0, 1.0), zip(ends, spectra, strict=True), strict=True))
+        self.width = abs(ends[1].value - ends[0].value)
+
+    def at(self, share: float) -> tuple[BranchPoint, list[np.ndarray]]:
+        """Return the point at a share of the way, with the multipliers of each subspace.
+
+        Raises:
+            NoOrbit: it cannot be resolved.
+
+        """
+        if share not in self._known:
+            place = _between(self._left, self._right, share)
+            if place is None:
+                raise NoOrbit('no orbit between two points of a branch')
+            point = BranchPoint(place.value, place.curve.orbit(place.z), place)
+            self._known[share] = point, _parts(multipliers(point.orbit))
+        return self._known[share]
+
+
+def _located(gap: _Gap, part: int, rank: int, exact: float) -> Bifurcation | None:
+    """Return the crossing between two points of a multiplier with so many that are larger."""
     def size(share: float) -> float:
         """Logarithm of the multiplier's modulus."""
-        place = {0.0: left.place, 1.0: right.place}.get(share) or _between(
-            left.place, right.place, share)
-        if place is None:
-            raise NoOrbit('no orbit between two points of a branch')
-        point = BranchPoint(place.value, place.curve.orbit(place.z), place)
-        mu = complex(_parts(multipliers(point.orbit))[part][rank])
-        tried[share] = point, mu
-        return float(np.log(abs(mu)))
+        return float(np.log(np.abs(gap.at(share)[1][part][rank])))
 
     if size(0.0) * size(1.0) >= 0.0:
         return None
-    share = float(brentq(size, 0.0, 1.0, xtol=EXACT))
-    if share not in tried:
-        size(share)
-    point, mu = tried[share]
+    point, spectrum = gap.at(float(brentq(size, 0.0, 1.0, xtol=exact)))
+    mu = complex(spectrum[part][rank])
     if abs(mu.imag) > REAL:
         kind, mu = 'torus', complex(mu.real, abs(mu.imag))
     else:

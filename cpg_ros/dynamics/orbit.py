@@ -25,9 +25,11 @@ from typing import Any, NamedTuple
 
 from cpg_ros.dynamics.fourier import curve as fourier_curve
 from cpg_ros.dynamics.fourier import floquet as fourier_floquet
+from cpg_ros.dynamics.fourier import mode as fourier_mode
 from cpg_ros.dynamics.fourier import solve as fourier_solve
 from cpg_ros.dynamics.mesh import curve as mesh_curve
 from cpg_ros.dynamics.mesh import floquet as mesh_floquet
+from cpg_ros.dynamics.mesh import mode as mesh_mode
 from cpg_ros.dynamics.mesh import solve as mesh_solve
 from cpg_ros.dynamics.periodic import NoOrbit, Orbit
 from cpg_ros.networks.network import Network, Preset
@@ -45,10 +47,11 @@ class Way(NamedTuple):
     solve: ModuleType
     curve: ModuleType
     floquet: ModuleType
+    mode: ModuleType
 
 
-FOURIER = Way(fourier_solve, fourier_curve, fourier_floquet)
-MESH = Way(mesh_solve, mesh_curve, mesh_floquet)
+FOURIER = Way(fourier_solve, fourier_curve, fourier_floquet, fourier_mode)
+MESH = Way(mesh_solve, mesh_curve, mesh_floquet, mesh_mode)
 
 
 def way(network: Network) -> Way:

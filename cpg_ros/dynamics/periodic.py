@@ -160,13 +160,16 @@ def added_symmetry(symmetry: Symmetry, x: np.ndarray, same: float) -> str:
         same: signals that differ by less are one, over the range of all.
 
     """
-    points, size, own = len(x), np.ptp(x), dict(symmetry.shifts)
+    points, most, own = len(x), same * np.ptp(x), dict(symmetry.shifts)
     for name, element in symmetry.group.elements.items():
-        order = symmetry.group.order(name)
+        order, moved = symmetry.group.order(name), x[:, list(element)]
+        known = round(order * own[name]) if name in own else None
         for k in range(order):
-            if own.get(name) == k / order:
+            if k == known:
                 continue
-            gap = x[:, list(element)] - np.roll(x, -(points * k // order), axis=0)
-            if np.abs(gap).max() < same * size:
+            late = points * k // order
+            # One time tells of nearly all of them that they are none.
+            if (np.abs(moved[0] - x[late]).max() < most
+                    and np.abs(moved - np.roll(x, -late, axis=0)).max() < most):
                 return f'{name} shifts it by {k}/{order} of a cycle'
     return ''

@@ -15,10 +15,11 @@
 """Gaits sought by letting the network run, held in the gait's symmetry, until it repeats."""
 
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 
 from cpg_ros.dynamics.equilibrium import equilibrium
 from cpg_ros.dynamics.periodic import added_symmetry
-from cpg_ros.integration.simulate import LANES, simulate, Trajectory
+from cpg_ros.integration.simulate import History, LANES, simulate, Trajectory
 from cpg_ros.networks.network import Network
 from cpg_ros.networks.symmetry import Symmetry
 import numpy as np
@@ -28,13 +29,49 @@ SETTLING, HOLD = 30, 1.0
 #: Where no start is known, gaits are sought from waves about the equilibrium of these sizes, and
 #: from so many states in the gait's class at random about it, this far in the mean.
 SIZES, RANDOM, SCATTER = (0.5, 0.1, 2.0), 12, 0.3
-#: For how many steps, and how many of them are taken at once where there is no delay.
-SOUGHT, COARSER = 25_000, 2.0
+#: After how many steps it is looked whether a start has settled, twice as many each time, and how
+#: many of them are taken at once where there is no delay.
+LOOKED, COARSER = (3125, 6250, 12_500, 25_000), 2.0
+#: Rates below which a network rests, 1/model time, and what its cycles differ by at most, over
+#: their size, where they repeat: neither changes any more.
+RESTING, REPEATING = 1e-9, 1e-3
 #: How well what the network settles on has to repeat the gait's shifts, over its range, and from
 #: where on it has a further symmetry.
 KEPT, ADDED = 0.05, 0.01
 #: States over times in cycles, from a peak of cell 1 on.
 Path = Callable[[np.ndarray], np.ndarray]
+
+
+@dataclass(frozen=True)
+class Cycle:
+    """What a simulation repeats.
+
+    Attributes:
+        path: states over times in cycles, from a peak of cell 1 on.
+        period: model time.
+        drift: difference between the first and the last state that should be one, over the size.
+
+    """
+
+    path: Path
+    period: float
+    drift: float
+
+
+class _Past:
+    """States of a trajectory up to its end, at its nodes, as a history."""
+
+    def __init__(self, run: Trajectory) -> None:
+        self._run = run
+
+    def _nodes(self, times: np.ndarray) -> np.ndarray:
+        return np.maximum(np.rint(times / self._run.t[1]).astype(int) - 1, -len(self._run.t))
+
+    def __call__(self, times: np.ndarray) -> np.ndarray:
+        return self._run.x[self._nodes(times)]
+
+    def derivative(self, times: np.ndarray) -> np.ndarray:
+        return self._run.slopes[self._nodes(times)]
 
 
 def settled(network: Network, symmetry: Symmetry, start: np.ndarray, period: float,
@@ -45,12 +82,27 @@ def settled(network: Network, symmetry: Symmetry, start: np.ndarray, period: flo
     """
     step = min(network.step, period / 400.0)
     lock = (hold, symmetry) if hold else None
-    run = simulate(network, start, (SETTLING + 3) * period, step, lock=lock, progress=False)
-    return _cycle(run, int(SETTLING * period / step))
+    history: History = start
+    early = 0 if network.delay_parameter else SETTLING // 4
+    if early:
+        # Most states from which no gait is reached come to rest soon.
+        run = simulate(network, start, early * period, step, lock=lock, progress=False)
+        if _ends(run, run.t.size // 2):
+            return None
+        history = run.x[-1]
+    rest = SETTLING + 3 - early
+    run = simulate(network, history, rest * period, step, lock=lock, progress=False)
+    found = _cycle(run, int((rest - 3) * period / step))
+    return None if found is None else (found.path, found.period)
 
 
-def _cycle(run: Trajectory, first: int) -> tuple[Path, float] | None:
-    """Find what a simulation repeats from a step on, from a peak of cell 1: states and period."""
+def _ends(run: Trajectory, first: int) -> bool:
+    """Whether the network rests from a step on, or has left all bounds."""
+    return not np.isfinite(run.x[-1]).all() or bool(np.abs(run.slopes[first:]).max() < RESTING)
+
+
+def _cycle(run: Trajectory, first: int) -> Cycle | None:
+    """Find what a simulation repeats from a step on."""
     v, rise = run.x[first:, 0], run.slopes[first:, 0]
     if not np.isfinite(run.x[-1]).all() or np.ptp(v) < 1e-3:
         return None
@@ -64,7 +116,12 @@ def _cycle(run: Trajectory, first: int) -> tuple[Path, float] | None:
     if gaps.min() > 0.2:
         return None
     begin, found = run.t[peaks[0]], float(run.t[peaks[1 + close[0]]] - run.t[peaks[0]])
-    return lambda theta: run(begin + theta * found), found
+    # Of a cycle with several peaks alike, those that are one and the same point.
+    same = peaks[::1 + close[0]]
+    share = run.slopes[same, 0] / (run.slopes[same, 0] - run.slopes[same + 1, 0])
+    states = run(run.t[same] + share * run.t[1])
+    drift = float(np.abs(states - states[0]).max() / size) if len(same) > 2 else np.inf
+    return Cycle(lambda theta: run(begin + theta * found), found, drift)
 
 
 def starts(network: Network, symmetry: Symmetry) -> np.ndarray:
@@ -94,11 +151,24 @@ def sought(network: Network, gait: str) -> Iterator[tuple[Path, float]]:
     step = network.step * (1.0 if network.delay_parameter else COARSER)
     # As many at a time as advance together.
     for some in np.split(starts(network, symmetry), (len(SIZES) + RANDOM) // LANES):
-        run = simulate(network, some, SOUGHT * step, step, lock=(HOLD, symmetry), progress=False)
-        for x, slopes in zip(run.x, run.slopes, strict=True):
-            found = _cycle(Trajectory(run.t, x, slopes), SOUGHT * 3 // 4)
-            if found is not None and _fits(found[0], symmetry):
-                yield found
+        histories: list[History] = list(some)
+        before = 0
+        for steps in LOOKED:
+            batch = simulate(network, histories, (steps - before) * step, step,
+                             lock=(HOLD, symmetry), progress=False)
+            histories = []
+            for x, slopes in zip(batch.x, batch.slopes, strict=True):
+                run = Trajectory(batch.t, x, slopes)
+                first = steps * 3 // 4 - before
+                found = _cycle(run, first)
+                if steps < LOOKED[-1] and not _ends(run, first) and (
+                        found is None or found.drift > REPEATING):
+                    histories.append(_Past(run))
+                elif found is not None and _fits(found.path, symmetry):
+                    yield found.path, found.period
+            if not histories:
+                break
+            before = steps
 
 
 def _fits(path: Path, symmetry: Symmetry) -> bool:

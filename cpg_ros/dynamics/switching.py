@@ -22,8 +22,7 @@ from fractions import Fraction
 
 from cpg_ros.dynamics.bifurcation import Bifurcation
 from cpg_ros.dynamics.continuation import Branch, from_disturbance
-from cpg_ros.dynamics.mesh.mode import mode
-from cpg_ros.dynamics.mesh.orbit import MeshOrbit
+from cpg_ros.dynamics.orbit import way
 from cpg_ros.dynamics.periodic import NoOrbit, richer
 from cpg_ros.errors import InputError
 from cpg_ros.networks.parameter_line import ParameterLine
@@ -41,23 +40,23 @@ def switched(bifurcation: Bifurcation, along: ParameterLine, low: float, high: f
     """Follow the branch that leaves at a branch point or a period doubling.
 
     Args:
-        bifurcation: of orbits of a network without delay.
+        bifurcation: of a branch of orbits.
         along: the line it was found on.
         low: least value.
         high: greatest value.
         most: points at most.
 
     Raises:
-        InputError: nothing of the kind leaves at a torus, or the network has a delay.
+        InputError: what leaves at a torus point are no periodic orbits.
         NoOrbit: Newton's method finds no orbit beside the point.
 
     """
     orbit, doubled = bifurcation.point.orbit, bifurcation.kind == 'period doubling'
-    if bifurcation.kind == 'torus' or not isinstance(orbit, MeshOrbit):
-        raise InputError('only at branch points and period doublings of networks without delay '
-                         'a branch of orbits is followed')
+    if bifurcation.kind == 'torus':
+        raise InputError(f'at the torus point at {along} {bifurcation.value:g} no branch of '
+                         'periodic orbits leaves')
     cycles = 2 if doubled else 1
-    disturbance = mode(orbit, bifurcation.part, -1.0 if doubled else 1.0)
+    disturbance = way(orbit.network).mode.mode(orbit, bifurcation.part, -1.0 if doubled else 1.0)
     theta = np.arange(POINTS) / POINTS
     symmetry = kept(orbit.symmetry, disturbance(cycles * theta), doubled)
     for amplitude in AMPLITUDES:
@@ -94,4 +93,7 @@ def kept(symmetry: Symmetry, disturbance: np.ndarray, doubled: bool) -> Symmetry
             if np.abs(image - turned).max() < SAME * size:
                 shifts[name] = choice
                 break
-    return Symmetry.of(symmetry.group, shifts, symmetry.variables)
+    # Two cycles that differ are no negatives of one another.
+    half = np.roll(x, len(x) // 2, axis=0)
+    odd = symmetry.odd and not doubled and bool(np.abs(x + half).max() < SAME * size)
+    return Symmetry.of(symmetry.group, shifts, symmetry.variables, odd)

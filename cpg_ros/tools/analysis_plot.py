@@ -45,6 +45,8 @@ CROSSINGS = {'torus': 'o', 'period doubling': '^', 'branch point': 'P'}
 #: Points of a branch at most, how far apart in arclength, how many times the first period the
 #: last may be (beyond, near a homoclinic orbit, branches wind), and how many branches are drawn.
 POINTS, LONGEST, SLOWEST, BRANCHES = 80, 0.2, 5.0, 12
+#: Share of the way between two points of a branch to which its crossings are drawn.
+VISIBLE = 0.01
 #: Roots that are drawn of each class, at most.
 ROOTS = 7
 
@@ -126,7 +128,7 @@ def _draw_branches(axes: Axes, analysis: Analysis) -> None:
                 bar(done)
             _draw_branch(axes, branch, kinds, _colour(gait))
             shown.add(gait)
-            for one in bifurcations(branch, spectra):
+            for one in bifurcations(branch, spectra, VISIBLE):
                 axes.plot(one.value, one.point.amplitude, marker=CROSSINGS[one.kind], markersize=6,
                           color=_colour(gait), markerfacecolor='white')
                 met[one.kind] = CROSSINGS[one.kind]

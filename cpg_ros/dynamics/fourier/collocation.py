@@ -21,17 +21,16 @@ import numpy as np
 
 @lru_cache(maxsize=16)
 def _tables(n: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Wave numbers 1..(n-1)/2, the circulant index table, and the derivative matrix."""
-    waves = np.arange(1, (n - 1) // 2 + 1)
+    """Derivatives by shift of the waves 0..(n-1)/2, circulant indices, and d/dtheta."""
+    waves = 2j * np.pi * np.arange((n + 1) // 2)
     index = (np.arange(n)[:, None] - np.arange(n)[None, :]) % n
     return waves, index, _kernel(n, waves, 0.0)[1][index]
 
 
 def _kernel(n: int, waves: np.ndarray, shift: float) -> tuple[np.ndarray, np.ndarray]:
     """Dirichlet kernel and its derivative at theta_m + shift, each of shape (n,)."""
-    angle = 2.0 * np.pi * np.outer(np.arange(n) / n + shift, waves)
-    return ((1.0 + 2.0 * np.cos(angle).sum(axis=1)) / n,
-            -4.0 * np.pi / n * (np.sin(angle) @ waves))
+    shifted = np.exp(waves * shift)
+    return np.fft.irfft(shifted, n), np.fft.irfft(waves * shifted, n)
 
 
 def derivative_matrix(n: int) -> np.ndarray:
@@ -78,5 +77,5 @@ def tail(values: np.ndarray) -> float:
 
 
 def resample(values: np.ndarray, n: int) -> np.ndarray:
-    """Nodal values on n nodes of the same interpolant."""
-    return evaluate(values, np.arange(n) / n)
+    """Nodal values on n nodes, more than there are, of the same interpolant."""
+    return np.fft.irfft(np.fft.rfft(values), n) * (n / values.size)

@@ -78,17 +78,18 @@ class Variation:
         self.inside, self.outside = split(orbit.symmetry)
         self._vectors: dict[int, np.ndarray] = {}
 
-    def period_map(self, columns: np.ndarray, gain: float
-                   ) -> tuple[int, Callable[[np.ndarray], np.ndarray]]:
-        """Return the map that takes histories in a subspace to those a period later.
+    def march(self, columns: np.ndarray, gain: float
+              ) -> tuple[int, Callable[[np.ndarray], np.ndarray]]:
+        """Return the map that takes histories in a subspace through a period.
 
         Args:
             columns: orthonormal, shape (components, d).
             gain: symmetry lock, 1/model time; 0 within the class.
 
         Returns:
-            Length of a history, d (n degree + 1), and a function of k histories, shape
-            (length, k).
+            Length of a history, d (n degree + 1), and a function that takes k histories, shape
+            (length, k), to values at the points of all elements from -tau on, shape
+            (points, d, k), where neighbours share one.
 
         """
         d, degree = columns.shape[1], DEGREE
@@ -100,16 +101,9 @@ class Variation:
         s = np.arange(degree)
         system[:, s, :, s, :] -= now.transpose(1, 0, 2, 3)
         inverse = np.linalg.inv(system.reshape(self.count, degree * d, degree * d))
-        # Where the last history lies among the elements.
-        points = np.append((np.arange(self.n)[:, None] + POINTS[:-1]).ravel(), self.n)
-        places = points + self.period / self.length
-        elements = np.minimum(places.astype(int), self.n + self.count - 1)
-        rows = _interpolation(places - elements)
-        nearby = elements[:, None] * degree + np.arange(degree + 1)
 
-        def later(histories: np.ndarray) -> np.ndarray:
+        def through(histories: np.ndarray) -> np.ndarray:
             k = histories.shape[1]
-            # Values at the points of all elements.
             values = np.empty(((self.n + self.count) * degree + 1, d, k))
             values[:self.n * degree + 1] = histories.reshape(-1, d, k)
             for element in range(self.count):
@@ -119,7 +113,44 @@ class Variation:
                     DERIVATIVE[1:, 0, None, None] / self.length * values[start])
                 values[start + 1:start + degree + 1] = (
                     inverse[element] @ right.reshape(degree * d, k)).reshape(degree, d, k)
-            return np.einsum('mk,mkds->mds', rows, values[nearby]).reshape(size, k)
+            return values
+
+        return size, through
+
+    def read(self, values: np.ndarray, times: np.ndarray) -> np.ndarray:
+        """Interpolate values at the points of all elements, shape (points, d, k).
+
+        Args:
+            values: as march has them.
+            times: from -tau to a period, over the length of an element, shape (m,).
+
+        Returns:
+            Values at the times, shape (m, d, k).
+
+        """
+        places = np.asarray(times) + self.n
+        elements = np.clip(places.astype(int), 0, self.n + self.count - 1)
+        nearby = elements[:, None] * DEGREE + np.arange(DEGREE + 1)
+        return np.einsum('mk,mkds->mds', _interpolation(places - elements), values[nearby])
+
+    def period_map(self, columns: np.ndarray, gain: float
+                   ) -> tuple[int, Callable[[np.ndarray], np.ndarray]]:
+        """Return the map that takes histories in a subspace to those a period later.
+
+        Args:
+            columns: as of march.
+            gain: as of march.
+
+        Returns:
+            Length of a history and a function of k histories, shape (length, k).
+
+        """
+        size, through = self.march(columns, gain)
+        points = np.append((np.arange(self.n)[:, None] + POINTS[:-1]).ravel(), self.n)
+        times = points - self.n + self.period / self.length
+
+        def later(histories: np.ndarray) -> np.ndarray:
+            return self.read(through(histories), times).reshape(histories.shape)
 
         return size, later
 

@@ -116,14 +116,15 @@ def _followed(known: MeshOrbit, network: Network) -> tuple[MeshOrbit | None, flo
     """Follow an orbit along the line to other parameters; also return the share reached."""
     start, end = known.network.as_dict(), network.as_dict()
     orbit, reached, step = known, 0.0, 0.25
-    while reached < 1.0 and step > 0.004:
+    # A failure costs more than a success, so steps shrink fast.
+    while reached < 1.0 and step > 0.003:
         share = min(1.0, reached + step)
         here = replace(network, **{key: start[key] + share * (end[key] - start[key])
                                    for key in start})  # type: ignore[type-var]
         found = _accepted(from_path(here, known.symmetry, _on_cycles(orbit), orbit.period))
         # A jump to another branch would be no continuation.
         if found is None or not 0.5 < found.period / orbit.period < 2.0:
-            step *= 0.5
+            step *= 0.25
             continue
         orbit, reached, step = found, share, 1.5 * step
     return (orbit if reached >= 1.0 else None), reached
