@@ -69,18 +69,21 @@ class Subject:
         return [int(seed) for seed in self.rng.integers(0, 2**31, 2 if self.quick else count)]
 
 
-def subject(robot_file: Path, gait: str, closed: bool, seed: int, quick: bool,
-            network: str = 'delayed', others: Sequence[str] = (), model: str = 'go2') -> Subject:
-    """Make a subject; seeds are those of the run, so that open and closed meet the same."""
+def subject(robot_file: Path, gait: str, gains: Gains | None, seed: int, quick: bool,
+            network: str = '', others: Sequence[str] = (), model: str = 'go2') -> Subject:
+    """Make a subject, on the robot's first network if none is named; open loop without gains.
+
+    Seeds are those of the run, so that open and closed meet the same.
+    """
     robot = load_robot(robot_file)
-    programs = [_program(robot, network, one) for one in (gait, *others)]
+    programs = [_program(robot, network or robot.networks[0], one) for one in (gait, *others)]
     loop = ClosedLoop(model, *programs)
     expected = {}
-    if closed:
+    if gains is not None:
         for program in programs:
             if program.motion.efference is None:
                 expected[program.name] = measure_efference(ClosedLoop(model, program))
-    return Subject(loop, expected, Gains() if closed else None, np.random.default_rng(seed),
+    return Subject(loop, expected, gains, np.random.default_rng(seed),
                    quick)
 
 
@@ -157,6 +160,7 @@ def flat(one: Subject) -> dict[str, object]:
             'off_line_m': float(np.abs(line.place[0, :, 1]).max()),
             'settling_s': settling(one),
             'friction_0.3_m': float(slippery.place[:, -1, 0].mean()),
+            'friction_0.3_speed': float(slippery.velocity[:, late:, 0].mean()),
             'friction_0.3_upright': float(slippery.upright.mean())}
 
 

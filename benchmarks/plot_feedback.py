@@ -27,6 +27,8 @@ import matplotlib
 matplotlib.use('Agg')
 import matplotlib.pyplot as plt  # noqa: E402
 
+#: Of the figures on a dark ground, NAME_dark.png.
+DARK = Path(__file__).resolve().parent.parent / 'docs' / 'static' / 'dark.matplotlibrc'
 LOOKS = {'closed': {'color': '#1f6fb4'}, 'open': {'color': '#c44e35'}}
 GROUNDS = {'height_field_6_cm': 'rough, 6 cm', 'height_field_8_cm': 'rough, 8 cm',
            'boxes_5_cm': 'boxes, 5 cm'}
@@ -77,7 +79,8 @@ def terrain(found: dict[str, dict[str, dict[str, Any]]], path: Path) -> None:
         axis.set_xticks(range(len(GROUNDS)), GROUNDS.values())
         axis.spines[['top', 'right']].set_visible(False)
     axes[0, 0].set_ylabel('crossed [%]')
-    axes[0, 0].legend(frameon=False)
+    figure.legend(*axes[0, 0].get_legend_handles_labels(), frameon=False, ncols=2,
+                  loc='outside upper center')
     figure.savefig(path, dpi=130)
 
 
@@ -90,6 +93,9 @@ def main() -> None:
     found = read(chosen.files)
     survival(found, chosen.out / 'feedback_pushes.png')
     terrain(found, chosen.out / 'feedback_terrain.png')
+    with plt.rc_context(fname=DARK):
+        survival(found, chosen.out / 'feedback_pushes_dark.png')
+        terrain(found, chosen.out / 'feedback_terrain_dark.png')
 
 
 if __name__ == '__main__':

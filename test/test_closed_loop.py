@@ -48,7 +48,7 @@ def walk(*parameters, seconds=10.0, bag=None):
             recorder = subprocess.Popen(
                 [sys.executable, str(HERE / 'recorder.py'), str(bag), 'joint_states'],
                 env=dict(os.environ, ROS_DOMAIN_ID=str(domain)), stdout=subprocess.PIPE, text=True)
-            assert recorder.stdout.readline() == 'recording\n'
+            assert recorder.stdout.readline() == 'listening\n'
         body = Process('-p', 'real_time_factor:=0.0', '-p', f'duration:={seconds}',
                        domain=domain, executable=EXECUTABLE.with_name('robot_sim'))
         ending.append(body)

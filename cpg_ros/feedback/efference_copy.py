@@ -59,7 +59,7 @@ class EfferenceCopy:
 
     def as_table(self) -> EfferenceTable:
         """Return it as a robot file has it."""
-        return EfferenceTable(tuple(self.speeds.tolist()), {
+        return EfferenceTable(tuple(self.speeds.round(4).tolist()), {
             key: tuple(tuple(row) for row in self.table[:, :, k].tolist())
             for k, key in enumerate(body_keys.SIGNALS)})
 

@@ -72,6 +72,9 @@ class Gains(NamedTuple):
         speed_most: the most by which speed changes the length of strides.
         sidestep_share: share of the commanded sideways motion that feet carry out.
         sidestep_most: the most that a foot is carried sideways [m].
+        sidestep_rate: how fast the sideways speed that feet are asked for is corrected by what is
+            missing of it [1/s].
+        sidestep_more: largest such correction, as a share of the commanded sideways speed.
         touchdown_gain: share of a landing's phase error that is corrected.
         tegotae_gain: largest change of the phase's rate when a leg bears the whole weight [rad/s].
         smooth: time constant with which every displacement is smoothed [s].
@@ -130,6 +133,8 @@ class Gains(NamedTuple):
 
     sidestep_share: float = 1.1
     sidestep_most: float = 0.08
+    sidestep_rate: float = 0.5
+    sidestep_more: float = 1.0
 
     touchdown_gain: float = 0.5
     tegotae_gain: float = 4.0

@@ -12,7 +12,10 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Sidestep: feet carry the body sideways while they stand, and step back while they swing."""
+"""Sidestep: feet carry the body sideways while they stand, and step back while they swing.
+
+How far they get depends on how the gait rocks the body: what is missing is added up and asked for.
+"""
 
 from cpg_ros.integration.jit import jit
 
@@ -38,3 +41,21 @@ def carry(way, wanted, gains, dt):
     """Return how far to the left a foot on the ground is of where the gait has it, m, dt later."""
     way -= dt * gains.sidestep_share * wanted
     return min(max(way, -gains.sidestep_most), gains.sidestep_most)
+
+
+@jit
+def gather(added, missing, wanted, gains, dt):
+    """Return what is asked of the feet beyond what is wanted, m/s, dt in s later.
+
+    Nothing where nothing is wanted.
+
+    Args:
+        added: so far, m/s.
+        missing: speed to the left, m/s.
+        wanted: speed to the left, m/s.
+        gains: of the law.
+        dt: s.
+
+    """
+    most = gains.sidestep_more * abs(wanted)
+    return min(max(added + dt * gains.sidestep_rate * missing, -most), most)

@@ -53,6 +53,7 @@ class Memory(NamedTuple):
         built: by reflexes, see reflexes, shape (runs, legs, 5).
         ground: low-passed roll and pitch, rad, shape (runs, 2).
         missed: integral of the missing speed, m, shape (runs,).
+        aside: asked of the feet beyond the sideways speed that is wanted, m/s, shape (runs,).
         stride: to be added to each leg's stride, shape (runs, legs).
         hurry: factor of the stride frequency, shape (runs,).
         fatigue: low-passed share by which it was above 1 for pushes, shape (runs,).
@@ -72,6 +73,7 @@ class Memory(NamedTuple):
     built: np.ndarray
     ground: np.ndarray
     missed: np.ndarray
+    aside: np.ndarray
     stride: np.ndarray
     hurry: np.ndarray
     fatigue: np.ndarray
@@ -89,9 +91,10 @@ class Memory(NamedTuple):
         return cls(np.zeros((runs, 3)), np.zeros((runs, legs), dtype=bool),
                    np.zeros((runs, legs, 3)), np.zeros((runs, legs, 2)), np.zeros((runs, legs)),
                    np.zeros((runs, legs, 5)), np.zeros((runs, 2)), np.zeros(runs),
-                   np.zeros((runs, legs)), np.ones(runs), np.zeros(runs), np.zeros(runs),
-                   np.zeros(runs), np.zeros((runs, 2, 2)), np.zeros(legs, dtype=bool),
-                   np.zeros((legs, 4)), np.zeros((5, 3)), np.zeros(SIGNALS))
+                   np.zeros(runs), np.zeros((runs, legs)), np.ones(runs), np.zeros(runs),
+                   np.zeros(runs), np.zeros(runs), np.zeros((runs, 2, 2)),
+                   np.zeros(legs, dtype=bool), np.zeros((legs, 4)), np.zeros((5, 3)),
+                   np.zeros(SIGNALS))
 
 
 @jit
@@ -160,14 +163,20 @@ def _cached(digest):
             wx, wy = turning[run, 0] - own[2], turning[run, 1] - own[3]
             roll, pitch = lean[run, 0] - own[4], lean[run, 1] - own[5]
 
+            # Feet that land together pitch and roll the body wherever they are put: of the laws
+            # that move feet or change the pace, only posture helps a hop.
+            turns = tables.turns[old] + mix[run] * (tables.turns[new] - tables.turns[old])
             ground = memory.ground[run]
             ground[0] = slope.follow(ground[0], roll, gains, dt)
             ground[1] = slope.follow(ground[1], pitch, gains, dt)
             uphill_x = uphill_y = 0.0
             if gains.slope:
-                uphill_x, uphill_y = slope.shift(ground[1], gains), -slope.shift(ground[0], gains)
+                uphill_x = turns * slope.shift(ground[1], gains)
+                uphill_y = -turns * slope.shift(ground[0], gains)
             step_x = placement.step(vx, wy, gains.step, gains.step_pitch_rate, gains)
             step_y = placement.step(vy, wx, gains.step_left, gains.step_roll_rate, gains)
+            memory.aside[run] = sidestep.gather(memory.aside[run], -vy, left, gains, share * dt)
+            sideways = left + memory.aside[run]
             strode = (phase - memory.phase[run] + 0.5) % 1.0 - 0.5
             memory.phase[run] = phase
             row = int((phase + LEAD) % 1.0 * POINTS) % POINTS
@@ -188,8 +197,9 @@ def _cached(digest):
                 x, y, z = uphill_x, uphill_y, 0.0
                 if gains.posture:
                     if swinging:
-                        z = posture.in_swing(foot[0], foot[1], roll - ground[0],
-                                             pitch - ground[1], gains)
+                        # A hop lands on legs that a falling nose would draw in.
+                        z = turns * posture.in_swing(foot[0], foot[1], roll - ground[0],
+                                                     pitch - ground[1], gains)
                     else:
                         # About the middle of the feet that stand: the body is tilted, not raised.
                         z = posture.in_stance(foot[0] - mean_x, foot[1] - mean_y, roll, pitch, wx,
@@ -202,23 +212,22 @@ def _cached(digest):
                     else:
                         stepped[0] = placement.stand(stepped[0], gains.give * vx, gains, dt)
                         stepped[1] = placement.stand(stepped[1], gains.give_left * vy, gains, dt)
-                    x, y = x + stepped[0], y + stepped[1]
+                    x, y = x + turns * stepped[0], y + turns * stepped[1]
                 if gains.sidestep:
                     carried = memory.carried[run, leg]
                     if swinging:
                         stance = tables.duty[slot, leg] * dt / max(strode, 0.1 * dt)
-                        carried = placement.swing(carried, sidestep.landing(left, stance, gains),
-                                                  gains, dt)
+                        landing = sidestep.landing(sideways, stance, gains)
+                        carried = placement.swing(carried, landing, gains, dt)
                     else:
-                        carried = sidestep.carry(carried, left, gains, dt)
+                        carried = sidestep.carry(carried, sideways, gains, dt)
                     memory.carried[run, leg] = carried
                     y += carried
                 if gains.reflexes:
-                    z += reflexes.advance(memory.built[run, leg], memory.contact[run, leg],
-                                          tables.swinging[slot, now, leg],
-                                          tables.progress[slot, now, leg], foot[2],
-                                          (roll - ground[0]) * foot[1]
-                                          - (pitch - ground[1]) * foot[0], gains, dt)
+                    z += turns * reflexes.advance(
+                        memory.built[run, leg], memory.contact[run, leg],
+                        tables.swinging[slot, now, leg], tables.progress[slot, now, leg], foot[2],
+                        (roll - ground[0]) * foot[1] - (pitch - ground[1]) * foot[0], gains, dt)
                 if gains.tegotae:
                     leaning += tegotae.rate(max(loads[run, leg], 0.0) / weight,
                                             tables.swinging[slot, now, leg],
@@ -234,7 +243,7 @@ def _cached(digest):
                 move_foot(rows[leg], columns[leg], out[run], foot, way)
             memory.hurry[run] = 1.0
             if gains.pace:
-                memory.hurry[run] += share * pace.hurry(vy, memory.fatigue[run], gains)
+                memory.hurry[run] += share * turns * pace.hurry(vy, memory.fatigue[run], gains)
             memory.fatigue[run] = pace.tire(memory.fatigue[run], memory.hurry[run] - 1.0, gains,
                                             dt)
             frequency = max(strode / dt, 0.1)

@@ -14,12 +14,17 @@
 
 """When each leg of a gait swings, and how far it has got, by the stride phase of the first leg."""
 
+import itertools
+
 from cpg_ros.feedback.kinematics import forward, Geometry
 from cpg_ros.motion.plan import Program
+from cpg_ros.robots.robot import Robot
 import numpy as np
 
 #: Points of a stride.
 POINTS = 512
+#: Legs of a pair swing together if they differ for less than this share of the stride.
+TOGETHER = 0.2
 
 
 class Timetable:
@@ -30,6 +35,7 @@ class Timetable:
         in_place: the same at strides of length 0.
         swinging: whether each leg is meant to, shape (POINTS, legs).
         progress: share of that swing, or else of its stance, that is over, shape (POINTS, legs).
+        hops: whether the left and right leg of each pair swing together.
 
     """
 
@@ -45,6 +51,19 @@ class Timetable:
         columns = [_swing(x) for x in feet[:, :, 0].T]
         self.swinging = np.stack([one for one, _ in columns], axis=1)
         self.progress = np.stack([one for _, one in columns], axis=1)
+        self.hops = _hops(robot, self.swinging)
+
+
+def _hops(robot: Robot, swinging: np.ndarray) -> bool:
+    pairs = [pair for pair in itertools.combinations(range(len(robot.legs)), 2)
+             if _paired(robot, *(list(robot.legs)[leg] for leg in pair))]
+    return bool(pairs) and all((swinging[:, one] != swinging[:, other]).mean() < TOGETHER
+                               for one, other in pairs)
+
+
+def _paired(robot: Robot, one: str, other: str) -> bool:
+    return (robot.girdles.get(one) == robot.girdles.get(other)
+            and {robot.sides.get(one), robot.sides.get(other)} == {'left', 'right'})
 
 
 def _periodic(values: np.ndarray, phase: np.ndarray) -> np.ndarray:

@@ -44,12 +44,13 @@ def measure_efference(loop: ClosedLoop, speeds: Sequence[float] | None = None) -
         asked = np.linspace(0.0, loop.program.speeds[1], SPEEDS) if speeds is None else speeds
     ran = loop.run([Scenario(speed=speed) for speed in asked], DURATION)
     first = round(BEGINNING / loop.timestep)
-    tables = []
-    for velocity, turning, lean, phase in zip(ran.velocity, ran.turning, ran.lean, ran.phase,
-                                              strict=True):
-        signals = np.concatenate([velocity[:, :2], turning[:, :2], lean[:, :2]], axis=1)
-        tables.append(fold(phase[first:], signals[first:]))
-    found = np.array([table[:, 0].mean() for table in tables])
+    # The velocity is what the robot makes of what it feels: an estimate that is a little wrong at
+    # every stride is no disturbance.
+    signals = np.concatenate([ran.estimated[:, :, :2], ran.turning[:, :, :2],
+                              ran.lean[:, :, :2]], axis=2)
+    tables = [fold(phase[first:], one[first:])
+              for phase, one in zip(ran.phase, signals, strict=True)]
+    found = ran.velocity[:, first:, 0].mean(axis=1)
     rising = np.argsort(found)
     return EfferenceCopy(found[rising], np.array(tables)[rising])
 

@@ -19,6 +19,7 @@ from io import BytesIO
 from pathlib import Path
 
 from cpg_ros.files.atomic_write import write_atomically
+from matplotlib import rcParams
 from matplotlib.figure import Figure
 import numpy as np
 
@@ -87,7 +88,7 @@ def plot_footfalls(path: Path, legs: Sequence[str], time: np.ndarray, forces: np
     above, below = figure.subplots(2, 1, sharex=True, height_ratios=[3, 2])
     for row in range(len(legs)):
         bars = stances(time, forces[:, row], least)
-        above.broken_barh(bars, (row - 0.36, 0.72), facecolor='black')
+        above.broken_barh(bars, (row - 0.36, 0.72), facecolor=rcParams['text.color'])
         share = sum(length for _, length in bars) / (time[-1] - time[0])
         above.annotate(f'{share:.0%}', (1.0, row), xycoords=('axes fraction', 'data'),
                        xytext=(4, 0), textcoords='offset points', va='center', fontsize=8)

