@@ -43,8 +43,9 @@ def swing(k: np.ndarray | int) -> np.ndarray:
 def command(domain: int, times: Path, stand: list[float]) -> None:
     """Publish targets every period, and note when: the process of its own that is a generator."""
     import rclpy
+    from rclpy.signals import SignalHandlerOptions
     from std_msgs.msg import Float64MultiArray
-    rclpy.init(domain_id=domain)
+    rclpy.init(domain_id=domain, signal_handler_options=SignalHandlerOptions.NO)
     node = rclpy.create_node('targets')
     publisher = node.create_publisher(Float64MultiArray,
                                       'forward_position_controller/commands', 1)
@@ -93,6 +94,8 @@ def measure(seconds: float) -> None:
                 time.sleep(1.0)
                 held = 'damping' not in bridge.output
             spent = time.monotonic() - began
+            if not held:
+                log(bridge.output.splitlines()[-1])
             cpu, memory = bridge.cpu_s() - cpu, (memory, bridge.resident_mb())
             noted = np.fromfile(file.name)
         finally:
@@ -100,17 +103,15 @@ def measure(seconds: float) -> None:
             bridge.end()
             until(lambda: robot.damped, 'damping')
             robot.end()
-        arrivals = np.array([row for row in list(robot.arrivals)
-                             if began < row[0] < began + spent])
-        damped = robot.since(began)
-        damped = damped[damped[:, 0] < began + spent]
-        gaps = np.diff(arrivals[:, 0])
-        age = ages(noted, arrivals)
+        rows = robot.since(began)
+        rows = rows[rows[:, 0] < began + spent]
+        gaps = np.diff(rows[:, 0])
+        age = ages(noted, rows[:, [0, 5]])
         sending = np.diff(noted[noted > 0.0])
         emit(benchmark='unitree', seconds=spent, held=held, wrong_sums=robot.wrong,
-             commands_hz=len(arrivals) / spent,
+             commands_hz=len(rows) / spent,
              late_percent=100.0 * float((gaps > 2.0 * PERIOD).mean()),
-             watchdog_commands=int((damped[:, 1] == 0.0).sum()),
+             watchdog_commands=int((rows[:, 1] == 0.0).sum()),
              sender_late_percent=100.0 * float((sending > 2.0 * PERIOD).mean()),
              gap_ms={f'p{p}': 1e3 * float(np.percentile(gaps, p)) for p in (50, 99, 99.9)},
              age_ms={f'p{p}': 1e3 * float(np.percentile(age, p)) for p in (50, 99, 99.9)},

@@ -14,7 +14,7 @@
 
 """Every fault of the bridge's table many times against a stand-in robot: when it damps.
 
-usage: bench_unitree_faults.py [--times 20] [--patient]
+usage: bench_unitree_faults.py [--times 20] [--only NAME] [--frequency 2] [--patient]
 """
 
 import argparse
@@ -31,7 +31,8 @@ def main() -> None:
     """Walk, break something, see what happens, mend it; as often as asked."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument('--times', type=int, default=20)
-    parser.add_argument('--only', default='')
+    parser.add_argument('--only', default='', help='faults with this in their names')
+    parser.add_argument('--frequency', type=float, default=2.0, help='of the trot, Hz')
     parser.add_argument('--patient', action='store_true', help='time limits for a busy machine')
     given = parser.parse_args()
     enter_workspace()
@@ -44,7 +45,7 @@ def main() -> None:
         rows, failures, restarts, walk = [], [], 0, None
         while len(rows) + len(failures) < given.times and restarts < given.times:
             if walk is None:
-                walk = Walk(*limits)
+                walk = Walk(*limits, frequency=given.frequency)
             try:
                 walk.walking()
             except AssertionError as error:
@@ -55,25 +56,27 @@ def main() -> None:
                 walk = None
                 continue
             try:
-                damped, sat, torque, step = inflict(walk, fault)
+                damped, sat, torque, step, upright = inflict(walk, fault)
                 rows.append((damped, sat[0] if sat else np.nan, torque, step,
-                             bool(sat) == (sitting is not None)))
+                             bool(sat) == (sitting is not None), upright))
             except AssertionError as error:
                 failures.append(str(error)[-300:])
             mend(walk)
         if walk is not None:
             walk.end()
-        table = np.array(rows, dtype=float).reshape(-1, 5)
+        table = np.array(rows, dtype=float).reshape(-1, 6)
         found[fault.__name__] = {
             'times': len(rows), 'failed': len(failures), 'as promised': int(table[:, 4].sum()),
-            'within': within, 'in time': int((table[:, 0] <= within).sum()),
+            'upright': int(table[:, 5].sum()), 'within': within,
+            'in time': int((table[:, 0] <= within).sum()),
             'damped_s': [*map(float, np.percentile(table[:, 0], (50, 100)))] if rows else [],
             'sat_s': [float(np.nanmedian(table[:, 1])), float(np.nanmax(table[:, 1]))]
             if rows and sitting else [],
             'largest_torque_of_limit': float(table[:, 2].max(initial=0)),
             'largest_step_nm': float(table[:, 3].max(initial=0)), 'restarts': restarts}
         log(f'{fault.__name__}: {found[fault.__name__]}')
-    emit(benchmark='unitree_faults', patient=given.patient, faults=found)
+    emit(benchmark='unitree_faults', patient=given.patient, frequency=given.frequency,
+         faults=found)
 
 
 if __name__ == '__main__':

@@ -17,7 +17,6 @@
 Written apart from cpg_ros.unitree: bytes by struct, the check sum by a table.
 """
 
-from collections import deque
 import json
 import math
 import struct
@@ -38,6 +37,8 @@ STATE = struct.Struct('<4B4IHxx 13fb Bxx7fb3xI2I' + 'B3x7fb3xI2I' * 19
 #: The C struct of LowCmd, as Unitree's own packs it.
 C_STRUCT = struct.Struct('<4B4IH2x' + 'B3x5f3I' * 20 + '4B40B12B2BBx2I')
 LYING = (0.0, 1.36, -2.65)
+#: Commands that are kept: half an hour.
+MOST = 1_000_000
 
 
 def _table():
@@ -68,8 +69,6 @@ class StandIn(threading.Thread):
     """The robot, in real time; its attributes may be set from another thread.
 
     Attributes:
-        commands: of each: time s, largest kp, largest torque by what the joint bears, largest
-            change of torque against the command before on the same state in N m, kd's largest.
         wrong: how many had a wrong check sum.
         mute: publishes no state.
         frozen: publishes the last state again and again.
@@ -105,8 +104,9 @@ class StandIn(threading.Thread):
                     self.node.create_subscription(Request, f'/api/{name}/request',
                                                   lambda _: None, 10),
                     self.node.create_publisher(Response, f'/api/{name}/response', 10))
-        self.commands: deque = deque(maxlen=1_000_000)
-        self.arrivals: deque = deque(maxlen=1_000_000)
+        # Rows of an array: a list of them that grows makes Python's collection of garbage take
+        # longer than states may stay away.
+        self._rows, self._count = np.zeros((MOST, 6)), 0
         self.wrong = 0
         self.mute = self.frozen = self.cut = False
         self.lean, self.heat, self.buttons = 0.0, 30, 0
@@ -179,9 +179,9 @@ class StandIn(threading.Thread):
         torque = kp * (q - angle) - kd * speed
         old_q, _, old_kp, old_kd = self._before
         step = np.abs(torque - (old_kp * (old_q - angle) - old_kd * speed))
-        self.commands.append((now, kp.max(), (np.abs(torque) / self.limit).max(), step.max(),
-                              kd.max()))
-        self.arrivals.append((now, q[0]))
+        self._rows[self._count] = (now, kp.max(), (np.abs(torque) / self.limit).max(),
+                                   step.max(), kd.max(), q[0])
+        self._count += 1
         self._before = np.array([q, dq, kp, kd])
         self.q, self.kp, self.kd = q, kp, kd
         self._drive(q, kp, kd)
@@ -225,10 +225,19 @@ class StandIn(threading.Thread):
 
     # -- what tests look at ---------------------------------------------------------------
 
+    @property
+    def commands(self):
+        """A row for each with a right check sum: six columns.
+
+        Time s, largest kp, largest torque by what the joint bears, largest change of torque
+        against the command before on the same state in N m, largest kd, the first angle in rad.
+        """
+        return self._rows[:self._count]
+
     def since(self, time_from):
-        """Commands since a time: rows of ``commands``."""
-        rows = [row for row in list(self.commands) if row[0] >= time_from]
-        return np.array(rows).reshape(-1, 5)
+        """Return the commands since a time, as rows of ``commands``."""
+        rows = self.commands
+        return rows[np.searchsorted(rows[:, 0], time_from):]
 
     @property
     def damped(self):

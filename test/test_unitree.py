@@ -80,7 +80,10 @@ def test_it_rises_from_where_it_is_follows_and_sits():
     steps = np.abs(np.diff([row[0] for row in rig.commands], axis=0))
     assert steps.max() < 0.01
     rig.machine.sit(rig.now, 'SIGINT')
-    rig.run(1.4)
+    # The gait fades while its targets come.
+    rig.run(0.25)
+    assert np.allclose(rig.machine.command.q, GO2.stand + 0.05, atol=1e-3)
+    rig.run(1.65)
     assert rig.machine.phase is Phase.SITTING
     rig.run(0.2)
     assert rig.machine.phase is Phase.DAMPING
@@ -100,12 +103,14 @@ def test_slow_commands_are_interpolated():
     assert steps.max() == pytest.approx(0.006, rel=0.01)
 
 
-def test_no_fresh_target_holds_then_sits_then_damps():
+def test_no_fresh_target_holds_then_gathers_then_sits_then_damps():
     rig = Rig().following()
     rig.target = None
-    rig.run(0.096)
-    assert rig.machine.phase is Phase.FOLLOWING
+    rig.run(0.026)
     assert np.allclose(rig.machine.command.q, GO2.stand + 0.1, atol=1e-6)
+    rig.run(0.07)
+    assert rig.machine.phase is Phase.FOLLOWING
+    assert np.allclose(rig.machine.command.q, GO2.stand, atol=1e-6)
     rig.run(0.008)
     assert rig.machine.phase is Phase.SITTING and 'no fresh target' in rig.machine.reason
     # A generator that comes back does not lift it again.
@@ -119,13 +124,33 @@ def test_no_fresh_target_holds_then_sits_then_damps():
     assert rig.machine.phase is Phase.FOLLOWING
 
 
+def test_targets_that_come_back_in_time_are_joined_smoothly():
+    rig = Rig().following()
+    rig.target = None
+    rig.run(0.096)
+    first, rig.target = len(rig.commands), GO2.stand + 0.1
+    rig.run(0.1)
+    assert rig.machine.phase is Phase.FOLLOWING
+    assert np.allclose(rig.machine.command.q, GO2.stand + 0.1, atol=1e-6)
+    assert np.abs(np.diff([row[0] for row in rig.commands[first:]], axis=0)).max() < 0.01
+
+
+def test_a_generator_that_ends_amid_the_fading_is_not_waited_for():
+    rig = Rig().following()
+    rig.machine.sit(rig.now, 'SIGINT')
+    rig.run(0.2)
+    rig.target = None
+    rig.run(1.55)
+    assert rig.machine.phase is Phase.DAMPING
+
+
 def test_a_leap_of_a_target_is_not_followed():
     rig = Rig().following()
     held = rig.machine.command.q.copy()
     rig.target = GO2.stand + 1.0
-    rig.run(0.09)
+    rig.run(0.026)
     assert np.allclose(rig.machine.command.q, held)
-    rig.run(0.02)
+    rig.run(0.084)
     assert rig.machine.phase is Phase.SITTING and 'leapt by 0.' in rig.machine.reason
     again = Rig().following()
     again.target = GO2.stand - 0.8
@@ -181,6 +206,19 @@ def test_a_mute_robot_damps_after_20_ms():
     assert rig.machine.phase is Phase.FOLLOWING
     rig.run(0.006)
     assert rig.machine.phase is Phase.DAMPING and 'no fresh state' in rig.machine.reason
+
+
+def test_without_a_fresh_state_joints_are_held_where_they_were_told_last():
+    rig = Rig().following()
+    first = len(rig.commands)
+    for k in range(14):
+        rig.target, rig.mute = GO2.stand + 0.1 - 0.01 * k, k >= 5
+        rig.run(DT)
+    wanted = np.array([row[0] for row in rig.commands[first:]])
+    assert rig.machine.phase is Phase.FOLLOWING
+    # Two periods without a state may be a late one.
+    assert np.allclose(np.diff(wanted[:7], axis=0), -0.01, atol=1e-6)
+    assert not np.diff(wanted[6:], axis=0).any()
 
 
 def test_a_frozen_robot_is_mute():

@@ -85,8 +85,9 @@ def test_from_lying_in_its_own_mode_to_walking_and_back():
 def test_what_happens_on_a_fault(walk, fault):
     walk.walking()
     try:
-        _, sat, torque, step = inflict(walk, fault)
-        assert bool(sat) == (FAULTS[fault][1] is not None)
+        _, sat, torque, step, upright = inflict(walk, fault)
+        # Sitting down is done on the feet; who lets go in mid-stride may roll over.
+        assert bool(sat) == (FAULTS[fault][1] is not None) and (upright or not sat)
         assert torque < 1.2 and step < 15.0
     finally:
         mend(walk)

@@ -36,8 +36,8 @@ COMMANDS = 'forward_position_controller/commands'
 class Walk:
     """All three of them, with what has been seen of the bridge's phases."""
 
-    def __init__(self, *parameters, services=False):
-        self.domain = free_domain()
+    def __init__(self, *parameters, services=False, frequency=2.0):
+        self.domain, self._frequency = free_domain(), frequency
         self.robot = StandIn(self.domain, services=services)
         self._parameters = [word for name in (
             'command:=forward_position', f'motion_switcher:={str(services).lower()}', *parameters)
@@ -60,7 +60,7 @@ class Walk:
     def start_generator(self):
         self.generator = Process(*(word for name in (
             'robot:=unitree_go2', 'rate:=500.0', "combined_topic:=''",
-            'feedback:=false', 'gait:=trot',
+            'feedback:=false', 'gait:=trot', f'frequency:={self._frequency}',
             'command:=forward_position', 'exclusive:=false') for word in ('-p', name)),
             domain=self.domain)
 
@@ -104,8 +104,8 @@ class Walk:
         """Seconds from an instant until the first command that damps for good."""
         def for_good():
             # A watchdog that a busy machine made look up damps for a tick or two.
-            last = [row[1] for row in list(self.robot.commands)[-25:]]
-            return self.robot.commands[-1][0] > instant and not any(last)
+            rows = self.robot.commands
+            return rows[-1, 0] > instant and not rows[-25:, 1].any()
 
         until(for_good, 'damping')
         rows = self.robot.since(instant)
@@ -174,11 +174,17 @@ def network_cut(walk):
     return time.monotonic()
 
 
+def interrupted(walk):
+    walk.bridge.signal(signal.SIGINT)
+    return time.monotonic()
+
+
 #: What is done -> within how many s it must damp; and when it must begin to sit, if it does.
 FAULTS = {generator_killed: (1.6 + 0.1, 0.1), generator_stopped: (1.6 + 0.1, 0.1),
           generator_restarted: (1.6 + 0.1, 0.1), nan_target: (0.02, None),
           target_leaps: (1.6 + 0.1, 0.1), state_frozen: (0.04, None), tilt: (0.02, None),
-          bridge_killed: (0.02, None), network_cut: (0.02, None)}
+          bridge_killed: (0.02, None), network_cut: (0.02, None),
+          interrupted: (0.5 + 1.5 + 0.1, 0.02)}
 
 
 def mend(walk):
@@ -195,8 +201,8 @@ def mend(walk):
 def inflict(walk, fault):
     """Let a fault happen; return seconds until it damped, and what was seen meanwhile.
 
-    Largest torque commanded by what the joint bears, and largest step of it in N m between two
-    commands that both hold the joints.
+    When it began to sit, s; largest torque commanded by what the joint bears; largest step of it
+    in N m between two commands that both hold the joints; whether the robot is upright.
     """
     seen = len(walk.phases)
     instant = fault(walk)
@@ -207,5 +213,8 @@ def inflict(walk, fault):
         walk.generator.wait_for('publishing')
         time.sleep(0.5)
     assert walk.robot.damped and not walk.robot.wrong
+    if fault is interrupted:
+        walk.bridge.wait()
     sat = [at - instant for at, phase in walk.phases[seen:] if phase == 'sitting']
-    return damped, sat, rows[:, 2].max(), rows[1:, 3][held].max(initial=0.0)
+    return (damped, sat, rows[:, 2].max(), rows[1:, 3][held].max(initial=0.0),
+            not walk.robot.leaning)

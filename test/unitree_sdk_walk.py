@@ -112,6 +112,9 @@ try:
     bridge.signal(signal.SIGINT)
     bridge.wait()
     time.sleep(1.5)
+except AssertionError:
+    print(bridge.log, seen[-3:], sep='\n', file=sys.stderr)
+    raise
 finally:
     for one in (generator, bridge, watcher):
         one.end()

@@ -104,12 +104,10 @@ class Commands:
         """Take what has arrived; return whether all topics have brought what is expected."""
         self.refused = ''
         for k, (subscription, read) in enumerate(self._sources):
-            last = None
+            # Every one: what cannot be used is told even if a better one has followed.
             for message, _ in taken(subscription):
-                last = message
-            if last is not None:
                 try:
-                    self._fresh[k] |= read(last)
+                    self._fresh[k] |= read(message)
                 except _Bad as error:
                     self.refused = str(error)
                     self._node.get_logger().warning(f'ignored: {error}',

@@ -41,8 +41,10 @@ class Settings:
         damping: kd once nothing else holds the joints, N m s / rad.
         rise: time from the measured pose to the stand, s.
         approach: time from the stand to the first targets, s.
+        late: longest time at a last target before the legs gather at the stand, s.
+        fade: time in which a gait fades to the stand before the robot sits, s; less than ``sit``.
         sit: time from the stand to lying, s.
-        fold: time in which legs amid a stride join the others on that way, s.
+        fold: time in which legs amid a stride gather on that way, or at the stand, s.
         target_timeout: longest time without a fresh target, s.
         state_timeout: longest time without a fresh state, s.
         tilt: largest lean of the body, rad.
@@ -66,8 +68,10 @@ class Settings:
     damping: float = 5.0
     rise: float = 2.0
     approach: float = 1.0
+    late: float = 0.03
+    fade: float = 0.5
     sit: float = 1.5
-    fold: float = 0.15
+    fold: float = 0.06
     target_timeout: float = 0.1
     state_timeout: float = 0.02
     tilt: float = math.radians(50.0)

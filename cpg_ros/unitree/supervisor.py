@@ -44,6 +44,10 @@ class Phase(Enum):
 #: Phases in which joints are held at angles.
 DRIVEN = (Phase.RISING, Phase.STANDING, Phase.FOLLOWING, Phase.SITTING)
 
+#: Without a fresh state for so many periods, what was commanded last is held: what torque another
+#: angle would ask for is not known.
+STALE = 2.5
+
 
 def _between(start: np.ndarray, end: np.ndarray, share: float) -> np.ndarray:
     """Return the angles on the smooth way from one pose to another, share from 0 to 1 or more."""
@@ -80,6 +84,7 @@ class Supervisor:
         self.phase, self.reason = Phase.IDLE, ''
         self._at = self._from = settings.stand
         self._began = self._before = 0.0
+        self._fades, self._gathered = False, 0.0
         self._heard, self._counter = -np.inf, -1
 
     # -- what comes from outside ----------------------------------------------------------
@@ -98,7 +103,7 @@ class Supervisor:
         reason = self._danger(now)
         if reason:
             return reason
-        self._at = self.state.q.astype(float)
+        self._at, self._gathered = self.state.q.astype(float), 0.0
         self.targets.forget()
         self._enter(Phase.RISING, now, 'from the pose that it was found in')
         return ''
@@ -116,8 +121,13 @@ class Supervisor:
             self.damp(now, reason)
 
     def sit(self, now: float, reason: str) -> None:
-        """Sit down, if it is up; what damps already goes on damping."""
+        """Sit down, if it is up; what damps already goes on damping.
+
+        A gait whose targets still come fades to the stand first.
+        """
         if self.phase in DRIVEN and self.phase is not Phase.SITTING:
+            self._fades = (self.phase is Phase.FOLLOWING and not self._gathered
+                           and self.since(now) >= self._settings.approach)
             self._enter(Phase.SITTING, now, reason)
 
     def damp(self, now: float, reason: str) -> None:
@@ -178,23 +188,40 @@ class Supervisor:
 
     def _lead(self, now: float, dt: float) -> None:
         settings, phase, passed = self._settings, self.phase, now - self._began
+        # After a late tick no more than two periods' way.
+        dt = min(dt, 2.0 * settings.period)
         if phase is Phase.FOLLOWING:
-            goal, time = self.targets.at(now), settings.approach
+            goal, time = self._followed(now, dt), settings.approach
         elif phase is Phase.SITTING:
-            # All legs on one way: a robot that holds its legs as in mid-stride topples.
-            goal = _between(settings.stand, settings.lying, passed / settings.sit)
-            time = settings.fold
+            goal, time = self._seated(now)
+            passed = now - self._began
         else:
             goal, time = settings.stand, settings.rise if phase is Phase.RISING else 0.0
         if passed < time:
             goal = _between(self._from, goal, passed / time)
-        # After a late tick no more than two periods' way.
-        way = settings.velocity * min(dt, 2.0 * settings.period)
+        way = settings.velocity * dt
         self._at = np.minimum(np.maximum(goal, self._at - way), self._at + way)
         if passed >= (settings.sit if phase is Phase.SITTING else time):
             self._arrive(now)
-        if self.phase in DRIVEN:
+        if self.phase in DRIVEN and now - self._heard < STALE * settings.period:
             self._drive()
+
+    def _followed(self, now: float, dt: float) -> np.ndarray:
+        """Return the target; if no other follows, the legs gather at the stand, and come back."""
+        settings, targets = self._settings, self.targets
+        way = dt if targets.reached(now) > settings.late else -dt
+        self._gathered = min(max(0.0, self._gathered + way / settings.fold), 1.0)
+        return _between(targets.at(now), settings.stand, self._gathered)
+
+    def _seated(self, now: float) -> tuple[np.ndarray, float]:
+        """Return where the joints go to sit down, and how long they take to join that way."""
+        settings, passed = self._settings, now - self._began
+        if self._fades:
+            if passed < settings.fade and self.targets.reached(now) < settings.late:
+                return _between(self.targets.at(now), settings.stand, passed / settings.fade), 0.0
+            self._fades, self._began, self._from, passed = False, now, self._at, 0.0
+        # All legs on one way: a robot that holds its legs as in mid-stride topples.
+        return _between(settings.stand, settings.lying, passed / settings.sit), settings.fold
 
     def _arrive(self, now: float) -> None:
         settings = self._settings

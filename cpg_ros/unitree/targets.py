@@ -78,3 +78,7 @@ class Targets:
             return self._to
         share = (now - self._began) / self._span
         return self._from + share * (self._to - self._from)
+
+    def reached(self, now: float) -> float:
+        """Return how long the joints have been where the last target wants them, s."""
+        return now - self._began - self._span
