@@ -67,7 +67,11 @@ class Warped:
         """Return the mean cycles at theta in cycles, shape (joints, m)."""
         c = self.coefficients
         weights = np.vstack([c.real[:1], 2.0 * c.real[1:], -2.0 * c.imag[1:]])
-        return series(weights, rows_of(theta, len(c) - 1))
+        out = np.empty((c.shape[1], theta.size))
+        for first in range(0, theta.size, BLOCK):
+            part = slice(first, first + BLOCK)
+            out[:, part] = series(weights, rows_of(theta[part], len(c) - 1))
+        return out
 
 
 def blocks(phases: np.ndarray) -> list[slice]:

@@ -20,7 +20,7 @@ the leg together, as the cross-correlation that leg phases come from weighs them
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from cpg_ros.gaits.phase_average import Warped
 import numpy as np
@@ -70,15 +70,17 @@ def phase_scatter(phases: np.ndarray, x: np.ndarray, found: Warped,
     stride = np.floor(theta - theta[0]).astype(int)
     count = int(stride[-1]) + 1
     order = np.arange(len(found.coefficients))[:, None]
-    slopes = Warped(found.zero, 2j * np.pi * order * found.coefficients, found.spread,
-                    found.error, found.counts, found.spikes, found.left).mean(theta).T
-    left = np.where(np.isfinite(x), x - found.mean(theta).T, 0.0)
-    slopes = np.where(np.isfinite(x), slopes, 0.0)
     early = np.full((len(legs), count), np.nan)
     for row, joints in zip(early, legs.values(), strict=True):
         columns = [names.index(name) for name in joints]
-        along, power = (np.bincount(stride, np.sum(one[:, columns] * slopes[:, columns], axis=1),
-                                    count) for one in (left, slopes))
+        # Leg by leg: a long recording is large.
+        own, c = x[:, columns], found.coefficients[:, columns]
+        slopes = replace(found, coefficients=2j * np.pi * order * c).mean(theta).T
+        left = own - replace(found, coefficients=c).mean(theta).T
+        missing = ~np.isfinite(own)
+        left[missing] = slopes[missing] = 0.0
+        along, power = (np.bincount(stride, np.sum(one * slopes, axis=1), count)
+                        for one in (left, slopes))
         told = power > ENOUGH * np.median(power)
         row[told] = along[told] / power[told]
     return {leg: _scatter(row - early[0]) for leg, row in zip(legs, early, strict=True)}

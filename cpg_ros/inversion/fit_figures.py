@@ -21,13 +21,19 @@ import matplotlib
 from matplotlib.figure import Figure
 import numpy as np
 
-RECORDED, FITTED, BAND = '#1a202c', '#c53030', '#cbd5e0'
+#: Of what is fitted, and of bands and zero lines, on light and on dark grounds; what is recorded
+#: has the colour of text.
+FITTED, BAND = '#e04040', '#90a0b080'
 LINES = ('#2b6cb0', '#c53030', '#2f855a', '#b7791f', '#805ad5', '#00838f')
 COLUMNS = 3
 #: Columns of the picture of a recording, and how far phases are shown beyond the seam (cycles).
 COLUMN, SEAM = 1200, 0.12
 #: Points of a cycle at which errors are shown, as in Liu & Zhang's Figures 5, 6, 8 and 9.
 POINTS = 20
+
+
+def _text() -> str:
+    return str(matplotlib.rcParams['text.color'])
 
 
 def _grid(count: int, height: float) -> tuple[Figure, np.ndarray]:
@@ -61,18 +67,18 @@ def joints(found: Inverted) -> Figure:
         spread = stride.spread[stride.joints.index(name)]
         axes.fill_between(fit.theta, recorded - spread, recorded + spread, color=BAND,
                           linewidth=0.0, label='spread of cycles')
-        axes.plot(fit.theta, recorded, color=RECORDED, linewidth=1.4, label='recorded')
+        axes.plot(fit.theta, recorded, color=_text(), linewidth=1.4, label='recorded')
         axes.plot(fit.theta, fitted, color=FITTED, linewidth=1.4, linestyle='--', label='fitted')
         poor = share[name] > POOR[fit.order]
         axes.set_title(f'{name}: {100 * share[name]:.1f} % of range{", poor" if poor else ""}',
-                       fontsize=8, loc='left', color=FITTED if poor else 'black')
+                       fontsize=8, loc='left', color=FITTED if poor else _text())
         axes.set_ylabel('angle [rad]', fontsize=8)
     grid[0].legend(fontsize=7, frameon=False)
     strides = f'{stride.cycles} strides' if stride.cycles > 1 else '1 stride'
     figure.suptitle(f'Mean cycle of {strides} at {stride.frequency:.4f} Hz, and the '
                     f'{fit.gait} of the {fit.network.name} network, readout of order '
                     f'{fit.order}{": a poor fit" if found.poor else ""}', fontsize=10,
-                    color=FITTED if found.poor else 'black')
+                    color=FITTED if found.poor else _text())
     return figure
 
 
@@ -101,7 +107,7 @@ def phases(found: Inverted) -> Figure:
     for row, (leg, phase) in enumerate(found.stride.phases.items()):
         height = len(found.stride.phases) - 1 - row
         marks: list[tuple[float | None, dict[str, Any]]] = [
-            (phase, {'marker': 'o', 'markersize': 8, 'color': RECORDED, 'label': 'recorded'}),
+            (phase, {'marker': 'o', 'markersize': 8, 'color': _text(), 'label': 'recorded'}),
             (wanted.get(leg), {'marker': 'D', 'markersize': 11, 'color': FITTED,
                                'markerfacecolor': 'none', 'label': found.fit.gait})]
         for value, style in marks:
@@ -138,7 +144,7 @@ def stretch(found: Inverted) -> Figure:
     low, high = (extreme.reduceat(np.where(np.isnan(angles), none, angles), edges)
                  for extreme, none in ((np.minimum, np.inf), (np.maximum, -np.inf)))
     there = low <= high
-    axes.fill_between(recording.times[edges][there], low[there], high[there], color=RECORDED,
+    axes.fill_between(recording.times[edges][there], low[there], high[there], color=_text(),
                       linewidth=0.6)
     axes.axvspan(stride.begin, stride.end, color=FITTED, alpha=0.15, linewidth=0.0)
     axes.set_title(f'{name}; shaded: the steady stretch, {stride.begin:.2f} to {stride.end:.2f} s '
