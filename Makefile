@@ -49,18 +49,21 @@ docs: install/.built unitree
 figures: install/.built
 	@$(ENTER); $(VENV)/bin/python docs/figures.py $(ARGS)
 
-# Of what needs no graph, branches included; compiled code is not seen by it. The tree is imported,
-# not the installed copy, which is another file to the tool.
+# Of what needs no graph, branches included; compiled code is not seen by it. What is measured is
+# the installed copy, which is what the tests import.
+COVER = --cov=$$(echo install/cpg_ros/lib/python3*/*-packages/cpg_ros)
+# Tools run in folders of their own: what they ran is gathered here.
+export COVERAGE_FILE := $(CURDIR)/.coverage
+
 coverage: install/.built
-	@$(ENTER); export PYTHONPATH=$(CURDIR):$$PYTHONPATH; \
-		$(VENV)/bin/pytest test -n auto -m 'not live' --cov=cpg_ros --cov-branch \
-		--cov-report=term --cov-report=html:out/coverage $(ARGS)
+	@$(ENTER); $(VENV)/bin/pytest test -n auto -m 'not live' $(COVER) --cov-report=term \
+		--cov-report=html:out/coverage $(ARGS)
 
 test: install/.built docs
 	@$(VENV)/bin/ruff check .
 	@$(VENV)/bin/mypy
 	@$(VENV)/bin/lint-imports --no-logo
-	@$(ENTER); for part in '-n auto -m "not live"' \
+	@$(ENTER); for part in '-n auto -m "not live" $(if $(ARGS),,$(COVER) --cov-report= --cov-fail-under=90)' \
 		'-n $(LIVE) --dist loadgroup -m "live and not alone"' '-m alone'; do \
 		eval $(VENV)/bin/pytest test $$part $(ARGS) || [ $$? = 5 ]; done  # 5: none selected
 

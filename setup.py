@@ -33,7 +33,7 @@ setup(
         ('share/cpg_ros/plotjuggler', glob('plotjuggler/*.xml')),
         ('share/cpg_ros/foxglove', glob('foxglove/*.json')),
     ],
-    python_requires='>=3.10',
+    python_requires='>=3.11',
     install_requires=['setuptools', 'numpy', 'scipy', 'numba', 'matplotlib', 'PyYAML', 'sympy',
                       'rosbags>=0.11.9,<0.12'],
     extras_require={'panel': ['websockets>=14,<18'],

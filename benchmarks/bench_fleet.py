@@ -39,6 +39,7 @@ from cpg_ros.fleet.executors import cluster, processes
 from cpg_ros.fleet.many_recordings import Folders
 from cpg_ros.fleet.outcomes import outcomes
 from cpg_ros.fleet.recording_job import Settings
+from cpg_ros.tools.atlas import main as draw
 
 GOALS = {'efficiency': 1.8, 'overhead': 0.10}
 
@@ -85,6 +86,11 @@ def table(folder: Path, count: int, damaged: int) -> dict[str, object]:
         work.run(fleet)
     del os.environ[COUNT]
     calm_rows, rough_rows = rows(folder / 'calm'), rows(folder / 'rough')
+    for one, other in zip(calm_rows, rough_rows, strict=False):
+        if one != other:
+            log(f'{dict(one)["file"]} differs in '
+                + ', '.join(name for (name, value), pair in zip(one, other, strict=True)
+                            if value != pair[1]))
     reasons = {Path(dict(row)['file']).name.split('.')[0]: dict(row)['reason']
                for row in calm_rows if dict(row)['reason']}
     reasons |= {Path(dict(row)['file']).parent.name: dict(row)['reason'] for row in calm_rows
@@ -117,6 +123,18 @@ def efficiency(folder: Path, count: int, rounds: int = 3) -> float:
     return spent[1] / spent[2]
 
 
+def atlas_efficiency(folder: Path) -> float:
+    """The same of a map, start of the processes and the drawing included."""
+    spent = {}
+    for jobs in (1, 2, 2, 1):
+        began = time.monotonic()
+        out = folder / f'map-{began}'
+        draw(['--over', 'c=2:10', 'tau=0.2:2', '--points', '60x60', '--jobs', str(jobs),
+              '--out', str(out)])
+        spent[jobs] = spent.get(jobs, 0.0) + time.monotonic() - began
+    return spent[1] / spent[2]
+
+
 def overhead(folder: Path, count: int = 200, rounds: int = 3) -> float:
     """Share by which jobs of 0.1 s take longer on dask than on processes."""
     spent = {'dask': 0.0, 'processes': 0.0}
@@ -133,16 +151,20 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument('--recordings', type=int, default=1000)
     parser.add_argument('--damaged', type=int, default=20)
+    parser.add_argument('--efficiency', action='store_true', help='nothing else')
     parser.add_argument('--atlas', action='store_true')
     parser.add_argument('--searches', action='store_true')
     chosen = parser.parse_args()
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        emit(benchmark='fleet table', **table(folder, chosen.recordings, chosen.damaged))
+        if not chosen.efficiency:
+            emit(benchmark='fleet table', **table(folder, chosen.recordings, chosen.damaged))
         emit(benchmark='fleet efficiency', goal=GOALS['efficiency'],
-             two_processes_over_one=efficiency(folder, 24))
-        emit(benchmark='fleet overhead', goal=GOALS['overhead'],
-             dask_over_processes=overhead(folder))
+             two_processes_over_one={'inversion': efficiency(folder, 24),
+                                     'atlas': atlas_efficiency(folder)})
+        if not chosen.efficiency:
+            emit(benchmark='fleet overhead', goal=GOALS['overhead'],
+                 dask_over_processes=overhead(folder))
         if chosen.atlas:
             emit(benchmark='fleet atlas', **atlas(folder))
         if chosen.searches:
@@ -151,7 +173,6 @@ def main() -> None:
 
 def atlas(folder: Path) -> dict[str, object]:
     """A map of 200 x 200 points of all six gaits on two processes."""
-    from cpg_ros.tools.atlas import main as draw
     began = time.monotonic()
     draw(['--over', 'c=2:10', 'tau=0.2:2', '--jobs', '2', '--out', str(folder / 'atlas')])
     return {'seconds': time.monotonic() - began, 'goal_seconds': 600}

@@ -19,6 +19,7 @@ shows the one that fits the reader's theme. The pictures of the simulation take 
 """
 
 import argparse
+import base64
 import os
 from pathlib import Path
 import shutil
@@ -28,18 +29,25 @@ import tempfile
 
 DOCS = Path(__file__).resolve().parent
 DARK = DOCS / 'static' / 'dark.matplotlibrc'
-#: Figure -> module, and its arguments; OUT stands for the file to write.
+WALK = DOCS.parent / 'test' / 'data' / 'human_walking.csv'
+#: Figure -> module, its arguments, in which FOLDER stands for where it writes, and the file there.
 FIGURES = {
-    'footfalls': ('gait_diagram', ['OUT']),
-    'quadruped': ('gait_diagram', ['OUT', '--network', 'quadruped']),
-    'biped': ('gait_diagram', ['OUT', '--network', 'biped']),
-    'phase': ('gait_diagram', ['OUT', '--network', 'phase']),
-    'hopf': ('gait_diagram', ['OUT', '--network', 'hopf']),
-    'matsuoka': ('gait_diagram', ['OUT', '--network', 'matsuoka']),
+    **{name: ('gait_diagram', ['FOLDER/it.png', '--network', network], 'it.png')
+       for name, network in {'footfalls': 'delayed', 'quadruped': 'quadruped', 'biped': 'biped',
+                             'phase': 'phase', 'hopf': 'hopf', 'matsuoka': 'matsuoka'}.items()},
     'branches': ('analyze', ['--network', 'delayed', '--set', 'a=-4.5', 'b=1', 'c=6.5', 'd=-2',
-                             'tau=0.4', '--plot', 'OUT']),
+                             'tau=0.4', '--plot', 'FOLDER/it.png'], 'it.png'),
     'branches_quadruped': ('analyze', ['--network', 'quadruped', '--preset', 'pace', '--along',
-                                       'alpha=beta', '--range=-0.1:0.6', '--plot', 'OUT'])}
+                                       'alpha=beta', '--range=-0.1:0.6', '--plot',
+                                       'FOLDER/it.png'], 'it.png'),
+    'inversion': ('inversion', ['--csv', str(WALK), '--out', 'FOLDER/fitted.yaml', '--report',
+                                'FOLDER/report.html'], 'report.html'),
+    'tour': ('demo', ['--no-panel', '--no-film', '--out', 'FOLDER'], 'footfalls.png'),
+    'hexapod_footfalls': ('demo', ['--hexapod', '--gaits', 'tripod', 'ripple', 'wave', '--every',
+                                   '4', '--no-panel', '--no-film', '--out', 'FOLDER'],
+                          'footfalls.png')}
+#: Heading of the picture that is taken from a report.
+HEADING = '<h2>Recorded and fitted</h2>'
 
 
 def draw(name: str, dark: bool) -> Path:
@@ -49,15 +57,20 @@ def draw(name: str, dark: bool) -> Path:
         subprocess.CalledProcessError: the command failed; what it said stands before.
 
     """
-    module, words = FIGURES[name]
+    module, words, left = FIGURES[name]
     out = DOCS / f'{name}{"_dark" if dark else ""}.png'
     with tempfile.TemporaryDirectory() as folder:
-        made = Path(folder) / out.name
         command = [sys.executable, '-m', f'cpg_ros.tools.{module}',
-                   *(str(made) if word == 'OUT' else word for word in words)]
+                   *(word.replace('FOLDER', folder) for word in words)]
         variables = dict(os.environ, **{'MATPLOTLIBRC': str(DARK)} if dark else {})
-        subprocess.run(command, env=variables, stdout=subprocess.DEVNULL, check=True)
-        shutil.move(made, out)
+        subprocess.run(command, env=variables, stdin=subprocess.DEVNULL,
+                       stdout=subprocess.DEVNULL, check=True)
+        made = Path(folder) / left
+        if made.suffix == '.html':
+            picture = made.read_text().partition(HEADING)[2].partition('base64,')[2]
+            out.write_bytes(base64.b64decode(picture.partition('"')[0]))
+        else:
+            shutil.move(made, out)
     return out
 
 

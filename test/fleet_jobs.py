@@ -23,8 +23,6 @@ import subprocess
 import sys
 import time
 
-import cpg_ros
-
 
 def square(job):
     return job * job
@@ -71,10 +69,9 @@ class Cluster:
 
     def __init__(self, folder, workers=2):
         self.port, self.folder = free_port(), folder
-        root = Path(cpg_ros.__file__).parents[1]
+        # Jobs are found where this process finds them: here, or in benchmarks.
         self.environment = {**os.environ, 'PYTHONPATH': os.pathsep.join(
-            [str(Path(__file__).parent), str(root), str(root / 'benchmarks'),
-             os.environ.get('PYTHONPATH', '')])}
+            [str(Path(__file__).parent), *filter(None, sys.path)])}
         self.address = f'tcp://127.0.0.1:{self.port}'
         self.scheduler = self.start_scheduler()
         self.workers = [self.start_worker() for _ in range(workers)]

@@ -32,6 +32,7 @@ import rclpy
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, QoSProfile
+from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray, String
 
@@ -229,3 +230,37 @@ class Watcher:
 def _messages(values: dict) -> list[ParameterMessage]:
     return [Parameter(re.sub('^(delayed|quadruped|biped|two_legs)_', r'\1.', name), value=value)
             .to_parameter_msg() for name, value in values.items()]
+
+
+class SimulatedTime:
+    """A /clock that the test advances."""
+
+    def __init__(self, watcher: Watcher) -> None:
+        self._watcher = watcher
+        self._publisher = watcher.node.create_publisher(Clock, '/clock', 100)
+        until(self._publisher.get_subscription_count, 'a listener to /clock')
+
+    def _tell(self, now: float) -> None:
+        message = Clock()
+        message.clock.sec, message.clock.nanosec = int(now), int(now % 1 * 1e9)
+        self._publisher.publish(message)
+
+    def run(self, start: float, end: float, step: float = 0.002) -> None:
+        """Advance, twice as fast as the wall clock or slower."""
+        for now in np.arange(start, end, step):
+            self._tell(now)
+            time.sleep(0.001)
+
+    def lead(self, start: float, end: float, step: float) -> None:
+        """Go on after run, each step once joint states of those before have come."""
+        samples = self._watcher.samples
+        for now in np.arange(start, end, step):
+            self._tell(now)
+            ends, waits = time.monotonic() + PATIENCE, 0
+            while samples[-1][0] < now - 2.5 * step:
+                assert time.monotonic() < ends, f'waited {PATIENCE} s in vain for joint states'
+                time.sleep(0.0002)
+                waits += 1
+                if waits % 1000 == 0:
+                    # It is sent best effort.
+                    self._tell(now)

@@ -14,6 +14,8 @@
 
 """Record topics to a bag, as `ros2 bag record` would: raw messages, until SIGINT.
 
+Says 'listening' once it has subscribed, and 'recording' once it knows publishers of all topics.
+
 Usage: python recorder.py BAG TOPIC...
 """
 
@@ -44,10 +46,14 @@ def main(path, *topics):
                                      raw=True)
         ending = []
         signal.signal(signal.SIGINT, lambda *_: ending.append(True))
-        print('recording', flush=True)
         executor = SingleThreadedExecutor()
         executor.add_node(node)
+        print('listening', flush=True)
+        heard = False
         while not ending:
+            if not heard and all(map(node.count_publishers, topics)):
+                heard = True
+                print('recording', flush=True)
             # In vain waits end: a signal that comes in one is seen at its end only.
             executor.spin_once(timeout_sec=0.2)
     rclpy.shutdown()

@@ -19,26 +19,9 @@ import time
 from types import SimpleNamespace
 
 from cpg_ros.nodes import deadline_thread as ticker_module
-from graph import off_grid, until
+from graph import off_grid, SimulatedTime
 import numpy as np
 import pytest
-from rosgraph_msgs.msg import Clock
-
-
-class SimulatedTime:
-    """A /clock that another thread of the test advances."""
-
-    def __init__(self, watcher):
-        self._publisher = watcher.node.create_publisher(Clock, '/clock', 100)
-        until(self._publisher.get_subscription_count, 'a listener to /clock')
-
-    def run(self, start, end, step=0.002):
-        for now in np.arange(start, end, step):
-            message = Clock()
-            message.clock.sec = int(now)
-            message.clock.nanosec = int(now % 1 * 1e9)
-            self._publisher.publish(message)
-            time.sleep(0.001)
 
 
 @pytest.fixture

@@ -27,8 +27,9 @@ from cpg_ros.errors import CpgError
 if TYPE_CHECKING:
     from rclpy.node import Node
 
-#: How long a node may take to answer, s: somebody waits for the word.
-PATIENCE = 3.0
+#: How long a node may take to answer, s: somebody waits for the word, but an announcement of DDS
+#: that was lost comes again only after 3 s.
+PATIENCE = 4.0
 
 
 class NoCompletion(CpgError):
