@@ -70,10 +70,10 @@ class Process:
     def output(self) -> str:
         return Path(self._log.name).read_text(errors='replace')
 
-    def wait_for(self, text: str, timeout: float = 90.0) -> 'Process':
-        """Wait until its log contains a text (the first start compiles, about 20 s)."""
+    def wait_for(self, text: str, times: int = 1, timeout: float = 90.0) -> 'Process':
+        """Wait until its log contains a text so often (the first start compiles, about 20 s)."""
         deadline = time.monotonic() + timeout
-        while text not in self.output:
+        while self.output.count(text) < times:
             if not self.alive or time.monotonic() > deadline:
                 raise RuntimeError(f"no '{text}' from {self._child.args}:\n{self.output}")
             time.sleep(0.1)

@@ -14,11 +14,13 @@
 
 """A page without a browser: what the panel sends, and what a page may send it."""
 
+from contextlib import ExitStack, suppress
 import json
 import re
 import threading
 
 from graph import EXECUTABLE, Process, until
+from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import connect
 
 PANEL = EXECUTABLE.with_name('panel')
@@ -43,28 +45,31 @@ class Client:
 
     def __init__(self, address, **options):
         base, _, query = address.partition('?')
-        self._socket = connect(base.replace('http', 'ws', 1) + 'socket'
-                               + (f'?{query}' if query else ''), max_size=None,
-                               compression=None, **options)
+        self._open = ExitStack()
+        self._socket = self._open.enter_context(connect(
+            base.replace('http', 'ws', 1) + 'socket' + (f'?{query}' if query else ''),
+            max_size=None, compression=None, **options))
         self.last, self.frames, self.said, self.frame = {}, 0, [], {}
         self.closed = ''
         threading.Thread(target=self._read, daemon=True).start()
 
     def _read(self):
-        try:
+        # However a connection ends, its code says it.
+        with suppress(ConnectionClosed):
             for text in self._socket:
-                message = json.loads(text)
-                self.last[message['type']] = message
-                if message['type'] == 'frame':
-                    self.frame.update(message)
-                    self.frames += 1
-                elif message['type'] == 'said':
-                    self.said.append(message['text'])
-                elif message['type'] == 'values':
-                    for one in self.last['controls']['controls']:
-                        one['value'] = message['values'].get(one['name'], one['value'])
-        finally:
-            self.closed = str(self._socket.close_code)
+                self._take(json.loads(text))
+        self.closed = str(self._socket.close_code)
+
+    def _take(self, message):
+        self.last[message['type']] = message
+        if message['type'] == 'frame':
+            self.frame.update(message)
+            self.frames += 1
+        elif message['type'] == 'said':
+            self.said.append(message['text'])
+        elif message['type'] == 'values':
+            for one in self.last['controls']['controls']:
+                one['value'] = message['values'].get(one['name'], one['value'])
 
     def send(self, **request):
         """Ask for something."""
@@ -87,4 +92,4 @@ class Client:
 
     def end(self):
         """Close the page."""
-        self._socket.close()
+        self._open.close()

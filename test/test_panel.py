@@ -49,6 +49,7 @@ def rig(tmp_path_factory):
     twists = []
     watcher.node.create_subscription(Twist, '/cmd_vel', lambda m: twists.append(
         (time.monotonic(), m.linear.x, m.angular.z)), 100)
+    until(lambda: watcher.gaits and watcher.names, 'what the generator publishes')
     yield generator, panel, address, watcher, twists
     watcher.end()
     panel.end()
