@@ -23,6 +23,7 @@ from cpg_ros.feedback.gait_tables import GaitTables, SLOTS
 from cpg_ros.feedback.kinematics import Geometry
 from cpg_ros.feedback.tick import Memory, tick
 from cpg_ros.feedback.timetable import Timetable
+from cpg_ros.integration.jit import bound
 from cpg_ros.motion.pattern import Pattern
 from cpg_ros.motion.plan import Program
 import numpy as np
@@ -51,6 +52,8 @@ class Feedback:
         self._sides = np.zeros(legs)
         self._geometry = (geometry.rows, geometry.columns, geometry.radius, geometry.weight)
         self.angles = np.zeros((runs, joints or int(geometry.columns.max()) + 1))
+        self._tick: Callable | None = None
+        self._bound: Gains | None = None
 
     def learn(self, program: Program, expected: EfferenceCopy | None = None) -> int:
         """Get to know a gait; return its slot.
@@ -100,9 +103,13 @@ class Feedback:
             level: of the pattern: 0 at the stand, 1 in the full gait.
 
         """
-        tick(*self._geometry, self.gains, self._tables, self._sides, self.memory, senses.angles,
-             senses.rates, senses.loads, senses.lean, senses.turning, senses.push, planned, phase,
-             gaits, mix, wanted, course, dt, share * level, level, self.angles)
+        arguments = (*self._geometry, self.gains, self._tables, self._sides, self.memory,
+                     senses.angles, senses.rates, senses.loads, senses.lean, senses.turning,
+                     senses.push, planned, phase, gaits, mix, wanted, course, dt, share * level,
+                     level, self.angles)
+        if self._tick is None or self._bound is not self.gains:
+            self._tick, self._bound = bound(tick, *arguments), self.gains
+        self._tick(*arguments)
         return self.angles
 
 

@@ -97,27 +97,44 @@ def _cached(digest):
         return 0
 
     @entry
-    def judge_joints(positions, velocities, efforts, lower, upper, fastest):
-        """Return an index into VERDICTS, 0 for good; rad, rad/s, N m, shape (joints,)."""
+    def judge_joints(positions, velocities, places, lower, upper, fastest, angles, rates):
+        """Fill angles and rates if they can be; return an index into VERDICTS, 0 for good.
+
+        Args:
+            positions: of a message, in its own order, rad.
+            velocities: the same, rad/s.
+            places: index of each joint in the message, shape (joints,).
+            lower: limits of the joints, rad, shape (joints,).
+            upper: the same.
+            fastest: the same, rad/s.
+            angles: rad, shape (joints,).
+            rates: rad/s, shape (joints,).
+
+        """
         digest  # noqa: B018
-        for k in range(len(positions)):
-            if not math.isfinite(positions[k] + velocities[k] + efforts[k]):
+        for k in range(len(places)):
+            angle, rate = positions[places[k]], velocities[places[k]]
+            if not math.isfinite(angle + rate):
                 return 1
-            if not lower[k] - BEYOND <= positions[k] <= upper[k] + BEYOND:
+            if not lower[k] - BEYOND <= angle <= upper[k] + BEYOND:
                 return 7
-            if abs(velocities[k]) > OUTRUN * fastest[k]:
+            if abs(rate) > OUTRUN * fastest[k]:
                 return 8
+        for k in range(len(places)):
+            angles[k], rates[k] = positions[places[k]], velocities[places[k]]
         return 0
 
     @entry
-    def judge_loads(loads, weight, dt, memory):
-        """Return an index into VERDICTS, 0 for good.
+    def judge_loads(loads, places, weight, dt, memory, felt):
+        """Fill felt if it can be; return an index into VERDICTS, 0 for good.
 
         Args:
-            loads: of the feet, N, shape (legs,).
+            loads: of the feet, N, in any order.
+            places: index of each foot among them, shape (legs,).
             weight: of the robot, N.
             dt: since the last ones, s.
             memory: shape (1,), zeros at first; overwritten.
+            felt: N, shape (legs,).
 
         """
         digest  # noqa: B018
@@ -129,7 +146,11 @@ def _cached(digest):
                 return 9
             whole += load
         memory[0] += min(dt / TELLING, 1.0) * (whole - memory[0])
-        return 9 if memory[0] > HEAVIEST * weight else 0
+        if memory[0] > HEAVIEST * weight:
+            return 9
+        for k in range(len(places)):
+            felt[k] = loads[places[k]]
+        return 0
 
     @entry
     def agreement(loads, least, swinging, share, before):

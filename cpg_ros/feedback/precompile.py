@@ -33,12 +33,15 @@ def precompile(geometry: Geometry, joints: int) -> None:
     """Run each kernel once, on the types that a generator uses; joints is their number."""
     feedback, legs = Feedback(geometry, joints=joints), len(geometry.hips)
     senses, some, load = Senses.blank(1, legs, joints), np.zeros(joints), np.zeros(legs)
-    values, three, one = np.zeros(IMU), np.zeros(3), np.zeros(1)
+    three, one = np.zeros(3), np.zeros(1)
+    values, places = np.zeros(IMU), np.arange(joints)
     values[3], values[27] = 1.0, GRAVITY
+    # As they come in messages: not aligned, not to be written to.
+    values, told = (np.frombuffer(b'1234' + numbers.tobytes(), offset=4)
+                    for numbers in (values, some))
     judge_imu(values, 0.1, np.zeros(IMU_MEMORY), senses.lean[0], senses.turning[0], three)
-    judge_joints(some, some, some, some, some, some)
-    judge_loads(load, geometry.weight, 0.1, one)
-    judge_loads(load[:1], geometry.weight, 0.1, one)
+    judge_joints(told, told, places, some, some, some, some.copy(), some.copy())
+    judge_loads(told[:legs], places[:legs], geometry.weight, 0.1, one, load.copy())
     loads_of(geometry.rows, geometry.columns, some, some, 0.0, 0.0, load)
     agreement(load, 1.0, np.zeros(legs, dtype=bool), 0.1, 1.0)
     feedback.advance(senses, some[None], one, np.zeros((1, 2), dtype=np.int64), one.copy(),

@@ -34,7 +34,7 @@ from cpg_ros.feedback.estimate import update
 from cpg_ros.feedback.kinematics import foot_of, move_foot
 from cpg_ros.feedback.timetable import POINTS
 from cpg_ros.integration.jit import entry, jit, sources_digest
-from cpg_ros.motion.steering import TIME_CONSTANT
+from cpg_ros.motion.strides import TIME_CONSTANT
 import numpy as np
 
 #: Joints are where they are told to be a little later: corrections come ahead by this, cycles.

@@ -49,31 +49,29 @@ class Watch:
         """Time since the last message that could be believed, s, at most 1."""
         return min(now - self.believed, 1.0)
 
-    def suspect(self, now: float, stamp: float | None, content: bytes, patience: float = 0.0
-                ) -> str:
-        """Say what is wrong with a new message by its time and its repetition, or ''.
+    def note(self, now: float, stamp: float | None, content: bytes, wrong: str = '',
+             patience: float = 0.0) -> None:
+        """Take note of a new message.
 
         Args:
             now: s.
             stamp: of the message, the same clock's, s; None if it has none.
             content: its numbers as bytes.
+            wrong: what is wrong with them, '' for nothing.
             patience: for how long the same numbers may come again, s.
 
         """
         if content != self._content:
             self._content, self._changed = content, now
+        elif now > self._changed + patience:
+            wrong = 'the same numbers again and again'
         if stamp is not None and not abs(now - stamp) <= DELAYED:
             late = now - stamp
-            return (f'stamps {late:.2f} s old' if late > 0.0 else
-                    f'stamps {-late:.2f} s ahead: are the clocks of both computers the same?')
-        return 'the same numbers again and again' if now > self._changed + patience else ''
-
-    def note(self, now: float, wrong: str) -> None:
-        """Take note of a message, and of what is wrong with it, '' for nothing."""
-        if wrong:
-            self._wrong = wrong
-        else:
-            self.believed, self._wrong = now, ''
+            wrong = (f'stamps {late:.2f} s old' if late > 0.0 else
+                     f'stamps {-late:.2f} s ahead: are the clocks of both computers the same?')
+        self._wrong = wrong
+        if not wrong:
+            self.believed = now
 
     def fault(self, now: float) -> str:
         """Say why the input is out, or ''."""

@@ -21,7 +21,7 @@ from pathlib import Path
 from typing import Any
 
 from cpg_ros.networks import generated
-from numba import config, njit
+from numba import config, njit, typeof
 import numpy as np
 
 #: Whether machine code can be kept; numba reads where, if not beside its source.
@@ -37,6 +37,16 @@ jit = njit(**OPTIONS)
 entry = njit(cache=KEPT, **OPTIONS)
 #: For what is built into its caller, where a loop of known length can be unrolled.
 part = njit(inline='always', **OPTIONS)
+
+
+def bound(kernel, *arguments):
+    """Return a kernel's machine code for arguments like these, to be called as it is.
+
+    A call of a kernel looks at the type of every argument; with tuples of arrays that takes longer
+    than a small kernel does. The machine code does not look: the arguments it is called with must
+    be of these types, arrays of these numbers of dimensions and orders in memory.
+    """
+    return kernel.compile(tuple(typeof(argument) for argument in arguments))
 
 
 def renamed(function, network: str):

@@ -23,5 +23,5 @@ from cpg_ros.errors import needed
 needed('numba')
 
 __all__ = ['absorption', 'duty', 'joint_readout', 'pattern', 'phase_readout', 'plan', 'precompile',
-           'ramp', 'readout', 'resumption', 'runnable', 'smoothstep', 'steering', 'told_waveform',
-           'track']
+           'ramp', 'readout', 'resumption', 'runnable', 'smoothstep', 'steering', 'strides',
+           'told_waveform', 'track']

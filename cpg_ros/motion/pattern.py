@@ -31,6 +31,7 @@ from cpg_ros.motion.readout import confine
 from cpg_ros.motion.resumption import Resumption
 from cpg_ros.motion.smoothstep import smoothstep
 from cpg_ros.motion.steering import Drive
+from cpg_ros.motion.strides import scale
 from cpg_ros.motion.track import Track
 import numpy as np
 
@@ -82,7 +83,7 @@ class Pattern:
         self._tracks = [newest]
         self.position, self.velocity = self._offset.copy(), np.zeros_like(self._offset)
         self._wanted, self._rate = self.position.copy(), self.velocity.copy()
-        self._corrected = np.zeros_like(self._offset)
+        self._corrected, self._correction = np.zeros((2, self._offset.size))
         self._absorption = Absorption()
         self._recovering = False
         self._slowing = self._slower = 1.0
@@ -196,10 +197,14 @@ class Pattern:
         wanted, rate = self._wanted, self._rate if share == 1.0 else share * self._rate
         if self.correct is not None:
             wanted = self.correct(wanted)
-            correction = wanted - self._wanted
+            now, before = self._correction, self._corrected
+            np.subtract(wanted, self._wanted, out=now)
             if dt > 0.0:
-                rate = rate + (correction - self._corrected) / dt
-            self._corrected = correction
+                np.subtract(now, before, out=before)
+                before /= dt
+                before += rate
+                rate = before
+            self._corrected, self._correction = now, before
         self.held += confine(wanted, rate, self._lower, self._upper, self._limit,
                              dt, self.position, self.velocity) > 0
 
@@ -248,11 +253,13 @@ class Pattern:
             self._recover(track)
             self._step(0.0)
             return False
+        if drive is not None:
+            scale(self._ramp.level, frequency, drive.rate, self._leg, self._offset, track.angle,
+                  track.rise, track.reach, self._wanted, self._rate)
+            return True
         np.multiply(track.angle, self._ramp.level, out=self._wanted)
         self._wanted += self._offset
         np.multiply(track.rise, self._ramp.level * frequency, out=self._rate)
-        if drive is not None:
-            self._rate += self._ramp.level * drive.rate[self._leg] * track.reach
         return True
 
     def _recover(self, track: Track) -> None:

@@ -20,6 +20,7 @@ from cpg_ros.integration.simulate import simulate
 from cpg_ros.integration.stepper import Stepper
 from cpg_ros.motion.phase_readout import observe_phases
 from cpg_ros.motion.readout import confine, observe
+from cpg_ros.motion.strides import approach, lengthen, scale
 from cpg_ros.motion.told_waveform import tell
 from cpg_ros.networks.registry import find_network
 from numba.core import event
@@ -70,3 +71,6 @@ def _run_all(name: str) -> None:
                        np.ones((1, 4, 4)), np.zeros((1, 2, 2)), joints, cells, weights, cells,
                        one, np.zeros((10, 1)), joints, joints, joints)
     confine(joints, joints, joints, joints, joints, 1.0, joints, joints)
+    approach(joints, joints, 0.1, joints, joints)
+    lengthen(joints, cells, joints, joints, joints, joints, joints)
+    scale(1.0, 1.0, joints, cells, joints, joints, joints, joints, joints, joints)

@@ -14,12 +14,10 @@
 
 """Steering a gait: how long each leg's stride is and how fast they follow one another."""
 
-import math
-
+from cpg_ros.motion.strides import approach
 import numpy as np
 
-#: What is asked for is approached with this time constant, s.
-TIME_CONSTANT = 0.2
+_NOTHING = np.zeros(0)
 
 
 class Drive:
@@ -58,15 +56,8 @@ class Drive:
 
     def advance(self, dt: float) -> None:
         """Advance by dt in s."""
-        # e(t) = (e + (v + e / T) t) exp(-t / T), e the distance from the target.
         target, at_once = self._asked
         if at_once:
             self._now[:], self._rate[:] = target, 0.0
             return
-        if self.trim is not None:
-            target = np.append(np.clip(target[:-1] + self.trim, -1.0, 1.0), target[-1])
-        decay = math.exp(-dt / TIME_CONSTANT)
-        gap = self._now - target
-        pull = self._rate + gap / TIME_CONSTANT
-        self._now[:] = target + (gap + pull * dt) * decay
-        self._rate[:] = (self._rate - pull * dt / TIME_CONSTANT) * decay
+        approach(target, _NOTHING if self.trim is None else self.trim, dt, self._now, self._rate)

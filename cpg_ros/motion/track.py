@@ -18,6 +18,7 @@ import math
 
 from cpg_ros.motion.plan import Program
 from cpg_ros.motion.steering import Drive
+from cpg_ros.motion.strides import lengthen
 import numpy as np
 
 #: Off the orbit: a cell further away than this share of the peak, or the phase behind or ahead
@@ -77,14 +78,11 @@ class Track:
         clocks = self._clocks
         distance = program.readout.look(now, strides, clocks, angle, rise, self.legs)
         if self.drive is not None:
-            # angle = in_place + stride (angle - in_place), and so its derivatives.
-            stride = self.drive.stride[self._leg]
-            still, lift = self.reach, self._lift
-            program.in_place.look(now, 0.0, clocks, still, lift, self.legs)
-            rise += (stride - 1.0) * (rise - lift)
-            np.subtract(angle, still, out=self.reach)
-            angle += (stride - 1.0) * self.reach
-        angle += program.shift
+            program.in_place.look(now, 0.0, clocks, self.reach, self._lift, self.legs)
+            lengthen(self.drive.stride, self._leg, program.shift, angle, rise, self.reach,
+                     self._lift)
+        else:
+            angle += program.shift
         return distance
 
     def advance(self, strides: float) -> bool:

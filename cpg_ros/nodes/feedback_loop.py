@@ -66,6 +66,8 @@ class FeedbackLoop:
         self._pattern, self._geometry, self._motion = pattern, geometry, motion
         self._feedback = Feedback(geometry, joints=len(pattern.robot.joints))
         self._known: list[tuple[Program, Timetable]] = []
+        # Of the gait that was met last: what the table of those known says.
+        self._met: tuple[Program | None, Timetable | None] = None, None
         self._inputs: SensesInput | None = None
         self._least = TOUCH * geometry.weight
         self._gaits, self._mix = np.zeros((1, 2), dtype=np.int64), np.zeros(1)
@@ -135,14 +137,19 @@ class FeedbackLoop:
 
     def _judge(self, inputs: SensesInput, now: float) -> None:
         """Find out what keeps the feedback out."""
-        found = [f'{watch.name}: {fault} for {now - watch.since:.1f} s'
-                 for watch in inputs.watches if (fault := watch.fault(now))]
-        self.waiting = any(watch.believed == -math.inf for watch in inputs.watches)
+        found, self.waiting = [], False
+        for watch in inputs.watches:
+            if fault := watch.fault(now):
+                found.append(f'{watch.name}: {fault} for {now - watch.since:.1f} s')
+                self.waiting = self.waiting or watch.believed == -math.inf
         pattern = self._pattern
         program = pattern.program
         if program.motion.efference is None:
             found.append(f"the robot file has no efference copy of the gait '{program.name}'")
-        times = next((times for known, times in self._known if known is program), None)
+        met, times = self._met
+        if met is not program:
+            times = next((times for known, times in self._known if known is program), None)
+            self._met = program if times is not None else None, times
         if found or times is None or pattern.level < 1.0 or pattern.in_transition:
             self._agrees = 1.0
         else:

@@ -61,14 +61,23 @@ def stamp_of(data: bytes) -> float | None:
     return seconds + 1e-9 * nanoseconds if seconds or nanoseconds else None
 
 
-def last_numbers(data: bytes, count: int) -> np.ndarray:
-    """Return the doubles at the end of a message, shape (count,).
+def numbers_at(data: bytes, begin: int, count: int) -> np.ndarray:
+    """Return the doubles from some byte on, read-only, shape (count,).
 
     Raises:
         ValueError: the message is shorter.
 
     """
-    return np.frombuffer(data, '<f8' if data[1] & 1 else '>f8', count, len(data) - 8 * count)
+    if data[1] & 1:
+        return np.frombuffer(data, float, count, begin)
+    swapped = np.frombuffer(data, '>f8', count, begin).astype(float)
+    swapped.flags.writeable = False
+    return swapped
+
+
+def last_numbers(data: bytes, count: int) -> np.ndarray:
+    """Return the doubles at the end of a message; as numbers_at."""
+    return numbers_at(data, len(data) - 8 * count, count)
 
 
 class JointLayout:
@@ -76,8 +85,9 @@ class JointLayout:
 
     Attributes:
         wrong: why the messages cannot be used, or ''.
-        position, velocity, effort: slices of the bytes, of doubles in the message's own order;
-            None where there are none.
+        position, velocity, effort: the byte at which the joints' doubles begin, in the message's
+            own order; None where there are none.
+        count: of the joints in a message.
         places: index of each wanted joint in the message, shape (joints,).
 
     """
@@ -88,7 +98,7 @@ class JointLayout:
         missing = [name for name in wanted if names.count(name) != 1]
         self.wrong = f'no joint {missing[0]}, or more than one' if missing else ''
         self.places = np.array([] if missing else [names.index(name) for name in wanted], int)
-        self._length = len(data)
+        self._length, self.count = len(data), len(names)
         # What tells that another message has the same layout: names and counts.
         self._same: list[tuple[slice, bytes]] = [(slice(1, 2), data[1:2])]
         end = HEADER + 8
@@ -110,14 +120,14 @@ class JointLayout:
         keep(4)
         for name in names:
             text(name)
-        parts: list[slice | None] = []
+        parts: list[int | None] = []
         for numbers in (message.position, message.velocity, message.effort):
             align(4)
             keep(4)
             if len(numbers):
                 align(8)
             whole = len(numbers) == len(names) and len(names) > 0
-            parts.append(slice(end, end + 8 * len(numbers)) if whole else None)
+            parts.append(end if whole else None)
             end += 8 * len(numbers)
         self.position, self.velocity, self.effort = parts
         if not self.wrong:
@@ -125,17 +135,20 @@ class JointLayout:
                 if part is None:
                     self.wrong = f'no {what}'
                     break
+        # The names and what is between them, at once: the bytes that align them are mostly alike.
+        first, last = self._same[1][0].start, self._same[-1][0].stop
+        middle = slice(first, self.position if self.position is not None else last)
+        self._quick = [(part, data[part]) for part in (
+            slice(1, 2), middle, *(part for part, _ in self._same if part.start >= middle.stop))]
 
     def fits(self, data: bytes) -> bool:
         """Tell whether another message has the same layout."""
-        return len(data) == self._length and all(data[part] == known
-                                                 for part, known in self._same)
-
-    def numbers(self, data: bytes, part: slice, out: np.ndarray) -> None:
-        """Fill out, shape (joints,), with the wanted joints' numbers."""
-        kind = '<f8' if data[1] & 1 else '>f8'
-        found = np.frombuffer(data, kind, (part.stop - part.start) // 8, part.start)
-        np.take(found, self.places, out=out)
+        if len(data) != self._length:
+            return False
+        for part, known in self._quick:
+            if data[part] != known:
+                return all(data[part] == known for part, known in self._same)
+        return True
 
 
 def legs_of(data: bytes, legs: Sequence[str]) -> np.ndarray:

@@ -30,7 +30,15 @@ from cpg_ros.feedback.plausibility import (
     VERDICTS,
 )
 from cpg_ros.feedback.watch import Watch
-from cpg_ros.nodes.raw_messages import JointLayout, last_numbers, legs_of, Newest, stamp_of
+from cpg_ros.integration.jit import bound
+from cpg_ros.nodes.raw_messages import (
+    JointLayout,
+    last_numbers,
+    legs_of,
+    Newest,
+    numbers_at,
+    stamp_of,
+)
 from cpg_ros.robots.robot import Robot
 from geometry_msgs.msg import WrenchStamped
 import numpy as np
@@ -42,8 +50,8 @@ from std_msgs.msg import Float64MultiArray
 CONTACTS = ('foot_contacts', 'wrenches', 'efforts')
 #: All feet in the air may feel nothing for this time, s.
 FLIGHT = 0.3
-#: Numbers of a Wrench.
-WRENCH = 6
+#: Numbers of a Wrench; the place of one foot among one.
+WRENCH, FIRST = 6, np.zeros(1, dtype=int)
 #: Takes a message and the time since the last one, s; returns what is wrong with it, its numbers,
 #: and whether they may well come again.
 Reader = Callable[[bytes, float], tuple[str, bytes, bool]]
@@ -54,6 +62,7 @@ class _Input:
 
     def __init__(self, node: Node, kind: type, topic: str) -> None:
         self.newest, self.watch = Newest(node, kind, topic), Watch(topic)
+        self.stamped = hasattr(kind, 'header')
 
 
 class SensesInput:
@@ -88,7 +97,11 @@ class SensesInput:
         count = len(self._names)
         self.senses = Senses.blank(1, len(self._legs), count)
         self.senses.angles[0], self.senses.push[0, 2] = robot.column('offset'), 9.81
-        self._found, self._rates, self._efforts = np.zeros((3, count))
+        self._efforts = np.zeros(count)
+        # Of the one run: rows, so that a tick need not look for them.
+        senses = self.senses
+        self._angles, self._rates, self._felt = senses.angles[0], senses.rates[0], senses.loads[0]
+        self._lean, self._turning, self._push = senses.lean[0], senses.turning[0], senses.push[0]
         self._loads = np.zeros(len(self._legs))
         self._contacts, self.feet = contacts, joints if contacts == 'efforts' else feet
         self._imu, self._joints = _Input(node, Imu, imu), _Input(node, JointState, joints)
@@ -100,9 +113,17 @@ class SensesInput:
             self._feet = [_Input(node, WrenchStamped, f'{leg}/{feet}') for leg in self._legs]
             self._readers = [partial(self._read_wrench, k) for k in range(len(self._legs))]
         self._layout: JointLayout | None = None
-        self._order: tuple[int, np.ndarray] | None = None
-        self._numbers, self._memory = np.zeros(IMU), np.zeros(IMU_MEMORY)
+        self._order, self._length = np.arange(len(self._legs)), 0
+        self._memory = np.zeros(IMU_MEMORY)
         self._heavy = np.zeros((len(self._legs), 1))
+        # Numbers as they come in messages; looking at their types would take most of the time.
+        told = np.frombuffer(bytes(8))
+        self._judge_imu = bound(judge_imu, told, 0.1, self._memory, self._lean, self._turning,
+                                self._push)
+        self._judge_joints = bound(judge_joints, told, told, self._order, *self._limits,
+                                   self._angles, self._rates)
+        self._judge_loads = bound(judge_loads, told, self._order, 0.1, 0.1, self._heavy[0],
+                                  self._felt)
         inputs = [self._imu, self._joints, *self._feet]
         self.watches: Sequence[Watch] = [one.watch for one in inputs]
         self.topics: Sequence[str] = [one.newest.topic for one in inputs]
@@ -130,22 +151,18 @@ class SensesInput:
         data = one.newest.take()
         if data is None:
             return
-        gap = one.watch.gap(now)
+        watch = one.watch
         try:
-            wrong, content, at_rest = read(data, gap)
+            wrong, content, at_rest = read(data, watch.gap(now))
         except ValueError as error:
             wrong, content, at_rest = str(error), b'', False
-        stamp = None if one in self._feet and self._contacts == 'foot_contacts' else (
-            stamp_of(data))
-        wrong = one.watch.suspect(now, stamp, content, max(patience, FLIGHT if at_rest else 0.0)
-                                  ) or wrong
-        one.watch.note(now, wrong)
+        if at_rest and patience < FLIGHT:
+            patience = FLIGHT
+        watch.note(now, stamp_of(data) if one.stamped else None, content, wrong, patience)
 
     def _read_imu(self, data: bytes, gap: float) -> tuple[str, bytes, bool]:
-        self._numbers[:] = last_numbers(data, IMU)
-        senses = self.senses
-        verdict = judge_imu(self._numbers, gap, self._memory, senses.lean[0], senses.turning[0],
-                            senses.push[0])
+        verdict = self._judge_imu(last_numbers(data, IMU), gap, self._memory, self._lean,
+                                  self._turning, self._push)
         return VERDICTS[verdict], data[-8 * IMU:], False
 
     def _read_joints(self, data: bytes, gap: float) -> tuple[str, bytes, bool]:
@@ -154,39 +171,33 @@ class SensesInput:
             layout = self._layout = JointLayout(data, self._names)
         if layout.wrong or layout.position is None or layout.velocity is None:
             return layout.wrong, b'', False
-        layout.numbers(data, layout.position, self._found)
-        layout.numbers(data, layout.velocity, self._rates)
-        if self._contacts == 'efforts':
-            if layout.effort is None:
-                return 'no efforts', b'', False
-            layout.numbers(data, layout.effort, self._efforts)
-        verdict = judge_joints(self._found, self._rates, self._efforts, *self._limits)
-        senses = self.senses
-        if not verdict and self._contacts == 'efforts':
-            loads_of(self._geometry.rows, self._geometry.columns, self._found, self._efforts,
-                     *senses.lean[0, :2], self._loads)
-            verdict = judge_loads(self._loads, self._geometry.weight, gap, self._heavy[0])
-        if not verdict:
-            senses.angles[0], senses.rates[0] = self._found, self._rates
-            if self._contacts == 'efforts':
-                senses.loads[0] = self._loads
-        return VERDICTS[verdict], data[layout.position.start:], False
+        if self._contacts == 'efforts' and layout.effort is None:
+            return 'no efforts', b'', False
+        verdict = self._judge_joints(numbers_at(data, layout.position, layout.count),
+                                     numbers_at(data, layout.velocity, layout.count),
+                                     layout.places, *self._limits, self._angles, self._rates)
+        if self._contacts == 'efforts' and not verdict:
+            assert layout.effort is not None
+            np.take(numbers_at(data, layout.effort, layout.count), layout.places,
+                    out=self._efforts)
+            loads_of(self._geometry.rows, self._geometry.columns, self._angles, self._efforts,
+                     *self._lean[:2], self._loads)
+            verdict = self._judge_loads(self._loads, self._order, self._geometry.weight, gap,
+                                        self._heavy[0], self._felt)
+        return VERDICTS[verdict], data[layout.position:], False
 
     def _read_loads(self, data: bytes, gap: float) -> tuple[str, bytes, bool]:
-        if self._order is None or self._order[0] != len(data):
-            self._order = len(data), legs_of(data, self._legs)
-        np.take(last_numbers(data, len(self._legs)), self._order[1], out=self._loads)
-        verdict = judge_loads(self._loads, self._geometry.weight, gap, self._heavy[0])
-        if not verdict:
-            self.senses.loads[0] = self._loads
-        return VERDICTS[verdict], data[-8 * len(self._legs):], not self._loads.any()
+        if self._length != len(data):
+            self._order, self._length = legs_of(data, self._legs), len(data)
+        verdict = self._judge_loads(last_numbers(data, len(self._legs)), self._order,
+                                    self._geometry.weight, gap, self._heavy[0], self._felt)
+        content = data[-8 * len(self._legs):]
+        return VERDICTS[verdict], content, not any(content)
 
     def _read_wrench(self, foot: int, data: bytes, gap: float) -> tuple[str, bytes, bool]:
         x, y, z = last_numbers(data, WRENCH)[:3].tolist()
         # Its frame turns with the leg: what is borne is as long in all of them.
         self._loads[foot] = load = math.sqrt(x * x + y * y + z * z)
-        verdict = judge_loads(self._loads[foot:foot + 1], self._geometry.weight, gap,
-                              self._heavy[foot])
-        if not verdict:
-            self.senses.loads[0, foot] = load
+        verdict = self._judge_loads(self._loads[foot:foot + 1], FIRST, self._geometry.weight, gap,
+                                    self._heavy[foot], self._felt[foot:foot + 1])
         return VERDICTS[verdict], data[-8 * WRENCH:], not load

@@ -21,7 +21,7 @@ from cpg_ros.feedback.timetable import POINTS, Timetable
 from cpg_ros.integration.jit import entry, sources_digest
 from cpg_ros.motion.plan import Program
 from cpg_ros.motion.smoothstep import smoothstep
-from cpg_ros.motion.steering import TIME_CONSTANT
+from cpg_ros.motion.strides import TIME_CONSTANT
 from cpg_ros.simulation.scenario import Scenario
 import numpy as np
 
