@@ -50,7 +50,7 @@ def main() -> None:
                 walk.walking()
             except AssertionError as error:
                 # The machine made it damp before there was a fault.
-                log(str(error).splitlines()[-1][-200:])
+                log((str(error).splitlines() or ['damped'])[-1][-200:])
                 restarts += 1
                 walk.end()
                 walk = None

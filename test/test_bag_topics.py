@@ -14,7 +14,6 @@
 
 """Joints on several topics of a bag: one recording of those that are asked for."""
 
-
 from bags import JOINTS, LEGS, START, walk, write_bag
 from cpg_ros.recordings.bag_reader import read_bag
 import numpy as np

@@ -14,7 +14,6 @@
 
 """Branches of periodic orbits: a law they follow, where they end, and what is refused."""
 
-
 from cpg_ros.dynamics import arclength
 from cpg_ros.dynamics.continuation import follow
 from cpg_ros.dynamics.orbit import NoOrbit, solve_preset

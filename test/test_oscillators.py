@@ -14,10 +14,7 @@
 
 """The oscillator networks against their papers' equations, and all that every network shows.
 
-The equations are written anew here, in the papers' own variables: phase oscillators in polar
-coordinates (Ijspeert et al. 2007), Hopf oscillators with logistic functions (Righetti & Ijspeert
-2008), Matsuoka's neurons with max(0, u), whose trot is followed exactly from kink to kink by
-matrix exponentials.
+Matsuoka's trot is followed exactly from kink to kink by matrix exponentials.
 """
 
 from dataclasses import replace
@@ -36,6 +33,7 @@ from cpg_ros.robots.robot_file import find_robot
 from hypothesis import given, settings
 from hypothesis import strategies as st
 import numpy as np
+from oscillator_equations import logistic, neurons, polar, TURN
 import pytest
 from scipy.integrate import quad, solve_ivp
 from scipy.linalg import expm
@@ -45,60 +43,6 @@ NAMES = tuple(network.name for network in shipped())
 ALL = [(network, gait) for network in NAMES for gait in PRESETS[network]]
 HEXAPODS = [(f'{network}6', gait) for network in NAMES for gait in ('tripod', 'ripple', 'wave')]
 LEGS = ('lh', 'rh', 'lf', 'rf')
-TURN = 2.0 * np.pi
-
-
-def polar(network):
-    """The equations of Ijspeert et al. 2007 for any number of legs, x = r cos(theta)."""
-    offsets = np.array([getattr(network, name) for name in type(network).offsets.values()])
-
-    def rates(t, state):
-        x, y, s = state.reshape(3, -1)
-        theta, r = np.arctan2(y, x), np.hypot(x, y)
-        phi = TURN * (offsets[None] - offsets[:, None])
-        pull = np.sin(theta[None] - theta[:, None] - phi) @ np.diag(r)
-        turn = TURN * network.nu + network.w * pull.sum(axis=1)
-        return np.concatenate([s * np.cos(theta) - turn * y, s * np.sin(theta) + turn * x,
-                               network.a * (network.a / 4.0 * (network.r - r) - s)])
-    return rates
-
-
-def matrix(network):
-    """k_ij of the legs, row i the leg that hears."""
-    names = list(next(iter(network.legs.values())))
-    return np.array([[0.0 if one == other else getattr(network, f'k_{other}_{one}')
-                      for other in names] for one in names])
-
-
-def logistic(network):
-    """The equations of Righetti & Ijspeert 2008 without feedback."""
-    k = matrix(network)
-    stance, swing = (np.pi * network.nu / share for share in (network.duty, 1.0 - network.duty))
-
-    def rates(t, state):
-        x, y = state.reshape(2, -1)
-        omega = stance / (np.exp(-network.b * y) + 1.0) + swing / (np.exp(network.b * y) + 1.0)
-        left = network.mu - x * x - y * y
-        return np.concatenate([network.alpha * left * x - omega * y,
-                               network.beta * left * y + omega * x + k @ y])
-    return rates
-
-
-def neurons(network):
-    """Matsuoka's equations; flexors first, then extensors."""
-    k = matrix(network)
-
-    def rates(t, state):
-        u, v = state.reshape(2, -1)
-        y = np.maximum(0.0, u)
-        flexor, extensor = y.reshape(2, -1)
-        out = flexor - extensor
-        rise = (network.c - u - network.beta * v - network.a * np.concatenate([extensor, flexor])
-                + np.concatenate([k @ out, -(k @ out)]))
-        return np.concatenate([rise / network.tau, (y - v) / network.tau_v])
-    return rates
-
-
 PAPERS = {'phase': polar, 'hopf': logistic, 'matsuoka': neurons}
 
 
