@@ -29,7 +29,8 @@ import tempfile
 
 from common import by_turns, emit, log
 from cpg_ros.recordings.bag_reader import read_bag
-from cpg_ros.recordings.cdr import JOINT_STATE, STORE
+from cpg_ros.recordings.cdr import JOINT_STATE
+from cpg_ros.recordings.rosbags_library import STORE
 import numpy as np
 from rosbags.rosbag2 import Reader, StoragePlugin, Writer
 

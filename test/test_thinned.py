@@ -14,10 +14,13 @@
 
 """Long recordings are smoothed to a coarser grid while they are read; short ones are not."""
 
+import tracemalloc
+
 from bags import joint_state, START, write_bag
 from cpg_ros.recordings import joint_streams, thinned
 from cpg_ros.recordings.bag_reader import read_bag
 from cpg_ros.recordings.csv_reader import read_csv
+from cpg_ros.recordings.recording import merged
 from cpg_ros.recordings.thinned import smoothed, Thinned
 import numpy as np
 import pytest
@@ -88,6 +91,22 @@ def test_a_long_table(tmp_path, soon):
     assert len(recording.times) == 2001
     assert np.abs(recording.positions - motion(recording.times + recording.start))[
         2:-2].max() < 2e-3
+
+
+def test_a_long_recording_is_in_memory_once(soon):
+    t = np.arange(400_000) / 500.0
+
+    def chunks():
+        for part in np.array_split(t, 400):
+            yield (np.rint(1e9 * part).astype(np.int64), [f'joint_{k}' for k in range(12)],
+                   np.tile(motion(part), 6))
+
+    tracemalloc.start()
+    recording = merged(chunks(), 'long')
+    most = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert len(recording.times) == pytest.approx(80_000, abs=2)
+    assert most < 2.0 * recording.positions.nbytes
 
 
 @pytest.mark.parametrize('stamped', [True, False])

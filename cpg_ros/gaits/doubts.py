@@ -113,7 +113,8 @@ def _by_parts(phases: np.ndarray, x: np.ndarray, legs: Mapping[str, Sequence[str
               names: Sequence[str]) -> list[dict[str, float]]:
     """Find the legs' phases in the first and the last part of a stretch, if it is that long."""
     span, found = phases[-1] - phases[0], []
-    for place in (phases - phases[0] < span / PARTS, phases[-1] - phases < span / PARTS):
+    for place in (slice(np.searchsorted(phases, phases[0] + span / PARTS)),
+                  slice(np.searchsorted(phases, phases[-1] - span / PARTS, side='right'), None)):
         if span < PARTS * STRIDES or (np.isfinite(x[place]).sum(axis=0) < FEWEST).any():
             return []
         try:

@@ -24,7 +24,6 @@ from cpg_ros.errors import InputError
 from cpg_ros.gaits.mean_cycle import determined, rows_of, series, weights_for
 import numpy as np
 from scipy.interpolate import PchipInterpolator
-from scipy.signal import argrelmin
 
 #: What deviates by less, as a share of the signals' RMS, does not tell a period from its half.
 NEGLIGIBLE = 0.005
@@ -108,7 +107,7 @@ def _lags(t: np.ndarray, x: np.ndarray) -> list[float]:
     # Up to a lag of one period the mean of this is 1, so the first rise is within it.
     risen = np.argmax(far > REPEATS)
     found, best = [], 2.0 * REPEATS
-    for low in argrelmin(far)[0]:
+    for low in 1 + np.flatnonzero((far[1:-1] < far[:-2]) & (far[1:-1] < far[2:])):
         if low > risen and far[low] < 0.5 * best:
             before, at, after = far[low - 1:low + 2]
             found.append((low + 0.5 * (before - after) / (before - 2.0 * at + after))

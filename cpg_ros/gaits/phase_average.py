@@ -67,11 +67,7 @@ class Warped:
         """Return the mean cycles at theta in cycles, shape (joints, m)."""
         c = self.coefficients
         weights = np.vstack([c.real[:1], 2.0 * c.real[1:], -2.0 * c.imag[1:]])
-        out = np.empty((c.shape[1], theta.size))
-        for first in range(0, theta.size, BLOCK):
-            part = slice(first, first + BLOCK)
-            out[:, part] = series(weights, rows_of(theta[part], len(c) - 1))
-        return out
+        return series(weights, rows_of(theta, len(c) - 1))
 
 
 def blocks(phases: np.ndarray) -> list[slice]:
@@ -116,7 +112,9 @@ def warped(phases: np.ndarray, positions: np.ndarray, theta: np.ndarray, first: 
         groups.setdefault(column.tobytes(), []).append(joint)
     for alike in groups.values():
         mask = there[:, alike[0]]
-        at, x = phases[mask], np.ascontiguousarray(positions[np.ix_(mask, alike)].T)
+        # A view where it can be: a long recording is large.
+        at, x = phases[mask], (positions.T if len(alike) == joints and mask.all()
+                               else positions.T[np.ix_(alike, mask)])
         weights[:, alike], rest, bins = _fitted(at, x)
         for row, joint in enumerate(alike):
             far, variance = np.abs(rest[row]), float(x[row].var())

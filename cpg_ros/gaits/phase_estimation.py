@@ -158,10 +158,10 @@ def followed(times: np.ndarray, positions: np.ndarray, rough: Rough) -> Warp:
                     if rough.times.size > 1 else (1.0, 0.0))
     # Plain numbers: what is fitted is written to files that know no others.
     span = float(rough.end - rough.begin)
-    within = (times >= rough.begin - 1.0 / slope) & (times <= rough.end + 1.0 / slope)
+    within = between(times, rough.begin - 1.0 / slope, rough.end + 1.0 / slope)
     grid, y = even(times[within], positions[within], BLOCKS * POINTS * slope)
-    inside = (grid >= rough.begin) & (grid <= rough.end)
-    grid, x = grid[inside] - rough.begin, np.ascontiguousarray(y[inside].T)
+    inside = between(grid, rough.begin, rough.end)
+    grid, x = grid[inside] - rough.begin, y.T[:, inside]
     if span * slope < FEW:
         phases, error = _straight(grid, x, np.array([level, level + slope * span]), span)
         return Warp(np.array([rough.begin, rough.end]), phases,
@@ -174,10 +174,16 @@ def followed(times: np.ndarray, positions: np.ndarray, rough: Rough) -> Warp:
         if last - first == knots.size - 2 or phases[last + 1] - phases[first] < FEW:
             break
         knots, phases = knots[first:last + 2], phases[first:last + 2]
-        inside = (grid >= knots[0]) & (grid <= knots[-1])
+        inside = between(grid, knots[0], knots[-1])
         grid, x = grid[inside], x[:, inside]
     frequency, error = _mean_rate(knots, phases)
     return Warp(knots + rough.begin, phases, frequency, error)
+
+
+def between(times: np.ndarray, begin: float, end: float) -> slice:
+    """Return where rising times are from one to another, both included."""
+    return slice(int(np.searchsorted(times, begin)),
+                 int(np.searchsorted(times, end, side='right')))
 
 
 def _mean_rate(knots: np.ndarray, phases: np.ndarray) -> tuple[float, float]:

@@ -22,9 +22,9 @@ the leg together, as the cross-correlation that leg phases come from weighs them
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from cpg_ros.gaits.phase_average import Warped
+from cpg_ros.gaits.phase_average import blocks, Warped
 import numpy as np
-from scipy.stats import t as student
+from scipy.special import stdtrit
 
 #: Share of a whole stride's slope that a stride must have for its phase to be told.
 ENOUGH = 0.5
@@ -70,19 +70,20 @@ def phase_scatter(phases: np.ndarray, x: np.ndarray, found: Warped,
     stride = np.floor(theta - theta[0]).astype(int)
     count = int(stride[-1]) + 1
     order = np.arange(len(found.coefficients))[:, None]
-    early = np.full((len(legs), count), np.nan)
-    for row, joints in zip(early, legs.values(), strict=True):
-        columns = [names.index(name) for name in joints]
-        # Leg by leg: a long recording is large.
-        own, c = x[:, columns], found.coefficients[:, columns]
-        slopes = replace(found, coefficients=2j * np.pi * order * c).mean(theta).T
-        left = own - replace(found, coefficients=c).mean(theta).T
-        missing = ~np.isfinite(own)
-        left[missing] = slopes[missing] = 0.0
-        along, power = (np.bincount(stride, np.sum(one * slopes, axis=1), count)
-                        for one in (left, slopes))
-        told = power > ENOUGH * np.median(power)
-        row[told] = along[told] / power[told]
+    turned = replace(found, coefficients=2j * np.pi * order * found.coefficients)
+    along, power = np.zeros((2, len(legs), count))
+    for part in blocks(phases):
+        there = np.isfinite(x[part])
+        slopes = np.where(there, turned.mean(theta[part]).T, 0.0)
+        left = np.where(there, x[part] - found.mean(theta[part]).T, 0.0)
+        for row, joints in enumerate(legs.values()):
+            columns = [names.index(name) for name in joints]
+            for sums, one in ((along, left), (power, slopes)):
+                sums[row] += np.bincount(
+                    stride[part], np.sum(one[:, columns] * slopes[:, columns], axis=1), count)
+    told = power > ENOUGH * np.median(power, axis=1, keepdims=True)
+    early = np.full_like(along, np.nan)
+    early[told] = along[told] / power[told]
     return {leg: _scatter(row - early[0]) for leg, row in zip(legs, early, strict=True)}
 
 
@@ -92,5 +93,5 @@ def _scatter(early: np.ndarray) -> PhaseScatter:
         return PhaseScatter(np.nan, np.nan, np.nan, told.size)
     spread = float(told.std(ddof=1))
     error = spread / np.sqrt(told.size)
-    return PhaseScatter(spread, error, float(student.ppf(0.975, told.size - 1)) * error,
+    return PhaseScatter(spread, error, float(stdtrit(told.size - 1, 0.975)) * error,
                         told.size)

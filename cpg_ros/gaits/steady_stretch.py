@@ -92,10 +92,16 @@ def even(times: np.ndarray, positions: np.ndarray, rate: float
     """
     span = times[-1] - times[0]
     grid = times[0] + np.arange(int(min(span * rate, GRID)) + 1) / min(rate, GRID / span)
-    there = np.isfinite(positions)
-    columns = [np.interp(grid, times[have], column[have])
-               for column, have in zip(positions.T, there.T, strict=True)]
-    return grid, np.stack(columns, axis=1)
+    signals = np.empty((positions.shape[1], grid.size)).T
+    for signal, column in zip(signals.T, positions.T, strict=True):
+        have = np.isfinite(column)
+        signal[:] = np.interp(grid, times[have], column[have])
+    return grid, signals
+
+
+def _summed(values: np.ndarray) -> np.ndarray:
+    """Return the sums of the first 0, 1, ... values."""
+    return np.concatenate([[0.0], np.cumsum(values)])
 
 
 def _differences(y: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -107,9 +113,9 @@ def _differences(y: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
     """
     n = len(y)
-    y = y - y.mean(axis=0)
-    sums = np.concatenate([np.zeros((1, y.shape[1])), np.cumsum(y, axis=0)])
-    squares = np.concatenate([[0.0], np.cumsum(np.einsum('nj,nj->n', y, y))])
+    # Joint by joint: all at once take several times the memory.
+    columns = (y - y.mean(axis=0)).T
+    squares = _summed(sum(column * column for column in columns))
     # What rounding leaves of a constant is no motion.
     least = 1e-12 * squares[-1] / n + 1e-300
     lags = np.array([lag for lag in LAGS if lag + min(lag, n - lag) >= CYCLES * lag], dtype=int)
@@ -119,11 +125,10 @@ def _differences(y: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         window = min(lag, n - lag)
         width = min(max(k for k in WIDTHS if k <= lag), window)
         if width not in variances:
-            means = (sums[width:] - sums[:-width]) / width
+            means = ((sums[width:] - sums[:-width]) / width for sums in map(_summed, columns))
             variances[width] = np.maximum((squares[width:] - squares[:-width]) / width
-                                          - np.einsum('nj,nj->n', means, means), least)
-        apart = y[lag:] - y[:-lag]
-        total = np.concatenate([[0.0], np.cumsum(np.einsum('nj,nj->n', apart, apart))])
+                                          - sum(mean * mean for mean in means), least)
+        total = _summed(sum((column[lag:] - column[:-lag])**2 for column in columns))
         places = total.size - window
         inside = np.arange(places) + (window - width) // 2
         # The smaller of both: standing before a step is not like the step.

@@ -35,7 +35,7 @@ from cpg_ros.gaits.leg_motion import doubts_of_travel, running
 from cpg_ros.gaits.leg_names import Legs
 from cpg_ros.gaits.leg_phases import leg_phases, named, named_by_cells, told_apart
 from cpg_ros.gaits.phase_average import Warped, warped
-from cpg_ros.gaits.phase_estimation import followed, grown, Rough, Warp
+from cpg_ros.gaits.phase_estimation import between, followed, grown, Rough, Warp
 from cpg_ros.gaits.phase_scatter import phase_scatter, PhaseScatter
 from cpg_ros.gaits.steady_stretch import best, CYCLES, even, FASTEST, FEWEST, FINER, stretches
 from cpg_ros.networks.network import Network
@@ -179,8 +179,7 @@ def find_stride(recording: Recorded, legs: Legs | Mapping[str, Sequence[str]],
     if warp.cycles < CYCLES:
         raise NoSteadyGait(f'{source}: no steady gait: only {warp.cycles:.1f} cycles of '
                            f'{1.0 / warp.frequency:.3g} s are alike, {CYCLES:g} are needed')
-    inside = slice(np.searchsorted(times, warp.knots[0]),
-                   np.searchsorted(times, warp.knots[-1], side='right'))
+    inside = between(times, warp.knots[0], warp.knots[-1])
     phases, x = warp(times[inside]), positions[inside]
     theta = np.arange(POINTS) / POINTS
     full = np.isfinite(x).sum(axis=0) >= SAMPLES
@@ -250,8 +249,10 @@ def _usable(recording: Recorded, legs: Mapping[str, Sequence[str]]
             ) -> tuple[dict[str, tuple[str, ...]], np.ndarray, list[str]]:
     """Return the legs' joints that have angles, their positions without spikes, and notes."""
     listed = [name for name in recording.joints if any(name in one for one in legs.values())]
-    x = recording.positions[:, [recording.joints.index(name) for name in listed]].astype(float)
-    for column in x.T:
+    # Joint by joint in memory, as they are averaged.
+    x = np.empty((len(listed), len(recording.times))).T
+    for column, name in zip(x.T, listed, strict=True):
+        column[:] = recording.positions[:, recording.joints.index(name)]
         column[np.isinf(column)] = np.nan
     enough = np.isfinite(x).sum(axis=0) >= SAMPLES
     names = [name for name, good in zip(listed, enough, strict=True) if good]

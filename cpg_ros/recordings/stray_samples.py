@@ -57,8 +57,9 @@ def without_far(parts: list[Part], width: int) -> np.ndarray:
     """Take away positions that no joint can have; return how many, shape (width,)."""
     count = np.zeros(width, int)
     for _, columns, positions in parts:
-        far = np.isfinite(positions) & (np.abs(positions) > FARTHEST)
-        if far.any():
-            count[columns] += far.sum(axis=0)
-            positions[far] = np.nan
+        # Column by column: a long recording is large.
+        for k, column in zip(columns, positions.T, strict=True):
+            far = np.isfinite(column) & (np.abs(column) > FARTHEST)
+            count[k] += np.count_nonzero(far)
+            column[far] = np.nan
     return count

@@ -20,6 +20,7 @@ stamps' jitter. Grids are multiples of a step since the epoch, so that topics re
 side come to lie on the same stamps.
 """
 
+from array import array
 from itertools import pairwise
 
 from cpg_ros.recordings.stray_samples import FARTHEST
@@ -53,8 +54,9 @@ class Thinned:
     def __init__(self) -> None:
         self.step, self.count, self.rate = 0, 0, 0.0
         self._coming: list[tuple[np.ndarray, np.ndarray]] = []
-        self._done: list[tuple[np.ndarray, np.ndarray]] = []
         self._size, self._next = 0, LONG
+        # Of the grid so far. Arrays that grow in place: pieces to be joined would take twice that.
+        self._stamps, self._values, self._columns = array('q'), array('d'), 0
 
     def add(self, stamps: np.ndarray, values: np.ndarray) -> None:
         """Take samples.
@@ -84,19 +86,28 @@ class Thinned:
         place = _places(stamps, self.step)
         others = np.flatnonzero(place != place[-1])
         last = int(others[-1]) + 1 if others.size else 0
-        self._done.append(smoothed(stamps[:last], values[:last], self.step))
+        self._keep(stamps[:last], values[:last])
         self._coming = [(stamps[last:].copy(), values[last:].copy())]
         self._size = len(stamps) - last
+
+    def _keep(self, stamps: np.ndarray, values: np.ndarray) -> None:
+        """Put samples on the grid."""
+        stamps, values = smoothed(stamps, values, self.step)
+        self._columns = values.shape[1]
+        self._stamps.frombytes(stamps.tobytes())
+        self._values.frombytes(values.tobytes())
 
     def taken(self) -> tuple[np.ndarray, np.ndarray]:
         """Return stamps and values, the caller's own, and forget them."""
         rest = _joined(self._coming)
-        if len(self._coming) == 1 and not self.step:
-            rest = rest[0].copy(), rest[1].copy()
         if self.step:
-            self._done.append(smoothed(*rest, self.step))
-            rest = _joined(self._done)
-        self._coming, self._done = [], []
+            self._keep(*rest)
+            rest = (np.frombuffer(self._stamps, np.int64),
+                    np.frombuffer(self._values).reshape(-1, self._columns))
+            self._stamps, self._values = array('q'), array('d')
+        elif len(self._coming) == 1:
+            rest = rest[0].copy(), rest[1].copy()
+        self._coming = []
         return rest
 
     @property
