@@ -30,14 +30,14 @@ from cpg_ros.gaits.leg_names import legs_of
 from cpg_ros.gaits.stride import find_stride, Stride
 from cpg_ros.networks.delayed import Delayed
 from cpg_ros.recordings.csv_reader import read_csv
-from hostile_recordings import spoiled, WAYS
+from hostile_recordings import SEED, spoiled, WAYS
 
 FILES, GOAL = 8 * len(WAYS), 0.9
 
 
-def outcome(number: int, folder: Path) -> tuple[str, Stride | None, str]:
+def outcome(number: int, folder: Path, seed: int = SEED) -> tuple[str, Stride | None, str]:
     """Return 'refused', 'right', 'warned', 'wrong' or 'traceback'; what was found; and words."""
-    way, data, made = spoiled(number)
+    way, data, made = spoiled(number, seed)
     path = folder / f'{number}.csv'
     path.write_bytes(data)
     try:
@@ -62,11 +62,13 @@ def outcome(number: int, folder: Path) -> tuple[str, Stride | None, str]:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument('--files', type=int, default=FILES)
+    parser.add_argument('--seed', type=int, default=SEED)
+    given = parser.parse_args()
     tally = dict.fromkeys(('refused', 'right', 'warned', 'wrong', 'traceback'), 0)
     sure, bad = [], []
     with tempfile.TemporaryDirectory() as folder:
-        for number in range(parser.parse_args().files):
-            kind, found, said = outcome(number, Path(folder))
+        for number in range(given.files):
+            kind, found, said = outcome(number, Path(folder), given.seed)
             tally[kind] += 1
             if kind in ('wrong', 'traceback'):
                 bad.append(said)
@@ -74,7 +76,7 @@ def main() -> None:
             if found is not None and found.confidence >= 0.95:
                 sure.append(kind == 'right')
     share = sum(sure) / max(len(sure), 1)
-    emit(benchmark='recordings', files=sum(tally.values()), **tally, bad=bad[:5],
+    emit(benchmark='recordings', seed=given.seed, files=sum(tally.values()), **tally, bad=bad[:5],
          said_with_95_percent=len(sure), of_these_right=share, target=GOAL,
          passed=not tally['traceback'] and not tally['wrong'] and share >= GOAL)
 

@@ -25,6 +25,8 @@ import numpy as np
 LEGS = ('lh', 'rh', 'lf', 'rf')
 GAITS = {'trot': (0.0, 0.5, 0.5, 0.0), 'pace': (0.0, 0.5, 0.0, 0.5), 'bound': (0.0, 0.0, 0.5, 0.5),
          'walk': (0.0, 0.5, 0.75, 0.25), 'pronk': (0.0, 0.0, 0.0, 0.0)}
+#: Of the files that the tests read.
+SEED = 19
 NAMES = [f'{leg}_{joint}' for leg in LEGS for joint in ('hip', 'knee')]
 
 
@@ -174,9 +176,9 @@ WAYS: dict[str, Callable[[Walked, np.random.Generator], str | bytes]] = {
     'names': _names, 'decimal commas': _commas, 'limp': _limp}
 
 
-def spoiled(number: int) -> tuple[str, bytes, Walked]:
+def spoiled(number: int, seed: int = SEED) -> tuple[str, bytes, Walked]:
     """Return hostile file `number`: how it is spoiled, its bytes, and what walked before that."""
-    rng = np.random.default_rng([19, number])
+    rng = np.random.default_rng([seed, number])
     way = list(WAYS)[number % len(WAYS)]
     made = walked(rng)
     text = WAYS[way](made, rng)
