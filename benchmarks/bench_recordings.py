@@ -14,7 +14,7 @@
 
 """Hostile recordings: whether reading and recognising them ever ends in a traceback, or wrongly.
 
-Of 168 seeded tables each is either refused in one line, or the gait and frequency found are those
+Of 192 seeded tables each is either refused in one line, or the gait and frequency found are those
 that walked, or a warning says what speaks against them. And whether `confidence` is what it says:
 of what is said with 95 %, how much is right.
 """
@@ -52,7 +52,7 @@ def outcome(number: int, folder: Path, seed: int = SEED) -> tuple[str, Stride | 
             f'where it was a {made.gait} at {made.frequency:.4g} Hz')
     # Hopping, turning and other units are no mistake of the gait's name, but must be said.
     must_say = way in ('milliseconds', 'microseconds', 'degrees', 'on the spot', 'turn',
-                       'slow change')
+                       'slow change', 'another between')
     warned = bool(found.doubts) and found.confidence < 0.95
     if right and not must_say:
         return 'right', found, said

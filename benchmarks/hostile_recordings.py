@@ -162,6 +162,27 @@ def _limp(made: Walked, rng: np.random.Generator) -> str:
     return made.text()
 
 
+def _between(made: Walked, rng: np.random.Generator) -> str:
+    """Shift the fore legs by a quarter of a cycle in the middle third."""
+    middle = np.abs(made.t - made.t.mean()) < np.ptp(made.t) / 6.0
+    for column in range(4, 8):
+        made.x[middle, column] = np.interp(made.t[middle] - 0.25 / made.frequency, made.t,
+                                           made.x[:, column].copy())
+    return made.text()
+
+
+def _noisy(made: Walked, rng: np.random.Generator) -> str:
+    made.x += 0.15 * rng.normal(size=made.x.shape)
+    return made.text()
+
+
+def _bursts(made: Walked, rng: np.random.Generator) -> str:
+    """Keep six samples in thirty."""
+    some = np.arange(len(made.t)) % 30 < 6
+    made.t, made.x = made.t[some], made.x[some]
+    return made.text()
+
+
 def _as_it_is(made: Walked, rng: np.random.Generator) -> str:
     return made.text()
 
@@ -173,7 +194,8 @@ WAYS: dict[str, Callable[[Walked, np.random.Generator], str | bytes]] = {
     'slow change': _slow_change, 'wild values': _wild, 'half of the rows': _holes,
     'a stamp far off': _stamp, 'shuffled': _shuffled, 'noise': _noise, 'standing': _standing,
     'sparse': _sparse, 'few strides': _few, 'cut': _cut, 'bytes': _bytes, 'words': _words,
-    'names': _names, 'decimal commas': _commas, 'limp': _limp}
+    'names': _names, 'decimal commas': _commas, 'limp': _limp, 'another between': _between,
+    'noisy': _noisy, 'bursts': _bursts}
 
 
 def spoiled(number: int, seed: int = SEED) -> tuple[str, bytes, Walked]:

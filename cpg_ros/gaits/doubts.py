@@ -16,6 +16,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import combinations, product
 
 from cpg_ros.errors import InputError
 from cpg_ros.gaits.leg_phases import leg_phases
@@ -24,6 +25,9 @@ import numpy as np
 
 #: Fewer samples a stride may be those of a gait several times as fast.
 SAMPLES = 20.0
+#: A mean cycle is several strides if all but this share of its power is at multiples of their
+#: rate.
+ALIKE = 0.1
 #: Strides slower than this (Hz) are of no leg; with their times in another unit they may lie
 #: between the others.
 SLOW, USUAL = 0.05, (0.2, 12.5)
@@ -32,9 +36,9 @@ UNITS = {'ms': 1e3, 'us': 1e6, 'ns': 1e9}
 SWING = 2.0 * np.pi
 #: Legs whose phases differ by more between the parts of a stretch (cycles) change gait.
 CHANGE = 0.1
-#: The first and last of so many parts of a stretch are compared, of so many strides at least, and
-#: of so many samples of each joint.
-PARTS, STRIDES, FEWEST = 3, 1, 16
+#: These parts of a stretch are compared, of so many strides at least, and of so many samples of
+#: each joint.
+PARTS, STRIDES, FEWEST = ('at its beginning', 'in its middle', 'at its end'), 1, 16
 #: A leg limps that moves by less than this share of what the others do.
 LIMPS = 0.6
 
@@ -53,9 +57,25 @@ class Doubt:
     left: float
 
 
-def doubts_of_rhythm(frequency: float, samples: float) -> list[Doubt]:
-    """Doubt a stride frequency (Hz) that rests on so many samples of a joint a stride."""
-    found = []
+def doubts_of_rhythm(frequency: float, phases: np.ndarray, x: np.ndarray, c: np.ndarray
+                     ) -> list[Doubt]:
+    """Doubt a stride frequency that rests on few samples, or whose mean cycle is several.
+
+    Args:
+        frequency: Hz.
+        phases: of the samples of a stretch, cycles, shape (n,).
+        x: rad, nan where missing, shape (n, joints).
+        c: coefficients of the mean cycles, shape (harmonics + 1, joints).
+
+    """
+    found, samples = [], _samples(phases, x)
+    power = np.sum(np.abs(c[1:])**2, axis=1)
+    order = np.arange(1, len(c))
+    for times in (3, 2):
+        if power[order % times > 0].sum() < ALIKE * power.sum():
+            found.append(Doubt(f'the mean cycle holds {times} that are alike: the gait may be '
+                               f'{times} times as fast, {times * frequency:.4g} Hz', 0.2))
+            break
     if samples < SAMPLES:
         found.append(Doubt(f'only {samples:.1f} samples a stride: a gait several times as fast '
                            'would look the same; record faster', 0.5))
@@ -66,6 +86,17 @@ def doubts_of_rhythm(frequency: float, samples: float) -> list[Doubt]:
             f': if the times are in {unit}, it is {frequency * UNITS[unit]:.4g} Hz; declare it '
             f'(--time {unit})' if unit else ''), 0.02))
     return found
+
+
+def _samples(phases: np.ndarray, x: np.ndarray) -> float:
+    """Return how many samples of a joint a stride has: of bursts, by the pauses between them."""
+    there = np.isfinite(x)
+    own = phases[there[:, int(np.argmax(there.sum(axis=0)))]]
+    steps = np.sort(np.diff(own))
+    passed = np.cumsum(steps)
+    # Half of the time passes between samples that are further apart than this.
+    apart = float(steps[np.searchsorted(passed, 0.5 * passed[-1])])
+    return min(own.size / float(phases[-1] - phases[0]), 1.0 / apart)
 
 
 def doubts_of_angles(joints: Sequence[str], mean: np.ndarray) -> list[Doubt]:
@@ -88,7 +119,7 @@ def doubts_of_legs(vague: Sequence[str]) -> list[Doubt]:
 
 def doubts_of_change(phases: np.ndarray, x: np.ndarray, legs: Mapping[str, Sequence[str]],
                      names: Sequence[str]) -> list[Doubt]:
-    """Doubt one gait where the legs' phases differ between the first and the last part.
+    """Doubt one gait where the legs' phases differ between parts of the stretch.
 
     Args:
         phases: of the samples of a stretch, cycles, shape (n,).
@@ -100,22 +131,26 @@ def doubts_of_change(phases: np.ndarray, x: np.ndarray, legs: Mapping[str, Seque
     parts = _by_parts(phases, x, legs, names)
     if not parts:
         return []
-    first, last = parts[0], parts[-1]
-    moved = {leg: (last[leg] - first[leg] + 0.5) % 1.0 - 0.5 for leg in first}
-    leg = max(moved, key=lambda one: abs(moved[one]))
-    if abs(moved[leg]) <= CHANGE:
+
+    def moved(leg: str, pair: tuple[int, int]) -> float:
+        return abs((parts[pair[1]][leg] - parts[pair[0]][leg] + 0.5) % 1.0 - 0.5)
+
+    leg, pair = max(product(parts[0], combinations(range(len(parts)), 2)),
+                    key=lambda one: moved(*one))
+    if moved(leg, pair) <= CHANGE:
         return []
-    return [Doubt(f'the gait changes within the stretch: {leg} is at {first[leg]:.2f} of a cycle '
-                  f'at its beginning and at {last[leg]:.2f} at its end', 0.2)]
+    at = [f'at {parts[k][leg]:.2f} {PARTS[k]}' for k in pair]
+    return [Doubt(f'the gait changes within the stretch: of a cycle, {leg} is {at[0]} and {at[1]}',
+                  0.2)]
 
 
 def _by_parts(phases: np.ndarray, x: np.ndarray, legs: Mapping[str, Sequence[str]],
               names: Sequence[str]) -> list[dict[str, float]]:
-    """Find the legs' phases in the first and the last part of a stretch, if it is that long."""
+    """Find the legs' phases in the parts of a stretch, if it is that long."""
     span, found = phases[-1] - phases[0], []
-    for place in (slice(np.searchsorted(phases, phases[0] + span / PARTS)),
-                  slice(np.searchsorted(phases, phases[-1] - span / PARTS, side='right'), None)):
-        if span < PARTS * STRIDES or (np.isfinite(x[place]).sum(axis=0) < FEWEST).any():
+    edges = np.searchsorted(phases, phases[0] + span * np.arange(1, len(PARTS)) / len(PARTS))
+    for place in map(slice, [0, *edges], [*edges, len(phases)]):
+        if span < len(PARTS) * STRIDES or (np.isfinite(x[place]).sum(axis=0) < FEWEST).any():
             return []
         try:
             part = warped(phases[place], x[place], np.zeros(1), [0])

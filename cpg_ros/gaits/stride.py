@@ -207,7 +207,7 @@ def find_stride(recording: Recorded, legs: Legs | Mapping[str, Sequence[str]],
                for leg, listed in chosen.items()}
     ahead, by_legs, vague, opposite = leg_phases(leading, c)
     gait = named(ahead, kind)
-    doubts = [*doubts_of_rhythm(warp.frequency, float(found.counts.max()) / warp.cycles),
+    doubts = [*doubts_of_rhythm(warp.frequency, phases, x, found.coefficients),
               *doubts_of_angles(names, found.mean(theta)), *doubts_of_legs(vague),
               *doubts_of_change(phases, x, leading, names),
               *doubts_of_travel(chosen, c, kind.girdles, opposite)]
