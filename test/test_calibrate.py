@@ -109,6 +109,19 @@ def test_a_bag_replaces_the_nearest_speed_of_a_full_table_and_the_file_still_loa
     assert abs(gone - new) == min(abs(speed - new) for speed in before)
 
 
+def test_a_measured_speed_is_what_a_copy_is_looked_up_by(tmp_path, messages, capsys):
+    robot = without_copies(tmp_path / 'robot.yaml')
+    write_bag(tmp_path / 'bag', messages, types=TYPES)
+    assert main([str(tmp_path / 'bag'), '--robot', str(robot), '--speed', '0.37']) == 0
+    made = EfferenceCopy.of(load_robot(robot).motions['trot'].efference)
+    # Velocities stay those of the estimate, whose errors then cancel.
+    assert made.speeds == [0.37]
+    assert made.table[0, :, 0].mean() == pytest.approx(0.397, abs=0.01)
+    with pytest.raises(SystemExit):
+        main([str(tmp_path / 'bag'), '--robot', str(robot), '--speed', '0.37', '0.4'])
+    assert '2 speeds for 1 bags' in capsys.readouterr().err
+
+
 def test_a_robot_file_with_more_speeds_than_fit_is_refused_with_its_key(tmp_path):
     table = GO2.motions['trot'].efference
     more = replace(table, speeds=(*table.speeds, 9.0),

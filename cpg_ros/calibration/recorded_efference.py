@@ -56,13 +56,15 @@ class Calibrated:
     copy: EfferenceCopy
 
 
-def efference_from(recording: WalkRecording, robot: Robot, gait: str | None = None) -> Calibrated:
+def efference_from(recording: WalkRecording, robot: Robot, gait: str | None = None,
+                   speed: float | None = None) -> Calibrated:
     """Work out what a gait makes the body do.
 
     Args:
         recording: of one gait at one speed on flat ground.
         robot: that walked.
         gait: which it was; None lets the legs' phases tell.
+        speed: true one, m/s; None takes the estimate's, which feet that slip or are soft bias.
 
     Raises:
         InputError: the robot has no geometry, no gait can be told, or the robot does not know it.
@@ -95,7 +97,7 @@ def efference_from(recording: WalkRecording, robot: Robot, gait: str | None = No
             stride.theta, stride.mean.T, Timetable(program, geometry), columns)
     signals = np.concatenate([velocity, felt.turning[:, :2], felt.lean[:, :2]], axis=1)[inside]
     table = fold(phases, signals)
-    speed = float(table[:, 0].mean())
+    speed = float(table[:, 0].mean()) if speed is None else speed
     return Calibrated(recording.source, gait, speed, stride.cycles,
                       EfferenceCopy(np.array([speed]), table[None]))
 

@@ -52,7 +52,8 @@ class BagWriter:
         self._store = get_typestore(Stores.ROS2_JAZZY)
         try:
             shutil.rmtree(self._beside, ignore_errors=True)
-            self._writer = Writer(self._beside / path.name, version=9, storage_plugin=StoragePlugin.MCAP)
+            self._writer = Writer(self._beside / path.name, version=9,
+                                  storage_plugin=StoragePlugin.MCAP)
             self._writer.open()
         except (OSError, WriterError) as error:
             raise BagError(f'{path}: {getattr(error, "strerror", None) or error}') from error
