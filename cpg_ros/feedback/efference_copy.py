@@ -25,10 +25,8 @@ from cpg_ros.robots import body_keys
 from cpg_ros.robots.body_keys import EfferenceTable
 import numpy as np
 
-#: Bins of a stride, and how many signals there are; see ``body_keys.SIGNALS``.
-BINS, SIGNALS = body_keys.BINS, len(body_keys.SIGNALS)
-#: Most speeds of a table.
-SPEEDS = 8
+#: Bins of a stride, how many signals there are, and most speeds of a table; see ``body_keys``.
+BINS, SIGNALS, SPEEDS = body_keys.BINS, len(body_keys.SIGNALS), body_keys.SPEEDS
 
 
 @dataclass(frozen=True)

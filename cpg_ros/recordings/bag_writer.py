@@ -47,11 +47,13 @@ class BagWriter:
         if path.exists():
             raise BagError(f'{path}: already exists')
         self.path, self.size = path, 0
+        # Its files are named after the bag's folder, which therefore has its name from the start.
         self._beside = path.with_name(f'.{path.name}.unfinished')
         self._store = get_typestore(Stores.ROS2_JAZZY)
         try:
             shutil.rmtree(self._beside, ignore_errors=True)
-            self._writer = Writer(self._beside, version=9, storage_plugin=StoragePlugin.MCAP)
+            self._writer = Writer(self._beside / path.name, version=9,
+                                  storage_plugin=StoragePlugin.MCAP)
             self._writer.open()
         except (OSError, WriterError) as error:
             raise BagError(f'{path}: {getattr(error, "strerror", None) or error}') from error
@@ -92,8 +94,7 @@ class BagWriter:
         try:
             self._writer.close()
             if self.size:
-                self._beside.rename(self.path)
-            else:
-                shutil.rmtree(self._beside)
+                (self._beside / self.path.name).rename(self.path)
+            shutil.rmtree(self._beside)
         except OSError as error:
             raise BagError(f'{self.path}: {error.strerror}') from error

@@ -25,8 +25,8 @@ from typing import Any
 from cpg_ros.files.yaml_reader import Reader, shown
 import numpy as np
 
-#: Bins of the stride in an efference table.
-BINS = 64
+#: Bins of the stride in an efference table, and most speeds that it has.
+BINS, SPEEDS = 64, 8
 #: Its signals: velocities in m/s, rates in rad/s, angles in rad, of the base in its own frame.
 SIGNALS = ('forward', 'left', 'roll_rate', 'pitch_rate', 'roll', 'pitch')
 
@@ -74,7 +74,7 @@ class EfferenceTable:
     """What the base does by itself in a gait, by speed and by the phase of the first leg.
 
     Attributes:
-        speeds: m/s, rising.
+        speeds: m/s, rising, at most SPEEDS.
         rows: by SIGNALS; of each a row for each speed, of BINS values, the means over parts of
             the stride.
 
@@ -152,6 +152,8 @@ def read_efference(reader: Reader, tree: Any, where: str) -> EfferenceTable:
     tree = reader.keys(tree, where, {'speeds', *SIGNALS})
     speeds = tuple(reader.number(entry, f'{where}.speeds[{k}]') for k, entry
                    in enumerate(reader.items(tree['speeds'], f'{where}.speeds')))
+    if len(speeds) > SPEEDS:
+        raise reader.fail(f'{where}.speeds', f'has {len(speeds)} speeds; at most {SPEEDS} fit')
     for k in range(1, len(speeds)):
         if not speeds[k - 1] < speeds[k]:
             raise reader.fail(f'{where}.speeds[{k}]', f'{speeds[k]:g} is not above '

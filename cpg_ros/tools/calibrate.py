@@ -60,6 +60,10 @@ def _parser() -> Parser:
     parser.add_argument('--gait', nargs='+', default=[], metavar='GAIT', help='gaits of the bags, '
                         "one for each or one for all (default: recognised from the legs' phases), "
                         'or gaits to simulate (default: all in the robot file)')
+    parser.add_argument('--speed', nargs='+', type=float, default=[], metavar='M/S',
+                        help='true speeds, one for each bag, as measured with a tape and a clock '
+                        '(default: estimated from the legs, which is wrong where feet slip or '
+                        'give way)')
     for key, kind in TYPES.items():
         parser.add_argument(f'--{key.replace("_", "-")}', metavar='TOPIC',
                             default={'phase': 'cpg_generator/phase'}.get(key, key),
@@ -79,8 +83,9 @@ def _simulated(robot: Robot, chosen: argparse.Namespace) -> Robot:
 def _recorded(robot: Robot, chosen: argparse.Namespace) -> tuple[Robot, list[Calibrated]]:
     topics = {key: getattr(chosen, key) for key in TYPES}
     gaits = chosen.gait * len(chosen.bags) if len(chosen.gait) < 2 else chosen.gait
-    found = [efference_from(read_walk(bag, robot, topics), robot, gait)
-             for bag, gait in zip(chosen.bags, gaits or [None] * len(chosen.bags), strict=True)]
+    none = [None] * len(chosen.bags)
+    found = [efference_from(read_walk(bag, robot, topics), robot, gait, speed) for bag, gait, speed
+             in zip(chosen.bags, gaits or none, chosen.speed or none, strict=True)]
     return with_efference(robot, found), found
 
 
@@ -99,6 +104,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         parser.error('give either bags or --model MODEL')
     if chosen.bags and len(chosen.gait) not in (0, 1, len(chosen.bags)):
         parser.error(f'argument --gait: {len(chosen.gait)} gaits for {len(chosen.bags)} bags')
+    if len(chosen.speed) not in (0, len(chosen.bags)):
+        parser.error(f'argument --speed: {len(chosen.speed)} speeds for {len(chosen.bags)} bags')
     out = chosen.out or Path(chosen.robot)
     if out.suffix not in ('.yaml', '.yml'):
         parser.error(f'argument --out: {out} does not end in .yaml')
