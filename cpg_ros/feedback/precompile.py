@@ -17,7 +17,7 @@
 from cpg_ros.feedback.estimate import Senses
 from cpg_ros.feedback.feedback import Feedback
 from cpg_ros.feedback.foot_force import loads_of
-from cpg_ros.feedback.kinematics import Geometry, GRAVITY
+from cpg_ros.feedback.kinematics import Geometry
 from cpg_ros.feedback.plausibility import (
     agreement,
     IMU,
@@ -33,15 +33,12 @@ def precompile(geometry: Geometry, joints: int) -> None:
     """Run each kernel once, on the types that a generator uses; joints is their number."""
     feedback, legs = Feedback(geometry, joints=joints), len(geometry.hips)
     senses, some, load = Senses.blank(1, legs, joints), np.zeros(joints), np.zeros(legs)
-    three, one = np.zeros(3), np.zeros(1)
-    values, places = np.zeros(IMU), np.arange(joints)
-    values[3], values[27] = 1.0, GRAVITY
-    # As they come in messages: not aligned, not to be written to.
-    values, told = (np.frombuffer(b'1234' + numbers.tobytes(), offset=4)
-                    for numbers in (values, some))
-    judge_imu(values, 0.1, np.zeros(IMU_MEMORY), senses.lean[0], senses.turning[0], three)
-    judge_joints(told, told, places, some, some, some, some.copy(), some.copy())
-    judge_loads(told[:legs], places[:legs], geometry.weight, 0.1, one, load.copy())
+    one, places = np.zeros(1), np.arange(joints)
+    # As they come in messages: not to be written to.
+    told = np.frombuffer(bytes(8 * max(IMU, joints)))
+    judge_imu(told, 0.1, np.zeros(IMU_MEMORY), senses.lean[0], senses.turning[0], senses.push[0])
+    judge_joints(told, told, places, some, some, some, some, some)
+    judge_loads(told, places[:legs], geometry.weight, 0.1, one, load)
     loads_of(geometry.rows, geometry.columns, some, some, 0.0, 0.0, load)
     agreement(load, 1.0, np.zeros(legs, dtype=bool), 0.1, 1.0)
     feedback.advance(senses, some[None], one, np.zeros((1, 2), dtype=np.int64), one.copy(),

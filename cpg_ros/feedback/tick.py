@@ -34,7 +34,7 @@ from cpg_ros.feedback.estimate import update
 from cpg_ros.feedback.kinematics import foot_of, move_foot
 from cpg_ros.feedback.timetable import POINTS
 from cpg_ros.integration.jit import entry, jit, sources_digest
-from cpg_ros.motion.strides import TIME_CONSTANT
+from cpg_ros.motion.strides import approach
 import numpy as np
 
 #: Joints are where they are told to be a little later: corrections come ahead by this, cycles.
@@ -59,8 +59,8 @@ class Memory(NamedTuple):
         fatigue: low-passed share by which it was above 1 for pushes, shape (runs,).
         phase: of the first leg at the last tick, cycles, shape (runs,).
         owed: by the touchdown reset to the phase, cycles, shape (runs,).
-        asked: wanted speed forward and to the left as it is approached, m/s, and its rates,
-            m/s^2, shape (runs, 2, 2).
+        asked: wanted speed forward and to the left as it is approached, m/s, and in a second row
+            its rates, m/s^2, shape (runs, 2, 2).
         landed, seen, scratch, own: for passing on within a tick.
 
     """
@@ -95,17 +95,6 @@ class Memory(NamedTuple):
                    np.zeros(runs), np.zeros(runs), np.zeros((runs, 2, 2)),
                    np.zeros(legs, dtype=bool), np.zeros((legs, 4)), np.zeros((5, 3)),
                    np.zeros(SIGNALS))
-
-
-@jit
-def _approach(asked, wanted, dt):
-    """Let each wish, a value and its rate, go to what is wanted as strides do; see Drive."""
-    decay = math.exp(-dt / TIME_CONSTANT)
-    for k in range(len(wanted)):
-        gap, rate = asked[k, 0] - wanted[k], asked[k, 1]
-        pull = rate + gap / TIME_CONSTANT
-        asked[k, 0] = wanted[k] + (gap + pull * dt) * decay
-        asked[k, 1] = (rate - pull * dt / TIME_CONSTANT) * decay
 
 
 @jit
@@ -149,9 +138,10 @@ def _cached(digest):
                    memory.seen, memory.scratch)
             old, new = gaits[run, 0], gaits[run, 1]
             slot = new if mix[run] > 0.5 else old
-            _approach(memory.asked[run], wanted[run], dt)
+            # What is wished for is approached as strides are.
+            approach(wanted[run], wanted[run, :0], dt, memory.asked[run, 0], memory.asked[run, 1])
             phase = phases[run]
-            forward, left = memory.asked[run, 0, 0], memory.asked[run, 1, 0]
+            forward, left = memory.asked[run, 0, 0], memory.asked[run, 0, 1]
             own[:] = 0.0
             expect(tables.speeds[old], tables.expected[old], phase, forward, 1.0 - mix[run], own)
             if mix[run] > 0.0:

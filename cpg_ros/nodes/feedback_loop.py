@@ -66,8 +66,6 @@ class FeedbackLoop:
         self._pattern, self._geometry, self._motion = pattern, geometry, motion
         self._feedback = Feedback(geometry, joints=len(pattern.robot.joints))
         self._known: list[tuple[Program, Timetable]] = []
-        # Of the gait that was met last: what the table of those known says.
-        self._met: tuple[Program | None, Timetable | None] = None, None
         self._inputs: SensesInput | None = None
         self._least = TOUCH * geometry.weight
         self._gaits, self._mix = np.zeros((1, 2), dtype=np.int64), np.zeros(1)
@@ -146,10 +144,7 @@ class FeedbackLoop:
         program = pattern.program
         if program.motion.efference is None:
             found.append(f"the robot file has no efference copy of the gait '{program.name}'")
-        met, times = self._met
-        if met is not program:
-            times = next((times for known, times in self._known if known is program), None)
-            self._met = program if times is not None else None, times
+        times = next((times for known, times in self._known if known is program), None)
         if found or times is None or pattern.level < 1.0 or pattern.in_transition:
             self._agrees = 1.0
         else:

@@ -15,13 +15,12 @@
 """The patterns of many runs: orbits looked up, ramped in, steered, switched, held to limits."""
 
 from collections.abc import Mapping, Sequence
-import math
 
 from cpg_ros.feedback.timetable import POINTS, Timetable
 from cpg_ros.integration.jit import entry, sources_digest
 from cpg_ros.motion.plan import Program
 from cpg_ros.motion.smoothstep import smoothstep
-from cpg_ros.motion.strides import TIME_CONSTANT
+from cpg_ros.motion.strides import approach
 from cpg_ros.simulation.scenario import Scenario
 import numpy as np
 
@@ -118,15 +117,7 @@ def _cached(digest):
             mix[run] = s * s * (3.0 - 2.0 * s)
             if s == 1.0:
                 old = gaits[run, 0] = new
-            decay = math.exp(-clock / TIME_CONSTANT)
-            for k in range(drive.shape[1]):
-                target = asked[run, k]
-                if k < drive.shape[1] - 1:
-                    target = min(max(target + strides[run, k], -1.0), 1.0)
-                gap, rate = drive[run, k] - target, rates[run, k]
-                pull = rate + gap / TIME_CONSTANT
-                drive[run, k] = target + (gap + pull * clock) * decay
-                rates[run, k] = (rate - pull * clock / TIME_CONSTANT) * decay
+            approach(asked[run], strides[run], clock, drive[run], rates[run])
             frequency = frequencies[old] + mix[run] * (frequencies[new] - frequencies[old])
             phases[run] = (phases[run] + frequency * drive[run, -1] * clock) % 1.0
             course[run] += turning[run] * dt
