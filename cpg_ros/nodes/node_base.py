@@ -27,6 +27,7 @@ from typing import Any
 from cpg_ros.errors import CpgError
 from cpg_ros.nodes.parameter_services import StrictParameterService
 from cpg_ros.nodes.parameter_spec import as_doubles, as_list, kind_of, Spec
+from cpg_ros.nodes.real_time import leave_shared_memory
 from cpg_ros.nodes.shutdown import ended
 import rclpy
 from rclpy.exceptions import (
@@ -216,6 +217,7 @@ def run(make: Callable[[], StartedNode], name: str, args: list[str] | None) -> i
     if wrong := _domain():
         print(f'{name}: {wrong}', file=sys.stderr)
         return 2
+    leave_shared_memory()
     try:
         rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
     except RuntimeError as error:

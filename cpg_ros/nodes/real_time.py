@@ -24,6 +24,8 @@ import threading
 from cpg_ros.errors import CpgError
 from cpg_ros.nodes.parameter_spec import Spec
 
+#: With which transport a participant of Fast DDS speaks; the user's own choice goes first.
+TRANSPORT = 'FASTDDS_BUILTIN_TRANSPORTS', 'UDPv4'
 #: Of mlockall: the pages that are there, and those to come.
 MCL_CURRENT, MCL_FUTURE = 1, 2
 LIMITS = 'in /etc/security/limits.conf, and log in again'
@@ -96,6 +98,17 @@ class RealTime:
                                f'the limit rtprio (@realtime - rtprio {max(98, self.priority)}) '
                                f'{LIMITS}')
         return granted, refused
+
+
+def leave_shared_memory() -> None:
+    """Let this process speak by UDP alone, on this computer, too; to be called before rclpy.init.
+
+    Whoever joins the graph on the same computer has a port of shared memory, and whoever first
+    sends there looks whether it is alive. If its listener is not waiting at that instant, Fast DDS
+    sleeps for a third of healthy_check_timeout_ms, 333 ms, and keeps the lock that every publisher
+    of the process needs: a robot would go without commands for so long.
+    """
+    os.environ.setdefault(*TRANSPORT)
 
 
 def _raise_others() -> None:
