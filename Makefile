@@ -83,6 +83,8 @@ $(VENV)/.unitree: $(INSTALLED) interfaces/build.py $(wildcard interfaces/unitree
 	@touch $@
 
 $(INSTALLED): requirements.txt requirements-docs.txt requirements-models.txt $(WHEELS)
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
+		{ echo "$(PYTHON) is $$($(PYTHON) --version 2>&1); cpg_ros needs Python 3.11 to 3.13 (PYTHON=...)" >&2; exit 1; }
 	@test -x $(VENV)/bin/pip -a -e $@ || $(PYTHON) -m venv --clear $(SITE) $(VENV) || \
 		{ echo '$(PYTHON) could not make a virtual environment (on Debian and Ubuntu: apt install python3-venv)' >&2; exit 1; }
 	@echo 'installing the dependencies into $(VENV) (the first time takes a few minutes)$(if $(ROS_DISTRO),; ROS 2 is the sourced one$(comma) $(ROS_DISTRO))'
