@@ -106,7 +106,8 @@ def leave_shared_memory() -> None:
     Whoever joins the graph on the same computer has a port of shared memory, and whoever first
     sends there looks whether it is alive. If its listener is not waiting at that instant, Fast DDS
     sleeps for a third of healthy_check_timeout_ms, 333 ms, and keeps the lock that every publisher
-    of the process needs: a robot would go without commands for so long.
+    of the process needs: a robot would go without commands for so long. With the discovery range
+    LOCALHOST the middleware of ROS brings shared memory itself; no robot is reached that way.
     """
     os.environ.setdefault(*TRANSPORT)
 
