@@ -86,14 +86,14 @@ def test_no_node_outlives_it_when_it_walks(tmp_path):
 
 
 def test_a_gait_that_is_chosen_on_its_page_ends_the_tour(tmp_path):
-    with demo(tmp_path, '--every', '3') as process:
+    with demo(tmp_path, '--every', '6') as process:
         line = until(lambda: re.search(rb'in a browser: (http://\S+)', process.stdout.readline()),
                      'the address')
         page = Client(line[1].decode()).ready()
         page.send(do='set', name='gait', value='pace')
         until(lambda: page.last['gait']['gait'] == 'pace', 'the gait')
         until(lambda: 'base' in page.frame, 'the robot')
-        end = page.frame['time'] + 4.0
+        end = page.frame['time'] + 7.0
         until(lambda: page.frame['time'] > end, 'more than a gait of the tour')
         assert page.last['gait']['gait'] == 'pace'
         page.end()

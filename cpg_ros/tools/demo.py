@@ -39,6 +39,7 @@ from rcl_interfaces.srv import SetParametersAtomically
 import rclpy
 from rclpy.node import Node
 from rclpy.parameter import Parameter
+from rclpy.qos import DurabilityPolicy, QoSProfile
 from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import try_shutdown
 from std_msgs.msg import String
@@ -71,9 +72,11 @@ class Operator(Node):
         self.time = 0.0
         self._client = self.create_client(SetParametersAtomically,
                                           'cpg_generator/set_parameters_atomically')
-        self._asked, self.taken_over = gait, False
+        self._asked, self.taken_over, self._heard = gait, False, False
         self.create_subscription(Odometry, 'odom', self._odom, 1)
-        self.create_subscription(String, 'cpg_generator/gait', self._gait, 10)
+        # As it is published: a gait that was chosen before the two had found each other counts.
+        self.create_subscription(String, 'cpg_generator/gait', self._gait, QoSProfile(
+            depth=10, durability=DurabilityPolicy.TRANSIENT_LOCAL))
 
     def _odom(self, message: Odometry) -> None:
         self.place = message.pose.pose.position.x, message.pose.pose.position.y
@@ -81,6 +84,7 @@ class Operator(Node):
 
     def _gait(self, message: String) -> None:
         # Who chooses a gait on the page, or by a parameter, has ended the tour.
+        self._heard = True
         self.taken_over |= message.data != self._asked
 
     def alone(self) -> None:
@@ -114,8 +118,8 @@ class Operator(Node):
 
     @property
     def ready(self) -> bool:
-        """Whether the body moves, as it does once it is commanded, and the generator serves."""
-        return self.place is not None and self._client.service_is_ready()
+        """Whether the body moves, as it does once it is commanded, and the generator is heard."""
+        return self.place is not None and self._heard and self._client.service_is_ready()
 
 
 @contextmanager
