@@ -66,7 +66,7 @@ test: install/.built docs
 	@$(VENV)/bin/ruff check .
 	@$(VENV)/bin/mypy
 	@$(VENV)/bin/lint-imports --no-logo
-	@$(ENTER); for part in '-n auto -m "not live" $(if $(ARGS),,$(COVER) --cov-report= --cov-fail-under=90)' \
+	@$(ENTER); for part in '-n auto --dist loadgroup -m "not live" $(if $(ARGS),,$(COVER) --cov-report= --cov-fail-under=90)' \
 		'-n $(LIVE) --dist loadgroup -m "live and not alone" $(AGAIN)' '-m alone $(AGAIN)'; do \
 		eval $(VENV)/bin/pytest test $$part $(ARGS) || [ $$? = 5 ]; done  # 5: none selected
 

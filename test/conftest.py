@@ -21,9 +21,11 @@ from graph import EXECUTABLE, Process, Watcher  # noqa: E402
 import pytest  # noqa: E402
 
 #: Files whose tests measure against the clock on the wall: beside others they would fail.
-ALONE = ('test_clock', 'test_closed_loop', 'test_demo', 'test_go2_live', 'test_inversion_live',
-         'test_lockstep', 'test_robot_sim', 'test_stalls', 'test_stop_paths', 'test_switching',
-         'test_topics', 'test_unitree_live')
+ALONE = ('test_clock', 'test_demo', 'test_inversion_live', 'test_lockstep', 'test_stalls',
+         'test_stop_paths', 'test_switching', 'test_topics', 'test_unitree_live')
+
+#: What several tests of a file share and takes seconds to make.
+SHARED = {'copied', 'drawn', 'executors', 'report', 'running', 'written'}
 
 
 def pytest_collection_modifyitems(items):
@@ -31,14 +33,25 @@ def pytest_collection_modifyitems(items):
     for item in items:
         known = vars(item.module).values()
         given = set(getattr(item, 'callspec', item).__dict__.get('params', ()))
-        if {'start', 'running'} & set(item.fixturenames) - given or any(
+        fixtures = set(item.fixturenames) - given
+        if {'start', 'running'} & fixtures or any(
                 thing is one for thing in known for one in (EXECUTABLE, Process, Watcher)):
             item.add_marker('live')
             if item.module.__name__ in ALONE:
                 item.add_marker('alone')
-        if 'running' in item.fixturenames:
-            # One generator for all of them: in one worker.
+        if SHARED & fixtures:
+            # What takes long and serves all of them: in one worker.
             item.add_marker(pytest.mark.xdist_group(item.module.__name__))
+
+
+@pytest.fixture
+def untraced(monkeypatch):
+    """Let processes run without being measured: what they run in is seen by other tests.
+
+    Measuring makes what runs in Python take two to three times as long. ``no_cover`` beside it
+    does the same to the test itself.
+    """
+    monkeypatch.delenv('COVERAGE_PROCESS_CONFIG', raising=False)
 
 
 @pytest.fixture

@@ -228,7 +228,7 @@ def test_nonsense_ends_in_one_line(capsys, arguments, words):
 
 
 def test_as_a_process():
-    command = [sys.executable, '-m', 'cpg_ros.tools.analyze']
+    command = [sys.executable, '-P', '-m', 'cpg_ros.tools.analyze']
     bad = subprocess.run([*command, '--set', 'c=0'], capture_output=True, text=True, timeout=120)
     assert bad.returncode == 2 and 'Traceback' not in bad.stderr and bad.stderr.count('\n') == 1
     with subprocess.Popen([*command], stdout=subprocess.PIPE, stderr=subprocess.PIPE) as left:

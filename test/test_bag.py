@@ -272,14 +272,14 @@ def test_a_bag_of_anything_is_read_as_the_library_reads_it_or_refused(batch, tmp
         if len(own) == len(position) and (stamp or not stamped or not dated):
             for name, value in zip(own, position, strict=True):
                 if np.isfinite(value):
-                    expected.setdefault(((stamp if stamped else START + k) / 1e9, name), []
-                                        ).append(value)
+                    at = stamp if stamped else START + k
+                    expected.setdefault((at, name), []).append(value)
     table = recording.positions
     assert (~np.isnan(table)).sum() <= len(expected)
     for row, column in zip(*np.nonzero(~np.isnan(table)), strict=True):
         time = recording.start + recording.times[row]
-        near = [values for (stamp, name), values in expected.items()
-                if name == recording.joints[column] and abs(stamp - time) < 2e-6]
+        near = [values for (at, name), values in expected.items()
+                if name == recording.joints[column] and abs(at / 1e9 - time) < 2e-6]
         assert table[row, column] in [value for values in near for value in values]
 
 

@@ -28,8 +28,9 @@ WARM = 'from cpg_ros.motion.precompile import precompile; precompile({network!r}
 STEP = """
 import numpy as np
 from cpg_ros.integration.stepper import Stepper
-from cpg_ros.networks.biped import Biped
-Stepper(Biped.symmetric(0.229, 0.254, 0.39, -0.681, 0.489), np.zeros(8)).advance(0.1)
+from cpg_ros.networks.registry import PRESETS
+network = next(iter(PRESETS[{network!r}].values())).network
+Stepper(network, np.zeros(network.components)).advance(0.1)
 """
 CHECK = """
 import numpy as np
@@ -60,27 +61,48 @@ def test_networks_compiled_apart_keep_their_own_code(tmp_path):
     assert sorted(tmp_path.rglob('*.nbc')) == before, 'the cache was not used'
 
 
-@pytest.mark.parametrize('source', ['integration/jit.py', 'motion/readout.py',
-                                    'networks/derivation.py'])
-def test_a_changed_source_is_compiled_again(tmp_path, source):
-    # numba watches only the file that a kernel stands in, and the rooms have several.
-    package = tmp_path / 'package'
+@pytest.fixture(scope='module')
+def copied(tmp_path_factory):
+    """Return a copy of the package in which one network has been compiled, and what that left."""
+    package = tmp_path_factory.mktemp('package')
     shutil.copytree(Path(cpg_ros.__file__).parent, package / 'cpg_ros',
                     ignore=shutil.ignore_patterns('__pycache__'))
     shutil.copytree(share() / 'config', package / 'config')
-    cache = tmp_path / 'cache'
-    environment = dict(os.environ, NUMBA_CACHE_DIR=str(cache), PYTHONPATH=os.pathsep.join(
-        [str(package), os.environ.get('PYTHONPATH', '')]))
+    known = kernels_after_a_start(package, 'delayed')
+    assert known
+    return package, known
 
-    def kernels_after_a_start():
-        subprocess.run([sys.executable, '-c', STEP], env=environment, check=True, cwd=package)
-        return sorted(cache.rglob('*.nbc'))
 
-    first = kernels_after_a_start()
-    assert first and kernels_after_a_start() == first
-    changed = package / 'cpg_ros' / source
-    changed.write_text(changed.read_text() + '\n# Changed.\n')
-    assert set(kernels_after_a_start()) > set(first)
+def kernels_after_a_start(package, network):
+    """Step a network in a process of its own; return what is on disk then."""
+    environment = {key: value for key, value in os.environ.items() if key != 'NUMBA_CACHE_DIR'}
+    environment['PYTHONPATH'] = str(package)
+    subprocess.run([sys.executable, '-c', STEP.format(network=network)], env=environment,
+                   check=True, cwd=package)
+    return set(package.rglob('*.nbc'))
+
+
+def test_the_first_start_of_another_network_leaves_what_is_compiled(copied):
+    # Its generated code is kept beside the sources, where anybody may write there.
+    package, known = copied
+    both = kernels_after_a_start(package, 'phase')
+    assert both > known and list(package.rglob('phase_*.py'))
+    assert kernels_after_a_start(package, 'delayed') == both
+
+
+def test_a_changed_source_is_generated_and_compiled_again(copied):
+    # numba watches only the file that a kernel stands in, and the rooms have several.
+    package, _ = copied
+    generated = set(package.rglob('delayed_*.py'))
+    known = set(package.rglob('*.nbc'))
+    assert generated and kernels_after_a_start(package, 'delayed') == known
+    for source in ('integration/field_code.py', 'motion/readout.py'):
+        changed = package / 'cpg_ros' / source
+        changed.write_text(changed.read_text() + '\n# Changed.\n')
+        before, known = known, kernels_after_a_start(package, 'delayed')
+        assert known > before, source
+        older, generated = generated, set(package.rglob('delayed_*.py'))
+        assert generated > older, source
 
 
 RUN = """

@@ -88,7 +88,7 @@ def test_workers_end_with_a_client_that_is_killed():
               'if __name__ == "__main__":\n    fleet = processes(1)\n'
               '    print(fleet.submit(os.getpid).result(), flush=True)\n'
               '    os.kill(os.getpid(), signal.SIGKILL)\n')
-    found = subprocess.run([sys.executable, '-c', script], capture_output=True, text=True)
+    found = subprocess.run([sys.executable, '-P', '-c', script], capture_output=True, text=True)
     worker = int(found.stdout)
     for _ in range(100):
         if not psutil.pid_exists(worker) or psutil.Process(worker).status() == 'zombie':
@@ -109,9 +109,9 @@ def test_what_is_no_address_is_said_to_be_none(address, said):
 def test_an_address_where_nothing_answers(tmp_path):
     pytest.importorskip('distributed')
     found = subprocess.run(
-        [sys.executable, '-m', 'cpg_ros.tools.inversion', '--bags', str(Path(__file__).parent),
-         '--out', str(tmp_path / 'out'), '--dask', 'tcp://127.0.0.1:1'], capture_output=True,
-        text=True, timeout=60)
+        [sys.executable, '-P', '-m', 'cpg_ros.tools.inversion', '--bags',
+         str(Path(__file__).parent), '--out', str(tmp_path / 'out'), '--dask',
+         'tcp://127.0.0.1:1'], capture_output=True, text=True, timeout=60)
     assert found.returncode == 2
     assert found.stderr == 'inversion: no dask scheduler answers at tcp://127.0.0.1:1\n'
 

@@ -298,7 +298,7 @@ def test_damaged_input_ends_in_one_line(tmp_path, damage):
     else:
         table_of(path, names, 0.0 * t, angles)
     out = tmp_path / 'fitted.yaml'
-    ended = subprocess.run([sys.executable, '-m', 'cpg_ros.tools.inversion', kind, str(path),
+    ended = subprocess.run([sys.executable, '-P', '-m', 'cpg_ros.tools.inversion', kind, str(path),
                             '--out', str(out)], capture_output=True, text=True, timeout=120)
     assert ended.returncode == 2 and ended.stdout == ''
     assert ended.stderr.count('\n') == 1 and str(path) in ended.stderr

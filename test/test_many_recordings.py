@@ -180,7 +180,7 @@ def test_ctrl_c_keeps_what_was_finished(folder, tmp_path):
     for k in range(40):
         (folder / f'more_{k}.csv').write_text(table(seed=k))
     out = tmp_path / 'out'
-    words = [sys.executable, '-m', 'cpg_ros.tools.inversion', '--bags', str(folder), '--out',
+    words = [sys.executable, '-P', '-m', 'cpg_ros.tools.inversion', '--bags', str(folder), '--out',
              str(out), '--jobs', '1', '--network', 'delayed', '--free', 'tau', '--order', '1']
     # A shell that runs the tests in the background has them ignore it.
     running = subprocess.Popen(

@@ -25,7 +25,7 @@ import pytest
 
 def run(missing, text):
     script = f'import sys; sys.modules[{missing!r}] = None; {text}'
-    return subprocess.run([sys.executable, '-c', script], capture_output=True, text=True,
+    return subprocess.run([sys.executable, '-P', '-c', script], capture_output=True, text=True,
                           check=False)
 
 

@@ -74,7 +74,7 @@ def test_all_ordered_pairs_switch_without_a_jerk(live):
     robot = load_robot(CONFIG / f'{network}.yaml')
     programs = {name: plan(robot, name, preset, preset.network, 3.0)
                 for name, preset in PRESETS[network].items() if name == preset.gait}
-    check_all_switches(watcher, robot, programs, PHASES[network], 0.5)
+    check_all_switches(watcher, robot, programs, PHASES[network], 0.35)
 
 
 def test_every_gait_comes_to_its_phases_and_stays_healthy(live):
@@ -226,4 +226,4 @@ def test_oscillators_switch_between_all_ordered_pairs(start, network):
     programs = {name: plan(robot, name, preset, preset.network, 3.0)
                 for name, preset in PRESETS[network].items()}
     phases = {name: program.orbit.phases[:4] for name, program in programs.items()}
-    check_all_switches(watcher, robot, programs, phases, 0.5)
+    check_all_switches(watcher, robot, programs, phases, 0.35)

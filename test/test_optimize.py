@@ -45,7 +45,7 @@ SMALL = ('--gait', 'walk', '--fix', 'current=0.229', 'phi=0.254', '--population'
 
 
 def run(*arguments, **environment):
-    return subprocess.run([sys.executable, '-W', 'error::RuntimeWarning', '-m',
+    return subprocess.run([sys.executable, '-P', '-W', 'error::RuntimeWarning', '-m',
                            'cpg_ros.tools.optimize', *map(str, arguments)], text=True,
                           capture_output=True, env={**os.environ, **environment})
 
@@ -211,8 +211,8 @@ def test_nothing_is_left_half_written(found, tmp_path):
 
 
 def test_a_reader_that_has_seen_enough_is_no_error(tmp_path):
-    process = subprocess.Popen([sys.executable, '-m', 'cpg_ros.tools.optimize', *SMALL, '--out',
-                                tmp_path], stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+    process = subprocess.Popen([sys.executable, '-P', '-m', 'cpg_ros.tools.optimize', *SMALL,
+                                '--out', tmp_path], stdout=subprocess.PIPE, stderr=subprocess.PIPE)
     process.stdout.close()
     assert process.stderr.read() == b''
     assert process.wait() == 0

@@ -206,8 +206,8 @@ def test_a_fit_names_the_file(tmp_path, twin):
 
 
 def analysed(network, **environment):
-    run = subprocess.run([sys.executable, '-m', 'cpg_ros.tools.analyze', '--network', network,
-                          '--json'], capture_output=True, text=True,
+    run = subprocess.run([sys.executable, '-P', '-m', 'cpg_ros.tools.analyze', '--network',
+                          network, '--json'], capture_output=True, text=True,
                          env={**os.environ, **environment})
     return run.returncode, run.stderr, json.loads(run.stdout) if run.stdout else None
 

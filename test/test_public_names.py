@@ -36,7 +36,7 @@ assert os.environ['OPENBLAS_NUM_THREADS'] == '1'
 preset = cpg_ros.PRESETS['delayed']['trot']
 print(cpg_ros.solve_orbit(preset.network, 'trot').period)
 """
-    found = subprocess.run([sys.executable, '-c', script], capture_output=True, text=True,
+    found = subprocess.run([sys.executable, '-P', '-c', script], capture_output=True, text=True,
                            check=True)
     # The trot of Liu & Zhang's example 1, at tau 0.4.
     assert float(found.stdout) == pytest.approx(1.27827056, abs=1e-8)

@@ -43,8 +43,8 @@ def report(tmp_path_factory):
     """One run of the executable on all papers: process, JSON, page."""
     out = tmp_path_factory.mktemp('reproduce') / 'deep'
     process = subprocess.run(
-        [sys.executable, '-W', 'error::RuntimeWarning', '-m', 'cpg_ros.tools.reproduce', '--json',
-         out / 'rows.json', '--html', out / 'page.html'], text=True, capture_output=True)
+        [sys.executable, '-P', '-W', 'error::RuntimeWarning', '-m', 'cpg_ros.tools.reproduce',
+         '--json', out / 'rows.json', '--html', out / 'page.html'], text=True, capture_output=True)
     assert process.returncode == 0, process.stdout[-3000:] + process.stderr
     assert sorted(file.name for file in out.iterdir()) == ['page.html', 'rows.json']
     return process, json.loads((out / 'rows.json').read_text()), (out / 'page.html').read_text()

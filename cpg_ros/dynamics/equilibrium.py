@@ -72,12 +72,22 @@ class Quotient:
         return np.stack(np.broadcast_arrays(*found, states[..., 0])[:-1], axis=-1)
 
     def linearised(self, state: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Rates, shape (variables,), and their Jacobian, if all cells move together."""
-        rates, slopes = self._equations.slopes([state[v] for v in self._variables], self._p)
-        jacobian = np.zeros((self.size, self.size))
+        """Rates and their Jacobian, if all cells move together.
+
+        Args:
+            state: shape (variables, ...).
+
+        Returns:
+            Rates of the same shape, and the Jacobian, shape (variables, variables, ...).
+
+        """
+        found, slopes = self._equations.slopes([state[v] for v in self._variables], self._p)
+        rates, jacobian = np.empty(state.shape), np.zeros((self.size, *state.shape))
+        for v, rate in enumerate(found):
+            rates[v] = rate
         for (v, k), slope in slopes.items():
             jacobian[v, self._variables[k]] += slope
-        return np.array(rates, dtype=float), jacobian
+        return rates, jacobian
 
     def push(self, state: np.ndarray) -> np.ndarray:
         """Return the derivative of the rates by the share of the couplings, shape (variables,)."""
@@ -105,6 +115,25 @@ class Quotient:
                 if size < 1e-14:
                     break
         return state if size < 1e-11 else None
+
+    def newton_from_all(self, states: np.ndarray, most: int = 50) -> np.ndarray:
+        """Return what newton reaches from states, shape (n, variables), of those that arrive."""
+        arrived = [states[:0]]
+        sizes = np.full(len(states), np.inf)
+        with np.errstate(all='ignore'):
+            for _ in range(most):
+                rates, slopes = self.linearised(states.T)
+                slopes = np.moveaxis(slopes, -1, 0)
+                sound = np.linalg.det(slopes) != 0.0
+                moves = np.linalg.solve(slopes[sound], rates.T[sound, :, None])[..., 0]
+                states = states[sound] - moves
+                sizes = np.abs(moves).max(axis=1) / (1.0 + np.abs(states).max(axis=1))
+                arrived.append(states[sizes < 1e-14])
+                under_way = (sizes >= 1e-14) & (sizes < 1e3)
+                states, sizes = states[under_way], sizes[under_way]
+                if not len(states):
+                    break
+        return np.concatenate([*arrived, states[sizes < 1e-11]])
 
 
 def everywhere(network: Network, cell: np.ndarray) -> np.ndarray:
@@ -138,12 +167,16 @@ def equilibria(network: Network) -> np.ndarray:
     """
     _check(network)
     cell, scanned = Quotient(network), _scanned(type(network))
-    starts = _scattered(cell.size) if scanned is None else _roots(cell, scanned)
+    if scanned is None:
+        reached = cell.newton_from_all(_scattered(cell.size))
+    else:
+        solved = [cell.newton(start) for start in _roots(cell, scanned)]
+        reached = np.array([state for state in solved if state is not None]
+                           ).reshape(-1, cell.size)
     found: list[np.ndarray] = []
-    for start in starts:
-        state = cell.newton(start, 8 if scanned is not None else 50)
-        if state is not None and not any(np.allclose(state, known, 1e-9, 1e-9) for known in found):
-            found.append(state)
+    while len(reached):
+        found.append(reached[0])
+        reached = reached[~np.isclose(reached, reached[0], 1e-9, 1e-9).all(axis=1)]
     return np.array(sorted(found, key=tuple)).reshape(-1, cell.size)
 
 

@@ -18,7 +18,8 @@ from dataclasses import dataclass
 import math
 
 from cpg_ros.feedback.kinematics import foot_of, Geometry, GRAVITY, slopes_of
-from cpg_ros.integration.jit import entry, jit, sources_digest
+from cpg_ros.integration.jit import entry, jit
+from cpg_ros.networks.generated import sources_digest
 import numpy as np
 
 #: A foot counts as on the ground above this share of the weight, until below the other.

@@ -17,7 +17,8 @@
 import math
 
 from cpg_ros.feedback.kinematics import slopes_of
-from cpg_ros.integration.jit import entry, jit, sources_digest
+from cpg_ros.integration.jit import entry, jit
+from cpg_ros.networks.generated import sources_digest
 import numpy as np
 
 #: A leg whose joints hardly move its foot says nothing: least determinant, m^3.

@@ -22,7 +22,8 @@ from functools import cached_property
 import math
 
 from cpg_ros.errors import InputError
-from cpg_ros.integration.jit import entry, jit, sources_digest
+from cpg_ros.integration.jit import entry, jit
+from cpg_ros.networks.generated import sources_digest
 from cpg_ros.robots.body_keys import BodyGeometry
 from cpg_ros.robots.robot import Robot
 import numpy as np

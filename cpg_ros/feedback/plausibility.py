@@ -21,7 +21,8 @@ it lasts.
 import math
 
 from cpg_ros.feedback.kinematics import GRAVITY
-from cpg_ros.integration.jit import entry, sources_digest
+from cpg_ros.integration.jit import entry
+from cpg_ros.networks.generated import sources_digest
 
 #: What is wrong with a message, by the number that a judge returns.
 VERDICTS = ('', 'numbers that are not finite', 'an orientation whose length is not 1',

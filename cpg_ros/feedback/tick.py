@@ -33,8 +33,9 @@ from cpg_ros.feedback.efference_copy import expect, SIGNALS
 from cpg_ros.feedback.estimate import update
 from cpg_ros.feedback.kinematics import foot_of, move_foot
 from cpg_ros.feedback.timetable import POINTS
-from cpg_ros.integration.jit import entry, jit, sources_digest
+from cpg_ros.integration.jit import entry, jit
 from cpg_ros.motion.strides import approach
+from cpg_ros.networks.generated import sources_digest
 import numpy as np
 
 #: Joints are where they are told to be a little later: corrections come ahead by this, cycles.

@@ -14,10 +14,7 @@
 
 """How the numerical kernels are compiled, and the elementary functions they share."""
 
-from functools import cache
-import hashlib
 import math
-from pathlib import Path
 from typing import Any
 
 from cpg_ros.networks import generated
@@ -58,22 +55,6 @@ def renamed(function, network: str):
     """
     function.__qualname__ = f'{function.__qualname__}_{network.rpartition(".")[2]}'
     return function
-
-
-@cache
-def sources_digest(key: str = '') -> int:
-    """Return a number that changes whenever a file with compiled code does, or the key.
-
-    numba's disk cache watches only the file a cached kernel stands in, not the files of the
-    functions it calls. A kernel that closes over this number is compiled again when any of
-    them changes, because numba keys its cache on closed-over values.
-    """
-    digest = hashlib.sha256(key.encode())
-    package = Path(__file__).resolve().parent.parent
-    for folder in ('networks', 'integration', 'dynamics', 'motion', 'feedback'):
-        for source in sorted((package / folder).rglob('*.py')):
-            digest.update(source.read_bytes())
-    return int.from_bytes(digest.digest()[:7], 'big')
 
 
 _LOG2E = 1.0 / math.log(2.0)

@@ -34,7 +34,7 @@ import math
 from types import FunctionType
 from typing import Any
 
-from cpg_ros.integration.jit import jit, KEPT, OPTIONS, part, renamed, sources_digest
+from cpg_ros.integration.jit import jit, KEPT, OPTIONS, part, renamed
 from cpg_ros.networks import generated
 from cpg_ros.networks.equations import equations_of
 from cpg_ros.networks.network import Network
@@ -323,6 +323,6 @@ def kernels(network: type[Network]) -> Kernels:
     equations = equations_of(network)
     _, _, steps_of_one = _compiled(part, equations)
     past_state, restart, steps = _compiled(jit, equations)
-    return _cached(sources_digest(equations.key), equations.key, network.cells * network.variables,
-                   _past_state=past_state, _restart=restart, _steps=steps,
-                   _steps_of_one=steps_of_one)
+    return _cached(generated.sources_digest(equations.key), equations.key,
+                   network.cells * network.variables, _past_state=past_state, _restart=restart,
+                   _steps=steps, _steps_of_one=steps_of_one)

@@ -33,9 +33,10 @@ from functools import lru_cache
 import math
 
 from cpg_ros.dynamics.periodic import Orbit
-from cpg_ros.integration.jit import entry, sources_digest
+from cpg_ros.integration.jit import entry
 from cpg_ros.motion.duty import at_even_phases, maps_of_cells, told
 from cpg_ros.motion.readout import monomials, NoPhase, TURN
+from cpg_ros.networks.generated import sources_digest
 import numpy as np
 
 #: Points of a cycle in the tables of an orbit: a cell may jump within a hundredth of a cycle.

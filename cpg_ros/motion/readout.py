@@ -22,9 +22,10 @@ import math
 
 from cpg_ros.dynamics.periodic import Orbit
 from cpg_ros.errors import CpgError
-from cpg_ros.integration.jit import entry, jit, sources_digest
+from cpg_ros.integration.jit import entry, jit
 from cpg_ros.motion.duty import at_even_phases
 from cpg_ros.motion.told_waveform import tables, tell
+from cpg_ros.networks.generated import sources_digest
 import numpy as np
 
 #: Entries of the tables over one cycle.

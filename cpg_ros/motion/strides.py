@@ -16,7 +16,8 @@
 
 import math
 
-from cpg_ros.integration.jit import entry, sources_digest
+from cpg_ros.integration.jit import entry
+from cpg_ros.networks.generated import sources_digest
 
 #: What is asked for is approached with this time constant, s.
 TIME_CONSTANT = 0.2

@@ -23,8 +23,9 @@ theta; rates follow by the chain rule from x, x' and x'': they are derivatives a
 import math
 
 from cpg_ros.dynamics.periodic import Orbit
-from cpg_ros.integration.jit import entry, jit, sources_digest
+from cpg_ros.integration.jit import entry, jit
 from cpg_ros.motion.duty import told
+from cpg_ros.networks.generated import sources_digest
 import numpy as np
 
 TURN = 2.0 * math.pi

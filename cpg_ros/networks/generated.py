@@ -17,6 +17,7 @@
 from collections.abc import Callable
 import contextlib
 from functools import cache
+import hashlib
 import importlib.util
 import logging
 import os
@@ -75,15 +76,34 @@ def _temporary() -> Path:
     return place
 
 
+@cache
+def sources_digest(key: str = '') -> int:
+    """Return a number that changes whenever a file with compiled code does, or the key.
+
+    numba's disk cache watches only the file a cached kernel stands in, not the files of the
+    functions it calls. A kernel that closes over this number is compiled again when any of
+    them changes, because numba keys its cache on closed-over values.
+    """
+    digest = hashlib.sha256(key.encode())
+    package = Path(__file__).resolve().parent.parent
+    for room in ('networks', 'integration', 'dynamics', 'motion', 'feedback'):
+        for source in sorted((package / room).rglob('*.py')):
+            # What is generated may stand beside the sources, and follows from them.
+            if source.parent.name != '__pycache__':
+                digest.update(source.read_bytes())
+    return int.from_bytes(digest.digest()[:7], 'big')
+
+
 def load(name: str, write: Callable[[], str]) -> ModuleType:
     """Return a generated module, written first where it is not on disk yet.
 
     Args:
-        name: of the module, which says all that its text depends on.
+        name: of the module, which says all that its text depends on but the sources.
         write: makes the text.
 
     """
-    place, known = folder(), f'cpg_ros_generated_{name}'
+    place, name = folder(), f'{name}_{sources_digest():014x}'
+    known = f'cpg_ros_generated_{name}'
     if known in sys.modules:
         return sys.modules[known]
     if place is None:

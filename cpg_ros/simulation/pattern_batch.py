@@ -17,10 +17,11 @@
 from collections.abc import Mapping, Sequence
 
 from cpg_ros.feedback.timetable import POINTS, Timetable
-from cpg_ros.integration.jit import entry, sources_digest
+from cpg_ros.integration.jit import entry
 from cpg_ros.motion.plan import Program
 from cpg_ros.motion.smoothstep import smoothstep
 from cpg_ros.motion.strides import approach
+from cpg_ros.networks.generated import sources_digest
 from cpg_ros.simulation.scenario import Scenario
 import numpy as np
 

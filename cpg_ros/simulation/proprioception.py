@@ -18,7 +18,8 @@ import math
 
 from cpg_ros.feedback.estimate import Senses
 from cpg_ros.feedback.kinematics import GRAVITY
-from cpg_ros.integration.jit import entry, sources_digest
+from cpg_ros.integration.jit import entry
+from cpg_ros.networks.generated import sources_digest
 from cpg_ros.simulation.body import Body
 from cpg_ros.simulation.scenario import Noise
 import numpy as np
