@@ -235,10 +235,11 @@ def _messages(values: dict) -> list[ParameterMessage]:
 class SimulatedTime:
     """A /clock that the test advances."""
 
-    def __init__(self, watcher: Watcher) -> None:
+    def __init__(self, watcher: Watcher, listeners: int = 1) -> None:
         self._watcher = watcher
         self._publisher = watcher.node.create_publisher(Clock, '/clock', 100)
-        until(self._publisher.get_subscription_count, 'a listener to /clock')
+        until(lambda: self._publisher.get_subscription_count() >= listeners,
+              f'{listeners} listeners to /clock')
 
     def _tell(self, now: float) -> None:
         message = Clock()

@@ -116,7 +116,10 @@ def test_a_gait_recorded_inverted_and_run_again_is_the_same(ending, tmp_path, ne
 
 
 def test_live_fits_on_call_written_and_applied(ending, tmp_path):
-    source = Process('-p', 'gait:=trot', '-p', 'frequency:=2.0', '-p', 'rate:=200.0')
+    # In simulated time: a generator that a busy machine holds up goes on from where it stood, so
+    # that by the wall clock its strides are longer than asked for.
+    simulated = ('-p', 'use_sim_time:=true')
+    source = Process('-p', 'gait:=trot', '-p', 'frequency:=2.0', '-p', 'rate:=200.0', *simulated)
     ending.append(source)
     source.wait_for('publishing')
     follower = Process('-p', 'gait:=pace', '-p', 'frequency:=1.0', '--ros-args', '-r',
@@ -124,13 +127,17 @@ def test_live_fits_on_call_written_and_applied(ending, tmp_path):
     ending.append(follower)
     out, report = tmp_path / 'fitted.yaml', tmp_path / 'report.html'
     node = Process('-p', f'out:={out}', '-p', f'report:={report}', '-p', 'window:=6.0', '-p',
-                   'apply_to:=/second/other', '-p', 'robot:=quadruped',
+                   'apply_to:=/second/other', '-p', 'robot:=quadruped', *simulated,
                    domain=source.domain, executable=INVERSION)
     ending.append(node)
     node.wait_for('listening to /joint_states')
     follower.wait_for('publishing')
     watcher = Watcher(source.domain, '/second/other')
     ending.append(watcher)
+    heard = Watcher(source.domain)
+    ending.append(heard)
+    clock = SimulatedTime(heard, listeners=2)
+    clock.run(100.0, 103.0)
     results = []
     watcher.node.create_subscription(
         String, '/cpg_inversion/result', lambda message: results.append(message.data),
@@ -138,7 +145,7 @@ def test_live_fits_on_call_written_and_applied(ending, tmp_path):
 
     early = watcher.call(Trigger, '/cpg_inversion/fit', Trigger.Request())
     assert early.success or early.message
-    time.sleep(7.0)
+    clock.lead(103.0, 110.0, 0.005)
     answer = watcher.call(Trigger, '/cpg_inversion/fit', Trigger.Request())
     assert answer.success, answer.message
     for words in ('trot at 2.0', 'mean RMS error', f'written: {out}',
@@ -157,7 +164,7 @@ def test_live_fits_on_call_written_and_applied(ending, tmp_path):
     # No source any more, as after a bag has been played: what was heard is fitted all the same.
     source.end()
     follower.end()
-    time.sleep(1.0)
+    clock.run(110.0, 111.0)
     watcher.call(SetParametersAtomically, '/cpg_inversion/set_parameters_atomically',
                  SetParametersAtomically.Request(parameters=[
                      Parameter('apply_to', value='').to_parameter_msg()]))
