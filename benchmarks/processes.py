@@ -14,6 +14,7 @@
 
 """Nodes as processes of their own: starting and ending them, their CPU time and their memory."""
 
+import ctypes
 import json
 import os
 from pathlib import Path
@@ -29,6 +30,18 @@ HERE = Path(__file__).resolve().parent
 GENERATOR = [str(ROOT / 'install/cpg_ros/lib/cpg_ros/generator')]
 NULL_NODE = [sys.executable, str(HERE / 'null_node.py')]
 TICKS_A_SECOND = os.sysconf('SC_CLK_TCK')
+#: Of linux/prctl.h.
+PR_SET_PDEATHSIG = 1
+LIBC = ctypes.CDLL(None)
+
+
+def _ends_with_us() -> None:
+    """Have this process ended with its parent, however that ends.
+
+    A generator that is left behind at a real-time priority is in the way of all that is measured
+    afterwards.
+    """
+    LIBC.prctl(PR_SET_PDEATHSIG, signal.SIGTERM)
 
 
 def enter_workspace() -> None:
@@ -53,7 +66,8 @@ class Process:
         if parameters:
             command = [*command, '--ros-args', *(word for name, value in parameters.items()
                                                  for word in ('-p', f'{name}:={value}'))]
-        self._child = subprocess.Popen(command, stdout=self._log, stderr=subprocess.STDOUT)
+        self._child = subprocess.Popen(command, stdout=self._log, stderr=subprocess.STDOUT,
+                                       preexec_fn=_ends_with_us)
         self.pid = self._child.pid
 
     def __enter__(self) -> 'Process':

@@ -21,8 +21,8 @@ from graph import EXECUTABLE, Process, Watcher  # noqa: E402
 import pytest  # noqa: E402
 
 #: Files whose tests measure against the clock on the wall: beside others they would fail.
-ALONE = ('test_clock', 'test_demo', 'test_inversion_live', 'test_lockstep', 'test_stalls',
-         'test_stop_paths', 'test_switching', 'test_topics', 'test_unitree_live')
+ALONE = ('test_clock', 'test_demo', 'test_lockstep', 'test_stalls', 'test_stop_paths',
+         'test_switching', 'test_topics', 'test_unitree_live')
 
 #: What several tests of a file share and takes seconds to make.
 SHARED = {'copied', 'drawn', 'executors', 'report', 'running', 'written'}
@@ -30,7 +30,14 @@ SHARED = {'copied', 'drawn', 'executors', 'report', 'running', 'written'}
 
 def pytest_collection_modifyitems(items):
     """Mark what runs on a graph in real time, and of that what must have the machine to itself."""
+    seen = set()
     for item in items:
+        # The lines that a test runs are those of its first parameters, but for what other tests
+        # see as well; measuring makes what runs in Python take two to three times as long.
+        name = item.nodeid.partition('[')[0]
+        if name in seen:
+            item.add_marker('no_cover')
+        seen.add(name)
         known = vars(item.module).values()
         given = set(getattr(item, 'callspec', item).__dict__.get('params', ()))
         fixtures = set(item.fixturenames) - given
@@ -44,14 +51,11 @@ def pytest_collection_modifyitems(items):
             item.add_marker(pytest.mark.xdist_group(item.module.__name__))
 
 
-@pytest.fixture
-def untraced(monkeypatch):
-    """Let processes run without being measured: what they run in is seen by other tests.
-
-    Measuring makes what runs in Python take two to three times as long. ``no_cover`` beside it
-    does the same to the test itself.
-    """
-    monkeypatch.delenv('COVERAGE_PROCESS_CONFIG', raising=False)
+@pytest.fixture(autouse=True)
+def processes(request, monkeypatch):
+    """Measure what a test's processes run where the test itself is measured."""
+    if request.node.get_closest_marker('no_cover'):
+        monkeypatch.delenv('COVERAGE_PROCESS_CONFIG', raising=False)
 
 
 @pytest.fixture

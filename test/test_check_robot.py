@@ -229,7 +229,7 @@ def test_nonsense_ends_in_one_line(tmp_path, capsys, monkeypatch, arguments, wor
     assert said.err.count('\n') == 1 and not Path('a.yaml').exists()
 
 
-@pytest.mark.usefixtures('no_cover', 'untraced')
+@pytest.mark.no_cover
 def test_as_a_process(tmp_path):
     command = [sys.executable, '-P', '-m', 'cpg_ros.tools.check_robot']
     urdf = SOURCE / 'urdf' / 'quadruped.urdf'

@@ -20,7 +20,6 @@ from pathlib import Path
 import signal
 import subprocess
 import sys
-import time
 
 from graph import EXECUTABLE, PATIENCE, Process, SimulatedTime, until, Watcher
 import numpy as np

@@ -46,7 +46,7 @@ def weights(executor):
             front.chosen.preset.network, front.chosen.orbit.period)
 
 
-@pytest.mark.usefixtures('no_cover', 'untraced')
+@pytest.mark.no_cover
 def test_islands_find_the_same_on_any_executor(executors):
     pytest.importorskip('pymoo')
     here = weights(None)
@@ -88,7 +88,7 @@ def test_options_that_do_not_go_together(capsys, tmp_path):
     assert 'argument --jobs: -1 is not between' in capsys.readouterr().err
 
 
-@pytest.mark.usefixtures('no_cover', 'untraced')
+@pytest.mark.no_cover
 def test_tuning_finds_the_same_on_any_executor(executors):
     pytest.importorskip('mujoco')
     pytest.importorskip('cma')

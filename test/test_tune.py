@@ -50,7 +50,7 @@ def quick(monkeypatch):
     monkeypatch.setattr(tuning, 'SCENARIOS', tuning.SCENARIOS[:2])
 
 
-@pytest.mark.usefixtures('no_cover', 'untraced')
+@pytest.mark.no_cover
 def test_the_search_improves_a_bad_start_and_can_be_repeated(quick):
     robot = replace(GO2, networks=('delayed',))
     told = []
