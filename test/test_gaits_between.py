@@ -16,6 +16,7 @@
 
 from dataclasses import replace
 import json
+from pathlib import Path
 
 from cpg_ros.dynamics.orbit import solve_orbit
 from cpg_ros.errors import InputError
@@ -74,6 +75,14 @@ def test_the_network_that_explains_a_canter(tmp_path, capsys):
     told = json.loads(capsys.readouterr().out)
     assert code == 0 and told['network'] == 'phase'
     assert told['networks'][0]['error'] == pytest.approx(found[0].error)
+
+
+def test_networks_are_not_compared_on_two_strides(capsys):
+    walk = Path(__file__).parent / 'data' / 'human_walking.csv'
+    assert inversion.main(['--csv', str(walk), '--network', 'auto']) == 2
+    assert capsys.readouterr().err.splitlines()[-1] == (
+        f'inversion: {walk}: comparing networks takes 4 strides or more, to fit one half and '
+        'judge on the other; here are 2')
 
 
 def made(path, network, gait, rows, **changes):

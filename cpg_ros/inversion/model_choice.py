@@ -141,8 +141,8 @@ def halves(recording: Recording, stride: Stride) -> tuple[Stride, np.ndarray]:
               & (recording.times <= stride.warp.knots[-1]))
     phases = stride.warp(recording.times[inside])
     if stride.cycles < 4:
-        raise InputError(f'{recording.source}: {stride.cycles} strides are too few to fit one '
-                         'half and judge on the other')
+        raise InputError(f'{recording.source}: comparing networks takes 4 strides or more, to fit '
+                         f'one half and judge on the other; here are {stride.cycles}')
     even = np.floor(phases - phases[0]).astype(int) % 2 == 0
     means = []
     for mask in (even, ~even):
