@@ -148,13 +148,13 @@ def refused(gait):
 
 def test_bipeds_are_told_that_they_are_not_tuned(capsys, tmp_path):
     assert tool.main(['--robot', 'biped', '--model', 'go2', '--gaits', 'walk', '--out',
-                      str(tmp_path / 'a.yaml')]) == 1
+                      str(tmp_path / 'a.yaml')]) == 2
     assert 'has 2 legs: bipeds are not tuned' in capsys.readouterr().err
 
 
 @pytest.mark.parametrize('arguments, code, words', [
     (['--robot', 'nothing'], 2, "robot 'nothing'"),
-    (['--model', 'nothing'], 1, "model 'nothing'"),
+    (['--model', 'nothing'], 2, "model 'nothing'"),
     (['--gaits', 'trot', 'trot'], 2, 'trot is given twice'),
     (['--evaluations', '0'], 2, '0 is not positive'),
     (['--kp', '0'], 2, '0 is not above 0'),
@@ -175,7 +175,7 @@ def test_the_tool_says_what_is_wrong_in_one_line(arguments, code, words, tmp_pat
 
 
 @pytest.mark.parametrize('error, code', [(KeyboardInterrupt(), 130),
-                                         (SimulationError('no design'), 1)])
+                                         (NoDesign('no design'), 1)])
 def test_a_search_that_is_stopped_leaves_nothing(error, code, tmp_path, monkeypatch, capsys):
     out = tmp_path / 'a.yaml'
     out.write_text('as it was')

@@ -288,7 +288,8 @@ def tune(robot: Robot, model: str, gaits: Sequence[str], evaluations: int, seed:
         gait that cannot be had why.
 
     Raises:
-        SimulationError: the simulation cannot be built, or no gait can be had.
+        SimulationError: the simulation cannot be built.
+        NoDesign: no gait can be had.
 
     """
     tuner = Tuner(robot, model, kp, kd, threads, say)
@@ -319,7 +320,7 @@ def tune(robot: Robot, model: str, gaits: Sequence[str], evaluations: int, seed:
     # The last word of what tells how far they are.
     next(results, None)
     if not found:
-        raise SimulationError('; '.join(missing))
+        raise NoDesign('; '.join(missing))
     # What feedback wants to know, too.
     measured = [one.gait for one in found]
     return calibrated(replace(robot, motions=motions), model, measured), found, missing

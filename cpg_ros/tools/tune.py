@@ -33,8 +33,7 @@ from cpg_ros.networks.registry import NETWORKS
 from cpg_ros.robots.robot import Robot
 from cpg_ros.robots.robot_file import find_robot, LIMITS, write_robot
 from cpg_ros.simulation.gait_design import AIMS
-from cpg_ros.simulation.robot_model import SimulationError
-from cpg_ros.simulation.tuning import GOOD, LONG, tune, Tuned
+from cpg_ros.simulation.tuning import GOOD, LONG, NoDesign, tune, Tuned
 from cpg_ros.tools.arguments import number, Parser, say, twice
 
 DESCRIPTION = """\
@@ -138,7 +137,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         write_robot(chosen.out, robot, '\n'.join([
             f'Gaits made by: {command}',
             f'{LONG:g} s in simulation from the stand:', *lines]))
-    except SimulationError as error:
+    except NoDesign as error:
         print(f'tune: {error}', file=sys.stderr)
         return 1
     except (CpgError, OSError) as error:
