@@ -24,10 +24,6 @@ import pytest  # noqa: E402
 ALONE = ('test_clock', 'test_demo', 'test_lockstep', 'test_stalls', 'test_stop_paths',
          'test_switching', 'test_topics', 'test_unitree_live')
 
-#: What several tests of a file share and takes seconds to make.
-SHARED = {'copied', 'drawn', 'executors', 'report', 'running', 'written'}
-
-
 def pytest_collection_modifyitems(items):
     """Mark what runs on a graph in real time, and of that what must have the machine to itself."""
     seen = set()
@@ -46,9 +42,6 @@ def pytest_collection_modifyitems(items):
             item.add_marker('live')
             if item.module.__name__ in ALONE:
                 item.add_marker('alone')
-        if SHARED & fixtures:
-            # What takes long and serves all of them: in one worker.
-            item.add_marker(pytest.mark.xdist_group(item.module.__name__))
 
 
 @pytest.fixture(autouse=True)

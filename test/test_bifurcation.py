@@ -19,7 +19,7 @@ from functools import cache
 from cpg_ros.dynamics.bifurcation import bifurcations
 from cpg_ros.dynamics.continuation import follow
 from cpg_ros.dynamics.floquet import multipliers
-from cpg_ros.dynamics.mesh.newton import collocate
+from cpg_ros.dynamics.mesh.refinement import collocate
 from cpg_ros.dynamics.orbit import solve_preset
 from cpg_ros.dynamics.switching import switched
 from cpg_ros.errors import InputError

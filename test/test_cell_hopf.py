@@ -20,7 +20,7 @@ from cpg_ros.dynamics import hopf_search
 from cpg_ros.dynamics.equilibrium import equilibrium, everywhere, NoEquilibrium
 from cpg_ros.dynamics.floquet import multipliers
 from cpg_ros.dynamics.hopf_search import hopf_points
-from cpg_ros.dynamics.mesh.newton import collocate
+from cpg_ros.dynamics.mesh.refinement import collocate
 from cpg_ros.dynamics.sign_changes import crossings
 from cpg_ros.integration.simulate import simulate
 from cpg_ros.networks.biped import Biped

@@ -20,7 +20,7 @@ import math
 
 from cpg_ros.dynamics.continuation import follow, from_hopf
 from cpg_ros.dynamics.floquet import multipliers
-from cpg_ros.dynamics.mesh.newton import collocate
+from cpg_ros.dynamics.mesh.refinement import collocate
 from cpg_ros.dynamics.orbit import NoOrbit, solve_orbit, solve_preset
 from cpg_ros.integration.simulate import simulate
 from cpg_ros.networks.biped import Biped

@@ -15,10 +15,13 @@
 """Networks for any even number of legs, by a rule."""
 
 from dataclasses import replace
+from fractions import Fraction
+from itertools import combinations
 import pickle
 
 from cpg_ros.dynamics.hopf_search import hopf_points
 from cpg_ros.dynamics.orbit import solve_orbit, solve_preset
+from cpg_ros.dynamics.periodic import richer
 from cpg_ros.dynamics.stability import stability
 from cpg_ros.errors import CpgError
 from cpg_ros.gaits.leg_phases import named
@@ -27,6 +30,7 @@ from cpg_ros.networks.delayed import Delayed, PRESETS
 from cpg_ros.networks.network import footfall_order
 from cpg_ros.networks.parameter_line import ParameterLine
 from cpg_ros.networks.registry import find_network, NETWORKS, numbered
+from cpg_ros.networks.symmetry import Symmetry
 import numpy as np
 import pytest
 
@@ -77,6 +81,33 @@ def test_every_gait_of_any_number_of_legs_attracts(legs):
     network = find_network(f'delayed{legs}')
     for gait, preset in network.presets().items():
         assert not stability(solve_preset(preset)).flaw, gait
+
+
+class Less:
+    """An orbit of which less symmetry is known than it has."""
+
+    def __init__(self, orbit, symmetry):
+        self.network, self.period, self.symmetry = orbit.network, orbit.period, symmetry
+        self._orbit = orbit
+
+    def __call__(self, times):
+        return self._orbit(times)
+
+
+@pytest.mark.parametrize('legs', [4, 6, 8, 12])
+def test_what_an_orbit_has_beyond_the_symmetry_known_is_seen(legs):
+    for gait, preset in find_network(f'delayed{legs}').presets().items():
+        orbit = solve_preset(preset)
+        assert richer(orbit) == '', gait
+        shifts = dict(orbit.symmetry.shifts)
+        for some in combinations(shifts, 2):
+            part = Symmetry.of(orbit.symmetry.group, {name: shifts[name] for name in some})
+            found = richer(Less(orbit, part))
+            if len(part.shifts) == len(shifts):
+                assert found == ''
+                continue
+            one, share = found.removesuffix(' of a cycle').split(' shifts it by ')
+            assert one not in part.h and shifts[one] == Fraction(share), (gait, some)
 
 
 @pytest.mark.parametrize(('legs', 'gait', 'same'), [

@@ -33,6 +33,9 @@ from scipy.optimize import brentq
 #: Newton stops at steps this short; what is left then is of the order of its square.
 TOLERANCE = 1e-9
 NEWTON = 8
+#: Where the tangent may be that of the point before, it stops where the next step would be shorter
+#: than this.
+NEGLIGIBLE = 1e-4 * TOLERANCE
 #: Steps along the curve, in the norm of its product: every unknown counts against its scale.
 FIRST, SHORTEST, LONGEST = 0.02, 1e-6, 0.2
 #: Times that a period has grown from which on steps may grow with it.
@@ -67,7 +70,7 @@ class Curve(Protocol):
         """Half the range of what is continued; zero at a bifurcation from rest."""
 
     def orbit(self, z: np.ndarray) -> Any:
-        """Complete a solution: the orbit, with its derivatives and its residual."""
+        """Make an orbit of a solution."""
 
     def renewed(self, z: np.ndarray, border: np.ndarray, again: bool
                 ) -> tuple['Curve', np.ndarray, np.ndarray] | None:
@@ -120,8 +123,19 @@ class Place:
         return replace(self, tangent=-self.tangent)
 
 
-def corrected(curve: Curve, z: np.ndarray, border: np.ndarray) -> Place | None:
-    """Return the curve's point z + v with (v, border) = 0; None if Newton's method has lost it."""
+def corrected(curve: Curve, z: np.ndarray, border: np.ndarray, *, exact: bool = True
+              ) -> Place | None:
+    """Find the curve's point z + v with (v, border) = 0; None if Newton's method has lost it.
+
+    Args:
+        curve: in a fixed discretisation.
+        z: unknowns near the point.
+        border: that v is normal to.
+        exact: the tangent is that of the point. Otherwise it is that of the point before Newton's
+            last step, which spares a step: enough to go on by, not to find a fold by.
+
+    """
+    before = 0.0
     with np.errstate(all='ignore'):
         for count in range(1, NEWTON + 1):
             try:
@@ -133,26 +147,30 @@ def corrected(curve: Curve, z: np.ndarray, border: np.ndarray) -> Place | None:
             # Steps of more than the scale of everything have lost the curve.
             if not size < 1.0 or z[-2] <= 0.0:
                 return None
-            if size <= TOLERANCE:
+            # Newton's next step is C size^2, with C = size / before^2 as in this one.
+            if size <= TOLERANCE or (not exact and size**3 <= NEGLIGIBLE * before**2):
                 length = math.sqrt(curve.product(direction, direction))
                 return Place(curve, z, direction / length, count, 1.0 / length)
+            before = size
     return None
 
 
-def resolved(curve: Curve, z: np.ndarray, border: np.ndarray) -> Place | None:
+def resolved(curve: Curve, z: np.ndarray, border: np.ndarray, *, exact: bool = True
+             ) -> Place | None:
     """Return the curve's point near z in a discretisation that resolves it.
 
     Raises:
         NoOrbit: it cannot be resolved.
 
     """
-    place = first = corrected(curve, z, border)
+    place = first = corrected(curve, z, border, exact=exact)
     while place is not None and first is not None:
         new = place.curve.renewed(place.z, border, place is not first)
         if new is None:
-            return replace(place, steps=first.steps, cosine=first.cosine)
+            return place if place is first else replace(place, steps=first.steps,
+                                                        cosine=first.cosine)
         border = new[2]
-        place = corrected(*new)
+        place = corrected(*new, exact=exact)
     return None
 
 
@@ -268,7 +286,8 @@ def follow(start: Place, low: float, high: float, visit: Callable[[Place], str],
         if step < SHORTEST:
             return folds, 'lost'
         try:
-            ahead = resolved(here.curve, here.z + step * here.tangent, here.tangent)
+            ahead = resolved(here.curve, here.z + step * here.tangent, here.tangent,
+                             exact=False)
         except NoOrbit:
             return folds, 'steep'
         if ahead is None or ahead.cosine < ALIGNED:
@@ -296,6 +315,6 @@ def follow(start: Place, low: float, high: float, visit: Callable[[Place], str],
                 folds.append(count)
             count += 1
         here = ahead
-        if ahead.steps <= 4 and ahead.cosine > 1.0 - 0.3 * (1.0 - ALIGNED):
+        if ahead.steps <= 3 and ahead.cosine > 1.0 - 0.3 * (1.0 - ALIGNED):
             step *= 1.5
     return folds, 'steps'

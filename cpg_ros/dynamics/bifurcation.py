@@ -133,7 +133,7 @@ def _between(left: Place, right: Place, share: float) -> Place | None:
     near = left if share < 0.5 else right
     z = near.z + (target - near.z[which]) / near.tangent[which] * near.tangent
     z[which] = target
-    return arclength.resolved(near.curve, z, arclength.held(z.size, which))
+    return arclength.resolved(near.curve, z, arclength.held(z.size, which), exact=False)
 
 
 class _Gap:

@@ -16,7 +16,7 @@
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 from cpg_ros.dynamics.arclength import NoOrbit
 from cpg_ros.errors import InputError
@@ -28,6 +28,8 @@ __all__ = ['NoOrbit', 'Orbit', 'added_symmetry', 'check_values', 'richer']
 
 #: Points of a cycle among which extremes are looked for before they are refined.
 POINTS = 1024
+#: Points of a cycle at which signals are compared, at least.
+COMPARED = 24
 #: Two signals this close, over their range, are one.
 SAME = 1e-4
 
@@ -45,7 +47,6 @@ class Orbit(ABC):
         symmetry: of the gait; gives waves and phases of the cells.
         period: T in model time.
         residual: largest residual of the equations, between the nodes where they are solved.
-        d_period: derivatives of the period by the network's parameters, shape (parameters,).
 
     """
 
@@ -53,7 +54,11 @@ class Orbit(ABC):
     symmetry: Symmetry
     period: float
     residual: float
-    d_period: np.ndarray
+
+    @property
+    @abstractmethod
+    def d_period(self) -> np.ndarray:
+        """Derivatives of the period by the network's parameters, shape (parameters,)."""
 
     @abstractmethod
     def waveform(self, theta: np.ndarray, order: int = 0, wave: int = 0, variable: int = 0
@@ -146,7 +151,9 @@ def richer(orbit: Orbit) -> str:
     Newton's method may end on an orbit with more symmetry, which every equation of the gait
     also holds for: a walk is a skip whose two waveforms agree.
     """
-    points = 64
+    # A whole number of them for every shift that there may be.
+    exponent = orbit.symmetry.group.exponent
+    points = exponent * -(-COMPARED // exponent)
     x = orbit(np.arange(points) / points * orbit.period)[:, :orbit.network.cells]
     return added_symmetry(orbit.symmetry, x, SAME)
 
@@ -156,20 +163,35 @@ def added_symmetry(symmetry: Symmetry, x: np.ndarray, same: float) -> str:
 
     Args:
         symmetry: that it has.
-        x: the cells' first variable at even times of a cycle, shape (points, cells).
+        x: the cells' first variable at even times of a cycle, shape (points, cells), a multiple of
+            the group's exponent.
         same: signals that differ by less are one, over the range of all.
 
     """
-    points, most, own = len(x), same * np.ptp(x), dict(symmetry.shifts)
-    for name, element in symmetry.group.elements.items():
-        order, moved = symmetry.group.order(name), x[:, list(element)]
-        known = round(order * own[name]) if name in own else None
-        for k in range(order):
-            if k == known:
-                continue
-            late = points * k // order
-            # One time tells of nearly all of them that they are none.
-            if (np.abs(moved[0] - x[late]).max() < most
-                    and np.abs(moved - np.roll(x, -late, axis=0)).max() < most):
-                return f'{name} shifts it by {k}/{order} of a cycle'
+    most = same * np.ptp(x)
+    names, lates, cells = _beyond(symmetry, len(x))
+    # One time tells of nearly all of them that they are none.
+    for k in np.flatnonzero(np.abs(x[0, cells] - x[lates]).max(axis=1) < most):
+        if np.abs(x[:, cells[k]] - np.roll(x, -lates[k], axis=0)).max() < most:
+            return names[k]
     return ''
+
+
+@lru_cache(maxsize=64)
+def _beyond(symmetry: Symmetry, points: int) -> tuple[list[str], np.ndarray, np.ndarray]:
+    """List what a cycle could have beyond a symmetry.
+
+    Returns:
+        What it is; by how many of a cycle's points it shifts; and whose signal each cell has,
+        shape (n, cells).
+
+    """
+    own, found = dict(symmetry.shifts), []
+    for name, element in symmetry.group.elements.items():
+        order = symmetry.group.order(name)
+        known = round(order * own[name]) if name in own else None
+        found += [(f'{name} shifts it by {k}/{order} of a cycle', points * k // order, element)
+                  for k in range(order) if k != known]
+    return ([name for name, _, _ in found], np.array([late for _, late, _ in found], dtype=int),
+            np.array([element for *_, element in found],
+                     dtype=int).reshape(len(found), symmetry.group.cells))

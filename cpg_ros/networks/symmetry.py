@@ -25,6 +25,7 @@ from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import cache, cached_property
 from itertools import product
+import math
 
 from cpg_ros.errors import InputError
 import numpy as np
@@ -70,6 +71,11 @@ class Group:
             name = ' '.join(names[g][k] for g, k in enumerate(choice) if k)
             found[name or '1'] = element
         return found
+
+    @cached_property
+    def exponent(self) -> int:
+        """Least common multiple of the orders of all elements."""
+        return math.lcm(*(self.order(name) for name in self.elements))
 
     def order(self, name: str, modulo: Collection[str] = ('1',)) -> int:
         """Return the smallest power of an element that lies in a subgroup, given by names."""

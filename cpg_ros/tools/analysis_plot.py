@@ -32,6 +32,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 import numpy as np
+from scipy.interpolate import Akima1DInterpolator
 
 COLOURS = {'pronk': '#805ad5', 'pace': '#2f855a', 'bound': '#b7791f', 'trot': '#c53030',
            'jump': '#00838f', 'walk': '#2b6cb0', 'run': '#c53030', 'two_legged_jump': '#00838f',
@@ -42,11 +43,13 @@ STYLES: tuple[tuple[Literal['-', '--', ':'], str], ...] = (
     ('-', 'stable'), ('--', 'stable with a lock'), (':', 'unstable'))
 #: Marks of places where an orbit's stability changes other than in a fold.
 CROSSINGS = {'torus': 'o', 'period doubling': '^', 'branch point': 'P'}
+#: Lines between two points of a branch.
+BETWEEN = 8
 #: Points of a branch at most, how far apart in arclength, how many times the first period the
 #: last may be (beyond, near a homoclinic orbit, branches wind), and how many branches are drawn.
-POINTS, LONGEST, SLOWEST, BRANCHES = 80, 0.2, 5.0, 12
+POINTS, LONGEST, SLOWEST, BRANCHES = 80, 0.3, 5.0, 12
 #: Share of the way between two points of a branch to which its crossings are drawn.
-VISIBLE = 0.01
+VISIBLE = 0.05
 #: Roots that are drawn of each class, at most.
 ROOTS = 7
 
@@ -100,16 +103,29 @@ def _born(point: HopfPoint, analysis: Analysis) -> list[Branch]:
         return []
 
 
+def _smooth(branch: Branch) -> np.ndarray:
+    """Interpolate values and amplitudes along a branch, shape (2, BETWEEN (points - 1) + 1)."""
+    path = np.stack([branch.values, branch.amplitudes])
+    sizes = np.ptp(path, axis=1, keepdims=True)
+    chords = np.linalg.norm(np.diff(path) / np.where(sizes > 0.0, sizes, 1.0), axis=0)
+    places = np.concatenate([[0.0], np.cumsum(np.maximum(chords, 1e-9))])
+    fine = np.interp(np.arange(BETWEEN * (places.size - 1) + 1) / BETWEEN,
+                     np.arange(places.size), places)
+    if places.size < 3:
+        return np.stack([np.interp(fine, places, row) for row in path])
+    return np.asarray(Akima1DInterpolator(places, path.T)(fine)).T
+
+
 def _draw_branch(axes: Axes, branch: Branch, kinds: list[int], colour: str) -> None:
     """Draw amplitudes, the line's style by the stability at the points: 0, 1 or 2."""
-    values, amplitudes = branch.values, branch.amplitudes
+    values, amplitudes = _smooth(branch)
     starts = [0, *(k for k in range(1, len(kinds)) if kinds[k] != kinds[k - 1]), len(kinds)]
     for begin, end in pairwise(starts):
-        part = slice(max(begin - 1, 0), end)
+        part = slice(BETWEEN * max(begin - 1, 0), BETWEEN * (end - 1) + 1)
         axes.plot(values[part], amplitudes[part], color=colour,
                   linestyle=STYLES[kinds[begin]][0], linewidth=1.6)
     for k in branch.turns:
-        axes.plot(values[k], amplitudes[k], marker='s', color=colour, markersize=5)
+        axes.plot(branch.values[k], branch.amplitudes[k], marker='s', color=colour, markersize=5)
 
 
 def _draw_branches(axes: Axes, analysis: Analysis) -> None:
@@ -153,12 +169,14 @@ def _draw_branches(axes: Axes, analysis: Analysis) -> None:
                 for marker, label in (('o', 'Hopf point'), ('s', 'fold'), ('D', 'this set'))]
     handles += [Line2D([], [], color='black', marker=marker, linestyle='', label=label,
                        markerfacecolor='white') for label, marker in met.items()]
-    axes.legend(handles=handles, fontsize=7, ncols=2, frameon=False)
+    # Above the axes, where it hides nothing.
+    axes.legend(handles=handles, fontsize=7, ncols=5, frameon=False, title='Branches of gaits',
+                title_fontsize=10, alignment='left', loc='lower left', bbox_to_anchor=(0.0, 1.0),
+                borderaxespad=0.2, borderpad=0.0)
     axes.set_ylim(bottom=0.0)
     timed = analysis.along.names == (analysis.delay,)
     axes.set_xlabel(f'{analysis.along} [model time]' if timed else str(analysis.along))
     axes.set_ylabel('amplitude of cell 1')
-    axes.set_title('Branches of gaits', loc='left', fontsize=10)
 
 
 def _draw_roots(axes: Axes, analysis: Analysis) -> None:

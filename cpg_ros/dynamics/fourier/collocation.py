@@ -19,31 +19,27 @@ from functools import lru_cache
 import numpy as np
 
 
+def _waves(n: int) -> np.ndarray:
+    """Return the factors by which d/dtheta multiplies the harmonics, shape ((n + 1) / 2,)."""
+    return 2j * np.pi * np.arange((n + 1) // 2)
+
+
 @lru_cache(maxsize=16)
-def _tables(n: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Derivatives by shift of the waves 0..(n-1)/2, circulant indices, and d/dtheta."""
-    waves = 2j * np.pi * np.arange((n + 1) // 2)
-    index = (np.arange(n)[:, None] - np.arange(n)[None, :]) % n
-    return waves, index, _kernel(n, waves, 0.0)[1][index]
+def _circulant(n: int) -> np.ndarray:
+    """Which entry of a column each entry of its circulant matrix is, shape (n, n)."""
+    return (np.arange(n)[:, None] - np.arange(n)) % n
 
 
-def _kernel(n: int, waves: np.ndarray, shift: float) -> tuple[np.ndarray, np.ndarray]:
-    """Dirichlet kernel and its derivative at theta_m + shift, each of shape (n,)."""
-    shifted = np.exp(waves * shift)
-    return np.fft.irfft(shifted, n), np.fft.irfft(waves * shifted, n)
-
-
+@lru_cache(maxsize=16)
 def derivative_matrix(n: int) -> np.ndarray:
     """Matrix of d/dtheta on nodal values, shape (n, n)."""
-    return _tables(n)[2]
+    return np.fft.irfft(_waves(n), n)[_circulant(n)]
 
 
 @lru_cache(maxsize=16)
-def shift_matrices(n: int, shift: float) -> tuple[np.ndarray, np.ndarray]:
-    """Matrices that take nodal values of u to those of u(theta + shift) and u'(theta + shift)."""
-    waves, index, _ = _tables(n)
-    value, slope = _kernel(n, waves, shift)
-    return value[index], slope[index]
+def shift_matrix(n: int, shift: float) -> np.ndarray:
+    """Matrix that takes nodal values of u to those of u(theta + shift), shape (n, n)."""
+    return np.fft.irfft(np.exp(_waves(n) * shift), n)[_circulant(n)]
 
 
 def evaluate(values: np.ndarray, theta: np.ndarray, order: int = 0,

@@ -74,20 +74,19 @@ def equations(network: Network, symmetry: Symmetry, u: np.ndarray, period: float
     rows, n = u.shape
     variables, tau, kind = network.variables, network.delay, equations_of(type(network))
     waves, derive = rows // variables, collocation.derivative_matrix(n)
-    heard = _heard(type(network), symmetry)
+    rise, heard = u @ derive.T, _heard(type(network), symmetry)
     states, slopes, matrices = [], [], []
     for delayed, places in heard:
         late = tau / period if delayed else 0.0
-        pairs = [None if shift == late == 0.0 else collocation.shift_matrices(n, shift - late)
-                 for _, shift in places]
-        matrices.append([None if pair is None else pair[0] for pair in pairs])
-        states.append(np.array([u[row] if pair is None else pair[0] @ u[row]
-                                for (row, _), pair in zip(places, pairs, strict=True)]))
-        slopes.append([pair[1] @ u[row] if delayed and pair is not None else None
-                       for (row, _), pair in zip(places, pairs, strict=True)])
+        matrices.append([None if shift == late == 0.0 else
+                         collocation.shift_matrix(n, shift - late) for _, shift in places])
+        moved = list(zip(places, matrices[-1], strict=True))
+        states.append(np.array([u[row] if matrix is None else matrix @ u[row]
+                                for (row, _), matrix in moved]))
+        slopes.append([matrix @ rise[row] if delayed and matrix is not None else None
+                       for (row, _), matrix in moved])
     p = [value[symmetry.first][:, None] if value.ndim else value for value in values_of(network)]
     rates, by_argument = kind.slopes(states, p)
-    rise = u @ derive.T
 
     residual = np.empty(rows * n + 1)
     left = residual[:-1].reshape(waves, variables, n)
@@ -127,16 +126,16 @@ def by_parameter(network: Network, symmetry: Symmetry, point: Point) -> np.ndarr
     names, kind = network.parameters(), equations_of(type(network))
     rows, n = by_delay.shape
     variables = network.variables
-    out = np.zeros((rows, n, len(names)))
+    out, flat = np.zeros((rows * n + 1, len(names))), np.zeros((rows // variables, n))
+    blocks = out[:-1].reshape(rows, n, len(names))
     for (v, r), slope in kind.by_parameter(states, p).items():
-        slope = np.broadcast_to(slope, (rows // variables, n))
-        row = kind.rows[r]
+        slope, row = slope + flat, kind.rows[r]
         for wave, cell in enumerate(symmetry.first):
             name = kind.by_cell[row][cell] if row in kind.by_cell else row
-            out[wave * variables + v, :, names.index(name)] -= slope[wave]
+            blocks[wave * variables + v, :, names.index(name)] -= slope[wave]
     if network.delay_parameter:
-        out[..., names.index(network.delay_parameter)] += by_delay
-    return np.vstack([out.reshape(rows * n, -1), np.zeros(len(names))])
+        blocks[..., names.index(network.delay_parameter)] += by_delay
+    return out
 
 
 def complete(network: Network, symmetry: Symmetry, u: np.ndarray, period: float,
@@ -151,8 +150,7 @@ def complete(network: Network, symmetry: Symmetry, u: np.ndarray, period: float,
             derivatives[:, members] = derivatives[:, members].mean(axis=1, keepdims=True)
     shape = (u.shape[0] // network.variables, network.variables, u.shape[1])
     return FourierOrbit(network, symmetry, period, float(np.abs(residual[:-1]).max()),
-                        derivatives[-1], u.reshape(shape),
-                        derivatives[:-1].reshape(*shape, len(names)))
+                        u.reshape(shape), derivatives)
 
 
 def newton(network: Network, symmetry: Symmetry, u: np.ndarray, period: float

@@ -28,13 +28,23 @@ class FourierOrbit(Orbit):
     Attributes:
         values: waveforms at the nodes theta = m / n, shape (waves, variables, n); that of
             cell 1's first variable peaks at the first one.
-        d_values: derivatives of the nodal values by the parameters, at fixed theta, shape
-            (waves, variables, n, parameters).
+        derivatives: of the nodal values by the parameters, at fixed theta, then of the period,
+            shape (waves variables n + 1, parameters).
 
     """
 
     values: np.ndarray = field(repr=False)
-    d_values: np.ndarray = field(repr=False)
+    derivatives: np.ndarray = field(repr=False)
+
+    @property
+    def d_period(self) -> np.ndarray:
+        """Derivatives of the period by the network's parameters, shape (parameters,)."""
+        return self.derivatives[-1]
+
+    @property
+    def d_values(self) -> np.ndarray:
+        """Those of the nodal values, shape (waves, variables, n, parameters)."""
+        return self.derivatives[:-1].reshape(*self.values.shape, -1)
 
     @property
     def peak(self) -> float:

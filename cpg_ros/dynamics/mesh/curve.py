@@ -24,7 +24,6 @@ from dataclasses import dataclass, replace
 
 from cpg_ros.dynamics.mesh.newton import (
     bordered,
-    completed,
     FEWEST,
     finer,
     first_mesh,
@@ -36,6 +35,7 @@ from cpg_ros.dynamics.mesh.newton import (
     Solution,
 )
 from cpg_ros.dynamics.mesh.orbit import MeshOrbit
+from cpg_ros.dynamics.mesh.refinement import completed
 from cpg_ros.networks.network import Network
 from cpg_ros.networks.parameter_line import ParameterLine
 from cpg_ros.networks.symmetry import Symmetry
@@ -172,7 +172,7 @@ class MeshCurve:
         return np.concatenate([now.points.ravel(), now.stages.ravel(), [length, value]])
 
     def orbit(self, z: np.ndarray) -> MeshOrbit:
-        """Complete a solution by its derivatives and its residual."""
+        """Make an orbit of a solution."""
         return completed(*self._solution(z))
 
 
@@ -180,10 +180,8 @@ def through(orbit: MeshOrbit, line: ParameterLine, scales: tuple[float, float]
             ) -> tuple[MeshCurve, np.ndarray]:
     """Return the curve of the orbits along a line, and the place of one of them on it."""
     curve = MeshCurve(orbit.network, orbit.symmetry, line, scales, orbit.mesh)
-    ends = np.vstack([orbit.coefficients[0], orbit.coefficients[:, -1].sum(axis=0)])
-    length = orbit.period / orbit.symmetry.order
-    return curve, curve.pack(Solution(orbit.mesh, ends, orbit.stages, length), length,
-                             line.value(orbit.network))
+    now = orbit.solution
+    return curve, curve.pack(now, now.length, line.value(orbit.network))
 
 
 def beside(network: Network, symmetry: Symmetry, line: ParameterLine,

@@ -26,8 +26,6 @@ from dataclasses import dataclass
 
 from cpg_ros.dynamics.mesh import collocation
 from cpg_ros.dynamics.mesh.elimination import chained, summed, transfer
-from cpg_ros.dynamics.mesh.kinks import aligned, places_of
-from cpg_ros.dynamics.mesh.orbit import MeshOrbit
 from cpg_ros.dynamics.periodic import NoOrbit
 from cpg_ros.networks.field import Field
 from cpg_ros.networks.network import Network
@@ -41,10 +39,6 @@ FEWEST, MOST_INTERVALS = 12, 300
 #: Newton stops at steps this small, against the size of the states and the period: what is left
 #: is of the order of their square.
 TOLERANCE = 1e-8
-#: Times that ends of intervals are put on kinks anew.
-ALIGNED = 8
-#: Below this range the orbit has fallen to an equilibrium.
-SMALLEST = 1e-5
 
 
 class Reduced(Field):
@@ -114,7 +108,7 @@ def bordered(reduced: Reduced, now: Solution, p: np.ndarray, r: np.ndarray) -> n
     return matrix
 
 
-def _newton(reduced: Reduced, now: Solution, steps: int = 15) -> bool:
+def newton(reduced: Reduced, now: Solution, steps: int = 15) -> bool:
     """Solve on a fixed mesh, in place; tell whether it converged."""
     scale = np.abs(now.points).max()
     d, longest = now.points.shape[1], 20.0 * now.length
@@ -154,7 +148,7 @@ def sampled(path: Callable[[np.ndarray], np.ndarray], mesh: np.ndarray, length: 
     return Solution(mesh, path(mesh), path(inner.ravel()).reshape(*inner.shape, -1), length)
 
 
-def _coefficients(reduced: Reduced, now: Solution) -> np.ndarray:
+def coefficients_of(reduced: Reduced, now: Solution) -> np.ndarray:
     """Of the polynomials on each interval, shape (S + 1, n, d)."""
     return collocation.power_coefficients(now.points[:-1], reduced.rates(now.stages),
                                           now.length * np.diff(now.mesh))
@@ -162,7 +156,7 @@ def _coefficients(reduced: Reduced, now: Solution) -> np.ndarray:
 
 def path_of(reduced: Reduced, now: Solution) -> Callable[[np.ndarray], np.ndarray]:
     """Return the solution as a function of places from 0 to 1."""
-    coefficients = _coefficients(reduced, now)
+    coefficients = coefficients_of(reduced, now)
 
     def path(places: np.ndarray) -> np.ndarray:
         k = np.clip(np.searchsorted(now.mesh, places, side='right') - 1, 0, now.mesh.size - 2)
@@ -195,25 +189,6 @@ def remeshed(reduced: Reduced, now: Solution, fewest: int = FEWEST) -> np.ndarra
     return collocation.spread(now.mesh, ends**(1.0 / collocation.S) / h, max(fewest, int(wanted)))
 
 
-def collocate(network: Network, symmetry: Symmetry, path: Callable[[np.ndarray], np.ndarray],
-              period: float) -> MeshOrbit | None:
-    """Solve for an orbit from a guess; None where Newton's method leads to none.
-
-    Args:
-        network: parameters.
-        symmetry: of the gait.
-        path: states, shape (m, components), as a function of times in cycles, shape (m,).
-        period: in model time.
-
-    """
-    reduced = Reduced(network, symmetry)
-
-    def guess(places: np.ndarray) -> np.ndarray:
-        return path(places / symmetry.order)[:, reduced.kept]
-
-    return _refined(reduced, sampled(guess, first_mesh(reduced, guess), period / symmetry.order))
-
-
 def first_mesh(reduced: Reduced, path: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
     """Return a mesh of few intervals for a path over the places 0 to 1, by how it bends."""
     coarse = np.linspace(0.0, 1.0, 513)
@@ -221,78 +196,16 @@ def first_mesh(reduced: Reduced, path: Callable[[np.ndarray], np.ndarray]) -> np
     return collocation.spread(coarse, np.sqrt(bend + 1e-3 * bend.max() + 1e-12), 30)
 
 
-def predicted(network: Network, near: MeshOrbit) -> MeshOrbit | None:
-    """Solve for an orbit from what the derivatives of a known one predict; None as in collocate.
+def derivatives(reduced: Reduced, now: Solution) -> tuple[np.ndarray, np.ndarray]:
+    """Differentiate a solution by the network's parameters.
 
-    The mesh of the known one is taken over, so that little is left to do.
-
-    Args:
-        network: parameters.
-        near: an orbit of the same gait at near parameters.
-
-    """
-    change = np.subtract([*network.as_dict().values()], [*near.network.as_dict().values()])
-    coefficients = near.coefficients + near.d_coefficients @ change
-    points = np.vstack([coefficients[0], coefficients[:, -1].sum(axis=0)])
-    stages = polynomial.polyval(collocation.NODES, coefficients).transpose(0, 2, 1)
-    length = (near.period + float(near.d_period @ change)) / near.symmetry.order
-    if not length > 0.0:
-        return None
-    return _refined(Reduced(network, near.symmetry), Solution(near.mesh, points, stages, length))
-
-
-def _refined(reduced: Reduced, now: Solution) -> MeshOrbit | None:
-    """Solve, remesh and solve again until the mesh is fine enough; None as in collocate."""
-    fewest = FEWEST
-    while True:
-        with np.errstate(all='ignore'):
-            converged = _newton(reduced, now)
-        if not converged or np.ptp(now.points[:, :reduced.size]) < SMALLEST:
-            return None
-        if not _on_kinks(reduced, now):
-            return None
-        try:
-            mesh = remeshed(reduced, now, fewest)
-            if mesh is None:
-                return completed(reduced, now)
-        except NoOrbit:
-            return None
-        now = sampled(path_of(reduced, now), mesh, now.length)
-        # Finer every time: equal shares of the error alone may stay short of the goal for ever.
-        fewest = finer(mesh)
-
-
-def kinks(reduced: Reduced, now: Solution) -> np.ndarray:
-    """Places, 0 to 1, at which the rates of a solution have a kink."""
-    network = reduced.network
-    columns = [variable * reduced.size + k for variable, name in enumerate(network.states)
-               if name in network.kinks for k in range(reduced.size)]
-    return places_of(now.mesh, _coefficients(reduced, now)[..., columns])
-
-
-def _on_kinks(reduced: Reduced, now: Solution) -> bool:
-    """Put ends of intervals on all kinks, in place; tell whether Newton's method converged."""
-    if not reduced.network.kinks:
-        return True
-    for _ in range(ALIGNED):
-        mesh = aligned(now.mesh, kinks(reduced, now))
-        if mesh is None:
-            break
-        moved = sampled(path_of(reduced, now), mesh, now.length)
-        now.mesh, now.points, now.stages = moved.mesh, moved.points, moved.stages
-        if not _newton(reduced, now):
-            return False
-    return True
-
-
-def completed(reduced: Reduced, now: Solution) -> MeshOrbit:
-    """Complete a solution by its derivatives and its residual.
+    Returns:
+        Those of the polynomials, shape (S + 1, n, d, parameters), and those of the period.
 
     Raises:
         NoOrbit: its equations are singular.
 
     """
-    coefficients = _coefficients(reduced, now)
     extra = reduced.by_parameter(now.stages)
     try:
         p, r, by_start, by_source = linearised(reduced, now, extra)
@@ -306,21 +219,15 @@ def completed(reduced: Reduced, now: Solution) -> MeshOrbit:
     h = np.diff(now.mesh)
     # Slopes in place: d(L F)/dp at the nodes.
     slopes, jacobians, _ = reduced.linearised(now.stages)
-    d_slopes = now.length * (jacobians @ inner + extra) \
-        + slopes[..., None] * d_length
+    d_slopes = now.length * (jacobians @ inner + extra) + slopes[..., None] * d_length
     d_coefficients = h[:, None, None] * np.einsum('sq,nsdp->qndp', collocation.INTEGRALS, d_slopes)
     d_coefficients[0] += moved[:-1]
 
-    d_period, m = reduced.symmetry.order * d_length, reduced.symmetry.order
+    d_period = reduced.symmetry.order * d_length
     # One cell of each class has seen only those of its family's weights that end on it.
     names = reduced.network.parameters()
     for family in reduced.network.families(reduced.symmetry):
         members = [names.index(name) for name in family]
         d_period[members] = d_period[members].mean()
         d_coefficients[..., members] = d_coefficients[..., members].mean(axis=-1, keepdims=True)
-    between = np.array([0.02, 0.3, 0.5, 0.7, 0.98])
-    values, rise = (polynomial.polyval(between, c).transpose(0, 2, 1)
-                    for c in (coefficients, polynomial.polyder(coefficients)))
-    residual = np.abs(rise / (now.length * h)[:, None, None] - reduced.rates(values))
-    return MeshOrbit(reduced.network, reduced.symmetry, m * now.length, float(residual.max()),
-                     d_period, now.mesh, now.stages, coefficients, d_coefficients)
+    return d_coefficients, d_period

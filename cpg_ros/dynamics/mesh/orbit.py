@@ -19,7 +19,9 @@ A gait with m = order of H/K is known from the cells of one class each, over one
 """
 
 from dataclasses import dataclass, field
+from functools import cached_property
 
+from cpg_ros.dynamics.mesh.newton import derivatives, Reduced, Solution
 from cpg_ros.dynamics.periodic import Orbit
 import numpy as np
 
@@ -35,16 +37,36 @@ class MeshOrbit(Orbit):
         mesh: ends of the intervals over T/m, from 0 to 1, shape (n + 1,).
         stages: reduced states at the nodes, shape (n, S, d).
         coefficients: of the polynomials on each interval, shape (S + 1, n, d).
-        d_coefficients: their derivatives by the parameters at fixed theta, shape
-            (S + 1, n, d, parameters). A family of weights that the symmetry carries into one
-            another acts as one: each has an equal share of what moving all of them does.
 
     """
 
     mesh: np.ndarray = field(repr=False)
     stages: np.ndarray = field(repr=False)
     coefficients: np.ndarray = field(repr=False)
-    d_coefficients: np.ndarray = field(repr=False)
+
+    @property
+    def solution(self) -> Solution:
+        """The same as what Newton's method works on."""
+        ends = np.vstack([self.coefficients[0], self.coefficients[:, -1].sum(axis=0)])
+        return Solution(self.mesh, ends, self.stages, self.period / self.symmetry.order)
+
+    @cached_property
+    def _derivatives(self) -> tuple[np.ndarray, np.ndarray]:
+        return derivatives(Reduced(self.network, self.symmetry), self.solution)
+
+    @property
+    def d_period(self) -> np.ndarray:
+        """Derivatives of the period by the network's parameters, shape (parameters,)."""
+        return self._derivatives[1]
+
+    @property
+    def d_coefficients(self) -> np.ndarray:
+        """Derivatives of the coefficients by the parameters at fixed theta.
+
+        A family of weights that the symmetry carries into one another acts as one: each has an
+        equal share of what moving all of them does. Shape (S + 1, n, d, parameters).
+        """
+        return self._derivatives[0]
 
     def _columns(self, wave: int, variable: int) -> list[int]:
         """Where u_wave is found in the reduced state, in each m-th of the cycle."""

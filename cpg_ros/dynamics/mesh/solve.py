@@ -24,9 +24,9 @@ from dataclasses import replace
 from functools import lru_cache
 
 from cpg_ros.dynamics.equilibrium import NoEquilibrium
-from cpg_ros.dynamics.mesh.newton import collocate as from_path
-from cpg_ros.dynamics.mesh.newton import predicted
 from cpg_ros.dynamics.mesh.orbit import MeshOrbit
+from cpg_ros.dynamics.mesh.refinement import collocate as from_path
+from cpg_ros.dynamics.mesh.refinement import predicted
 from cpg_ros.dynamics.periodic import check_values, NoOrbit, richer
 from cpg_ros.dynamics.seek import settled, sought
 from cpg_ros.integration.simulate import simulate
@@ -168,19 +168,17 @@ def solve(network: Network, gait: str, near: MeshOrbit | None = None) -> MeshOrb
         near = _sought(network, gait) if known is None else from_preset(known)
     if near.network == network and near.symmetry == symmetry:
         return near
-    orbit = None
     if near.symmetry == symmetry:
         try:
             return beside(network, near)
         except NoOrbit:
             # Not near enough.
             pass
-    if orbit is None:
-        start = near(np.array(0.0))
-        if near.symmetry != symmetry and near.symmetry.h == symmetry.h:
-            # A wave that runs the other way: the same signals with other phases.
-            start = _states(near, symmetry)
-        orbit = _by_itself(network, symmetry, start, near.period) or _settled(network, gait)
+    start = near(np.array(0.0))
+    if near.symmetry != symmetry and near.symmetry.h == symmetry.h:
+        # A wave that runs the other way: the same signals with other phases.
+        start = _states(near, symmetry)
+    orbit = _by_itself(network, symmetry, start, near.period) or _settled(network, gait)
     if orbit is not None:
         return orbit
     if near.symmetry == symmetry:
