@@ -146,7 +146,7 @@ def _draw_branches(axes: Axes, analysis: Analysis) -> None:
             shown.add(gait)
             for one in bifurcations(branch, spectra, VISIBLE):
                 axes.plot(one.value, one.point.amplitude, marker=CROSSINGS[one.kind], markersize=6,
-                          color=_colour(gait), markerfacecolor='white')
+                          color=_colour(gait), markerfacecolor=axes.get_facecolor())
                 met[one.kind] = CROSSINGS[one.kind]
             for end, last in zip(branch.ends, (branch.points[0], branch.points[-1]), strict=True):
                 if end.why == 'period':
@@ -163,12 +163,14 @@ def _draw_branches(axes: Axes, analysis: Analysis) -> None:
         shown.add(verdict.gait)
     handles = [Line2D([], [], color=_colour(gait), label=gait.replace('_', ' '))
                for gait in dict.fromkeys([*COLOURS, *sorted(shown)]) if gait in shown]
-    handles += [Line2D([], [], color='black', linestyle=style, label=label)
+    # Of the text's colour, which differs on a dark page.
+    plain = matplotlib.rcParams['text.color']
+    handles += [Line2D([], [], color=plain, linestyle=style, label=label)
                 for style, label in STYLES]
-    handles += [Line2D([], [], color='black', marker=marker, linestyle='', label=label)
+    handles += [Line2D([], [], color=plain, marker=marker, linestyle='', label=label)
                 for marker, label in (('o', 'Hopf point'), ('s', 'fold'), ('D', 'this set'))]
-    handles += [Line2D([], [], color='black', marker=marker, linestyle='', label=label,
-                       markerfacecolor='white') for label, marker in met.items()]
+    handles += [Line2D([], [], color=plain, marker=marker, linestyle='', label=label,
+                       markerfacecolor=axes.get_facecolor()) for label, marker in met.items()]
     # Above the axes, where it hides nothing.
     axes.legend(handles=handles, fontsize=7, ncols=5, frameon=False, title='Branches of gaits',
                 title_fontsize=10, alignment='left', loc='lower left', bbox_to_anchor=(0.0, 1.0),
