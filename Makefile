@@ -25,7 +25,7 @@ ENTER := set -e; source install/setup.bash; \
 
 # Live tests wait for most of their time: one for each core runs at once.
 LIVE ?= $(shell nproc)
-# Tests of a file run in one process: what they share is made, and compiled, once.
+# Tests of a file that need no graph run in one process: what they share is made, and compiled, once.
 # What fails on a graph runs once more, and is listed, as colcon test --retest-until-pass does it:
 # a shared machine stands still now and then. What hangs ends.
 AGAIN := --reruns 1 -r aR --timeout 600
@@ -68,7 +68,7 @@ test: install/.built docs
 	@$(VENV)/bin/mypy
 	@$(VENV)/bin/lint-imports --no-logo
 	@$(ENTER); for part in '-n auto --dist loadfile -m "not live" $(if $(ARGS),,$(COVER) --cov-report= --cov-fail-under=90)' \
-		'-n $(LIVE) --dist loadfile -m "live and not alone" $(AGAIN)' '-m alone $(AGAIN)'; do \
+		'-n $(LIVE) --dist loadgroup -m "live and not alone" $(AGAIN)' '-m alone $(AGAIN)'; do \
 		eval $(VENV)/bin/pytest test $$part $(ARGS) || [ $$? = 5 ]; done  # 5: none selected
 
 bench: install/.built
