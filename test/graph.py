@@ -42,9 +42,10 @@ PATIENCE = 60.0
 #: Which of the processes that share the tests this one is, and how many there are.
 WORKER = int(os.environ.get('PYTEST_XDIST_WORKER', 'gw0')[2:])
 WORKERS = int(os.environ.get('PYTEST_XDIST_WORKER_COUNT', '1'))
-#: Those whose ports the system gives to nobody else, without that of make.
-DOMAINS = [domain for domain in range(1, 101) if domain != 42]
-_domains = itertools.count(WORKER, WORKERS)
+#: Those whose ports the system gives to nobody else, without that of make; other processes that
+#: share the tests have others, however many tests each of them has run.
+DOMAINS = [domain for domain in range(1, 101) if domain != 42][WORKER::WORKERS]
+_domains = itertools.count()
 
 
 def free_domain() -> int:
