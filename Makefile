@@ -26,6 +26,7 @@ ENTER := set -e; source install/setup.bash; \
 # Live tests wait for most of their time: one for each core runs at once.
 LIVE ?= $(shell nproc)
 # Tests of a file that need no graph run in one process: what they share is made, and compiled, once.
+# Live ones, without groups, are dealt out one by one.
 # What fails on a graph runs once more, and is listed, as colcon test --retest-until-pass does it:
 # a shared machine stands still now and then. What hangs ends.
 AGAIN := --reruns 1 -r aR --timeout 600

@@ -24,6 +24,7 @@ import pytest  # noqa: E402
 ALONE = ('test_clock', 'test_demo', 'test_lockstep', 'test_stalls', 'test_stop_paths',
          'test_switching', 'test_topics', 'test_unitree_live')
 
+
 def pytest_collection_modifyitems(items):
     """Mark what runs on a graph in real time, and of that what must have the machine to itself."""
     seen = set()
