@@ -14,6 +14,8 @@
 
 """Kernels on disk: compiled for one network in one process, loaded with others in the next."""
 
+import ast
+import fcntl
 import os
 from pathlib import Path
 import shutil
@@ -21,6 +23,7 @@ import subprocess
 import sys
 
 import cpg_ros
+from cpg_ros.files.cache_folder import KEPT
 from cpg_ros.files.shared_resources import share
 import pytest
 
@@ -55,11 +58,11 @@ def environment(*without, **more):
 
 def test_networks_compiled_apart_keep_their_own_code(tmp_path):
     # numba told them apart by a number that is the same in either process: one network's loop ran
-    # on the other's arrays.
+    # on the other's arrays. They start together, as nodes of one launch file do.
     given = environment(NUMBA_CACHE_DIR=str(tmp_path))
-    for network in ('quadruped', 'biped'):
-        subprocess.run([sys.executable, '-c', WARM.format(network=network)], env=given,
-                       check=True)
+    together = [subprocess.Popen([sys.executable, '-c', WARM.format(network=network)], env=given)
+                for network in ('quadruped', 'biped', 'quadruped')]
+    assert [one.wait() for one in together] == [0, 0, 0]
     before = sorted(tmp_path.rglob('*.nbc'))
     found = subprocess.run([sys.executable, '-c', CHECK], env=given, check=True,
                            stdout=subprocess.PIPE, text=True)
@@ -90,14 +93,14 @@ def test_the_first_start_of_another_network_leaves_what_is_compiled(copied):
     # Its generated code is kept beside the sources, where anybody may write there.
     package, known = copied
     both = kernels_after_a_start(package, 'phase')
-    assert both > known and list(package.rglob('phase_*.py'))
+    assert both > known and list(package.rglob('phase_*/kernel.py'))
     assert kernels_after_a_start(package, 'delayed') == both
 
 
 def test_a_changed_source_is_generated_and_compiled_again(copied):
     # numba watches only the file that a kernel stands in, and the rooms have several.
     package, _ = copied
-    generated = set(package.rglob('delayed_*.py'))
+    generated = set(package.rglob('delayed_*/kernel.py'))
     known = set(package.rglob('*.nbc'))
     assert generated and kernels_after_a_start(package, 'delayed') == known
     for source in ('integration/field_code.py', 'motion/readout.py'):
@@ -105,8 +108,79 @@ def test_a_changed_source_is_generated_and_compiled_again(copied):
         changed.write_text(changed.read_text() + '\n# Changed.\n')
         before, known = known, kernels_after_a_start(package, 'delayed')
         assert known > before, source
-        older, generated = generated, set(package.rglob('delayed_*.py'))
+        older, generated = generated, set(package.rglob('delayed_*/kernel.py'))
         assert generated > older, source
+
+
+OWN = """
+import numpy as np
+from cpg_ros.integration.stepper import Stepper
+from cpg_ros.motion.precompile import precompile
+from own import TwoLegs
+precompile('delayed')
+state, slope, _ = Stepper(TwoLegs(1.0, 2.0, 0.1), np.array([1.0, 0.5, 0.0, 0.0])).advance(0.01)
+# Of x of the first leg, whose square rate is 1 - x^2 - y^2.
+x, y = state[0], state[2]
+print(np.round((slope[0] + 2.0 * y - 0.1 * state[1]) / x / (1.0 - x ** 2 - y ** 2), 9))
+"""
+
+
+def test_an_edited_network_of_ones_own_is_compiled_again_and_nothing_else(tmp_path):
+    own, given = tmp_path / 'own.py', environment(NUMBA_CACHE_DIR=str(tmp_path / 'cache'),
+                                                  PYTHONPATH=str(tmp_path))
+    text = Path(__file__).with_name('test_own_network.py').read_text()
+    found, growth = [], []
+    for factor in ('', '', '1.5 * '):
+        own.write_text(text.replace('return rest * x', f'return {factor}rest * x'))
+        run = subprocess.run([sys.executable, '-c', OWN], env=given, check=True,
+                             stdout=subprocess.PIPE, text=True)
+        found.append(float(run.stdout))
+        growth.append(set(tmp_path.rglob('*.nbc')) - set().union(*growth))
+    assert found == [1.0, 1.0, 1.5]
+    first, again, edited = growth
+    assert not again and edited
+    assert {kernel.name.partition('two_legs')[1] for kernel in edited} == {'two_legs'}
+    assert len(edited) < len(first)
+
+
+def test_what_compiled_code_takes_from_other_files_is_watched():
+    # numba puts numbers and functions of other modules into machine code when it compiles.
+    package = Path(cpg_ros.__file__).parent
+    watched = {'cpg_ros.integration', 'cpg_ros.networks', 'cpg_ros.dynamics', 'cpg_ros.motion',
+               'cpg_ros.feedback'}
+    seen = set()
+    for file in package.rglob('*.py'):
+        tree = ast.parse(file.read_text())
+        imported = {alias.asname or alias.name: node.module for node in ast.walk(tree)
+                    if isinstance(node, ast.ImportFrom) and node.module for alias in node.names}
+        for function in ast.walk(tree):
+            if isinstance(function, ast.FunctionDef) and {'jit', 'entry', 'own'} & {
+                    ast.unparse(decorator) for decorator in function.decorator_list}:
+                used = {node.id for node in ast.walk(function) if isinstance(node, ast.Name)}
+                seen |= {imported[name] for name in used & set(imported)
+                         if imported[name].startswith('cpg_ros.')}
+    assert 'cpg_ros.motion.duty' in seen
+    assert {'.'.join(module.split('.')[:2]) for module in seen} <= watched
+
+
+def test_unused_folders_of_the_cache_are_removed_and_no_others(tmp_path):
+    cache, given = tmp_path / 'cpg_ros', environment(NUMBA_CACHE_DIR=str(tmp_path))
+    old = [cache / f'package-{number:014x}' for number in range(KEPT + 5)]
+    for age, folder in enumerate(old):
+        folder.mkdir(parents=True)
+        lock = folder / 'in_use'
+        lock.touch()
+        os.utime(lock, (1e9 - age, 1e9 - age))
+    other = cache / 'notes'
+    other.mkdir()
+    with (old[-1] / 'in_use').open() as running:
+        fcntl.flock(running, fcntl.LOCK_SH)
+        subprocess.run([sys.executable, '-c', 'import cpg_ros.integration.jit, cpg_ros.motion.duty;'
+                        'import cpg_ros.motion.strides'], env=given, check=True)
+        left = {folder for folder in cache.iterdir() if folder.name.startswith('package-')}
+    # The new one, those last used, and the oldest, which is in use.
+    assert set(old) & left == {*old[:KEPT - 1], old[-1]} and len(left) == KEPT + 1
+    assert other.exists()
 
 
 RUN = """

@@ -19,7 +19,6 @@ import math
 
 from cpg_ros.feedback.kinematics import foot_of, Geometry, GRAVITY, slopes_of
 from cpg_ros.integration.jit import entry, jit
-from cpg_ros.networks.generated import sources_digest
 import numpy as np
 
 #: A foot counts as on the ground above this share of the weight, until below the other.
@@ -137,21 +136,12 @@ def update(rows, columns, radius, weight, angles, rates, loads, lean, turning, p
         velocity[2] += pull * (seen[leg, 2] - vz)
 
 
-def _cached(digest):
-    """Build the cached entry point; see sources_digest for why it is a closure."""
-
-    @entry
-    def update_all(rows, columns, radius, weight, angles, rates, loads, lean, turning, push, dt,
-                   velocity, contact, seen, scratch):
-        digest  # noqa: B018
-        for run in range(angles.shape[0]):
-            update(rows, columns, radius, weight, angles[run], rates[run], loads[run], lean[run],
-                   turning[run], push[run], dt, velocity[run], contact[run], seen, scratch)
-
-    return update_all
-
-
-_update_all = _cached(sources_digest())
+@entry
+def _update_all(rows, columns, radius, weight, angles, rates, loads, lean, turning, push, dt,
+                velocity, contact, seen, scratch):
+    for run in range(angles.shape[0]):
+        update(rows, columns, radius, weight, angles[run], rates[run], loads[run], lean[run],
+               turning[run], push[run], dt, velocity[run], contact[run], seen, scratch)
 
 
 class BodyState:

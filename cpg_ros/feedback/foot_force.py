@@ -18,7 +18,6 @@ import math
 
 from cpg_ros.feedback.kinematics import slopes_of
 from cpg_ros.integration.jit import entry, jit
-from cpg_ros.networks.generated import sources_digest
 import numpy as np
 
 #: A leg whose joints hardly move its foot says nothing: least determinant, m^3.
@@ -61,24 +60,15 @@ def load_of(leg, columns, angles, efforts, up, slopes):
     return load
 
 
-def _cached(digest):
-    """Build the cached entry point; see sources_digest for why it is a closure."""
+@entry
+def loads_of(rows, columns, angles, efforts, roll, pitch, out):
+    """Fill out, N, shape (legs,), with the upward forces on the feet of one robot.
 
-    @entry
-    def loads_of(rows, columns, angles, efforts, roll, pitch, out):
-        """Fill out, N, shape (legs,), with the upward forces on the feet of one robot.
-
-        Rows and columns are the geometry's; angles in rad, efforts in N m, shape (joints,); roll
-        and pitch in rad.
-        """
-        digest  # noqa: B018
-        up = (-math.sin(pitch), math.sin(roll) * math.cos(pitch),
-              math.cos(roll) * math.cos(pitch))
-        slopes = np.empty((3, 3))
-        for leg in range(len(out)):
-            out[leg] = load_of(rows[leg], columns[leg], angles, efforts, up, slopes)
-
-    return loads_of
-
-
-loads_of = _cached(sources_digest())
+    Rows and columns are the geometry's; angles in rad, efforts in N m, shape (joints,); roll
+    and pitch in rad.
+    """
+    up = (-math.sin(pitch), math.sin(roll) * math.cos(pitch),
+          math.cos(roll) * math.cos(pitch))
+    slopes = np.empty((3, 3))
+    for leg in range(len(out)):
+        out[leg] = load_of(rows[leg], columns[leg], angles, efforts, up, slopes)

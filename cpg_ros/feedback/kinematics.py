@@ -23,7 +23,6 @@ import math
 
 from cpg_ros.errors import InputError
 from cpg_ros.integration.jit import entry, jit
-from cpg_ros.networks.generated import sources_digest
 from cpg_ros.robots.body_keys import BodyGeometry
 from cpg_ros.robots.robot import Robot
 import numpy as np
@@ -179,44 +178,35 @@ def move_foot(leg, columns, angles, foot, way):
     angles[columns[2]] += wrapped(then[2] - now[2])
 
 
-def _cached(digest):
-    """Build the cached entry points; see sources_digest for why they are closures."""
-
-    @entry
-    def feet(rows, columns, angles, out):
-        digest  # noqa: B018
-        for k in range(angles.shape[0]):
-            for leg in range(rows.shape[0]):
-                out[k, leg] = foot_of(rows[leg], angles[k, columns[leg, 0]],
-                                      angles[k, columns[leg, 1]], angles[k, columns[leg, 2]])
-
-    @entry
-    def slopes(rows, columns, angles, out):
-        digest  # noqa: B018
-        for k in range(angles.shape[0]):
-            for leg in range(rows.shape[0]):
-                slopes_of(rows[leg], angles[k, columns[leg, 0]], angles[k, columns[leg, 1]],
-                          angles[k, columns[leg, 2]], out[k, leg])
-
-    @entry
-    def joints(rows, places, out):
-        digest  # noqa: B018
-        for k in range(places.shape[0]):
-            for leg in range(rows.shape[0]):
-                out[k, leg] = joints_of(rows[leg], places[k, leg, 0], places[k, leg, 1],
-                                        places[k, leg, 2])
-
-    @entry
-    def moved(rows, columns, places, ways, angles):
-        digest  # noqa: B018
-        for k in range(places.shape[0]):
-            for leg in range(rows.shape[0]):
-                move_foot(rows[leg], columns[leg], angles[k], places[k, leg], ways[k, leg])
-
-    return feet, slopes, joints, moved
+@entry
+def _feet(rows, columns, angles, out):
+    for k in range(angles.shape[0]):
+        for leg in range(rows.shape[0]):
+            out[k, leg] = foot_of(rows[leg], angles[k, columns[leg, 0]],
+                                  angles[k, columns[leg, 1]], angles[k, columns[leg, 2]])
 
 
-_feet, _slopes, _joints, _moved = _cached(sources_digest())
+@entry
+def _slopes(rows, columns, angles, out):
+    for k in range(angles.shape[0]):
+        for leg in range(rows.shape[0]):
+            slopes_of(rows[leg], angles[k, columns[leg, 0]], angles[k, columns[leg, 1]],
+                      angles[k, columns[leg, 2]], out[k, leg])
+
+
+@entry
+def _joints(rows, places, out):
+    for k in range(places.shape[0]):
+        for leg in range(rows.shape[0]):
+            out[k, leg] = joints_of(rows[leg], places[k, leg, 0], places[k, leg, 1],
+                                    places[k, leg, 2])
+
+
+@entry
+def _moved(rows, columns, places, ways, angles):
+    for k in range(places.shape[0]):
+        for leg in range(rows.shape[0]):
+            move_foot(rows[leg], columns[leg], angles[k], places[k, leg], ways[k, leg])
 
 
 def _flat(values: np.ndarray, last: int) -> np.ndarray:

@@ -15,25 +15,49 @@
 """How the numerical kernels are compiled, and the elementary functions they share."""
 
 import math
+from pathlib import Path
 from typing import Any
 
 from cpg_ros.networks import generated
 from numba import config, njit, typeof
 import numpy as np
 
-#: Whether machine code can be kept; numba reads where, if not beside its source.
-KEPT = generated.folder() is not None
-config.reload_config()
-
 #: No division checks (they keep loops from being vectorised), fused multiply-add allowed,
 #: and the interpreter lock released: the publishing thread must not wait for parameters.
 OPTIONS: dict[str, Any] = {'error_model': 'numpy', 'fastmath': {'contract'}, 'nogil': True}
 
 jit = njit(**OPTIONS)
-#: For entry points, whose machine code is kept on disk.
-entry = njit(cache=KEPT, **OPTIONS)
 #: For what is built into its caller, where a loop of known length can be unrolled.
 part = njit(inline='always', **OPTIONS)
+
+
+def kept(function, folder: Path | None, **options):
+    """Compile a function when it is first called, and keep its machine code on disk.
+
+    Args:
+        function: not compiled yet.
+        folder: which is another one whenever something that the function calls has changed;
+            without one, nothing is kept.
+        options: of numba, beside those of every kernel.
+
+    """
+    if folder is not None:
+        # Read here and now: what others compile with numba is kept where it was.
+        numba: Any = config
+        others, numba.CACHE_DIR = numba.CACHE_DIR, str(folder)
+        try:
+            compiled = njit(cache=True, **OPTIONS, **options)(function)
+        finally:
+            numba.CACHE_DIR = others
+        # Where the folder cannot be written numba tries others, whose code may be out of date.
+        if Path(compiled.stats.cache_path).is_relative_to(folder):
+            return compiled
+    return njit(**OPTIONS, **options)(function)
+
+
+def entry(function):
+    """Compile an entry point of the package, whose machine code is kept on disk."""
+    return kept(function, generated.folder())
 
 
 def bound(kernel, *arguments):
@@ -46,14 +70,19 @@ def bound(kernel, *arguments):
     return kernel.compile(tuple(typeof(argument) for argument in arguments))
 
 
-def renamed(function, network: str):
+def renamed(function, key: str):
     """Give a function that is compiled once for each network a name of its own for this one.
 
     numba names machine code by the function's qualified name and a running number. Code that two
     processes have put into the disk cache under one name is taken for the same when a third one
     loads both: a network would run another's equations, on arrays of another length.
+
+    Args:
+        function: to be renamed.
+        key: of the network's equations.
+
     """
-    function.__qualname__ = f'{function.__qualname__}_{network.rpartition(".")[2]}'
+    function.__qualname__ = f'{function.__qualname__}_{key.rpartition(".")[2]}'
     return function
 
 

@@ -34,11 +34,11 @@ import math
 from types import FunctionType
 from typing import Any
 
-from cpg_ros.integration.jit import jit, KEPT, OPTIONS, part, renamed
+from cpg_ros.integration.jit import jit, kept, part, renamed
 from cpg_ros.networks import generated
 from cpg_ros.networks.equations import equations_of
 from cpg_ros.networks.network import Network
-from numba import njit, prange
+from numba import prange
 import numpy as np
 
 
@@ -62,7 +62,7 @@ def _compiled(decorate, equations):
     def own(function):
         return decorate(renamed(function, equations.key))
 
-    code = generated.load(f'{equations.key}_kernel',
+    code = generated.load(equations.key, 'kernel',
                           lambda: _field_code().kernel_source(equations))
     drive, rates = code.compiled(own)
     delays = drive is not None
@@ -194,117 +194,87 @@ def _compiled(decorate, equations):
     return past_state, restart, steps_of
 
 
-# Stand-ins for the functions of a network, which ``_with`` puts in their place.
+# What the entry points below use of a network, which ``kernels`` puts in place of these.
+_components: Any = None
 _past_state: Any = None
 _restart: Any = None
 _steps: Any = None
 _steps_of_one: Any = None
 
 
-def _with(function, names):
-    """Copy a function that is to use other functions instead of its module's of these names.
+def set_slope(p, tau, gain, basis, step, x, after, before, head):
+    """Recompute the slope that leaves the head node, after parameters have changed."""
+    _restart(x.shape[1], tau.shape[0], p, tau, gain, basis, step, x, after, before, head)
 
-    numba keys its disk cache on closed-over values, and a compiled function is another value in
-    every process; what a function finds among its globals does not count.
+
+def advance(p, tau, gain, basis, step, x, after, before, clock, duration, out):
+    """Advance the output instant of one lane by duration and evaluate there.
+
+    clock is (head, ahead): the newest node and its distance beyond the output instant, in
+    [0, step). out receives x, x', x'' at that instant, shape (3, components).
     """
-    copy = FunctionType(function.__code__, {**globals(), **names}, function.__name__,
-                        function.__defaults__, function.__closure__)
-    copy.__qualname__, copy.__doc__ = function.__qualname__, function.__doc__
-    return copy
+    head = int(clock[0])
+    ahead = clock[1] - duration
+    if ahead < 0.0:
+        steps = math.ceil(-ahead / step)
+        nothing = np.empty((0, 0, 0))
+        # Not the unrolled code: it gains nothing here and takes 15 s more to compile.
+        head = _steps(x.shape[1], tau.shape[0], p, tau, gain, basis, step, x,
+                      after, before, head, steps, 0.0, nothing, nothing,
+                      np.int64(0), np.int64(1))
+        ahead = max(0.0, ahead + steps * step)
+    clock[0] = head
+    clock[1] = ahead
+    start = head - 1 if head > 0 else x.shape[0] - 1
+    s = 1.0 - ahead / step
+    _past_state(x.shape[1], x, after, before, head, 0.0, ahead, step, 0, 1, out[0])
+    for i in range(x.shape[1]):
+        rise = (x[head, i] - x[start, i]) / step
+        out[1, i] = ((1.0 - s) * (1.0 - 3.0 * s) * after[start, i]
+                     + 6.0 * s * (1.0 - s) * rise + s * (3.0 * s - 2.0) * before[head, i])
+        out[2, i] = ((6.0 * s - 4.0) * after[start, i] + 6.0 * (1.0 - 2.0 * s) * rise
+                     + (6.0 * s - 2.0) * before[head, i]) / step
 
 
-def _cached(digest, network, components, **functions):
-    """Build a network's cached entry points; see sources_digest for why they are closures.
+def integrate_one(p, tau, gain, basis, step, x, after, before, head, steps, noise,
+                  seed, states, slopes, row, every):
+    """Return what integrate does for a single trajectory, in one piece, loops unrolled."""
+    np.random.seed(seed)
+    return _steps_of_one(_components, 1, p, tau, gain, basis, step, x, after, before, head,
+                         steps, noise, states, slopes, row, every)
 
-    Args:
-        digest: of the sources, for the cache.
-        network: its name.
-        components: length of its state.
-        functions: its _past_state, _restart, _steps and _steps_of_one.
 
+def integrate(p, tau, gain, basis, step, x, after, before, head, steps, noise, seed,
+              states, slopes, row, every):
+    """Take steps of one block of lanes; return the new head.
+
+    What is reached is recorded in states and slopes, shape (lanes, rows, components): every
+    ``every``-th step, the first one here being number ``row``.
     """
+    np.random.seed(seed)
+    return _steps(x.shape[1], tau.shape[0], p, tau, gain, basis, step, x, after,
+                  before, head, steps, noise, states, slopes, row, every)
 
-    def set_slope(p, tau, gain, basis, step, x, after, before, head):
-        """Recompute the slope that leaves the head node, after parameters have changed."""
-        digest  # noqa: B018
-        _restart(x.shape[1], tau.shape[0], p, tau, gain, basis, step, x, after, before, head)
 
-    def advance(p, tau, gain, basis, step, x, after, before, clock, duration, out):
-        """Advance the output instant of one lane by duration and evaluate there.
+def integrate_many(p, tau, gain, basis, step, x, after, before, head, steps, noise,
+                   seeds, states, slopes, row, every):
+    """Take and record steps of many blocks on all cores; return the new head.
 
-        clock is (head, ahead): the newest node and its distance beyond the output instant, in
-        [0, step). out receives x, x', x'' at that instant, shape (3, components).
-        """
-        digest  # noqa: B018
-        head = int(clock[0])
-        ahead = clock[1] - duration
-        if ahead < 0.0:
-            steps = math.ceil(-ahead / step)
-            nothing = np.empty((0, 0, 0))
-            # Not the unrolled code: it gains nothing here and takes 15 s more to compile.
-            head = _steps(x.shape[1], tau.shape[0], p, tau, gain, basis, step, x,
-                          after, before, head, steps, 0.0, nothing, nothing,
-                          np.int64(0), np.int64(1))
-            ahead = max(0.0, ahead + steps * step)
-        clock[0] = head
-        clock[1] = ahead
-        start = head - 1 if head > 0 else x.shape[0] - 1
-        s = 1.0 - ahead / step
-        _past_state(x.shape[1], x, after, before, head, 0.0, ahead, step, 0, 1, out[0])
-        for i in range(x.shape[1]):
-            rise = (x[head, i] - x[start, i]) / step
-            out[1, i] = ((1.0 - s) * (1.0 - 3.0 * s) * after[start, i]
-                         + 6.0 * s * (1.0 - s) * rise + s * (3.0 * s - 2.0) * before[head, i])
-            out[2, i] = ((6.0 * s - 4.0) * after[start, i] + 6.0 * (1.0 - 2.0 * s) * rise
-                         + (6.0 * s - 2.0) * before[head, i]) / step
-
-    def integrate_one(p, tau, gain, basis, step, x, after, before, head, steps, noise,
-                      seed, states, slopes, row, every):
-        """Return what integrate does for a single trajectory, in one piece, loops unrolled."""
-        digest  # noqa: B018
-        np.random.seed(seed)
-        return _steps_of_one(components, 1, p, tau, gain, basis, step, x, after, before, head,
-                             steps, noise, states, slopes, row, every)
-
-    def integrate(p, tau, gain, basis, step, x, after, before, head, steps, noise, seed,
-                  states, slopes, row, every):
-        """Take steps of one block of lanes; return the new head.
-
-        What is reached is recorded in states and slopes, shape (lanes, rows, components): every
-        ``every``-th step, the first one here being number ``row``.
-        """
-        digest  # noqa: B018
-        np.random.seed(seed)
-        return _steps(x.shape[1], tau.shape[0], p, tau, gain, basis, step, x, after,
-                      before, head, steps, noise, states, slopes, row, every)
-
-    def integrate_many(p, tau, gain, basis, step, x, after, before, head, steps, noise,
-                       seeds, states, slopes, row, every):
-        """Take and record steps of many blocks on all cores; return the new head.
-
-        Arrays have a leading axis, the block; states and slopes stay as they are.
-        """
-        digest  # noqa: B018
-        lanes = tau.shape[1]
-        for m in prange(x.shape[0]):
-            np.random.seed(seeds[m])
-            mine = slice(m * lanes, min((m + 1) * lanes, states.shape[0]))
-            _steps(x.shape[2], lanes, p[m], tau[m], gain, basis, step, x[m],
-                   after[m], before[m], head, steps, noise, states[mine], slopes[mine],
-                   row, every)
-        return (head + steps) % x.shape[1]
-
-    def ready(function, parallel=False):
-        mine = renamed(_with(function, functions), network)
-        return njit(cache=KEPT, parallel=parallel, **OPTIONS)(mine)
-
-    return Kernels(ready(set_slope), ready(advance), ready(integrate_one), ready(integrate),
-                   ready(integrate_many, parallel=True))
+    Arrays have a leading axis, the block; states and slopes stay as they are.
+    """
+    lanes = tau.shape[1]
+    for m in prange(x.shape[0]):
+        np.random.seed(seeds[m])
+        mine = slice(m * lanes, min((m + 1) * lanes, states.shape[0]))
+        _steps(x.shape[2], lanes, p[m], tau[m], gain, basis, step, x[m],
+               after[m], before[m], head, steps, noise, states[mine], slopes[mine],
+               row, every)
+    return (head + steps) % x.shape[1]
 
 
 @dataclass(frozen=True)
 class Kernels:
-    """The compiled entry points of one kind of network; see _cached for what they do."""
+    """The entry points above, compiled for one kind of network."""
 
     set_slope: Callable[..., None]
     advance: Callable[..., None]
@@ -323,6 +293,18 @@ def kernels(network: type[Network]) -> Kernels:
     equations = equations_of(network)
     _, _, steps_of_one = _compiled(part, equations)
     past_state, restart, steps = _compiled(jit, equations)
-    return _cached(generated.sources_digest(equations.key), equations.key,
-                   network.cells * network.variables, _past_state=past_state, _restart=restart,
-                   _steps=steps, _steps_of_one=steps_of_one)
+    names = {'_components': network.cells * network.variables, '_past_state': past_state,
+             '_restart': restart, '_steps': steps, '_steps_of_one': steps_of_one}
+
+    def of_network(function, **options):
+        """Compile a copy of an entry point that finds the network's functions as its globals.
+
+        Not as closed-over values: numba keys its cache on those, and a compiled function is
+        another value in every process.
+        """
+        copy = FunctionType(function.__code__, {**globals(), **names}, function.__name__)
+        copy.__doc__ = function.__doc__
+        return kept(renamed(copy, equations.key), generated.folder(equations.key), **options)
+
+    return Kernels(of_network(set_slope), of_network(advance), of_network(integrate_one),
+                   of_network(integrate), of_network(integrate_many, parallel=True))

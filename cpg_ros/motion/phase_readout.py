@@ -36,7 +36,6 @@ from cpg_ros.dynamics.periodic import Orbit
 from cpg_ros.integration.jit import entry
 from cpg_ros.motion.duty import at_even_phases, maps_of_cells, told
 from cpg_ros.motion.readout import monomials, NoPhase, TURN
-from cpg_ros.networks.generated import sources_digest
 import numpy as np
 
 #: Points of a cycle in the tables of an orbit: a cell may jump within a hundredth of a cycle.
@@ -53,133 +52,124 @@ PHASE_SHARE = 4.0
 LEAST_SHARE = 0.1
 
 
-def _cached(digest):
-    """Build the cached entry point; see sources_digest for why it is a closure."""
+@entry
+def observe_phases(now, strides, waves, phases, shape, circles, tables, harmonics, crests,
+                   cells, weights, leg_cells, maps, clocks, angle, rise, legs):
+    """Let the cells' clocks go on and read joints and legs off them.
 
-    @entry
-    def observe_phases(now, strides, waves, phases, shape, circles, tables, harmonics, crests,
-                       cells, weights, leg_cells, maps, clocks, angle, rise, legs):
-        """Let the cells' clocks go on and read joints and legs off them.
+    Args:
+        now: x, x', x'' of the components, two or more of each cell, shape (3, ...); only x
+            of the first two is used.
+        strides: since the last look; with 0 the clocks stand and are only read.
+        waves: number of each cell's waveform, shape (size,).
+        phases: phase of each cell in the gait, cycles, shape (size,).
+        shape: mean and half range of both variables of each wave, shape (waves, 4).
+        circles: cosine and sine term of both variables' first harmonic over its mean
+            square, shape (waves, 4).
+        tables: both variables from their mean over their half range, and their slopes from
+            row to row, over the phase, shape (waves, POINTS, 4).
+        harmonics: cosine and sine terms of x, shape (waves, 1 + H, 2).
+        crests: phase at which x peaks, shape (waves,).
+        cells: the cell behind each joint, shape (joints,).
+        weights: readout weights of each joint in rad, shape (joints, 6).
+        leg_cells: the cell that gives each leg's phase.
+        maps: what the duty factor makes of each cell's phase, shape (size, 3), see
+            motion.duty.
+        clocks: of each cell, shape (10, size): phase (cycles), what its speed (cycles a
+            stride) is above 1 now and at the next look, amplitude, its rate (per stride)
+            now and at the next look; and x, y and their derivatives by the strides.
+        angle: filled with the joints' deviation from their offset, rad.
+        rise: filled with its derivative by the strides, rad per stride.
+        legs: filled with the legs' phases in cycles, [0, 1), 0 where x peaks.
 
-        Args:
-            now: x, x', x'' of the components, two or more of each cell, shape (3, ...); only x
-                of the first two is used.
-            strides: since the last look; with 0 the clocks stand and are only read.
-            waves: number of each cell's waveform, shape (size,).
-            phases: phase of each cell in the gait, cycles, shape (size,).
-            shape: mean and half range of both variables of each wave, shape (waves, 4).
-            circles: cosine and sine term of both variables' first harmonic over its mean
-                square, shape (waves, 4).
-            tables: both variables from their mean over their half range, and their slopes from
-                row to row, over the phase, shape (waves, POINTS, 4).
-            harmonics: cosine and sine terms of x, shape (waves, 1 + H, 2).
-            crests: phase at which x peaks, shape (waves,).
-            cells: the cell behind each joint, shape (joints,).
-            weights: readout weights of each joint in rad, shape (joints, 6).
-            leg_cells: the cell that gives each leg's phase.
-            maps: what the duty factor makes of each cell's phase, shape (size, 3), see
-                motion.duty.
-            clocks: of each cell, shape (10, size): phase (cycles), what its speed (cycles a
-                stride) is above 1 now and at the next look, amplitude, its rate (per stride)
-                now and at the next look; and x, y and their derivatives by the strides.
-            angle: filled with the joints' deviation from their offset, rad.
-            rise: filled with its derivative by the strides, rad per stride.
-            legs: filled with the legs' phases in cycles, [0, 1), 0 where x peaks.
+    Returns:
+        The largest distance of a cell from where the gait has it, in half ranges; 0 if the
+        clocks stand.
 
-        Returns:
-            The largest distance of a cell from where the gait has it, in half ranges; 0 if the
-            clocks stand.
-
-        """
-        digest  # noqa: B018
-        distance, sum_ = 0.0, 0.0
-        pull = PULL / (1.0 + 2.0 * PULL * strides)
-        share = strides / (SMOOTHING + strides)
-        for cell in range(waves.shape[0]):
-            wave = waves[cell]
-            if strides > 0.0:
-                # Both rates are linear in between, so that this is their exact integral.
-                phase = clocks[0, cell] + strides * (
-                    1.0 + 0.5 * (clocks[1, cell] + clocks[2, cell]))
-                clocks[0, cell] = phase - math.floor(phase)
-                clocks[1, cell] = clocks[2, cell]
-                clocks[3, cell] += 0.5 * strides * (clocks[4, cell] + clocks[5, cell])
-                clocks[4, cell] = clocks[5, cell]
-            phase, amount = clocks[0, cell], clocks[3, cell]
-            c1, s1 = math.cos(TURN * phase), math.sin(TURN * phase)
-            if strides > 0.0:
-                s, table, circle = shape[wave], tables[wave], circles[wave]
-                # The comparison keeps NaN from becoming an index.
-                place = phase * table.shape[0]
-                low = int(place) if place >= 0.0 else 0
-                t = place - low
-                low = low if low < table.shape[0] else 0
-                here, there = table[low], table[low + 1 if low + 1 < table.shape[0] else 0]
-                h01 = t * t * (3.0 - 2.0 * t)
-                h10, h11 = t * (1.0 - t) * (1.0 - t), t * t * (t - 1.0)
-                v = here[0] + h01 * (there[0] - here[0]) + h10 * here[2] + h11 * there[2]
-                w = here[1] + h01 * (there[1] - here[1]) + h10 * here[3] + h11 * there[3]
-                x = (now[0, cell] - s[0]) / s[2]
-                y = (now[0, waves.shape[0] + cell] - s[1]) / s[3]
-                off = max(abs(x - v), abs(y - w), abs(amount - 1.0))
-                distance = max(distance, off)
-                sum_ += x + y
-                x = min(max(x, -FURTHEST), FURTHEST) - amount * v
-                y = min(max(y, -FURTHEST), FURTHEST) - amount * w
-                along = ((circle[0] * c1 + circle[1] * s1) * x
-                         + (circle[2] * c1 + circle[3] * s1) * y)
-                across = ((circle[1] * c1 - circle[0] * s1) * x
-                          + (circle[3] * c1 - circle[2] * s1) * y)
-                across = min(max(pull * across / TURN, -MOST), MOST)
-                clocks[2, cell] += share * (across - clocks[2, cell])
-                clocks[5, cell] += share * (pull * along - clocks[5, cell])
-            steep = 1.0
-            if maps[cell, 0] != 1.0:
-                phase, steep, _ = told(phase, maps[cell, 0], maps[cell, 1], maps[cell, 2])
-                c1, s1 = math.cos(TURN * phase), math.sin(TURN * phase)
-            terms = harmonics[wave]
-            x, y, z = terms[0, 0], 0.0, 0.0
-            c, s_ = 1.0, 0.0
-            for k in range(1, terms.shape[0]):
-                c, s_ = c * c1 - s_ * s1, s_ * c1 + c * s1
-                in_phase = terms[k, 0] * c + terms[k, 1] * s_
-                quadrature = terms[k, 1] * c - terms[k, 0] * s_
-                x += in_phase
-                y += k * quadrature
-                z -= k * k * in_phase
-            speed, scale, rate = steep * TURN * (1.0 + clocks[1, cell]), 1.0, 0.0
-            if amount < 1.0:
-                rest = (1.0 - amount * amount) if amount > 0.0 else 1.0
-                scale = 1.0 - rest * rest * rest
-                rate = 6.0 * max(amount, 0.0) * rest * rest * clocks[4, cell]
-            clocks[6, cell], clocks[7, cell] = scale * x, scale * y
-            clocks[8, cell] = scale * y * speed + rate * x
-            clocks[9, cell] = scale * z * speed + rate * y
-        base = clocks[0, leg_cells[0]] - phases[leg_cells[0]]
+    """
+    distance, sum_ = 0.0, 0.0
+    pull = PULL / (1.0 + 2.0 * PULL * strides)
+    share = strides / (SMOOTHING + strides)
+    for cell in range(waves.shape[0]):
+        wave = waves[cell]
         if strides > 0.0:
-            for cell in range(waves.shape[0]):
-                late = clocks[0, cell] - base - phases[cell]
-                distance = max(distance, PHASE_SHARE * abs(late - math.floor(late + 0.5)))
-        for joint in range(cells.shape[0]):
-            cell = cells[joint]
-            x, y, dx, dy = clocks[6, cell], clocks[7, cell], clocks[8, cell], clocks[9, cell]
-            w = weights[joint]
-            angle[joint] = (w[0] * x + w[1] * y + w[2] * x * x + w[3] * x * y
-                            + (w[4] * x + w[5] * y) * x * x)
-            rise[joint] = ((w[0] + 2.0 * w[2] * x + w[3] * y + 3.0 * w[4] * x * x
-                            + 2.0 * w[5] * x * y) * dx
-                           + (w[1] + w[3] * x + w[5] * x * x) * dy)
-        for leg in range(leg_cells.shape[0]):
-            phase = clocks[0, leg_cells[leg]] - crests[waves[leg_cells[leg]]]
-            phase -= math.floor(phase)
-            legs[leg] = phase if phase < 1.0 else 0.0
-        # Whatever max makes of a NaN: it comes through the sum.
-        return distance + 0.0 * sum_
-
-    return observe_phases
-
-
-observe_phases = _cached(sources_digest())
+            # Both rates are linear in between, so that this is their exact integral.
+            phase = clocks[0, cell] + strides * (
+                1.0 + 0.5 * (clocks[1, cell] + clocks[2, cell]))
+            clocks[0, cell] = phase - math.floor(phase)
+            clocks[1, cell] = clocks[2, cell]
+            clocks[3, cell] += 0.5 * strides * (clocks[4, cell] + clocks[5, cell])
+            clocks[4, cell] = clocks[5, cell]
+        phase, amount = clocks[0, cell], clocks[3, cell]
+        c1, s1 = math.cos(TURN * phase), math.sin(TURN * phase)
+        if strides > 0.0:
+            s, table, circle = shape[wave], tables[wave], circles[wave]
+            # The comparison keeps NaN from becoming an index.
+            place = phase * table.shape[0]
+            low = int(place) if place >= 0.0 else 0
+            t = place - low
+            low = low if low < table.shape[0] else 0
+            here, there = table[low], table[low + 1 if low + 1 < table.shape[0] else 0]
+            h01 = t * t * (3.0 - 2.0 * t)
+            h10, h11 = t * (1.0 - t) * (1.0 - t), t * t * (t - 1.0)
+            v = here[0] + h01 * (there[0] - here[0]) + h10 * here[2] + h11 * there[2]
+            w = here[1] + h01 * (there[1] - here[1]) + h10 * here[3] + h11 * there[3]
+            x = (now[0, cell] - s[0]) / s[2]
+            y = (now[0, waves.shape[0] + cell] - s[1]) / s[3]
+            off = max(abs(x - v), abs(y - w), abs(amount - 1.0))
+            distance = max(distance, off)
+            sum_ += x + y
+            x = min(max(x, -FURTHEST), FURTHEST) - amount * v
+            y = min(max(y, -FURTHEST), FURTHEST) - amount * w
+            along = ((circle[0] * c1 + circle[1] * s1) * x
+                     + (circle[2] * c1 + circle[3] * s1) * y)
+            across = ((circle[1] * c1 - circle[0] * s1) * x
+                      + (circle[3] * c1 - circle[2] * s1) * y)
+            across = min(max(pull * across / TURN, -MOST), MOST)
+            clocks[2, cell] += share * (across - clocks[2, cell])
+            clocks[5, cell] += share * (pull * along - clocks[5, cell])
+        steep = 1.0
+        if maps[cell, 0] != 1.0:
+            phase, steep, _ = told(phase, maps[cell, 0], maps[cell, 1], maps[cell, 2])
+            c1, s1 = math.cos(TURN * phase), math.sin(TURN * phase)
+        terms = harmonics[wave]
+        x, y, z = terms[0, 0], 0.0, 0.0
+        c, s_ = 1.0, 0.0
+        for k in range(1, terms.shape[0]):
+            c, s_ = c * c1 - s_ * s1, s_ * c1 + c * s1
+            in_phase = terms[k, 0] * c + terms[k, 1] * s_
+            quadrature = terms[k, 1] * c - terms[k, 0] * s_
+            x += in_phase
+            y += k * quadrature
+            z -= k * k * in_phase
+        speed, scale, rate = steep * TURN * (1.0 + clocks[1, cell]), 1.0, 0.0
+        if amount < 1.0:
+            rest = (1.0 - amount * amount) if amount > 0.0 else 1.0
+            scale = 1.0 - rest * rest * rest
+            rate = 6.0 * max(amount, 0.0) * rest * rest * clocks[4, cell]
+        clocks[6, cell], clocks[7, cell] = scale * x, scale * y
+        clocks[8, cell] = scale * y * speed + rate * x
+        clocks[9, cell] = scale * z * speed + rate * y
+    base = clocks[0, leg_cells[0]] - phases[leg_cells[0]]
+    if strides > 0.0:
+        for cell in range(waves.shape[0]):
+            late = clocks[0, cell] - base - phases[cell]
+            distance = max(distance, PHASE_SHARE * abs(late - math.floor(late + 0.5)))
+    for joint in range(cells.shape[0]):
+        cell = cells[joint]
+        x, y, dx, dy = clocks[6, cell], clocks[7, cell], clocks[8, cell], clocks[9, cell]
+        w = weights[joint]
+        angle[joint] = (w[0] * x + w[1] * y + w[2] * x * x + w[3] * x * y
+                        + (w[4] * x + w[5] * y) * x * x)
+        rise[joint] = ((w[0] + 2.0 * w[2] * x + w[3] * y + 3.0 * w[4] * x * x
+                        + 2.0 * w[5] * x * y) * dx
+                       + (w[1] + w[3] * x + w[5] * x * x) * dy)
+    for leg in range(leg_cells.shape[0]):
+        phase = clocks[0, leg_cells[leg]] - crests[waves[leg_cells[leg]]]
+        phase -= math.floor(phase)
+        legs[leg] = phase if phase < 1.0 else 0.0
+    # Whatever max makes of a NaN: it comes through the sum.
+    return distance + 0.0 * sum_
 
 
 def smooth_terms(values: np.ndarray, harmonics: int) -> np.ndarray:

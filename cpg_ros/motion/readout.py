@@ -25,7 +25,6 @@ from cpg_ros.errors import CpgError
 from cpg_ros.integration.jit import entry, jit
 from cpg_ros.motion.duty import at_even_phases
 from cpg_ros.motion.told_waveform import tables, tell
-from cpg_ros.networks.generated import sources_digest
 import numpy as np
 
 #: Entries of the tables over one cycle.
@@ -50,85 +49,76 @@ def lookup(table, cycles):
     return table[low] + rest * (table[high] - table[low])
 
 
-def _cached(digest):
-    """Build the cached entry points; see sources_digest for why they are closures."""
+@entry
+def observe(now, peak, period, cells, weights, phases, leg_cells, wave, lead, angle, rise,
+            leg_phases):
+    """Read joints and legs off a network's state.
 
-    @entry
-    def observe(now, peak, period, cells, weights, phases, leg_cells, wave, lead, angle, rise,
-                leg_phases):
-        """Read joints and legs off a network's state.
+    Args:
+        now: x, x', x'' of the cells, shape (3, cells).
+        peak: largest value of a cell on the gait's orbit.
+        period: of the orbit, model time.
+        cells: the cell behind each joint, shape (joints,).
+        weights: readout weights of each joint in rad, shape (joints, 6).
+        phases: phase of each cell in the gait.
+        leg_cells: the cell that gives each leg's phase.
+        wave: normalised waveform over the cycle.
+        lead: phase minus angle, both in cycles, as a function of the angle.
+        angle: filled with the joints' deviation from their offset, rad.
+        rise: filled with its derivative by phase, rad per cycle.
+        leg_phases: filled with the legs' phases in cycles, [0, 1).
 
-        Args:
-            now: x, x', x'' of the cells, shape (3, cells).
-            peak: largest value of a cell on the gait's orbit.
-            period: of the orbit, model time.
-            cells: the cell behind each joint, shape (joints,).
-            weights: readout weights of each joint in rad, shape (joints, 6).
-            phases: phase of each cell in the gait.
-            leg_cells: the cell that gives each leg's phase.
-            wave: normalised waveform over the cycle.
-            lead: phase minus angle, both in cycles, as a function of the angle.
-            angle: filled with the joints' deviation from their offset, rad.
-            rise: filled with its derivative by phase, rad per cycle.
-            leg_phases: filled with the legs' phases in cycles, [0, 1).
+    Returns:
+        The largest distance of a cell from where the gait has it, in units of the peak.
 
-        Returns:
-            The largest distance of a cell from where the gait has it, in units of the peak.
-
-        """
-        digest  # noqa: B018
-        by_phase = period / TURN
-        for joint in range(cells.shape[0]):
-            cell = cells[joint]
-            x = now[0, cell] / peak
-            y = now[1, cell] * by_phase / peak
-            z = now[2, cell] * by_phase * by_phase / peak
-            w = weights[joint]
-            angle[joint] = (w[0] * x + w[1] * y + w[2] * x * x + w[3] * x * y
-                            + (w[4] * x + w[5] * y) * x * x)
-            rise[joint] = TURN * ((w[0] + 2.0 * w[2] * x + w[3] * y + 3.0 * w[4] * x * x
-                                   + 2.0 * w[5] * x * y) * y
-                                  + (w[1] + w[3] * x + w[5] * x * x) * z)
-        for leg in range(leg_cells.shape[0]):
-            cell = leg_cells[leg]
-            turn = math.atan2(-now[1, cell] * by_phase, now[0, cell]) / TURN
-            phase = turn + lookup(lead, turn)
-            leg_phases[leg] = phase - math.floor(phase)
-        base = leg_phases[0] - phases[leg_cells[0]]
-        distance, sum_ = 0.0, 0.0
-        for cell in range(phases.shape[0]):
-            off = abs(now[0, cell] / peak - lookup(wave, base + phases[cell]))
-            distance = max(distance, off)
-            sum_ += off
-        # Whatever max makes of a NaN: it comes through the sum.
-        return distance + 0.0 * sum_
-
-    @entry
-    def confine(wanted, wanted_rate, lower, upper, speed, dt, position, velocity):
-        """Move position to the wanted one within the joints' limits; count those held back.
-
-        position is that of the last tick on entry. Where a limit bites, velocity is the
-        difference quotient, so that it stays the derivative of what is published.
-        """
-        digest  # noqa: B018
-        held = 0
-        for joint in range(position.shape[0]):
-            last = position[joint]
-            reach = speed[joint] * dt * (1.0 + 1e-9)
-            new = min(max(wanted[joint], last - reach), last + reach)
-            new = min(max(new, lower[joint]), upper[joint])
-            rate = wanted_rate[joint]
-            if new != wanted[joint] or abs(rate) > speed[joint] * (1.0 + 1e-9):
-                held += 1
-                rate = (new - last) / dt if dt > 0.0 else 0.0
-            position[joint] = new
-            velocity[joint] = min(max(rate, -speed[joint]), speed[joint])
-        return held
-
-    return observe, confine
+    """
+    by_phase = period / TURN
+    for joint in range(cells.shape[0]):
+        cell = cells[joint]
+        x = now[0, cell] / peak
+        y = now[1, cell] * by_phase / peak
+        z = now[2, cell] * by_phase * by_phase / peak
+        w = weights[joint]
+        angle[joint] = (w[0] * x + w[1] * y + w[2] * x * x + w[3] * x * y
+                        + (w[4] * x + w[5] * y) * x * x)
+        rise[joint] = TURN * ((w[0] + 2.0 * w[2] * x + w[3] * y + 3.0 * w[4] * x * x
+                               + 2.0 * w[5] * x * y) * y
+                              + (w[1] + w[3] * x + w[5] * x * x) * z)
+    for leg in range(leg_cells.shape[0]):
+        cell = leg_cells[leg]
+        turn = math.atan2(-now[1, cell] * by_phase, now[0, cell]) / TURN
+        phase = turn + lookup(lead, turn)
+        leg_phases[leg] = phase - math.floor(phase)
+    base = leg_phases[0] - phases[leg_cells[0]]
+    distance, sum_ = 0.0, 0.0
+    for cell in range(phases.shape[0]):
+        off = abs(now[0, cell] / peak - lookup(wave, base + phases[cell]))
+        distance = max(distance, off)
+        sum_ += off
+    # Whatever max makes of a NaN: it comes through the sum.
+    return distance + 0.0 * sum_
 
 
-observe, confine = _cached(sources_digest())
+@entry
+def confine(wanted, wanted_rate, lower, upper, speed, dt, position, velocity):
+    """Move position to the wanted one within the joints' limits; count those held back.
+
+    position is that of the last tick on entry. Where a limit bites, velocity is the
+    difference quotient, so that it stays the derivative of what is published.
+    """
+    held = 0
+    for joint in range(position.shape[0]):
+        last = position[joint]
+        reach = speed[joint] * dt * (1.0 + 1e-9)
+        new = min(max(wanted[joint], last - reach), last + reach)
+        new = min(max(new, lower[joint]), upper[joint])
+        rate = wanted_rate[joint]
+        if new != wanted[joint] or abs(rate) > speed[joint] * (1.0 + 1e-9):
+            held += 1
+            rate = (new - last) / dt if dt > 0.0 else 0.0
+        position[joint] = new
+        velocity[joint] = min(max(rate, -speed[joint]), speed[joint])
+    return held
 
 
 def lead_table(x: np.ndarray, y: np.ndarray) -> np.ndarray:

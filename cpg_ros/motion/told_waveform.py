@@ -25,7 +25,6 @@ import math
 from cpg_ros.dynamics.periodic import Orbit
 from cpg_ros.integration.jit import entry, jit
 from cpg_ros.motion.duty import told
-from cpg_ros.networks.generated import sources_digest
 import numpy as np
 
 TURN = 2.0 * math.pi
@@ -52,65 +51,56 @@ def _hermite(table, column, cycles):
     return value, slope * table.shape[0]
 
 
-def _cached(digest):
-    """Build the cached entry point; see sources_digest for why it is a closure."""
+@entry
+def tell(now, peak, period, cells, weights, lead, cycle, maps, angle, rise):
+    """Read joints off a network's state as they are told.
 
-    @entry
-    def tell(now, peak, period, cells, weights, lead, cycle, maps, angle, rise):
-        """Read joints off a network's state as they are told.
+    Args:
+        now: x, x', x'' of the cells, shape (3, cells).
+        peak: largest value of a cell on the gait's orbit.
+        period: of the orbit, model time.
+        cells: the cell behind each joint, shape (joints,).
+        weights: readout weights of each joint in rad, shape (joints, 6).
+        lead: of the orbit over its angle: phase minus angle, cycles, and slope per entry.
+        cycle: of the orbit over its phase: x and its slope per entry, y and the same.
+        maps: k, centre and own of each joint, shape (joints, 3), see motion.duty.
+        angle: filled with the joints' deviation from their offset, rad.
+        rise: filled with its derivative by phase, rad per cycle.
 
-        Args:
-            now: x, x', x'' of the cells, shape (3, cells).
-            peak: largest value of a cell on the gait's orbit.
-            period: of the orbit, model time.
-            cells: the cell behind each joint, shape (joints,).
-            weights: readout weights of each joint in rad, shape (joints, 6).
-            lead: of the orbit over its angle: phase minus angle, cycles, and slope per entry.
-            cycle: of the orbit over its phase: x and its slope per entry, y and the same.
-            maps: k, centre and own of each joint, shape (joints, 3), see motion.duty.
-            angle: filled with the joints' deviation from their offset, rad.
-            rise: filled with its derivative by phase, rad per cycle.
-
-        """
-        digest  # noqa: B018
-        by_phase = period / TURN
-        last, x, y, dx, dy = -1, 0.0, 0.0, 0.0, 0.0
-        for joint in range(cells.shape[0]):
-            cell = cells[joint]
-            if cell != last:
-                last = cell
-                x = now[0, cell] / peak
-                y = now[1, cell] * by_phase / peak
-                z = now[2, cell] * by_phase * by_phase / peak
-                square = x * x + y * y
-                # Derivatives by the phase that goes on evenly, in radians.
-                turning = (y * y - x * z) / square if square > REST else 1.0
-                growing = y * (x + z) / square if square > REST else 0.0
-                turn = math.atan2(-y, x) / TURN
-                ahead, slope = _hermite(lead, 0, turn)
-                theta, going = turn + ahead, (1.0 + slope) * turning
-                own_x, own_y = _hermite(cycle, 0, theta)[0], _hermite(cycle, 2, theta)[0]
-                own_z = _hermite(cycle, 2, theta)[1] / TURN
-                whole = own_x * own_x + own_y * own_y
-                size = math.sqrt(square / whole)
-                growing = size * (growing - going * own_y * (own_x + own_z) / whole)
-                phase, steep, _ = told(theta, maps[joint, 0], maps[joint, 1], maps[joint, 2])
-                unit_x, unit_y = _hermite(cycle, 0, phase)[0], _hermite(cycle, 2, phase)[0]
-                unit_z = _hermite(cycle, 2, phase)[1] / TURN
-                speed = size * steep * going
-                x, y = size * unit_x, size * unit_y
-                dx, dy = speed * unit_y + growing * unit_x, speed * unit_z + growing * unit_y
-            w = weights[joint]
-            angle[joint] = (w[0] * x + w[1] * y + w[2] * x * x + w[3] * x * y
-                            + (w[4] * x + w[5] * y) * x * x)
-            rise[joint] = TURN * ((w[0] + 2.0 * w[2] * x + w[3] * y + 3.0 * w[4] * x * x
-                                   + 2.0 * w[5] * x * y) * dx
-                                  + (w[1] + w[3] * x + w[5] * x * x) * dy)
-
-    return tell
-
-
-tell = _cached(sources_digest())
+    """
+    by_phase = period / TURN
+    last, x, y, dx, dy = -1, 0.0, 0.0, 0.0, 0.0
+    for joint in range(cells.shape[0]):
+        cell = cells[joint]
+        if cell != last:
+            last = cell
+            x = now[0, cell] / peak
+            y = now[1, cell] * by_phase / peak
+            z = now[2, cell] * by_phase * by_phase / peak
+            square = x * x + y * y
+            # Derivatives by the phase that goes on evenly, in radians.
+            turning = (y * y - x * z) / square if square > REST else 1.0
+            growing = y * (x + z) / square if square > REST else 0.0
+            turn = math.atan2(-y, x) / TURN
+            ahead, slope = _hermite(lead, 0, turn)
+            theta, going = turn + ahead, (1.0 + slope) * turning
+            own_x, own_y = _hermite(cycle, 0, theta)[0], _hermite(cycle, 2, theta)[0]
+            own_z = _hermite(cycle, 2, theta)[1] / TURN
+            whole = own_x * own_x + own_y * own_y
+            size = math.sqrt(square / whole)
+            growing = size * (growing - going * own_y * (own_x + own_z) / whole)
+            phase, steep, _ = told(theta, maps[joint, 0], maps[joint, 1], maps[joint, 2])
+            unit_x, unit_y = _hermite(cycle, 0, phase)[0], _hermite(cycle, 2, phase)[0]
+            unit_z = _hermite(cycle, 2, phase)[1] / TURN
+            speed = size * steep * going
+            x, y = size * unit_x, size * unit_y
+            dx, dy = speed * unit_y + growing * unit_x, speed * unit_z + growing * unit_y
+        w = weights[joint]
+        angle[joint] = (w[0] * x + w[1] * y + w[2] * x * x + w[3] * x * y
+                        + (w[4] * x + w[5] * y) * x * x)
+        rise[joint] = TURN * ((w[0] + 2.0 * w[2] * x + w[3] * y + 3.0 * w[4] * x * x
+                               + 2.0 * w[5] * x * y) * dx
+                              + (w[1] + w[3] * x + w[5] * x * x) * dy)
 
 
 def tables(orbit: Orbit) -> tuple[np.ndarray, np.ndarray]:

@@ -141,11 +141,11 @@ class Equations:
 
     @cached_property
     def _first(self) -> ModuleType:
-        return generated.load(f'{self.key}_rates', lambda: _derivation().first(self))
+        return generated.load(self.key, 'rates', lambda: _derivation().first(self))
 
     @cached_property
     def _higher(self) -> ModuleType:
-        return generated.load(f'{self.key}_higher', lambda: _derivation().higher(self))
+        return generated.load(self.key, 'higher', lambda: _derivation().higher(self))
 
     def rates(self, x: Sequence[Any], p: Sequence[Any]) -> list[Any]:
         """Return the rate of each variable.

@@ -12,100 +12,63 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Code that is generated from a network's equations, kept on disk between processes."""
+"""What is compiled and generated from a network's equations, kept on disk between processes."""
 
 from collections.abc import Callable
-import contextlib
 from functools import cache
 import hashlib
 import importlib.util
-import logging
-import os
 from pathlib import Path
-import stat
 import sys
-import tempfile
 from types import ModuleType
 
 from cpg_ros.files.atomic_write import write_atomically
+from cpg_ros.files.cache_folder import cache_folder
 
-_LOGGER = logging.getLogger(__name__)
+#: Subpackages with compiled code, and with the numbers that it takes from elsewhere.
+_COMPILED = ('networks', 'integration', 'dynamics', 'motion', 'feedback')
+
+
+def folder(key: str = 'package') -> Path | None:
+    """Return where code is kept: of the package, or what follows from a network's equations.
+
+    Its name has a digest of the sources. numba's own cache watches only the file that a kernel
+    stands in, not those of the functions it calls; here any edit leads to another folder.
+
+    Args:
+        key: of the equations, see Equations.key.
+
+    Returns:
+        The folder, None if nothing can be written.
+
+    """
+    return cache_folder(f'{key}-{_sources_digest()}')
 
 
 @cache
-def folder() -> Path | None:
-    """Return where generated code and numba's machine code are kept, created if need be.
-
-    ``NUMBA_CACHE_DIR`` if it is set, else beside the package, else among the user's caches, else
-    one temporary folder a user, to which ``NUMBA_CACHE_DIR`` is set. None if nothing can be
-    written; either is said.
-    """
-    own = Path(__file__).resolve().parent / '__pycache__'
-    wanted = [own, Path(os.environ.get('XDG_CACHE_HOME') or '~/.cache').expanduser() / 'cpg_ros']
-    if os.environ.get('NUMBA_CACHE_DIR'):
-        wanted.insert(0, Path(os.environ['NUMBA_CACHE_DIR']))
-    for place in wanted:
-        with contextlib.suppress(OSError):
-            place.mkdir(parents=True, exist_ok=True)
-            if os.access(place, os.W_OK):
-                return place
-    tried = f'compiled code cannot be kept in {" or ".join(map(str, wanted))}'
-    with contextlib.suppress(OSError):
-        place = _temporary()
-        os.environ['NUMBA_CACHE_DIR'] = str(place)
-        _LOGGER.warning('%s: kept in %s', tried, place)
-        return place
-    _LOGGER.warning('%s, nor in a temporary folder: it is compiled at every start', tried)
-    return None
-
-
-def _temporary() -> Path:
-    """Return a temporary folder that is the user's alone: what is in it will be run.
-
-    Raises:
-        OSError: there is none.
-
-    """
-    user = os.getuid() if hasattr(os, 'getuid') else 0
-    place = Path(tempfile.gettempdir()) / f'cpg_ros-{user}'
-    with contextlib.suppress(FileExistsError):
-        place.mkdir(mode=0o700)
-    found = place.lstat()
-    if found.st_uid != user or found.st_mode != stat.S_IFDIR | 0o700:
-        return Path(tempfile.mkdtemp(prefix='cpg_ros-'))
-    return place
-
-
-@cache
-def sources_digest(key: str = '') -> int:
-    """Return a number that changes whenever a file with compiled code does, or the key.
-
-    numba's disk cache watches only the file a cached kernel stands in, not the files of the
-    functions it calls. A kernel that closes over this number is compiled again when any of
-    them changes, because numba keys its cache on closed-over values.
-    """
-    digest = hashlib.sha256(key.encode())
+def _sources_digest() -> str:
+    """Return a word that changes whenever a file with compiled code does."""
+    digest = hashlib.sha256()
     package = Path(__file__).resolve().parent.parent
-    for room in ('networks', 'integration', 'dynamics', 'motion', 'feedback'):
+    for room in _COMPILED:
         for source in sorted((package / room).rglob('*.py')):
-            # What is generated may stand beside the sources, and follows from them.
-            if source.parent.name != '__pycache__':
-                digest.update(source.read_bytes())
-    return int.from_bytes(digest.digest()[:7], 'big')
+            digest.update(source.read_bytes())
+    return digest.hexdigest()[:14]
 
 
-def load(name: str, write: Callable[[], str]) -> ModuleType:
+def load(key: str, name: str, write: Callable[[], str]) -> ModuleType:
     """Return a generated module, written first where it is not on disk yet.
 
     Args:
-        name: of the module, which says all that its text depends on but the sources.
+        key: of the equations that it follows from.
+        name: of the module.
         write: makes the text.
 
     """
-    place, name = folder(), f'{name}_{sources_digest():014x}'
-    known = f'cpg_ros_generated_{name}'
+    known = f'cpg_ros_generated_{key}_{name}'
     if known in sys.modules:
         return sys.modules[known]
+    place = folder(key)
     if place is None:
         module = sys.modules[known] = ModuleType(known)
         exec(compile(write(), known, 'exec'), vars(module))

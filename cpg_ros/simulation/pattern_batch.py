@@ -21,7 +21,6 @@ from cpg_ros.integration.jit import entry
 from cpg_ros.motion.plan import Program
 from cpg_ros.motion.smoothstep import smoothstep
 from cpg_ros.motion.strides import approach
-from cpg_ros.networks.generated import sources_digest
 from cpg_ros.simulation.scenario import Scenario
 import numpy as np
 
@@ -103,47 +102,38 @@ class PatternBatch:
         return self._last
 
 
-def _cached(digest):
-    """Build the cached entry points; see sources_digest for why they are closures."""
-
-    @entry
-    def advance(angles, still, frequencies, legs, offset, asked, drive, rates, strides, hurries,
-                phases, gaits, faded, mix, turning, course, level, dt, planned):
-        """Advance each run; arguments as of PatternBatch."""
-        digest  # noqa: B018
-        for run in range(len(phases)):
-            old, new, clock = gaits[run, 0], gaits[run, 1], hurries[run] * dt
-            faded[run] = min(1.0, faded[run] + clock / TRANSITION)
-            s = faded[run]
-            mix[run] = s * s * (3.0 - 2.0 * s)
-            if s == 1.0:
-                old = gaits[run, 0] = new
-            approach(asked[run], strides[run], clock, drive[run], rates[run])
-            frequency = frequencies[old] + mix[run] * (frequencies[new] - frequencies[old])
-            phases[run] = (phases[run] + frequency * drive[run, -1] * clock) % 1.0
-            course[run] += turning[run] * dt
-            place = phases[run] * POINTS
-            low = int(place) % POINTS
-            high, on = (low + 1) % POINTS, place - int(place)
-            for joint in range(len(offset)):
-                stride, found = drive[run, legs[joint]], 0.0
-                for gait, share in ((old, 1.0 - mix[run]), (new, mix[run])):
-                    rest = still[gait, low, joint] + on * (still[gait, high, joint]
-                                                           - still[gait, low, joint])
-                    full = angles[gait, low, joint] + on * (angles[gait, high, joint]
-                                                            - angles[gait, low, joint])
-                    found += share * (rest + stride * (full - rest))
-                planned[run, joint] = offset[joint] + level * found
-
-    @entry
-    def confine(angles, last, lower, upper, reach):
-        digest  # noqa: B018
-        for run in range(len(angles)):
-            for k in range(len(lower)):
-                near = min(max(angles[run, k], last[run, k] - reach[k]), last[run, k] + reach[k])
-                last[run, k] = min(max(near, lower[k]), upper[k])
-
-    return advance, confine
+@entry
+def _advance(angles, still, frequencies, legs, offset, asked, drive, rates, strides, hurries,
+             phases, gaits, faded, mix, turning, course, level, dt, planned):
+    """Advance each run; arguments as of PatternBatch."""
+    for run in range(len(phases)):
+        old, new, clock = gaits[run, 0], gaits[run, 1], hurries[run] * dt
+        faded[run] = min(1.0, faded[run] + clock / TRANSITION)
+        s = faded[run]
+        mix[run] = s * s * (3.0 - 2.0 * s)
+        if s == 1.0:
+            old = gaits[run, 0] = new
+        approach(asked[run], strides[run], clock, drive[run], rates[run])
+        frequency = frequencies[old] + mix[run] * (frequencies[new] - frequencies[old])
+        phases[run] = (phases[run] + frequency * drive[run, -1] * clock) % 1.0
+        course[run] += turning[run] * dt
+        place = phases[run] * POINTS
+        low = int(place) % POINTS
+        high, on = (low + 1) % POINTS, place - int(place)
+        for joint in range(len(offset)):
+            stride, found = drive[run, legs[joint]], 0.0
+            for gait, share in ((old, 1.0 - mix[run]), (new, mix[run])):
+                rest = still[gait, low, joint] + on * (still[gait, high, joint]
+                                                       - still[gait, low, joint])
+                full = angles[gait, low, joint] + on * (angles[gait, high, joint]
+                                                        - angles[gait, low, joint])
+                found += share * (rest + stride * (full - rest))
+            planned[run, joint] = offset[joint] + level * found
 
 
-_advance, _confine = _cached(sources_digest())
+@entry
+def _confine(angles, last, lower, upper, reach):
+    for run in range(len(angles)):
+        for k in range(len(lower)):
+            near = min(max(angles[run, k], last[run, k] - reach[k]), last[run, k] + reach[k])
+            last[run, k] = min(max(near, lower[k]), upper[k])

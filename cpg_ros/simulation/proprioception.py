@@ -19,40 +19,30 @@ import math
 from cpg_ros.feedback.estimate import Senses
 from cpg_ros.feedback.kinematics import GRAVITY
 from cpg_ros.integration.jit import entry
-from cpg_ros.networks.generated import sources_digest
 from cpg_ros.simulation.body import Body
 from cpg_ros.simulation.scenario import Noise
 import numpy as np
 
 
-def _cached(digest):
-    """Build the cached entry point; see sources_digest for why it is a closure."""
-
-    @entry
-    def feel(quaternions, moving, before, dt, lean, turning, push, velocity):
-        """Fill what the base feels and its true velocity; see felt."""
-        digest  # noqa: B018
-        for k in range(len(quaternions)):
-            w, x, y, z = quaternions[k]
-            lean[k, 0] = math.atan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y))
-            lean[k, 1] = math.asin(min(max(2.0 * (w * y - z * x), -1.0), 1.0))
-            lean[k, 2] = math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
-            axes = ((1 - 2 * (y * y + z * z), 2 * (x * y + w * z), 2 * (x * z - w * y)),
-                    (2 * (x * y - w * z), 1 - 2 * (x * x + z * z), 2 * (y * z + w * x)),
-                    (2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)))
-            faster = ((moving[k, 0] - before[k, 0]) / dt, (moving[k, 1] - before[k, 1]) / dt,
-                      (moving[k, 2] - before[k, 2]) / dt + GRAVITY)
-            for axis in range(3):
-                turning[k, axis] = moving[k, 3 + axis]
-                push[k, axis] = velocity[k, axis] = 0.0
-                for world in range(3):
-                    push[k, axis] += axes[axis][world] * faster[world]
-                    velocity[k, axis] += axes[axis][world] * moving[k, world]
-
-    return feel
-
-
-_feel = _cached(sources_digest())
+@entry
+def _feel(quaternions, moving, before, dt, lean, turning, push, velocity):
+    """Fill what the base feels and its true velocity; see felt."""
+    for k in range(len(quaternions)):
+        w, x, y, z = quaternions[k]
+        lean[k, 0] = math.atan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y))
+        lean[k, 1] = math.asin(min(max(2.0 * (w * y - z * x), -1.0), 1.0))
+        lean[k, 2] = math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
+        axes = ((1 - 2 * (y * y + z * z), 2 * (x * y + w * z), 2 * (x * z - w * y)),
+                (2 * (x * y - w * z), 1 - 2 * (x * x + z * z), 2 * (y * z + w * x)),
+                (2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)))
+        faster = ((moving[k, 0] - before[k, 0]) / dt, (moving[k, 1] - before[k, 1]) / dt,
+                  (moving[k, 2] - before[k, 2]) / dt + GRAVITY)
+        for axis in range(3):
+            turning[k, axis] = moving[k, 3 + axis]
+            push[k, axis] = velocity[k, axis] = 0.0
+            for world in range(3):
+                push[k, axis] += axes[axis][world] * faster[world]
+                velocity[k, axis] += axes[axis][world] * moving[k, world]
 
 
 def felt(senses: Senses, quaternions: np.ndarray, moving: np.ndarray, before: np.ndarray,

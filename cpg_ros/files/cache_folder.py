@@ -1,0 +1,149 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+
+"""A cache whose folders are named by what their contents follow from.
+
+Contents that follow from something else are in another folder, so nothing in a folder is ever out
+of date. What is no longer used is removed when a new folder is made.
+"""
+
+import contextlib
+import fcntl
+from functools import cache
+import logging
+import os
+from pathlib import Path
+import shutil
+import stat
+import tempfile
+from typing import IO
+
+_LOGGER = logging.getLogger(__name__)
+#: Folders that are kept, the last used ones; those of running processes always are.
+KEPT = 32
+#: In each folder: locked by the processes that use it, its time is that of the last start.
+_LOCK = 'in_use'
+#: Locks of this process, which the system releases when it ends, however it does.
+_HELD: list[IO[bytes]] = []
+
+
+@cache
+def cache_folder(name: str) -> Path | None:
+    """Return a folder of the cache, which stays as long as this process runs.
+
+    Args:
+        name: says all that the contents follow from.
+
+    Returns:
+        The folder, created if need be; None if nothing can be written. A warning says so.
+
+    """
+    place = _place()
+    if place is None:
+        return None
+    folder = place / name
+    try:
+        new = not folder.exists()
+        _use(folder)
+        if new:
+            _remove_unused(place)
+    except OSError as error:
+        _LOGGER.warning('compiled code cannot be kept in %s (%s): it is compiled at every start',
+                        folder, error.strerror)
+        return None
+    return folder
+
+
+@cache
+def _place() -> Path | None:
+    """Return where the folders are, created if need be.
+
+    ``NUMBA_CACHE_DIR`` if it is set, else beside the package, else among the user's caches, else
+    one temporary folder a user, to which ``NUMBA_CACHE_DIR`` is set, for child processes.
+    """
+    caches = Path(os.environ.get('XDG_CACHE_HOME') or '~/.cache').expanduser()
+    wanted = [Path(__file__).resolve().parents[1] / '__pycache__' / 'compiled',
+              caches / 'cpg_ros' / 'compiled']
+    if os.environ.get('NUMBA_CACHE_DIR'):
+        wanted.insert(0, Path(os.environ['NUMBA_CACHE_DIR']) / 'cpg_ros')
+    for place in wanted:
+        with contextlib.suppress(OSError):
+            place.mkdir(parents=True, exist_ok=True)
+            if os.access(place, os.W_OK):
+                return place
+    tried = f'compiled code cannot be kept in {" or ".join(map(str, wanted))}'
+    with contextlib.suppress(OSError):
+        temporary = _temporary()
+        os.environ['NUMBA_CACHE_DIR'] = str(temporary)
+        _LOGGER.warning('%s: kept in %s', tried, temporary)
+        (temporary / 'cpg_ros').mkdir(exist_ok=True)
+        return temporary / 'cpg_ros'
+    _LOGGER.warning('%s, nor in a temporary folder: it is compiled at every start', tried)
+    return None
+
+
+def _temporary() -> Path:
+    """Return a temporary folder that is the user's alone: what is in it will be run.
+
+    Raises:
+        OSError: there is none.
+
+    """
+    user = os.getuid()
+    place = Path(tempfile.gettempdir()) / f'cpg_ros-{user}'
+    with contextlib.suppress(FileExistsError):
+        place.mkdir(mode=0o700)
+    found = place.lstat()
+    if found.st_uid != user or found.st_mode != stat.S_IFDIR | 0o700:
+        return Path(tempfile.mkdtemp(prefix='cpg_ros-'))
+    return place
+
+
+def _use(folder: Path) -> None:
+    """Create a folder if need be, and lock it against removal while this process runs."""
+    while True:
+        folder.mkdir(exist_ok=True)
+        try:
+            lock = (folder / _LOCK).open('ab')
+        except FileNotFoundError:
+            continue    # Removed in between.
+        # Where locks are not supported, nothing is removed either.
+        with contextlib.suppress(OSError):
+            fcntl.flock(lock, fcntl.LOCK_SH)
+        with contextlib.suppress(FileNotFoundError):
+            if os.path.samestat(os.fstat(lock.fileno()), (folder / _LOCK).stat()):
+                os.utime(lock.fileno())
+                _HELD.append(lock)
+                return
+        lock.close()
+
+
+def _remove_unused(place: Path) -> None:
+    """Remove all folders but the last used ones and those that a process has locked."""
+    locks = sorted(place.glob(f'*/{_LOCK}'), key=_last_used)
+    for path in locks[:-KEPT]:
+        # Those that are in use, or whose users cannot be known.
+        with contextlib.suppress(OSError), path.open('rb') as lock:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            # At once, or a process that starts now would find half of it.
+            removed = path.parent.rename(place / f'.{path.parent.name}.{os.getpid()}')
+            shutil.rmtree(removed)
+
+
+def _last_used(lock: Path) -> float:
+    try:
+        return lock.stat().st_mtime
+    except FileNotFoundError:
+        return 0.0
