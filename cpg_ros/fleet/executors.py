@@ -14,15 +14,14 @@
 
 """Where jobs run: processes of this machine, or the workers of a dask cluster.
 
-A ``Fleet`` is a ``concurrent.futures.Executor`` over another one that can be made anew when it
-breaks: a pool whose worker was killed, a cluster whose scheduler was restarted. What runs jobs
-takes any executor; on one that is no fleet a broken pool ends the work.
+A ``Fleet`` is a ``concurrent.futures.Executor`` over another one that is made anew when it breaks:
+a pool whose worker was killed, a cluster whose scheduler was restarted. What runs jobs takes any
+executor; on one that is no fleet a broken pool ends the work.
 """
 
 import asyncio
 from collections.abc import Callable, Iterator
-from concurrent.futures import CancelledError, Executor, Future, ProcessPoolExecutor
-from concurrent.futures.process import BrokenProcessPool
+from concurrent.futures import CancelledError, Executor, ProcessPoolExecutor
 import contextlib
 import logging
 import multiprocessing
@@ -34,6 +33,8 @@ from typing import Any
 
 import cpg_ros
 from cpg_ros.errors import CpgError, InputError
+from cpg_ros.fleet.outcomes import in_order
+from cpg_ros.fleet.renewable_executor import RenewableExecutor
 from cpg_ros.fleet.tally import Tally
 
 #: Within this many seconds an address answers, or is said not to; and a scheduler that was lost
@@ -53,56 +54,24 @@ class NotInstalled(CpgError):
     """The optional dependency is missing; the message says how to get it."""
 
 
-class Fleet(Executor):
-    """An executor that survives the loss of its workers.
+class Fleet(RenewableExecutor):
+    """Worker processes, or a cluster's workers, that results come from in the order of the jobs.
 
     Attributes:
-        inner: that which runs the jobs now.
-        room: jobs that are handed to it at the same time.
         what: the jobs of map are called, where it tells how far they are; '' to tell nothing.
 
     """
 
-    def __init__(self, inner: Executor, room: int = 2 * EXPECTED,
-                 renew: Callable[[], tuple[Executor, int]] | None = None,
-                 close: Callable[[bool], None] | None = None) -> None:
-        self.inner, self.room, self.what = inner, room, ''
-        self._renew, self._close = renew, close
-
-    def submit(self, function: Callable[..., Any], /, *arguments: Any, **options: Any
-               ) -> Future[Any]:
-        """Hand a job over."""
-        return self.inner.submit(function, *arguments, **options)
+    what = ''
 
     def map(self, function: Callable[..., Any], *iterables: Any, timeout: float | None = None,
             chunksize: int = 1) -> Iterator[Any]:
         """Yield results in the order of the jobs; jobs of a worker that dies are done again."""
-        # It knows fleets, too.
-        from cpg_ros.fleet.outcomes import in_order
         jobs = list(zip(*iterables, strict=False))
         with Tally(self.what, len(jobs), bool(self.what)) as tally:
             for result in in_order(self, function, jobs, tally.tick):
                 tally.add()
                 yield result
-
-    def lost(self, error: BaseException) -> bool:
-        """Whether an error tells of the executor and not of the job."""
-        return self._renew is not None and isinstance(error, BrokenProcessPool | CancelledError)
-
-    def renew(self) -> None:
-        """Replace an executor that broke.
-
-        Raises:
-            NoCluster: a scheduler does not come back.
-
-        """
-        assert self._renew is not None
-        self.inner, self.room = self._renew()
-
-    def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
-        """Let go of the workers, without waiting for jobs that are under way if wait is False."""
-        if self._close is not None:
-            self._close(wait)
 
 
 def _begin(parent: int) -> None:

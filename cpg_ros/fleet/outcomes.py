@@ -27,7 +27,7 @@ import itertools
 from typing import Any, Generic, TypeVar
 
 from cpg_ros.errors import CpgError
-from cpg_ros.fleet.executors import Fleet
+from cpg_ros.fleet.renewable_executor import RenewableExecutor
 
 #: The clock goes on while nothing ends: s.
 TICK = 0.5
@@ -60,7 +60,8 @@ class Outcome(Generic[Job]):
 class _Stream(Generic[Job]):
     def __init__(self, executor: Executor, function: Callable[..., Any],
                  jobs: Iterable[Job]) -> None:
-        self.fleet = executor if isinstance(executor, Fleet) else Fleet(executor)
+        self.fleet = (executor if isinstance(executor, RenewableExecutor)
+                      else RenewableExecutor(executor))
         self.function, self.jobs = function, iter(jobs)
         self.flying: dict[Future[Any], Job] = {}
         # Jobs that were under way when a worker died: they go alone, and so are told apart.
@@ -136,7 +137,7 @@ def outcomes(executor: Executor, function: Callable[[Job], Any], jobs: Iterable[
     there, has the error WorkerDied. What was under way when a scheduler was lost is done again.
 
     Args:
-        executor: any; a Fleet survives the loss of workers.
+        executor: any; a RenewableExecutor survives the loss of workers.
         function: of a job; both and the result travel to another process.
         jobs: as they are wanted.
         tick: called twice a second at least.
