@@ -23,8 +23,9 @@ from collections.abc import Sequence
 from typing import Any
 
 from cpg_ros.integration.loops import LoopProgram, Writer
+from cpg_ros.networks.cell import Source
 from cpg_ros.networks.derivation import expressions
-from cpg_ros.networks.equations import Equations, Source
+from cpg_ros.networks.equations import Equations
 import sympy
 
 

@@ -22,8 +22,8 @@ compilers turn into vector instructions.
 from collections.abc import Sequence
 from typing import Any
 
+from cpg_ros.networks.cell import Argument, Source
 from cpg_ros.networks.derivation import print_float
-from cpg_ros.networks.equations import Argument, Source
 import sympy
 from sympy.printing.pycode import PythonCodePrinter
 

@@ -25,8 +25,7 @@ from cpg_ros.inversion.fit_data import cells_of
 from cpg_ros.inversion.gait_fit import Fit
 from cpg_ros.inversion.given_up import fit_at_all
 from cpg_ros.inversion.identifiability import Estimate
-from cpg_ros.networks.network import Network
-from cpg_ros.networks.preset_files import Preset
+from cpg_ros.networks.network import Network, Preset
 from cpg_ros.networks.registry import (
     find_network,
     NetworkError,

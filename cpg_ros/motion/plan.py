@@ -27,8 +27,7 @@ from cpg_ros.motion.joint_readout import joint_readout, standing
 from cpg_ros.motion.phase_readout import PhaseReadout
 from cpg_ros.motion.readout import extremes, WaveReadout
 from cpg_ros.motion.runnable import obstacle
-from cpg_ros.networks.network import Network
-from cpg_ros.networks.preset_files import Preset
+from cpg_ros.networks.network import Network, Preset
 from cpg_ros.robots.robot import Joint, Motion, Robot, Steering
 import numpy as np
 

@@ -25,9 +25,9 @@ from functools import cache
 import math
 from typing import Any, ClassVar
 
-from cpg_ros.networks.equations import Cell
-from cpg_ros.networks.leg_numbers import leg_count
+from cpg_ros.networks.cell import Cell
 from cpg_ros.networks.network import known, LeastCoupling, Network, Preset, Range
+from cpg_ros.networks.network_definition import leg_count
 from cpg_ros.networks.rings import across, behind, ring_gaits, ring_places, ring_symmetry
 from cpg_ros.networks.symmetry import Symmetry
 from cpg_ros.networks.terms import Number, tanh

@@ -16,13 +16,23 @@
 
 from collections.abc import Iterable, Sequence
 from itertools import combinations_with_replacement, product
-from typing import Any, TYPE_CHECKING
+from typing import Any, Protocol
 
+from cpg_ros.networks.cell import Argument
 import sympy
 from sympy.printing.numpy import NumPyPrinter
 
-if TYPE_CHECKING:
-    from cpg_ros.networks.equations import Equations
+
+class EquationTexts(Protocol):
+    """What is derived from: see Equations, whose functions are written here."""
+
+    texts: tuple[str, ...]
+    arguments: tuple[Argument, ...]
+    rows: tuple[str, ...]
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The symbols in the texts: arguments, then parameters."""
 
 
 def print_float(printer: Any, value: Any) -> str:
@@ -39,7 +49,7 @@ class _Printer(NumPyPrinter):  # type: ignore[misc]
 _PRINTER = _Printer({'fully_qualified_modules': False, 'allow_unknown_functions': False})
 
 
-def expressions(equations: 'Equations') -> tuple[list[Any], list[Any]]:
+def expressions(equations: EquationTexts) -> tuple[list[Any], list[Any]]:
     """Return the equations as sympy has them, and their symbols in the order of ``names``."""
     symbols = {name: sympy.Symbol(name, real=True) for name in equations.names}
     return ([sympy.sympify(text, locals=symbols) for text in equations.texts],
@@ -74,7 +84,7 @@ def _source(*parts: str) -> str:
     return f'{head}{text}\n'
 
 
-def first(equations: 'Equations') -> str:
+def first(equations: EquationTexts) -> str:
     """Write rates, and their derivatives by the arguments and by the parameters."""
     rates, symbols = expressions(equations)
     count = len(equations.arguments)
@@ -93,7 +103,7 @@ def _smooth(part: Any) -> Any:
     return part.replace(sympy.DiracDelta, lambda *_: sympy.Integer(0))
 
 
-def higher(equations: 'Equations') -> str:
+def higher(equations: EquationTexts) -> str:
     """Write second and third derivatives by the arguments, and those by a parameter as well."""
     rates, symbols = expressions(equations)
     count = len(equations.arguments)

@@ -19,82 +19,18 @@ written once for a cell (``Network.equations``); here they are read as texts, an
 rates and their derivatives, exactly, as numpy code that is kept on disk.
 """
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 from functools import cache, cached_property
 import hashlib
 import re
 from types import ModuleType
-from typing import Any, TYPE_CHECKING
+from typing import Any
 
 from cpg_ros.networks import generated
+from cpg_ros.networks.cell import Cell, Parameters
+from cpg_ros.networks.network_definition import NetworkDefinition
 from cpg_ros.networks.terms import Term
 import numpy as np
-
-if TYPE_CHECKING:
-    from cpg_ros.networks.network import Network
-
-#: Which cell each cell hears, from 0.
-Source = tuple[int, ...]
-#: The same, or a rule: cell -> the cell that it hears, counted round.
-Heard = Source | Callable[[int], int]
-
-
-@dataclass(frozen=True)
-class Argument:
-    """A state variable as it stands in the equations of a cell.
-
-    Attributes:
-        variable: of the cell that is heard, from 0.
-        source: the cell that each cell hears; None for itself.
-        delayed: whether it is heard a delay ago.
-
-    """
-
-    variable: int
-    source: Source | None
-    delayed: bool
-
-
-class Cell:
-    """Any cell of a network, as its equations see it."""
-
-    def __init__(self, variables: int, cells: int) -> None:
-        """Begin to note what is heard."""
-        self._variables, self._cells = variables, cells
-        self.arguments: list[Argument] = []
-
-    def now(self, source: Heard | None = None) -> tuple[Term, ...]:
-        """Return the variables of the cell itself, or of those that each cell hears."""
-        return self._heard(source, False)
-
-    def past(self, source: Heard | None = None) -> tuple[Term, ...]:
-        """Return the same as they were a delay ago."""
-        return self._heard(source, True)
-
-    def _heard(self, source: Heard | None, delayed: bool) -> tuple[Term, ...]:
-        if callable(source):
-            source = tuple(source(i) % self._cells for i in range(self._cells))
-        found = []
-        for variable in range(self._variables):
-            one = Argument(variable, None if source is None else tuple(source), delayed)
-            if one not in self.arguments:
-                self.arguments.append(one)
-            found.append(Term(f'x{self.arguments.index(one)}'))
-        return tuple(found)
-
-
-class Parameters:
-    """A network's parameters, as its equations see them: one number, or one for each cell."""
-
-    def __init__(self, network: 'type[Network]') -> None:
-        """Offer the parameters by name, and groups that have one for each cell."""
-        self._known = {*network.parameters(), *network.by_cell()}
-
-    def __getattr__(self, name: str) -> Term:
-        if name not in self._known:
-            raise AttributeError(f"'{name}' is not one of {', '.join(sorted(self._known))}")
-        return Term(f'p_{name}')
 
 
 class Equations:
@@ -111,7 +47,7 @@ class Equations:
 
     """
 
-    def __init__(self, network: 'type[Network]') -> None:
+    def __init__(self, network: type[NetworkDefinition]) -> None:
         """Read a network's equations.
 
         Raises:
@@ -119,7 +55,7 @@ class Equations:
 
         """
         cell = Cell(network.variables, network.cells)
-        found = network.equations(cell, Parameters(network))
+        found = network.equations(cell, Parameters((*network.parameters(), *network.by_cell())))
         self.texts = tuple(term.text if isinstance(term, Term) else repr(float(term))
                            for term in found)
         if len(self.texts) != network.variables:
@@ -189,12 +125,12 @@ def _derivation() -> ModuleType:
 
 
 @cache
-def equations_of(network: 'type[Network]') -> Equations:
+def equations_of(network: type[NetworkDefinition]) -> Equations:
     """Return a network's equations, read once."""
     return Equations(network)
 
 
-def values_of(network: 'Network') -> list[np.ndarray]:
+def values_of(network: NetworkDefinition) -> list[np.ndarray]:
     """Return the parameters of the equations' rows, each one number or one for each cell."""
     equations = equations_of(type(network))
     return [np.array([getattr(network, name) for name in equations.by_cell[row]])

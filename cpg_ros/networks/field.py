@@ -18,16 +18,14 @@ Where a symmetry makes cells equal, or equal but for the sign, one cell of each 
 all: the equations are the same, and what a cell hears is found among the classes.
 """
 
-from typing import TYPE_CHECKING
+from typing import Generic
 
 from cpg_ros.networks.equations import equations_of, values_of
+from cpg_ros.networks.network_definition import AnyDefinition
 import numpy as np
 
-if TYPE_CHECKING:
-    from cpg_ros.networks.network import Network
 
-
-class Field:
+class Field(Generic[AnyDefinition]):
     """``dx/dt = f(x(t), x(t - tau); p)`` of a network, or of one cell of each class.
 
     Attributes:
@@ -37,7 +35,7 @@ class Field:
 
     """
 
-    def __init__(self, network: 'Network', classes: np.ndarray | None = None) -> None:
+    def __init__(self, network: AnyDefinition, classes: np.ndarray | None = None) -> None:
         """Look at a network.
 
         Args:

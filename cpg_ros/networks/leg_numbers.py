@@ -26,12 +26,10 @@ the foremost, l1 r1 l2 r2 ..., as arachnologists do.
 from dataclasses import dataclass
 from functools import cache
 import re
-from typing import Any, TYPE_CHECKING
+from typing import Any
 
 from cpg_ros.errors import InputError
-
-if TYPE_CHECKING:
-    from cpg_ros.networks.network import Network
+from cpg_ros.networks.network_definition import AnyDefinition, leg_count
 
 BIPED = ('left', 'right')
 #: Most legs that a network can be asked for.
@@ -83,24 +81,19 @@ def places(legs: int) -> dict[str, dict[str, str]]:
             'girdles': {leg: words[leg[1:]] for leg in names}}
 
 
-def leg_count(network: 'type[Network]') -> int:
-    """Return how many legs a network has."""
-    return len(next(iter(network.legs.values())))
-
-
-def with_legs(network: 'type[Network]', legs: int) -> 'type[Network]':
+def with_legs(network: type[AnyDefinition], legs: int) -> type[AnyDefinition]:
     """Return a network's like for another number of legs.
 
     Raises:
         InputError: the network takes no such number.
 
     """
-    family = network.family or network
+    family: type[AnyDefinition] = network.family or network
     return family if legs == leg_count(family) else _made(family, legs)
 
 
 @cache
-def _made(family: 'type[Network]', legs: int) -> 'type[Network]':
+def _made(family: type[Any], legs: int) -> type[Any]:
     stated: dict[str, Any] = family.fitted(legs)
     names: tuple[str, ...] = stated.pop('fields', ())
     # Where legs have parameters of their own, they are not those of the family's legs.
@@ -112,7 +105,8 @@ def _made(family: 'type[Network]', legs: int) -> 'type[Network]':
     return dataclass(frozen=True)(found) if names else found
 
 
-def restored(family: 'type[Network]', legs: int, values: tuple[float, ...]) -> 'Network':
+def restored(family: type[AnyDefinition], legs: int, values: tuple[float, ...]
+             ) -> AnyDefinition:
     """Return a network from its family, number of legs and parameters: what pickle calls."""
     return with_legs(family, legs)(*values)
 

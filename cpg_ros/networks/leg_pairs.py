@@ -28,8 +28,9 @@ from functools import cache
 import math
 from typing import Any, ClassVar
 
-from cpg_ros.networks.leg_numbers import leg_count, leg_names, places
+from cpg_ros.networks.leg_numbers import leg_names, places
 from cpg_ros.networks.network import known, Network, Range
+from cpg_ros.networks.network_definition import leg_count
 from cpg_ros.networks.rings import ring_gaits
 from cpg_ros.networks.symmetry import Group, Permutation, Symmetry
 

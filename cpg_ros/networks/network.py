@@ -12,26 +12,23 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What every network states: parameters, cells, legs, gaits and presets; what is usual for it.
+"""What every network is: its rates, presets and the symmetries of its gaits; what is usual for it.
 
-States are vectors of ``components`` numbers, variable by variable: first that of every cell
-which the legs read (x or v), then the second one (w or u). All three networks have the form
-``dx/dt = f(x(t), x(t - delay); p)``; networks without delay ignore the second argument.
+What it states of its parameters, cells and equations is in network_definition.
 """
 
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, fields, replace
-from functools import cache
-from typing import Any, ClassVar, Literal, NamedTuple, TypeVar
+from dataclasses import replace
+from typing import Any, NamedTuple, TypeAlias, TypeVar
 
 from cpg_ros.errors import InputError
-from cpg_ros.networks.equations import Cell, values_of
+from cpg_ros.networks import preset_files
+from cpg_ros.networks.equations import values_of
 from cpg_ros.networks.field import Field
-from cpg_ros.networks.leg_numbers import leg_count, restored
-from cpg_ros.networks.preset_files import own_presets, Preset
+from cpg_ros.networks.leg_numbers import restored
+from cpg_ros.networks.network_definition import leg_count, NetworkDefinition, Range
 from cpg_ros.networks.symmetry import Symmetry
-from cpg_ros.networks.terms import Number
 import numpy as np
 
 __all__ = ['Network', 'Preset', 'Range', 'footfall_order', 'known']
@@ -39,17 +36,8 @@ __all__ = ['Network', 'Preset', 'Range', 'footfall_order', 'known']
 #: Pairs of legs from the head on.
 GIRDLES = ('fore', 'middle', 'hind')
 
-
 AnyNetwork = TypeVar('AnyNetwork', bound='Network')
-
-
-@dataclass(frozen=True)
-class Range:
-    """A parameter's range and meaning."""
-
-    low: float
-    high: float
-    text: str
+Preset: TypeAlias = preset_files.Preset['Network']
 
 
 class LeastCoupling(NamedTuple):
@@ -60,135 +48,16 @@ class LeastCoupling(NamedTuple):
     least: float
 
 
-class Network(ABC):
-    """Parameters of a network, as a frozen dataclass of floats.
+class Network(NetworkDefinition):
+    """Parameters of a network, as a frozen dataclass of floats; see NetworkDefinition, too.
 
-    What tells one network from another stands here; everything else asks.
-
-    Attributes:
-        name: by which it is chosen.
-        cells: how many.
-        states: names of each cell's variables, the one that legs read first.
-        variables: how many these are.
-        readout: what joints follow: the waveform itself of cells that swing as smoothly as joints
-            can, or the phase, which two variables of a cell tell, of cells that jump.
-        delay_parameter: the one that is the delay, '' for an ordinary differential equation.
-        longest_delay: that may be set at run time, model time.
-        needed: parameter that must not be 0 -> what would be lost.
-        step: model time per step in real time; an orbit is followed to about 1e-9 a cycle.
-        ranges: parameter -> range in which it may be set at run time.
-        legs: assignment of cells to legs -> leg -> cells numbered from 1, the first of which
-            gives the leg's phase; the first assignment is the usual one.
-        family: of a network made for another number of legs, the one it is made after.
-        sides: leg -> left or right; where this is not said, robot files say it.
-        girdles: leg -> fore, middle or hind, the same; of two legs neither.
-        muscles: name -> cell from 1, where cells drive muscles: phases are told of each, and
-            diagrams draw when it is active. Otherwise both are of legs, which stand while their
-            first cell falls.
-        groups: name -> parameters that can be set together under it.
-        own_of_cells: name in the equations -> the parameter that each cell has for it, where
-            they are not to be set together as a group is.
-        kinks: variables at whose zeros the rates have a kink.
-        couplings: parameters without which no cell hears another.
-        offsets: leg -> the parameter that states by how many cycles it is ahead, where any phases
-            are a gait and no symmetry tells them.
-        unnamed: the gait with whatever phases, of such a network.
-        usual_gait: that it starts with; a gait's own name is that of its usual preset.
-        usual_robot: file that it starts with, or name of a shipped one.
-        free: parameters or groups that are usually fitted to a recording.
-        line: what usually moves to look for Hopf points and branches, as ParameterLine reads it.
-        span: how far, or None: up to a multiple of the delay.
-        searched: parameter or group -> bounds within which weights are usually looked for; those
-            with equal bounds are given. Empty: nothing can be looked for.
-        typical_cycle: middle, half range and lag in cycles of each variable on a cycle near which
-            that search starts.
-
+    What tells one network from another stands in these two; everything else asks.
     """
-
-    name: ClassVar[str]
-    family: ClassVar['type[Network] | None'] = None
-    cells: ClassVar[int]
-    states: ClassVar[tuple[str, ...]]
-    variables: ClassVar[int]
-    readout: ClassVar[Literal['waveform', 'phase']]
-    delay_parameter: ClassVar[str] = ''
-    longest_delay: ClassVar[float] = 0.0
-    needed: ClassVar[dict[str, str]] = {}
-    step: ClassVar[float]
-    ranges: ClassVar[dict[str, Range]]
-    legs: ClassVar[dict[str, dict[str, tuple[int, ...]]]]
-    sides: ClassVar[dict[str, str]] = {}
-    girdles: ClassVar[dict[str, str]] = {}
-    muscles: ClassVar[dict[str, int]] = {}
-    groups: ClassVar[dict[str, tuple[str, ...]]] = {}
-    own_of_cells: ClassVar[dict[str, tuple[str, ...]]] = {}
-    kinks: ClassVar[tuple[str, ...]] = ()
-    couplings: ClassVar[tuple[str, ...]] = ()
-    offsets: ClassVar[dict[str, str]] = {}
-    unnamed: ClassVar[str] = ''
-    usual_gait: ClassVar[str]
-    usual_robot: ClassVar[str] = ''
-    free: ClassVar[tuple[str, ...]]
-    line: ClassVar[str]
-    span: ClassVar[tuple[float, float] | None] = None
-    searched: ClassVar[dict[str, tuple[float, float]]] = {}
-    typical_cycle: ClassVar[tuple[tuple[float, float, float], ...]] = ()
-
-    def __init_subclass__(cls, **options: Any) -> None:
-        super().__init_subclass__(**options)
-        if hasattr(cls, 'states'):
-            cls.variables = len(cls.states)
 
     def __reduce__(self) -> Any:
         if self.family is None:
             return super().__reduce__()
         return restored, (self.family, leg_count(type(self)), tuple(self.as_dict().values()))
-
-    @classmethod
-    def fitted(cls, legs: int) -> dict[str, Any]:
-        """Return what the network states for another number of legs: attribute -> value.
-
-        One that takes any even number gives its cells, legs, sides and girdles by a rule, and
-        whatever else depends on them; ``equations`` then hear by rules, too. Parameters that the
-        legs have of their own are named by ``fields``.
-
-        Raises:
-            ValueError: it takes no such number.
-
-        """
-        raise InputError(f'the network {cls.name} has {leg_count(cls)} legs, not {legs}')
-
-    def as_dict(self) -> dict[str, float]:
-        """Return the parameters by name, in their own order."""
-        return {name: getattr(self, name) for name in self.parameters()}
-
-    @classmethod
-    def parameters(cls) -> tuple[str, ...]:
-        """Names of the parameters, in their own order."""
-        return _names(cls)
-
-    @property
-    def components(self) -> int:
-        """Length of a state."""
-        return self.cells * self.variables
-
-    @property
-    def delay(self) -> float:
-        """How far back the rates look, model time; 0 for an ordinary differential equation."""
-        return float(getattr(self, self.delay_parameter)) if self.delay_parameter else 0.0
-
-    @staticmethod
-    @abstractmethod
-    def equations(cell: Cell, p: Any) -> tuple[Number, ...]:
-        """Return the rate of each variable of a cell, written once for all cells.
-
-        Args:
-            cell: gives the variables: ``cell.now()`` its own, ``cell.now(source)`` those of the
-                cells that each cell hears, ``cell.past(source)`` the same a delay ago. The source
-                is a cell for each cell, or a function that gives it, counted round.
-            p: the parameters, and groups of them that have one for each cell, by name.
-
-        """
 
     def rates(self, x: np.ndarray, past: np.ndarray | None = None) -> np.ndarray:
         """Right-hand side at states now and a delay ago, by default the same; shaped like x."""
@@ -208,11 +77,6 @@ class Network(ABC):
         return np.array([np.broadcast_to(value, self.cells) for value in values_of(self)])
 
     @classmethod
-    @abstractmethod
-    def gaits(cls) -> tuple[str, ...]:
-        """Names of the gaits it knows."""
-
-    @classmethod
     def presets(cls) -> dict[str, Preset]:
         """Return the named parameter sets: of the file beside its module, or the shipped one.
 
@@ -220,7 +84,7 @@ class Network(ABC):
             PresetError: there is no such file, or it cannot be used.
 
         """
-        return own_presets(cls)
+        return preset_files.own_presets(cls)
 
     @abstractmethod
     def symmetry(self, gait: str) -> Symmetry:
@@ -258,12 +122,6 @@ class Network(ABC):
     def at_rest(self) -> np.ndarray | None:
         """Return the state of every cell at rest, (variables,), where it is known beforehand."""
         return None
-
-    @classmethod
-    def by_cell(cls) -> dict[str, tuple[str, ...]]:
-        """Names that stand in the equations for a parameter of each cell -> these parameters."""
-        return {**{name: members for name, members in cls.groups.items()
-                   if len(members) == cls.cells}, **cls.own_of_cells}
 
     @classmethod
     def families(cls, symmetry: Symmetry) -> tuple[tuple[str, ...], ...]:
@@ -316,11 +174,6 @@ class Network(ABC):
         apart = {float((symmetry.phases[b] - symmetry.phases[a]) % 1.0) for a, b in pairs}
         return ('run-like' if alike and apart == {0.0} else
                 'walk-like' if alike and apart == {0.5} else 'neither')
-
-
-@cache
-def _names(network: type[Network]) -> tuple[str, ...]:
-    return tuple(field.name for field in fields(network))  # type: ignore[arg-type]
 
 
 def footfall_order(legs: Iterable[str], sides: Mapping[str, str], girdles: Mapping[str, str]

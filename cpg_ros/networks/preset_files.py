@@ -18,23 +18,21 @@ from dataclasses import dataclass
 from functools import cache
 import inspect
 from pathlib import Path
-from typing import Any, TYPE_CHECKING
+from typing import Any, Generic
 
 from cpg_ros.errors import CpgError
 from cpg_ros.files.atomic_write import write_atomically
 from cpg_ros.files.shared_resources import share
 from cpg_ros.files.yaml_reader import Reader
+from cpg_ros.networks.network_definition import AnyDefinition
 import yaml
-
-if TYPE_CHECKING:
-    from cpg_ros.networks.network import Network
 
 #: No number in a preset is larger.
 LARGEST = 1e3
 
 
 @dataclass(frozen=True)
-class Preset:
+class Preset(Generic[AnyDefinition]):
     """A named parameter set and the gait it runs.
 
     Attributes:
@@ -47,7 +45,7 @@ class Preset:
     """
 
     gait: str
-    network: 'Network'
+    network: AnyDefinition
     start: tuple[float, ...] | None = None
     period: float = 0.0
 
@@ -56,7 +54,8 @@ class PresetError(CpgError):
     """A preset file cannot be used; the message names the file, the key and the reason."""
 
 
-def read_presets(path: str | Path, network: 'type[Network]') -> dict[str, Preset]:
+def read_presets(path: str | Path, network: type[AnyDefinition]
+                 ) -> dict[str, Preset[AnyDefinition]]:
     """Read a preset file of a network: name -> preset.
 
     Raises:
@@ -108,7 +107,7 @@ def read_presets(path: str | Path, network: 'type[Network]') -> dict[str, Preset
 
 
 @cache
-def own_presets(network: 'type[Network]') -> dict[str, Preset]:
+def own_presets(network: type[AnyDefinition]) -> dict[str, Preset[AnyDefinition]]:
     """Read a network's own presets: of the file beside its module, or the shipped one.
 
     Raises:
@@ -120,8 +119,8 @@ def own_presets(network: 'type[Network]') -> dict[str, Preset]:
     return read_presets(beside if beside.is_file() else shipped, network)
 
 
-def write_presets(path: str | Path, network: 'type[Network]', presets: dict[str, Preset],
-                  comment: str = '') -> None:
+def write_presets(path: str | Path, network: type[AnyDefinition],
+                  presets: dict[str, Preset[AnyDefinition]], comment: str = '') -> None:
     """Write a preset file."""
     tree: dict[str, Any] = {'network': network.name, 'presets': {}}
     for name, preset in presets.items():

@@ -23,7 +23,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any, ClassVar
 
-from cpg_ros.networks.equations import Cell
+from cpg_ros.networks.cell import Cell
 from cpg_ros.networks.morris_lecar import MorrisLecar
 from cpg_ros.networks.network import known, Network, Range
 from cpg_ros.networks.symmetry import GAITS, Symmetry, Z4_Z2

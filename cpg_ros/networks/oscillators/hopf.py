@@ -30,7 +30,7 @@ from functools import cache
 import math
 from typing import Any, ClassVar
 
-from cpg_ros.networks.equations import Cell
+from cpg_ros.networks.cell import Cell
 from cpg_ros.networks.leg_pairs import LegPairs
 from cpg_ros.networks.network import Preset, Range
 from cpg_ros.networks.terms import Number, tanh

@@ -31,10 +31,10 @@ from dataclasses import dataclass
 from functools import cache
 from typing import Any, ClassVar
 
-from cpg_ros.networks.equations import Cell
-from cpg_ros.networks.leg_numbers import leg_count
+from cpg_ros.networks.cell import Cell
 from cpg_ros.networks.leg_pairs import LegPairs
 from cpg_ros.networks.network import Preset, Range
+from cpg_ros.networks.network_definition import leg_count
 from cpg_ros.networks.terms import Number, positive
 import numpy as np
 

@@ -34,7 +34,7 @@ from functools import cache
 import math
 from typing import Any, ClassVar
 
-from cpg_ros.networks.equations import Cell
+from cpg_ros.networks.cell import Cell
 from cpg_ros.networks.leg_numbers import leg_names, places
 from cpg_ros.networks.network import known, Network, Preset, Range
 from cpg_ros.networks.rings import ring_gaits

@@ -1,0 +1,185 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What every network states of itself: parameters, cells, equations, legs, gaits.
+
+States are vectors of ``components`` numbers, variable by variable: first that of every cell
+which the legs read (x or v), then the second one (w or u). All networks have the form
+``dx/dt = f(x(t), x(t - delay); p)``; networks without delay ignore the second argument.
+"""
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass, fields
+from functools import cache
+from typing import Any, ClassVar, Literal, TypeVar
+
+from cpg_ros.errors import InputError
+from cpg_ros.networks.cell import Cell
+from cpg_ros.networks.terms import Number
+
+AnyDefinition = TypeVar('AnyDefinition', bound='NetworkDefinition')
+
+
+@dataclass(frozen=True)
+class Range:
+    """A parameter's range and meaning."""
+
+    low: float
+    high: float
+    text: str
+
+
+class NetworkDefinition(ABC):
+    """Parameters, cells and equations of a network, as a frozen dataclass of floats.
+
+    Attributes:
+        name: by which it is chosen.
+        cells: how many.
+        states: names of each cell's variables, the one that legs read first.
+        variables: how many these are.
+        readout: what joints follow: the waveform itself of cells that swing as smoothly as joints
+            can, or the phase, which two variables of a cell tell, of cells that jump.
+        delay_parameter: the one that is the delay, '' for an ordinary differential equation.
+        longest_delay: that may be set at run time, model time.
+        needed: parameter that must not be 0 -> what would be lost.
+        step: model time per step in real time; an orbit is followed to about 1e-9 a cycle.
+        ranges: parameter -> range in which it may be set at run time.
+        legs: assignment of cells to legs -> leg -> cells numbered from 1, the first of which
+            gives the leg's phase; the first assignment is the usual one.
+        family: of a network made for another number of legs, the one it is made after.
+        sides: leg -> left or right; where this is not said, robot files say it.
+        girdles: leg -> fore, middle or hind, the same; of two legs neither.
+        muscles: name -> cell from 1, where cells drive muscles: phases are told of each, and
+            diagrams draw when it is active. Otherwise both are of legs, which stand while their
+            first cell falls.
+        groups: name -> parameters that can be set together under it.
+        own_of_cells: name in the equations -> the parameter that each cell has for it, where
+            they are not to be set together as a group is.
+        kinks: variables at whose zeros the rates have a kink.
+        couplings: parameters without which no cell hears another.
+        offsets: leg -> the parameter that states by how many cycles it is ahead, where any phases
+            are a gait and no symmetry tells them.
+        unnamed: the gait with whatever phases, of such a network.
+        usual_gait: that it starts with; a gait's own name is that of its usual preset.
+        usual_robot: file that it starts with, or name of a shipped one.
+        free: parameters or groups that are usually fitted to a recording.
+        line: what usually moves to look for Hopf points and branches, as ParameterLine reads it.
+        span: how far, or None: up to a multiple of the delay.
+        searched: parameter or group -> bounds within which weights are usually looked for; those
+            with equal bounds are given. Empty: nothing can be looked for.
+        typical_cycle: middle, half range and lag in cycles of each variable on a cycle near which
+            that search starts.
+
+    """
+
+    name: ClassVar[str]
+    family: ClassVar['type[Any] | None'] = None
+    cells: ClassVar[int]
+    states: ClassVar[tuple[str, ...]]
+    variables: ClassVar[int]
+    readout: ClassVar[Literal['waveform', 'phase']]
+    delay_parameter: ClassVar[str] = ''
+    longest_delay: ClassVar[float] = 0.0
+    needed: ClassVar[dict[str, str]] = {}
+    step: ClassVar[float]
+    ranges: ClassVar[dict[str, Range]]
+    legs: ClassVar[dict[str, dict[str, tuple[int, ...]]]]
+    sides: ClassVar[dict[str, str]] = {}
+    girdles: ClassVar[dict[str, str]] = {}
+    muscles: ClassVar[dict[str, int]] = {}
+    groups: ClassVar[dict[str, tuple[str, ...]]] = {}
+    own_of_cells: ClassVar[dict[str, tuple[str, ...]]] = {}
+    kinks: ClassVar[tuple[str, ...]] = ()
+    couplings: ClassVar[tuple[str, ...]] = ()
+    offsets: ClassVar[dict[str, str]] = {}
+    unnamed: ClassVar[str] = ''
+    usual_gait: ClassVar[str]
+    usual_robot: ClassVar[str] = ''
+    free: ClassVar[tuple[str, ...]]
+    line: ClassVar[str]
+    span: ClassVar[tuple[float, float] | None] = None
+    searched: ClassVar[dict[str, tuple[float, float]]] = {}
+    typical_cycle: ClassVar[tuple[tuple[float, float, float], ...]] = ()
+
+    def __init_subclass__(cls, **options: Any) -> None:
+        super().__init_subclass__(**options)
+        if hasattr(cls, 'states'):
+            cls.variables = len(cls.states)
+
+    @classmethod
+    def fitted(cls, legs: int) -> dict[str, Any]:
+        """Return what the network states for another number of legs: attribute -> value.
+
+        One that takes any even number gives its cells, legs, sides and girdles by a rule, and
+        whatever else depends on them; ``equations`` then hear by rules, too. Parameters that the
+        legs have of their own are named by ``fields``.
+
+        Raises:
+            ValueError: it takes no such number.
+
+        """
+        raise InputError(f'the network {cls.name} has {leg_count(cls)} legs, not {legs}')
+
+    def as_dict(self) -> dict[str, float]:
+        """Return the parameters by name, in their own order."""
+        return {name: getattr(self, name) for name in self.parameters()}
+
+    @classmethod
+    def parameters(cls) -> tuple[str, ...]:
+        """Names of the parameters, in their own order."""
+        return _names(cls)
+
+    @property
+    def components(self) -> int:
+        """Length of a state."""
+        return self.cells * self.variables
+
+    @property
+    def delay(self) -> float:
+        """How far back the rates look, model time; 0 for an ordinary differential equation."""
+        return float(getattr(self, self.delay_parameter)) if self.delay_parameter else 0.0
+
+    @staticmethod
+    @abstractmethod
+    def equations(cell: Cell, p: Any) -> tuple[Number, ...]:
+        """Return the rate of each variable of a cell, written once for all cells.
+
+        Args:
+            cell: gives the variables: ``cell.now()`` its own, ``cell.now(source)`` those of the
+                cells that each cell hears, ``cell.past(source)`` the same a delay ago. The source
+                is a cell for each cell, or a function that gives it, counted round.
+            p: the parameters, and groups of them that have one for each cell, by name.
+
+        """
+
+    @classmethod
+    @abstractmethod
+    def gaits(cls) -> tuple[str, ...]:
+        """Names of the gaits it knows."""
+
+    @classmethod
+    def by_cell(cls) -> dict[str, tuple[str, ...]]:
+        """Names that stand in the equations for a parameter of each cell -> these parameters."""
+        return {**{name: members for name, members in cls.groups.items()
+                   if len(members) == cls.cells}, **cls.own_of_cells}
+
+
+def leg_count(network: type[NetworkDefinition]) -> int:
+    """Return how many legs a network has."""
+    return len(next(iter(network.legs.values())))
+
+
+@cache
+def _names(network: type[NetworkDefinition]) -> tuple[str, ...]:
+    return tuple(field.name for field in fields(network))  # type: ignore[arg-type]
