@@ -39,12 +39,13 @@ if TYPE_CHECKING:
     from cpg_ros.networks.registry import NETWORKS, PRESETS
     from cpg_ros.recordings.bag_reader import read_bag
     from cpg_ros.recordings.csv_reader import read_csv
+    from cpg_ros.recordings.formats import read_recording
     from cpg_ros.robots.robot_file import find_robot
 
 __version__ = '0.1.0'
 __all__ = ['NETWORKS', 'PRESETS', 'CpgError', 'NoOrbit', 'Pattern', 'Stepper', 'find_robot',
            'follow', 'hopf_points', 'inverted', 'multipliers', 'plan', 'read_bag', 'read_csv',
-           'simulate', 'solve_orbit']
+           'read_recording', 'simulate', 'solve_orbit']
 
 _PLACES = {
     'NETWORKS': 'networks.registry', 'PRESETS': 'networks.registry', 'CpgError': 'errors',
@@ -52,8 +53,8 @@ _PLACES = {
     'find_robot': 'robots.robot_file', 'follow': 'dynamics.continuation',
     'hopf_points': 'dynamics.hopf_search', 'inverted': 'inversion.recording_fit',
     'multipliers': 'dynamics.floquet', 'plan': 'motion.plan', 'read_bag': 'recordings.bag_reader',
-    'read_csv': 'recordings.csv_reader', 'simulate': 'integration.simulate',
-    'solve_orbit': 'dynamics.orbit'}
+    'read_csv': 'recordings.csv_reader', 'read_recording': 'recordings.formats',
+    'simulate': 'integration.simulate', 'solve_orbit': 'dynamics.orbit'}
 
 
 def __getattr__(name: str) -> object:

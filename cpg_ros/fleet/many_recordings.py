@@ -48,9 +48,10 @@ class Summary:
 
 def settings_digest(settings: Settings) -> str:
     """What tells one way of fitting from another."""
-    told = '\n'.join(f'{field.name}={getattr(settings, field.name)!r}'
-                     for field in fields(settings))
-    return hashlib.sha256(told.encode()).hexdigest()[:16]
+    values = {field.name: getattr(settings, field.name) for field in fields(settings)}
+    values |= values.pop('reading')
+    lines = '\n'.join(f'{name}={value!r}' for name, value in values.items())
+    return hashlib.sha256(lines.encode()).hexdigest()[:16]
 
 
 class Folders:

@@ -15,7 +15,7 @@
 """One recording inverted, as a job: what comes of it in plain types, or why nothing does."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from tempfile import TemporaryDirectory
 import time
@@ -23,13 +23,11 @@ import traceback
 from typing import Any
 
 from cpg_ros.errors import CpgError
-from cpg_ros.fleet.recordings_found import digest, TABLES
+from cpg_ros.fleet.recordings_found import digest
 from cpg_ros.inversion.parameter_files import robot_file_of, write_fitted
 from cpg_ros.inversion.recording_fit import Inverted, inverted
-from cpg_ros.recordings.bag_reader import read_bag
-from cpg_ros.recordings.csv_reader import read_csv
+from cpg_ros.recordings.formats import format_of, read_recording
 from cpg_ros.recordings.recording import Recording
-from cpg_ros.recordings.servo import Servo
 from cpg_ros.robots.robot import Robot
 
 #: Joints that are drawn, points of their mean cycles, and the size of the picture in pixels.
@@ -47,11 +45,8 @@ class Settings:
     free: tuple[str, ...] = ()
     order: int = 3
     starts: tuple[Mapping[str, float], ...] = ({},)
-    topics: tuple[str, ...] = ()
-    joints: tuple[str, ...] = ()
-    unit: str | None = None
-    time: str | None = None
-    servo: Servo | None = None
+    #: As of read_recording; each is for those recordings whose format has it.
+    reading: Mapping[str, Any] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -75,15 +70,12 @@ class Task:
 
 
 def read(path: Path, settings: Settings) -> Recording:
-    """Read a recording of either kind; errors as of read_bag and read_csv."""
-    if path.is_file() and path.name.endswith(TABLES):
-        return read_csv(path, settings.unit, settings.time, settings.joints, progress=False)
-    robot = settings.robot
-    if robot is None or settings.joints:
-        return read_bag(path, settings.topics, settings.joints, progress=False,
-                        servo=settings.servo)
-    return read_bag(path, settings.topics, [joint.name for joint in robot.joints],
-                    progress=False, some=True, servo=settings.servo)
+    """Read a recording of any format, by those of the options that it has."""
+    chosen, robot = format_of(path), settings.robot
+    return read_recording(
+        path, chosen.name, progress=False,
+        robot_joints=[joint.name for joint in robot.joints] if robot else (),
+        **{name: value for name, value in settings.reading.items() if not chosen.refusal(name)})
 
 
 def invert_recording(task: Task) -> dict[str, Any]:

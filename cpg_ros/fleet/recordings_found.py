@@ -12,18 +12,15 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Recordings in folders: bags, split ones as one, and tables of joint angles."""
+"""Recordings in folders: bags, split ones as one, and other files of known formats."""
 
 from collections.abc import Iterator, Sequence
 import hashlib
 from pathlib import Path
-import re
 
 from cpg_ros.errors import InputError
-from cpg_ros.recordings.bag_storage import STORAGES
+from cpg_ros.recordings.formats import FORMATS
 
-#: Endings of tables, packed by gzip or not.
-TABLES = ('.csv', '.csv.gz', '.mot', '.sto')
 #: A folder that has this is one that results are written to: what is in it is no recording.
 RESULTS = 'cpg_ros_results.json'
 #: Bytes that are read at once.
@@ -33,8 +30,8 @@ BLOCK = 1 << 20
 def found(folders: Sequence[Path]) -> Iterator[Path]:
     """Yield the recordings in folders, each of which may be one, sorted, each once.
 
-    A folder with metadata.yaml is a bag, and so is one whose storage files are parts of one
-    recording; other storage files and tables are recordings by themselves.
+    A folder that a format takes for one recording is one; other files of known endings are
+    recordings by themselves.
 
     Raises:
         InputError: a folder is not there.
@@ -52,18 +49,18 @@ def found(folders: Sequence[Path]) -> Iterator[Path]:
 
 def _below(place: Path) -> Iterator[Path]:
     if place.is_file():
-        if place.suffix in STORAGES or place.name.endswith(TABLES):
+        if place.name.endswith(tuple(
+                ending for one in FORMATS.values() for ending in one.endings)):
             yield place
         return
     if (place / RESULTS).exists():
         return
     try:
         inside = sorted(place.iterdir())
+        whole = bool(files_of(place))
     except PermissionError:
-        yield place
-        return
-    storages = [one for one in inside if one.suffix in STORAGES and one.is_file()]
-    if (place / 'metadata.yaml').exists() or (len(storages) > 1 and _split(storages)):
+        inside, whole = [], True
+    if whole:
         yield place
         return
     for one in inside:
@@ -71,19 +68,12 @@ def _below(place: Path) -> Iterator[Path]:
             yield from _below(one)
 
 
-def _split(storages: list[Path]) -> bool:
-    """Whether storage files are parts of one bag: name_0.mcap, name_1.mcap ..."""
-    parts = [re.fullmatch(r'(.*)_(\d+)', one.stem) for one in storages]
-    return (all(parts) and len({(part[1], one.suffix) for part, one in zip(
-        parts, storages, strict=True) if part}) == 1)
-
-
 def files_of(recording: Path) -> list[Path]:
-    """The files that a recording is made of, sorted."""
+    """The files that a recording is made of, sorted; none of a folder that is no recording."""
     if not recording.is_dir():
         return [recording]
-    return sorted(one for one in recording.iterdir()
-                  if one.is_file() and (one.suffix in STORAGES or one.name == 'metadata.yaml'))
+    return next((files for one in FORMATS.values()
+                 if one.files_in is not None and (files := one.files_in(recording))), [])
 
 
 def digest(recording: Path) -> str:
@@ -108,8 +98,8 @@ def outline(recording: Path) -> tuple[tuple[str, int, int], ...]:
     found = []
     for one in files_of(recording):
         try:
-            told = one.stat()
+            status = one.stat()
         except FileNotFoundError:
             continue
-        found.append((one.name, told.st_size, told.st_mtime_ns))
+        found.append((one.name, status.st_size, status.st_mtime_ns))
     return tuple(found)

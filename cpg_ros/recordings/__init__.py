@@ -18,5 +18,6 @@ Imports ``files``; knows nothing of ROS, but for ``rosbag2_library``, which read
 """
 
 __all__ = ['bag_library', 'bag_reader', 'bag_storage', 'bag_writer', 'cdr', 'csv_reader',
-           'joint_streams', 'live_buffer', 'recording', 'rosbag2_library', 'rosbags_library',
-           'servo', 'stray_samples', 'table_text', 'thinned', 'unfinished_mcap']
+           'formats', 'joint_streams', 'live_buffer', 'recording', 'recording_format',
+           'rosbag2_library', 'rosbags_library', 'servo', 'stray_samples', 'table_text', 'thinned',
+           'unfinished_mcap']

@@ -22,9 +22,10 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from cpg_ros.files.progress_bar import progress_bar
-from cpg_ros.recordings.bag_storage import opened
+from cpg_ros.recordings.bag_storage import files_of_bag, opened, STORAGES
 from cpg_ros.recordings.joint_streams import BATCH, recorded, Stream
 from cpg_ros.recordings.recording import Recording
+from cpg_ros.recordings.recording_format import JOINTS, Option, RecordingFormat
 from cpg_ros.recordings.servo import Servo
 
 
@@ -72,3 +73,11 @@ def read_bag(path: str | Path, topics: Sequence[str] = (), joints: Sequence[str]
             for topic, stream in streams.items() if stream.count != expected[topic]), *(
             f'{topic}: no messages' for topic, stream in streams.items() if not stream.count)]
     return recorded(list(streams.values()), joints, f'{path}, ', notes, some)
+
+
+BAG = RecordingFormat(
+    name='bag', contents='a rosbag2 bag', help='a rosbag2 bag, sqlite3 or mcap', metavar='DIR',
+    read=read_bag, endings=STORAGES, files_in=files_of_bag, features=('servo', 'some'),
+    options=(Option('topics', 'topics of the bag to read (default: all of type '
+                    'sensor_msgs/msg/JointState)', 'TOPIC', several=True), JOINTS),
+    lacks={'unit': 'joint states are in rad', 'time': 'joint states have their stamps'})

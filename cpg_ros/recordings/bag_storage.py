@@ -21,13 +21,15 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, ExitStack
 from pathlib import Path
+import re
 
 from cpg_ros.recordings.bag_library import Reader, ReaderError
 from cpg_ros.recordings.cdr import JOINT_STATE
 from cpg_ros.recordings.recording import few, RecordingError
 from cpg_ros.recordings.unfinished_mcap import UnfinishedPath, whole_part
 
-STORAGES = ('.mcap', '.db3')
+#: Endings of a bag's storage files, and the name of the file that describes them.
+STORAGES, METADATA = ('.mcap', '.db3'), 'metadata.yaml'
 
 
 class Bag:
@@ -98,7 +100,7 @@ def opened(path: Path) -> Iterator[Bag]:
         files = _files(path)
         notes = [f'{file}: its recorder did not finish it; what is whole before byte {end} is used'
                  for file in files if (end := whole_part(file)) is not None]
-        whole = path.is_file() or (path / 'metadata.yaml').exists()
+        whole = path.is_file() or (path / METADATA).exists()
     except OSError as error:
         raise RecordingError(f'{error.filename or path}: {error.strerror}') from error
     cut = bool(notes)
@@ -128,10 +130,29 @@ def _files(path: Path) -> list[Path]:
                                  f'{" or ".join(STORAGES)}')
         return [path]
     files = [file for file in path.iterdir() if file.suffix in STORAGES and file.is_file()]
-    if not files and not (path / 'metadata.yaml').exists():
+    if not files and not (path / METADATA).exists():
         raise RecordingError(f'{path}: not a bag: it has neither metadata.yaml nor a storage file '
                              f'({", ".join(STORAGES)})')
     return sorted(files, key=lambda file: (len(file.name), file.name))
+
+
+def files_of_bag(folder: Path) -> list[Path]:
+    """Return the files of a folder that is one bag, sorted, and none of any other folder.
+
+    One with metadata.yaml is a bag, and so is one whose storage files are parts of one recording:
+    name_0.mcap, name_1.mcap ...
+
+    Raises:
+        OSError: the folder cannot be listed.
+
+    """
+    files = sorted(one for one in folder.iterdir() if one.is_file() and (
+        one.suffix in STORAGES or one.name == METADATA))
+    storages = [one for one in files if one.suffix in STORAGES]
+    parts = [re.fullmatch(r'(.*)_\d+', one.stem) for one in storages]
+    split = len(parts) > 1 and all(parts) and len({
+        (part[1], one.suffix) for part, one in zip(parts, storages, strict=True) if part}) == 1
+    return files if split or len(files) > len(storages) else []
 
 
 def _culprit(path: Path, files: list[Path], error: Exception) -> str:
@@ -145,9 +166,9 @@ def _culprit(path: Path, files: list[Path], error: Exception) -> str:
         except Exception:
             return str(file)
     if files or isinstance(error, ReaderError):
-        return (f'{path / "metadata.yaml"} cannot be used'
+        return (f'{path / METADATA} cannot be used'
                 + (f' to read {few([file.name for file in files])}' if files else ''))
-    return ' or '.join(str(file) for file in path.iterdir() if file.name != 'metadata.yaml')
+    return ' or '.join(str(file) for file in path.iterdir() if file.name != METADATA)
 
 
 def line(error: Exception) -> str:

@@ -33,6 +33,7 @@ from cpg_ros.recordings.recording import (
     RecordingError,
     require,
 )
+from cpg_ros.recordings.recording_format import JOINTS, Option, RecordingFormat
 from cpg_ros.recordings.table_text import decimal_commas, opened, preamble, units_of
 import numpy as np
 
@@ -125,10 +126,10 @@ class _Table:
             raise RecordingError(f'{path}: the file is empty')
         self._printable(line, self.line)
         if not any(map(line.count, DELIMITERS)) and (found := preamble(line, file)) is not None:
-            line, self.line, said = found[0], self.line + found[1], found[2]
-            if unit and said and unit != said:
-                raise RecordingError(f'{path}: its preamble says {said}, not {unit}')
-            unit = unit or said
+            line, self.line, declared = found[0], self.line + found[1], found[2]
+            if unit and declared and unit != declared:
+                raise RecordingError(f'{path}: its preamble says {declared}, not {unit}')
+            unit = unit or declared
         self.delimiter = max(DELIMITERS, key=line.count)
         headers = [header.strip() for header in self._cells(line.lstrip('#'), self.line)]
         while len(headers) > 2 and not headers[-1]:
@@ -324,3 +325,16 @@ def _number(cell: str) -> float | None:
         return float(cell)
     except ValueError:
         return None
+
+
+CSV = RecordingFormat(
+    name='csv', contents='a CSV file with a column for time and one for each joint',
+    help="a table with a header, optionally compressed with gzip, or OpenSim's .mot or .sto",
+    metavar='FILE',
+    read=read_csv, endings=('.csv', '.csv.gz', '.mot', '.sto'),
+    options=(JOINTS,
+             Option('unit', 'unit of the angles in the CSV file (default: as in its header, or '
+                    'rad)', choices=('rad', 'deg')),
+             Option('time', 'unit of the time in the CSV file (default: as in its header, or s)',
+                    choices=('s', 'ms', 'us', 'ns'))),
+    lacks={'topics': 'a CSV file has none', 'servo': 'a CSV file has no efforts'})

@@ -91,8 +91,8 @@ class Reader:
         """
         try:
             if (self.path / 'metadata.yaml').exists():
-                said = rosbag2_py.Info().read_metadata(str(self.path), '')
-                if said.compression_mode.lower() not in ('', 'none'):
+                metadata = rosbag2_py.Info().read_metadata(str(self.path), '')
+                if metadata.compression_mode.lower() not in ('', 'none'):
                     self._kind = rosbag2_py.SequentialCompressionReader
             found = self._opened().get_metadata().topics_with_message_count
         except RuntimeError as error:

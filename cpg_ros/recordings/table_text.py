@@ -65,7 +65,7 @@ def preamble(first: str, text: io.TextIOBase) -> tuple[str, int, str | None] | N
 
     Returns:
         The line of the header, how many lines come before that, and the unit of angles if it
-        is said; None if it is no such file.
+        is declared; None if it is no such file.
 
     """
     lines = [first]
@@ -73,10 +73,10 @@ def preamble(first: str, text: io.TextIOBase) -> tuple[str, int, str | None] | N
         lines.append(text.readline())
         if not lines[-1] or len(lines) > PREAMBLE:
             return None
-    said = {name.strip().lower(): value.strip().lower()
-            for name, mark, value in (line.partition('=') for line in lines) if mark}
+    values = {name.strip().lower(): value.strip().lower()
+              for name, mark, value in (line.partition('=') for line in lines) if mark}
     units = {'yes': 'deg', 'no': 'rad'}
-    return text.readline(), len(lines), units.get(said.get('indegrees', ''))
+    return text.readline(), len(lines), units.get(values.get('indegrees', ''))
 
 
 def units_of(cells: Sequence[str]) -> list[str] | None:

@@ -23,6 +23,7 @@ from argparse import Namespace, RawDescriptionHelpFormatter
 from collections.abc import Sequence
 from pathlib import Path
 import sys
+from textwrap import fill
 
 from cpg_ros.errors import CpgError, InputError
 from cpg_ros.files.atomic_write import write_atomically
@@ -37,18 +38,22 @@ from cpg_ros.inversion.paper_fit import paper_fits, PaperFit, refuse_others
 from cpg_ros.inversion.parameter_files import write_fitted
 from cpg_ros.inversion.recording_fit import Inverted, inverted, network_of, preset_of
 from cpg_ros.networks.registry import SHIPPED
-from cpg_ros.recordings.bag_reader import read_bag
-from cpg_ros.recordings.csv_reader import read_csv
+from cpg_ros.recordings.formats import FORMATS, read_recording
 from cpg_ros.recordings.recording import Recording
-from cpg_ros.recordings.servo import Servo
 from cpg_ros.robots.robot import Robot
 from cpg_ros.robots.robot_file import find_robot
 from cpg_ros.tools.arguments import assignment, Parser, say, twice
+from cpg_ros.tools.reading_options import (
+    add_reading_options,
+    check_reading_options,
+    chosen_format,
+    reading_arguments,
+)
 
 DESCRIPTION = """\
 Find the steady gait in a recording, and the network parameters that move a robot like it. Reads
-joint states from a rosbag2 bag, or a CSV file with a column for time and one for each joint.
-Writes a parameter file and a robot file that the generator loads as they are."""
+joint states from {}. Writes a parameter file and a robot file that the generator loads as they
+are."""
 EPILOG = """\
 examples:
   inversion --bag walk_bag --robot go1.yaml --out fitted.yaml --report report.html
@@ -56,35 +61,19 @@ examples:
   ros2 run cpg_ros generator --ros-args --params-file fitted.yaml
   inversion --bags recordings/ --out results/ --jobs 2
 
-Without --bag and --csv, inversion runs as the node cpg_inversion, which listens to joint states
+Without {}, inversion runs as the node cpg_inversion, which listens to joint states
 and fits them when ~/fit is called.
 
 exit codes: 0 fitted, 1 no steady gait or none that fits, 2 invalid arguments or damaged input."""
 
 
 def _parser() -> Parser:
-    parser = Parser(prog='inversion', description=DESCRIPTION, epilog=EPILOG,
-                    formatter_class=RawDescriptionHelpFormatter)
-    source = parser.add_mutually_exclusive_group(required=True)
-    source.add_argument('--bag', type=Path, metavar='DIR', help='a rosbag2 bag, sqlite3 or mcap')
-    source.add_argument('--bags', type=Path, nargs='+', metavar='FOLDER', help='all bags and '
-                        'tables in these folders; --out is then a folder for the results')
-    source.add_argument('--csv', type=Path, metavar='FILE', help='a table with a header, '
-                        "optionally compressed with gzip, or OpenSim's .mot or .sto")
-    parser.add_argument('--topics', nargs='+', default=[], metavar='TOPIC', help='topics of the '
-                        'bag to read (default: all of type sensor_msgs/msg/JointState)')
-    parser.add_argument('--joints', nargs='+', default=[], metavar='NAME', help='joints to use '
-                        "(default: the robot's, or all); for a CSV file also patterns such as "
-                        "'JointPos*'")
-    parser.add_argument('--unit', choices=('rad', 'deg'), help='unit of the angles in the CSV '
-                        'file (default: as in its header, or rad)')
-    parser.add_argument('--time', choices=('s', 'ms', 'us', 'ns'), help='unit of the time in the '
-                        'CSV file (default: as in its header, or s)')
-    parser.add_argument('--kp', type=float, metavar='KP', help='fit the commands of the joints in '
-                        'the bag instead of their measured positions: position + (effort + kd '
-                        'velocity) / kp, with the proportional gain of their controllers, N m/rad')
-    parser.add_argument('--kd', type=float, metavar='KD', help='damping gain of the joint '
-                        'controllers, N m s/rad (default: 0)')
+    parser = Parser(
+        prog='inversion', formatter_class=RawDescriptionHelpFormatter,
+        description=fill(DESCRIPTION.format(
+            ', or '.join(one.contents for one in FORMATS.values())), 98),
+        epilog=EPILOG.format(' and '.join(f'--{name}' for name in FORMATS)))
+    add_reading_options(parser)
     parser.add_argument('--robot', metavar='FILE', help='robot file, or the name of a shipped '
                         'one, which assigns joints to legs and cells and gives their limits '
                         '(default: legs identified by the names of the joints)')
@@ -120,13 +109,11 @@ def _parser() -> Parser:
 
 
 def _recording(chosen: Namespace, robot: Robot | None) -> Recording:
-    if chosen.csv is not None:
-        return read_csv(chosen.csv, unit=chosen.unit, time=chosen.time, joints=chosen.joints)
-    servo = None if chosen.kp is None else Servo(chosen.kp, chosen.kd or 0.0)
-    if robot is None or chosen.joints:
-        return read_bag(chosen.bag, chosen.topics, chosen.joints, servo=servo)
-    names = [joint.name for joint in robot.joints]
-    return read_bag(chosen.bag, chosen.topics, names, some=True, servo=servo)
+    given = chosen_format(chosen)
+    return read_recording(
+        getattr(chosen, given), given,
+        robot_joints=[joint.name for joint in robot.joints] if robot else (),
+        **reading_arguments(chosen))
 
 
 def _checked(parser: Parser, chosen: Namespace) -> None:
@@ -136,16 +123,7 @@ def _checked(parser: Parser, chosen: Namespace) -> None:
     elif chosen.jobs or chosen.dask or chosen.watch:
         option = 'watch' if chosen.watch else 'dask' if chosen.dask else 'jobs'
         parser.error(f'argument --{option}: one recording is one job; see --bags')
-    if chosen.csv is not None and chosen.topics:
-        parser.error('argument --topics: a CSV file has none')
-    if chosen.bag is not None and chosen.unit:
-        parser.error('argument --unit: joint states are in rad')
-    if chosen.bag is not None and chosen.time:
-        parser.error('argument --time: joint states have their stamps')
-    if chosen.csv is not None and chosen.kp is not None:
-        parser.error('argument --kp: a CSV file has no efforts')
-    if chosen.kp is None and chosen.kd is not None:
-        parser.error('argument --kd: without --kp')
+    check_reading_options(parser, chosen)
     if chosen.bags is None:
         _checked_files(parser, chosen)
     _checked_names(parser, chosen)

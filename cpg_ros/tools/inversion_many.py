@@ -20,9 +20,9 @@ import sys
 from cpg_ros.fleet.many_recordings import Folders, Summary
 from cpg_ros.fleet.options import working
 from cpg_ros.fleet.recording_job import Settings
-from cpg_ros.recordings.servo import Servo
 from cpg_ros.robots.robot import Robot
 from cpg_ros.tools.arguments import say
+from cpg_ros.tools.reading_options import reading_arguments
 
 
 def _note(line: str) -> None:
@@ -30,11 +30,10 @@ def _note(line: str) -> None:
 
 
 def _settings(chosen: Namespace, robot: Robot | None) -> Settings:
-    servo = None if chosen.kp is None else Servo(chosen.kp, chosen.kd or 0.0)
     return Settings(robot, chosen.network or '', chosen.gait or '', chosen.preset or '',
                     tuple(chosen.free), chosen.order,
-                    tuple(dict(start) for start in chosen.start) or ({},), tuple(chosen.topics),
-                    tuple(chosen.joints), chosen.unit, chosen.time, servo)
+                    tuple(dict(start) for start in chosen.start) or ({},),
+                    reading_arguments(chosen))
 
 
 def run(chosen: Namespace, robot: Robot | None) -> int:

@@ -1,0 +1,85 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The formats of recordings that can be read, and the front door to all of them."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from cpg_ros.errors import InputError
+from cpg_ros.recordings.bag_reader import BAG
+from cpg_ros.recordings.csv_reader import CSV
+from cpg_ros.recordings.recording import few, Recording, RecordingError
+from cpg_ros.recordings.recording_format import Option, RecordingFormat
+
+#: Name -> format. One more is a file like those of these, and its name here.
+FORMATS: dict[str, RecordingFormat] = {one.name: one for one in (BAG, CSV)}
+
+
+def reading_options() -> list[Option]:
+    """Return the options of all formats, each once."""
+    return list(dict.fromkeys(option for one in FORMATS.values() for option in one.options))
+
+
+def format_of(path: Path) -> RecordingFormat:
+    """Return a recording's format, by the ending of its name or by what the folder holds.
+
+    Raises:
+        RecordingError: it is a file of another ending.
+        OSError: the folder cannot be listed.
+
+    """
+    if path.is_dir():
+        folders = [one for one in FORMATS.values() if one.files_in is not None]
+        return next((one for one in folders if one.files_in and one.files_in(path)), folders[0])
+    for one in FORMATS.values():
+        if path.name.endswith(one.endings):
+            return one
+    endings = [ending for one in FORMATS.values() for ending in one.endings]
+    raise RecordingError(f'{path}: no recording; the names of recordings end in '
+                         f'{", ".join(endings)}')
+
+
+def read_recording(path: str | Path, format_name: str = '', *, robot_joints: Sequence[str] = (),
+                   progress: bool = True, **options: Any) -> Recording:
+    """Read a recording of any format.
+
+    Args:
+        path: of the file, or of the folder of a bag.
+        format_name: one of FORMATS; by default the path decides.
+        robot_joints: joints of a robot, of which those that are there are taken where ``joints``
+            names none and the format may hold others.
+        progress: show a progress bar.
+        options: as of the format's reader, `read_bag` or `read_csv`; those that are None or
+            empty count as not given.
+
+    Raises:
+        RecordingError: see `merged`; the recording cannot be read, or its format is not known.
+        InputError: no such format, or an option that it does not have.
+
+    """
+    path = Path(path)
+    if format_name and format_name not in FORMATS:
+        raise InputError(f'no format {format_name!r} of recordings; there are '
+                         f'{few(list(FORMATS))}')
+    chosen = FORMATS[format_name] if format_name else format_of(path)
+    given = {name: value for name, value in options.items() if value is not None and value != ()
+             and value != []}
+    for name in given:
+        if why := chosen.refusal(name):
+            raise InputError(f'{path}: option {name}: {why}')
+    if robot_joints and 'joints' not in given and 'some' in chosen.features:
+        given |= {'joints': robot_joints, 'some': True}
+    return chosen.read(path, progress=progress, **given)
