@@ -20,7 +20,8 @@ from typing import Any
 
 from cpg_ros.errors import CpgError
 from cpg_ros.panel.graph import namespace
-from cpg_ros.panel.pages import Page, Pages
+from cpg_ros.panel.lease import LeaseError
+from cpg_ros.panel.pages import MOST, Page, Pages
 from cpg_ros.panel.recorder import Recorder
 from cpg_ros.panel.requests import Request
 from cpg_ros.panel.robot_view import RobotView
@@ -30,6 +31,10 @@ from std_srvs.srv import SetBool, Trigger
 
 #: A fit may take this long, s.
 FIT = 120.0
+#: What moves the robot, apart from steering, may be this old when it comes, s.
+LATE = 2.0
+#: What moves the robot beside steering: it takes the lease.
+MOVING = ('set', 'enable', 'push', 'reset', 'take_over')
 #: Recorded whatever the generator's namespace.
 EVERYWHERE = ('/diagnostics', '/tf', '/tf_static', '/clock')
 
@@ -55,32 +60,62 @@ class Orders:
 
         """
         values, action = request.values, request.action
+        now, teleop = asyncio.get_running_loop().time(), view.teleop
+        if request.stamp is not None:
+            if request.stamp > now:
+                raise OrderError(f'{action}: stamp is not one that the panel has sent')
+            page.round_trip = now - request.stamp
+        teleop.lease.renew(page, now)
+        if action == 'stop' or (action == 'enable' and not values['on']):
+            teleop.steering.stop()
+            await self._call(page, SetBool, f'{view.name}/enable', SetBool.Request(data=False))
+            return
+        if page.stop_only and action != 'alive':
+            raise OrderError(f'{MOST} pages are open already: this one can only stop the robot')
+        if action in MOVING:
+            self._acquire(page, view, request, now)
         if action == 'set':
             view.controls.set(values['name'], values['value'])
         elif action == 'steer':
-            if view.controls.value('cmd_vel') is not True:
-                raise OrderError(f'{view.name} ignores cmd_vel; start it with cmd_vel:=true to '
-                                 'steer')
-            view.steering.hold(page, asyncio.get_running_loop().time(), values['speed'],
-                               values['turn'])
-        elif action == 'stop':
-            view.steering.stop()
+            self._steer(page, view, request, now)
+        elif action == 'release':
+            teleop.release(page)
         elif action == 'enable':
-            if not values['on']:
-                view.steering.stop()
-            await self._call(page, SetBool, f'{view.name}/enable',
-                             SetBool.Request(data=values['on']))
+            await self._call(page, SetBool, f'{view.name}/enable', SetBool.Request(data=True))
         elif action == 'push':
             await asyncio.to_thread(view.push, push(values['force'], values['direction']))
         elif action == 'record':
             await self._record(view, values['on'])
-        else:
+        elif action in ('reset', 'fit'):
             nodes, what = {'reset': (view.graph.simulations, 'simulated robot'),
                            'fit': (view.graph.inversions, 'inversion node')}[action]
             node = view.graph.beside(view.name, nodes)
             if not node:
                 raise OrderError(f'there is no {what} for {view.name}')
             await self._call(page, Trigger, f'{node}/{action}', Trigger.Request(), FIT)
+
+    def _acquire(self, page: Page, view: RobotView, request: Request, now: float) -> None:
+        """Let a page do what moves the robot, if it is fresh and no other page may."""
+        if (age := now - _stamp(request)) > LATE:
+            raise OrderError(f'{request.action} came up to {age:.1f} s late, and was ignored: the '
+                             f'limit is {LATE:g} s')
+        if request.action != 'take_over':
+            view.teleop.acquire(page, now)
+        elif lost := view.teleop.take_over(page, now):
+            self._pages.say([lost], f'{page} has taken over; this page no longer moves the robot')
+
+    def _steer(self, page: Page, view: RobotView, request: Request, now: float) -> None:
+        """Steer; why it is refused is shown once."""
+        if view.controls.value('cmd_vel') is not True:
+            raise OrderError(f'{view.name} ignores cmd_vel; start it with cmd_vel:=true to steer')
+        try:
+            view.teleop.steer(page, _stamp(request), now, request.values['speed'],
+                              request.values['turn'])
+            page.refused = ''
+        except LeaseError as error:
+            if str(error) != page.refused:
+                page.refused = str(error)
+                raise
 
     async def _call(self, page: Page, kind: Any, service: str, request: Any,
                     patience: float = PATIENCE) -> None:
@@ -99,3 +134,10 @@ class Orders:
         else:
             await asyncio.to_thread(self._recorder.stop)
         self._recorded()
+
+
+def _stamp(request: Request) -> float:
+    """Return the stamp of a request that must have one, s."""
+    if request.stamp is None:
+        raise OrderError(f'{request.action}: the newest stamp from the panel is missing')
+    return request.stamp

@@ -137,16 +137,16 @@ class Panel(StartedNode):
                 looked = due
                 self._look()
             for view in self._views.values():
-                view.steering.beat(loop.time())
+                view.teleop.beat(loop.time())
                 if pages := self._pages.of(view.name):
                     view.news()
-                    if frame := view.frame():
-                        self._pages.frame(pages, {'type': 'frame', **frame})
+                    self._pages.frame(pages, view.frame(), loop.time())
+            self._lease_news()
             due = max(due + 1.0 / FRAMES, loop.time() - 1.0 / FRAMES)
             await asyncio.sleep(max(due - loop.time(), 0.0))
         for view in self._views.values():
-            view.steering.stop()
-            view.steering.beat(loop.time())
+            view.teleop.steering.stop()
+            view.teleop.beat(loop.time())
         self._recorder.stop()
         server.close()
         await server.wait_closed()
@@ -155,7 +155,7 @@ class Panel(StartedNode):
         graph = look(self)
         if graph != self._graph:
             self._graph = graph
-            self._pages.send(self._pages.open, self._state())
+            self._pages.send(self._pages.everyone, self._state())
         for name in set(self._views) - set(graph.generators):
             self._views.pop(name).close()
         for name in graph.generators:
@@ -163,9 +163,17 @@ class Panel(StartedNode):
                 self._views[name] = self._view(name)
             self._views[name].listen(graph, bool(self._pages.of(name)))
             self._views[name].ready()
-        for page in self._pages.open:
+            self._views[name].teleop.look()
+        for page in self._pages.everyone:
             if page.node not in self._views and graph.generators:
                 self._choose(page, graph.generators[0])
+
+    def _lease_news(self) -> None:
+        """Tell each page of its robot's lease, if that is news to it."""
+        for page in self._pages.everyone:
+            if (view := self._views.get(page.node)) and page.lease(
+                    message := view.teleop.state(page)):
+                self._pages.send([page], message)
 
     def _view(self, name: str) -> RobotView:
         return RobotView(
@@ -197,7 +205,7 @@ class Panel(StartedNode):
 
     def _gone(self, page: Page) -> None:
         for view in self._views.values():
-            view.steering.release(page)
+            view.teleop.release(page)
 
     def _choose(self, page: Page, name: str) -> None:
         view = self._views.get(name)
@@ -208,6 +216,8 @@ class Panel(StartedNode):
         self._gone(page)
         page.node = name
         self._pages.send([page], {'type': 'chosen', 'node': name})
+        if page.stop_only:
+            return
         for message in view.messages():
             self._pages.send([page], message)
         view.listen(self._graph, wanted=True)
@@ -231,7 +241,7 @@ class Panel(StartedNode):
         """Tell of a recording that began or ended, by itself if that has a reason."""
         if why:
             self._pages.say(self._pages.open, why)
-        self._pages.send(self._pages.open, self._state())
+        self._pages.send(self._pages.everyone, self._state())
 
 
 def main(args: list[str] | None = None) -> int:

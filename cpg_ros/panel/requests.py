@@ -34,10 +34,11 @@ class RequestError(CpgError):
 
 @dataclass(frozen=True)
 class Request:
-    """What is to be done, and with what."""
+    """What is to be done, and with what; the newest stamp that its page had received, s."""
 
     action: str
     values: Mapping[str, Any] = field(default_factory=dict)
+    stamp: float | None = None
 
 
 def _text(value: Any) -> str:
@@ -79,7 +80,7 @@ def _setting(value: Any) -> bool | int | float | str:
 ACTIONS: dict[str, dict[str, Callable[[Any], Any]]] = {
     'choose': {'node': _text}, 'set': {'name': _text, 'value': _setting},
     'steer': {'speed': _number(-1.0, 1.0), 'turn': _number(-1.0, 1.0)},
-    'stop': {}, 'enable': {'on': _flag}, 'reset': {},
+    'alive': {}, 'take_over': {}, 'release': {}, 'stop': {}, 'enable': {'on': _flag}, 'reset': {},
     'push': {'force': _number(0.0, HARDEST), 'direction': _number(-360.0, 360.0)},
     'record': {'on': _flag}, 'fit': {}}
 
@@ -109,6 +110,12 @@ def read(text: str | bytes) -> Request:
     if not isinstance(action, str) or action not in ACTIONS:
         raise RequestError(f"'do' is not one of {', '.join(ACTIONS)}")
     wanted = ACTIONS[action]
+    stamp = found.pop('stamp', None)
+    if stamp is not None:
+        try:
+            stamp = _number(0.0, 1e12)(stamp)
+        except RequestError as error:
+            raise RequestError(f'{action}: stamp {error}') from error
     if set(found) != set(wanted):
         raise RequestError(f"'{action}' takes {', '.join(wanted) or 'nothing'}")
     values = {}
@@ -117,4 +124,4 @@ def read(text: str | bytes) -> Request:
             values[name] = check(found[name])
         except RequestError as error:
             raise RequestError(f'{action}: {name} {error}') from error
-    return Request(action, values)
+    return Request(action, values, stamp)

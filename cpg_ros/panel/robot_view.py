@@ -24,10 +24,10 @@ from cpg_ros.panel import shape_facts, shape_source
 from cpg_ros.panel.controls import Controls
 from cpg_ros.panel.graph import Graph, namespace
 from cpg_ros.panel.service_calls import CallError, Services
-from cpg_ros.panel.steering import Steering
+from cpg_ros.panel.teleop import Teleop
 from cpg_ros.panel.topics import latched, Topic
 from diagnostic_msgs.msg import DiagnosticArray
-from geometry_msgs.msg import Twist, Wrench
+from geometry_msgs.msg import Wrench
 from nav_msgs.msg import Odometry
 from rcl_interfaces.msg import ParameterEvent
 from rclpy.node import Node
@@ -44,7 +44,7 @@ class RobotView:
 
     Attributes:
         controls: its parameters.
-        steering: what its ``cmd_vel`` is told.
+        teleop: who may move it, and how its ``cmd_vel`` is steered.
 
     """
 
@@ -67,9 +67,8 @@ class RobotView:
         self._node, self._watch, self._services = node, watch, services
         self._said, self._tell = said, tell
         self.controls = Controls(services, name, said)
-        self._twists = node.create_publisher(Twist, f'{self._space}/cmd_vel', 10)
         self._pushes: Any = None
-        self.steering = Steering(self._twists.publish, fastest)
+        self.teleop = Teleop(node, f'{self._space}/cmd_vel', fastest)
         self.graph = Graph()
         self._topics: dict[str, Topic] = {}
         self._kept: dict[str, dict[str, Any]] = {}
@@ -178,8 +177,8 @@ class RobotView:
             speed = moved.twist.twist
             found['base'] = _short((place.x, place.y, place.z, turn.w, turn.x, turn.y, turn.z))
             found['speed'] = _short((speed.linear.x, speed.linear.y, speed.angular.z))
-        if self.steering.asked != (0.0, 0.0):
-            found['steered'] = _short(self.steering.asked)
+        if self.teleop.steering.asked != (0.0, 0.0):
+            found['steered'] = _short(self.teleop.steering.asked)
         return found
 
     def _told_names(self, key: str, names: list[str]) -> None:
@@ -235,7 +234,7 @@ class RobotView:
     def close(self) -> None:
         """Let go of all of it."""
         self.listen(self.graph, wanted=False)
-        self._node.destroy_publisher(self._twists)
+        self.teleop.close()
         if self._pushes is not None:
             self._node.destroy_publisher(self._pushes)
         self._services.forget(self.name)

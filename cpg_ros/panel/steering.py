@@ -11,7 +11,6 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
-
 """Steering with a dead man: the robot walks only as long as somebody holds on."""
 
 from collections.abc import Callable
@@ -20,14 +19,14 @@ from typing import Any
 
 from geometry_msgs.msg import Twist, Wrench
 
-#: Who steers must say so again within this time, s.
+#: A command may be this old when it is published, s; what is older is zero.
 HOLD = 0.3
 #: The stop is sent this many times: messages are cheap, a robot that walks on is not.
 STOPS = 5
 
 
 class Steering:
-    """Turns what one page at a time asks for into ``cmd_vel``.
+    """Turns the newest command of a page into ``cmd_vel``, as long as it is fresh.
 
     Attributes:
         asked: forward speed in m/s and turn in rad/s, (0, 0) where nobody steers.
@@ -37,28 +36,28 @@ class Steering:
     def __init__(self, publish: Callable[[Any], None], fastest: tuple[float, float]) -> None:
         """Publish through this; a whole deflection is this speed in m/s and turn in rad/s."""
         self._publish, self._fastest = publish, fastest
-        self._holder: object = None
         self._until, self._stops = -math.inf, 0
         self.asked = (0.0, 0.0)
 
-    def hold(self, who: object, now: float, speed: float, turn: float) -> None:
-        """Steer from now on, now in s, by shares of the fastest; who came last steers."""
-        self._holder, self._until, self._stops = who, now + HOLD, STOPS
-        self.asked = speed * self._fastest[0], turn * self._fastest[1]
+    @property
+    def idle(self) -> bool:
+        """Tell whether nobody steers and every stop has been sent."""
+        return self._until == -math.inf and not self._stops
 
-    def release(self, who: object) -> None:
-        """Stop, if it is this one that steers."""
-        if who is self._holder:
-            self.stop()
+    def hold(self, stamp: float, speed: float, turn: float) -> None:
+        """Steer by shares of the fastest, with a command that was given after a time, s."""
+        self._until, self._stops = stamp + HOLD, STOPS
+        self.asked = speed * self._fastest[0], turn * self._fastest[1]
 
     def stop(self) -> None:
         """Stop, whoever steers."""
-        self._until, self._holder = -math.inf, None
+        self._until = -math.inf
 
     def beat(self, now: float) -> None:
         """Send what is to be sent at a time, s; nothing if nobody has steered."""
         if now > self._until:
-            self.asked, self._holder = (0.0, 0.0), None
+            self.stop()
+            self.asked = 0.0, 0.0
             if not self._stops:
                 return
             self._stops -= 1

@@ -31,8 +31,8 @@ from websockets.http11 import Request, Response
 FILES = Path(__file__).parent / 'page'
 TYPES = {'.html': 'text/html', '.css': 'text/css', '.js': 'text/javascript',
          '.svg': 'image/svg+xml'}
-#: Pages at once, connections that have not said what they want, and a request's size, bytes.
-MOST, WAITING, LONGEST = 16, 64, 4096
+#: A request's size, bytes.
+LONGEST = 4096
 #: Where recordings are fetched.
 BAGS = '/bags/'
 #: What the browser lets the page do: nothing that is not from here.
@@ -84,8 +84,8 @@ class WebServer:
         if refused:
             return _text(HTTPStatus.FORBIDDEN, refused)
         if path == '/socket':
-            if len(self._pages.open) >= MOST:
-                return _text(HTTPStatus.SERVICE_UNAVAILABLE, f'{MOST} pages are open already')
+            if self._pages.full:
+                return _text(HTTPStatus.SERVICE_UNAVAILABLE, 'too many pages are open')
             return None
         if path.startswith(BAGS) and path.endswith('.zip'):
             try:
@@ -97,8 +97,7 @@ class WebServer:
         return _text(HTTPStatus.NOT_FOUND, 'there is nothing here')
 
     async def _page(self, connection: ServerConnection) -> None:
-        page = Page(connection)
-        self._pages.open.add(page)
+        page = self._pages.admit(connection)
         # One request may wait for another node; a stop must not wait for that.
         under_way: set[asyncio.Task] = set()
         try:
@@ -113,8 +112,9 @@ class WebServer:
         except ConnectionClosed:
             pass
         finally:
-            self._pages.open.discard(page)
             self._gone(page)
+            if promoted := self._pages.leave(page):
+                self._come(promoted)
 
 
 def _text(status: HTTPStatus, text: str) -> Response:

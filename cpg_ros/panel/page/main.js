@@ -1,5 +1,6 @@
 // The page: messages from the node go to its parts, and user actions go to the node.
 import { Body } from './body.js';
+import { Lease } from './lease.js';
 import { Parameters } from './parameters.js';
 import { Plots } from './plots.js';
 import { Scene } from './scene.js';
@@ -33,13 +34,13 @@ dark.addEventListener('change', paint);
 
 // -- its parts --------------------------------------------------------------------------------
 
-let socket = null, opened = false, state = {}, body = null, frames = 0, counted = 0, fresh = true;
+let opened = false, state = {}, body = null, frames = 0, counted = 0, fresh = true;
 const last = {};
-const send = (request) => {
-  if (socket?.readyState === WebSocket.OPEN) socket.send(JSON.stringify(request));
-};
+const link = new Worker('link.js');
+const send = (request) => link.postMessage({ send: request });
 const parameters = new Parameters((name, value) => send({ do: 'set', name, value }));
-const steering = new Steering(send);
+const lease = new Lease(send);
+const steering = new Steering((held) => link.postMessage({ held }));
 const scene = new Scene(at('scene'), camera, () => {
   fresh = true;
   remember();
@@ -47,7 +48,7 @@ const scene = new Scene(at('scene'), camera, () => {
 const plots = new Plots(view, remember);
 // What tests look at.
 window.panel = { get frames() { return frames; }, last, get state() { return state; },
-  get body() { return body; }, scene };
+  get body() { return body; }, get lease() { return lease.now; }, scene, steering };
 
 function say(text, kind) {
   const line = Object.assign(document.createElement('p'), { textContent: text, className: kind });
@@ -67,9 +68,10 @@ function beside() {
   at('pushing').hidden = !simulation;
   at('fit').disabled = !inversion;
   const steered = parameters.known.cmd_vel?.value === true;
-  steering.enable(steered);
-  at('steered').textContent = steered ? `up to ${state.fastest[0]} m/s and ${state.fastest[1]} rad/s`
-    : 'this generator ignores cmd_vel; start it with cmd_vel:=true to steer';
+  steering.enable(steered && lease.steers);
+  at('steered').textContent = lease.reason || (steered
+    ? `up to ${state.fastest[0]} m/s and ${state.fastest[1]} rad/s`
+    : 'this generator ignores cmd_vel; start it with cmd_vel:=true to steer');
 }
 
 const takes = {
@@ -141,6 +143,14 @@ const takes = {
       return made;
     }));
   },
+  lease(message) {
+    lease.take(message);
+    beside();
+  },
+  let_go() {
+    steering.release();
+    say('steering stopped: this page stood still', 'refused');
+  },
   said(message) {
     say(message.text, message.kind);
     if (message.kind === 'refused') parameters.restore();
@@ -158,30 +168,50 @@ function connect() {
   where.protocol = location.protocol === 'https:' ? 'wss:' : 'ws:';
   where.hash = '';
   where.search = token ? `?token=${encodeURIComponent(token)}` : '';
-  socket = new WebSocket(where);
-  socket.onopen = () => {
-    opened = true;
-    takes.wanted = false;
-    chip(at('link-state'), 'connected', 'ok');
-  };
-  socket.onmessage = (event) => {
-    const message = JSON.parse(event.data);
-    takes[message.type]?.(message);
-  };
-  socket.onclose = () => {
-    steering.release();
-    chip(at('link-state'), opened ? 'the panel is gone; reconnecting'
-      : 'cannot connect: is the panel running, and is the token in the address right?', 'error');
-    setTimeout(connect, 1000);
-  };
+  link.postMessage({ connect: where.href });
 }
+
+takes.opened = () => {
+  opened = true;
+  takes.wanted = false;
+  chip(at('link-state'), 'connected', 'ok');
+};
+takes.closed = () => {
+  steering.release();
+  chip(at('link-state'), opened ? 'the panel is gone; reconnecting'
+    : 'cannot connect: is the panel running, and is the token in the address right?', 'error');
+  setTimeout(connect, 1000);
+};
+link.onmessage = ({ data }) => {
+  takes[data.type]?.(data);
+  if (data.type === 'frame') link.postMessage({ drawn: true });
+};
+// The link stops the robot if it does not hear that this thread runs.
+setInterval(() => link.postMessage({}), 50);
 
 // -- drawing ----------------------------------------------------------------------------------
 
+// Where a picture takes so long, ms, none is drawn while the robot is steered.
+const SLOW = 100;
+let slowest = 0;
+const pauses = () => !!steering.held && slowest > SLOW;
+
+// Draw, and take note of how long that takes.
+function timed(drawing) {
+  const began = performance.now();
+  drawing();
+  link.postMessage({});
+  slowest = Math.max(performance.now() - began, 0.95 * slowest);
+}
+
 function draw() {
   requestAnimationFrame(draw);
-  if (!fresh) return;
+  if (!fresh || pauses()) return;
   fresh = false;
+  timed(picture);
+}
+
+function picture() {
   const named = (key) => Object.fromEntries((plots.names[key] || []).map((name, k) =>
     [name, last[key === 'joints' ? 'angles' : key]?.[k]]).filter(([, value]) => value != null));
   if (body) {
@@ -193,7 +223,8 @@ function draw() {
 
 setInterval(() => {
   if (document.hidden) return;
-  plots.draw();
+  at('paused').hidden = !pauses();
+  if (!pauses()) timed(() => plots.draw());
   const digits = (value, unit) => value == null ? '–' : `${value.toFixed(2)} ${unit}`;
   at('speed').textContent = digits(last.speed?.[0], 'm/s');
   at('turning').textContent = digits(last.speed?.[2], 'rad/s');
@@ -208,7 +239,7 @@ setInterval(() => {
 
 const stop = () => {
   steering.release();
-  send({ do: 'enable', on: false });
+  send({ do: 'stop' });
 };
 at('generators').onchange = () => send({ do: 'choose', node: at('generators').value });
 at('stop').onclick = stop;

@@ -1,10 +1,9 @@
 // The pad and the arrow keys: the robot is steered only while one of them is held.
 
-const AGAIN = 100;  // ms; the node stops the robot if it hears nothing for three times as long
-
 export class Steering {
-  constructor(send) {
-    this.send = send;
+  // What is held goes to the link, which repeats it: [speed, turn], or null.
+  constructor(hold) {
+    this.send = hold;
     this.pad = document.getElementById('pad');
     this.knob = this.pad.querySelector('i');
     this.keys = new Set();
@@ -23,21 +22,14 @@ export class Steering {
     if (!this.able) return;
     this.held = [speed, turn];
     this.knob.style.transform = `translate(${-4 * turn}rem, ${-4 * speed}rem)`;
-    this.say();
-    this.timer ??= setInterval(() => this.say(), AGAIN);
-  }
-
-  say() {
-    if (this.held) this.send({ do: 'steer', speed: this.held[0], turn: this.held[1] });
+    this.send(this.held);
   }
 
   // Let go: whatever was held, and nothing is sent after it.
   release() {
     this.keys.clear();
     this.knob.style.transform = '';
-    clearInterval(this.timer);
-    this.timer = null;
-    if (this.held) this.send({ do: 'stop' });
+    if (this.held) this.send(null);
     this.held = null;
   }
 
@@ -49,6 +41,7 @@ export class Steering {
         clip((box.left + box.width / 2 - event.clientX) / reach));
     };
     pad.addEventListener('pointerdown', (event) => {
+      if (!this.able) return;
       pad.setPointerCapture(event.pointerId);
       follow(event);
     });

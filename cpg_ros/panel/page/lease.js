@@ -1,0 +1,64 @@
+// Who has control of the robot, and the click that takes it over.
+
+const at = (id) => document.getElementById(id);
+const listed = (names) => names.length < 2 ? names.join('')
+  : `${names.slice(0, -1).join(', ')} and ${names.at(-1)}`;
+
+export class Lease {
+  constructor(send) {
+    this.now = null;
+    at('take-over').onclick = () => send({ do: 'take_over' });
+    at('release').onclick = () => send({ do: 'release' });
+  }
+
+  // Whether this page may steer, or would by its first command.
+  get steers() {
+    const { now } = this;
+    return !!now && !now.stop_only && (now.yours || !now.holder) && now.confirmed;
+  }
+
+  get watches() {
+    return !!this.now && (this.now.stop_only || (!!this.now.holder && !this.now.yours));
+  }
+
+  // Why the robot does not move as steered, '' if it does.
+  get reason() {
+    const { now } = this;
+    if (!now || (this.steers && now.round_trip === null)) return '';
+    if (now.stop_only) return 'this page can only stop the robot';
+    if (this.watches) return `${now.holder} has control`;
+    if (now.round_trip !== null) return `link too slow to steer: ${now.round_trip.toFixed(1)} s`;
+    return `cmd_vel is also published by ${listed(now.others)}`;
+  }
+
+  text() {
+    const { now } = this, lines = [];
+    if (now.stop_only) return ['16 pages are already open: this one can only stop the robot. '
+      + 'It gets full access when another page closes.'];
+    if (now.yours) lines.push('This page has control.');
+    else if (!now.holder) lines.push('Nobody has control: the first command takes it.');
+    else if (now.lost_to === now.holder) lines.push(`${now.holder} took over. This page only watches.`);
+    else lines.push(`${now.holder} has control. This page only watches.`);
+    if (now.others.length) {
+      lines.push(`cmd_vel is also published by ${listed(now.others)}${now.confirmed
+        ? ': both steer.' : '. To steer, take over.'}`);
+    }
+    if (now.round_trip !== null) {
+      lines.push(`Link too slow to steer: ${now.round_trip.toFixed(1)} s (limit ${now.limit} s).`);
+    }
+    return lines;
+  }
+
+  take(message) {
+    this.now = message;
+    const others = message.others.length > 0 && !message.confirmed;
+    at('control').className = message.yours ? 'yours' : this.watches ? 'other' : '';
+    at('control').classList.toggle('warn', others || message.round_trip !== null);
+    at('this-page').textContent = `this is ${message.page}`;
+    at('holder').replaceChildren(...this.text().map((textContent) =>
+      Object.assign(document.createElement('p'), { textContent })));
+    at('take-over').hidden = message.stop_only || !(this.watches || others);
+    at('release').hidden = !message.yours;
+    document.body.classList.toggle('watching', this.watches);
+  }
+}
