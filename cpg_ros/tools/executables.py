@@ -21,6 +21,8 @@ import signal
 import sys
 from types import FrameType
 
+#: The signals by which users, terminals and launch files end a process.
+ENDINGS = signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT
 #: Executable -> module whose ``main`` it runs.
 PLACES = {'generator': 'nodes.generator', 'robot_sim': 'nodes.robot_sim',
           'unitree_bridge': 'nodes.unitree.bridge', 'panel': 'panel.panel_node',
@@ -31,15 +33,24 @@ PLACES = {'generator': 'nodes.generator', 'robot_sim': 'nodes.robot_sim',
 
 def start(name: str) -> int:
     """Run an executable on the words of the command line; return its exit code."""
-    def leave(number: int, _: FrameType | None) -> None:
+    def leave(number: int, _: FrameType | None = None) -> None:
         # An exception amid the loading of compiled code would become another error there.
         print(f'{name}: stopped', file=sys.stderr, flush=True)
         os._exit(128 + number)
 
-    before = signal.signal(signal.SIGINT, leave)
+    before = {number: signal.getsignal(number) for number in ENDINGS}
+    for number in ENDINGS:
+        if before[number] != signal.SIG_IGN:
+            signal.signal(number, leave)
     main = import_module(f'cpg_ros.{PLACES[name]}').main
-    signal.signal(signal.SIGINT, before)
-    return main()
+    try:
+        for number in ENDINGS:
+            signal.signal(number, before[number])
+        return main()
+    except KeyboardInterrupt:
+        # Before what it runs says what is to be done then.
+        leave(signal.SIGINT)
+        raise
 
 
 (generator, robot_sim, unitree_bridge, panel, inversion, cpg, demo, analyze, check_robot,
