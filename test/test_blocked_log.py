@@ -31,7 +31,7 @@ import numpy as np
 import pytest
 from rcl_interfaces.msg import Log
 from rclpy.qos import DurabilityPolicy, QoSProfile
-from std_srvs.srv import SetBool
+from std_srvs.srv import SetBool, Trigger
 from unitree_faults import BRIDGE, Walk
 
 KINDS = 'terminal', 'pipe', 'small pipe', 'full disk'
@@ -77,15 +77,13 @@ class Console:
         elif self.kind != 'full disk':
             self._reading.set()
 
-    def close(self):
-        os.close(self.node)
-
 
 @pytest.fixture(params=KINDS)
 def console(request):
     console = Console(request.param)
     yield console
     console.unblock()
+    os.close(console.node)
 
 
 def dropped(watcher):
@@ -110,7 +108,6 @@ def test_a_generator_moves_on_and_ends_at_the_stand(console):
         Log, '/rosout', lambda message: said.append(message.msg),
         QoSProfile(depth=1000, durability=DurabilityPolicy.TRANSIENT_LOCAL))
     try:
-        console.close()
         watcher.record(1.0)
         console.block()
         for _ in range(3000):
@@ -132,8 +129,7 @@ def test_a_generator_moves_on_and_ends_at_the_stand(console):
         watcher.record(1.0)
         process.signal(signal.SIGTERM)
         assert ended(process) == 0
-        watcher.node.get_clock()
-        assert not np.any(watcher.samples[-1][2])
+        until(lambda: not np.any(watcher.samples[-1][2]), 'the last message, at rest')
         stand = {'hip': 0.0, 'thigh': 0.8, 'calf': -1.5}
         assert watcher.samples[-1][1] == pytest.approx(
             [stand[name.split('_')[1]] for name in watcher.names], abs=1e-9)
@@ -153,19 +149,29 @@ def test_a_generator_moves_on_and_ends_at_the_stand(console):
 @pytest.mark.parametrize('number', [signal.SIGTERM, signal.SIGHUP])
 def test_a_bridge_sits_down(console, number):
     class Blocked(Walk):
+        # It stands, which a shared machine can let it do.
+        def start_generator(self):
+            self.generator = Process('-p', 'autostart:=false', domain=self.domain)
+
         def start_bridge(self):
             self.bridge = Process(*self._parameters, domain=self.domain, executable=BRIDGE,
                                   output=console.node)
-            console.close()
 
-    walk = Blocked('state_timeout:=0.5', 'target_timeout:=0.5')
+    walk = Blocked('rate:=200.0', 'state_timeout:=0.2')
     health = []
     walk.watcher.node.create_subscription(
         DiagnosticArray, '/diagnostics', lambda message: health.extend(
             value.key for status in message.status if 'unitree' in status.name
             for value in status.values), 10)
     try:
-        walk.wait_for('standing')
+        for _ in range(10):
+            until(lambda: walk.phase in ('standing', 'damping'), 'the stand')
+            if walk.phase == 'standing':
+                break
+            # A shared machine stood still.
+            walk.watcher.call(Trigger, '/unitree_bridge/start', Trigger.Request())
+            until(lambda: walk.phase != 'damping' or not walk.robot.damped, 'the start')
+            time.sleep(1.0)
         console.block()
         until(lambda: 'log lines dropped' in health, 'the health')
         walk.bridge.signal(number)
@@ -206,7 +212,6 @@ def test_nothing_that_a_process_writes_makes_it_wait(kind):
     console = Console(kind)
     console.block()
     process = run(STRAYS, console.node)
-    console.close()
     assert process.wait(60.0) == 0
     console.unblock()
     if kind != 'full disk':
@@ -297,7 +302,6 @@ def test_a_paused_terminal_does_not_hold_up_the_end_of_a_start():
     console = Console('terminal')
     console.block()
     process = Process('-p', 'gait:=gallop_sideways', output=console.node)
-    console.close()
     assert ended(process) in (1, None) and process._process.wait(60.0) == 1
     console.unblock()
     until(lambda: "gait 'gallop_sideways' is not one of" in console.text, 'the reason')
@@ -306,12 +310,10 @@ def test_a_paused_terminal_does_not_hold_up_the_end_of_a_start():
 @pytest.mark.parametrize('name', ['generator', 'inversion', 'robot_sim', 'panel'])
 def test_every_node_ends_though_its_terminal_is_paused(name):
     console = Console('terminal')
-    node = {'inversion': 'inversion'}.get(name, name)
     words = ['-p', 'gait:=trot'] if name == 'generator' else []
     domain = free_domain()
     process = Process(*words, '-r', '__ns:=/blocked', domain=domain,
-                      executable=EXECUTABLE.with_name(node), output=console.node)
-    console.close()
+                      executable=EXECUTABLE.with_name(name), output=console.node)
     watcher = Watcher(domain)
     try:
         until(lambda: watcher.node.get_publishers_info_by_topic('/rosout'), 'the node')
