@@ -13,12 +13,40 @@
 # limitations under the License.
 
 from glob import glob
+from pathlib import Path
 
 from setuptools import find_packages, setup
+from setuptools.command.install_scripts import install_scripts
+
+#: Ctrl-C is no traceback from the first line on, and nobody looks for the package's metadata.
+SCRIPT = """{shebang}
+import os
+import signal
+
+if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
+    signal.signal(signal.SIGINT, lambda *_: os._exit(130))
+
+from cpg_ros.tools.executables import {name}
+
+if __name__ == '__main__':
+    raise SystemExit({name}())
+"""
+
+
+class Scripts(install_scripts):
+    """Executables that can be interrupted as soon as Python runs them."""
+
+    def run(self):
+        super().run()
+        for path in map(Path, self.outfiles):
+            shebang, _, _ = path.read_text().partition('\n')
+            path.write_text(SCRIPT.format(shebang=shebang, name=path.name))
+
 
 setup(
     name='cpg_ros',
     version='0.1.0',
+    cmdclass={'install_scripts': Scripts},
     packages=find_packages(include=['cpg_ros', 'cpg_ros.*']),
     package_data={'cpg_ros': ['py.typed', 'panel/page/*']},
     data_files=[

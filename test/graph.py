@@ -56,16 +56,17 @@ def free_domain() -> int:
 
 
 class Process:
-    """The installed generator in a domain of its own, its log kept."""
+    """The installed generator in a domain of its own, its log kept unless it goes elsewhere."""
 
     def __init__(self, *ros_args: str, domain: int | None = None, executable: Path = EXECUTABLE,
-                 environment: dict[str, str] | None = None) -> None:
+                 environment: dict[str, str] | None = None,
+                 output: int = subprocess.PIPE) -> None:
         self.domain = free_domain() if domain is None else domain
         variables = {**os.environ, 'ROS_DOMAIN_ID': str(self.domain),
                      'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST', 'ROS_PYTHON_CHECK_FIELDS': '1',
                      'PYTHONUNBUFFERED': '1', **(environment or {})}
         command = [str(executable), *(['--ros-args', *ros_args] if ros_args else [])]
-        self._process = subprocess.Popen(command, env=variables, stdout=subprocess.PIPE,
+        self._process = subprocess.Popen(command, env=variables, stdout=output,
                                          stderr=subprocess.STDOUT, text=True)
         self.pid = self._process.pid
         self.lines: list[str] = []
@@ -73,7 +74,7 @@ class Process:
         self._reader.start()
 
     def _read(self) -> None:
-        for line in self._process.stdout:
+        for line in self._process.stdout or ():
             self.lines.append(line.rstrip())
 
     @property

@@ -14,15 +14,23 @@
 
 """Two thousand hostile parameter requests; the benchmark sends more and times them."""
 
+import os
 from pathlib import Path
 import sys
 
 from cpg_ros.networks.delayed import PRESETS
-from graph import off_grid
+from graph import off_grid, until
 import numpy as np
 import pytest
-from rcl_interfaces.msg import ParameterType
-from rcl_interfaces.srv import SetParameters, SetParametersAtomically
+from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
+from rcl_interfaces.srv import (
+    DescribeParameters,
+    GetParameters,
+    GetParameterTypes,
+    ListParameters,
+    SetParameters,
+    SetParametersAtomically,
+)
 
 TYPES = {bool: ParameterType.PARAMETER_BOOL, float: ParameterType.PARAMETER_DOUBLE,
          str: ParameterType.PARAMETER_STRING}
@@ -70,3 +78,40 @@ def test_hostile_requests_change_nothing_they_should_not(start, hostile):
     assert off_grid([sample[0] for sample in samples], 0.005) < 1e-3
     steps = np.abs(np.diff([sample[1] for sample in samples], axis=0))
     assert steps.max() <= 0.005 * 20.0 * (1.0 + 1e-6)
+
+
+def cpu(process):
+    """Seconds of CPU time that a process has used."""
+    fields = Path(f'/proc/{process.pid}/stat').read_text().rpartition(')')[2].split()
+    return sum(map(int, fields[11:13])) / os.sysconf('SC_CLK_TCK')
+
+
+def test_a_request_of_100000_parameters_costs_nothing(start):
+    process, watcher = start('-p', 'rate:=50', '-p', 'combined_topic:=joint_states')
+    names = [f'name{k}' for k in range(100_000)]
+    values = [Parameter(name=name, value=ParameterValue(
+        type=ParameterType.PARAMETER_DOUBLE, double_value=1.0)) for name in names]
+    watcher.record(0.5)
+    for name, kind, request, reason in (
+            ('set_parameters', SetParameters, {'parameters': values},
+             lambda answer: answer.results[0].reason),
+            ('set_parameters_atomically', SetParametersAtomically, {'parameters': values},
+             lambda answer: answer.result.reason),
+            ('get_parameters', GetParameters, {'names': names},
+             lambda answer: not answer.values and process.log),
+            ('get_parameter_types', GetParameterTypes, {'names': names},
+             lambda answer: not answer.types and process.log),
+            ('describe_parameters', DescribeParameters, {'names': names},
+             lambda answer: not answer.descriptors and process.log),
+            ('list_parameters', ListParameters, {'prefixes': names},
+             lambda answer: not answer.result.names and process.log)):
+        before, lines, published = cpu(process), len(process.lines), len(watcher.samples)
+        answer = watcher.call(kind, f'/cpg_generator/{name}', kind.Request(**request))
+        # Converting the values takes 5 s of it, looking up the names more than a second.
+        assert cpu(process) - before < 1.0, name
+        until(lambda reason=reason, answer=answer: '100000 parameters in one request: at most '
+              '1000 are allowed' in str(reason(answer)), f'the reason of {name}')
+        until(lambda published=published: len(watcher.samples) > published + 50, 'joint states')
+        assert len(process.lines) <= lines + 1
+    assert watcher.set(gait='walk')[0].successful
+    assert watcher.get('gait', 'rate') == ['walk', 50.0]

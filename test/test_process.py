@@ -16,6 +16,7 @@
 
 from pathlib import Path
 import signal
+import time
 
 from ament_index_python.packages import get_package_share_directory
 from diagnostic_msgs.msg import DiagnosticStatus
@@ -27,7 +28,8 @@ import yaml
 CONFIG = Path(get_package_share_directory('cpg_ros')) / 'config'
 
 
-@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM, signal.SIGHUP,
+                                    signal.SIGQUIT])
 def test_a_signal_ends_it_at_the_stand_with_code_0(start, number):
     process, watcher = start('-p', 'rate:=200', '-p', 'frequency:=2')
     watcher.record(1.5)
@@ -42,6 +44,41 @@ def test_a_signal_ends_it_at_the_stand_with_code_0(start, number):
     assert velocity == pytest.approx([0.0] * 12, abs=1e-9)
     speeds = np.abs(np.diff([sample[1] for sample in watcher.samples], axis=0)) / 0.005
     assert speeds.max() <= 20.0
+
+
+def test_nohup_lets_it_live_on_without_its_terminal(start):
+    before = signal.signal(signal.SIGHUP, signal.SIG_IGN)
+    try:
+        process, watcher = start('-p', 'rate:=200')
+    finally:
+        signal.signal(signal.SIGHUP, before)
+    process.signal(signal.SIGHUP)
+    watcher.record(1.5)
+    assert process.alive and np.any(watcher.samples[-1][2])
+
+
+# Instants of a start-up, s, and some of the interpreter's own, of which a package knows nothing.
+@pytest.mark.parametrize('instant', np.random.default_rng(28).uniform(0.0, 2.5, 20).round(3))
+def test_ctrl_c_while_it_starts_is_no_traceback(start, instant):
+    process = start('-p', 'autostart:=false', watch=False)
+    time.sleep(instant)
+    process.signal(signal.SIGINT)
+    code = process.wait()
+    if 'Fatal Python error: init' in process.log or (code == -signal.SIGINT and not process.log):
+        pytest.skip('Python itself was starting')
+    assert code in (0, 130)
+    assert 'Traceback' not in process.log and len(process.lines) < 10
+
+
+@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM, signal.SIGHUP,
+                                    signal.SIGQUIT])
+def test_a_signal_while_it_imports_is_one_line(start, number):
+    process = start('-p', 'autostart:=false', watch=False)
+    maps = Path(f'/proc/{process.pid}/maps')
+    until(lambda: 'multiarray' in maps.read_text(), 'numpy, the first to be imported')
+    process.signal(number)
+    assert process.wait() == 128 + number
+    assert process.lines == ['generator: stopped']
 
 
 def test_a_volley_of_signals_ends_it(start):

@@ -20,6 +20,7 @@ from cpg_ros.motion.pattern import Pattern
 from cpg_ros.nodes.cmd_vel import CmdVel
 from cpg_ros.nodes.deadline_thread import Ticker
 from cpg_ros.nodes.feedback_switch import FeedbackSwitch
+from cpg_ros.nodes.log_queue import QUEUE
 from cpg_ros.nodes.rivals import Rivals
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.clock import Clock
@@ -85,6 +86,7 @@ class Diagnostics:
             'rate wanted [Hz]': f'{self._ticker.rate:.6g}', 'ticks in the last second':
             str(new['ticks']), **{key: str(value) for key, value in counts.items()},
             'worst delay of a tick [ms]': f'{1e3 * self._ticker.worst:.3f}',
+            'log lines dropped': str(QUEUE.dropped),
         }
         if self._cmd_vel:
             values['cmd_vel'] = self._cmd_vel.state

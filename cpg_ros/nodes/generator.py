@@ -57,7 +57,7 @@ from std_msgs.msg import String
 from std_srvs.srv import SetBool
 
 NAME = 'cpg_generator'
-#: On SIGINT or SIGTERM the ramp takes this long, and the node ends by the later time, s.
+#: When a signal ends the node, the ramp takes this long, and the node ends by the later time, s.
 LAST_RAMP, LAST_DEADLINE = 0.5, 0.8
 #: Two nodes know of one another this long after the later one joined the graph, s: they are
 #: announced every 3 s, and the first announcements of a busy machine are lost at times.
@@ -329,7 +329,7 @@ class Generator(StartedNode):
 
 
 def main(args: list[str] | None = None) -> int:
-    """Run the node until SIGINT or SIGTERM; return the exit code."""
+    """Run the node until a signal ends it; return the exit code."""
     known = {'network': NETWORK, **specs(find_network(NETWORK.default)),
              'feedback': feedback_parameters.SWITCH, **feedback_parameters.TOPICS}
     code = asked_for_help('generator', 'Publishes the joint states of a gait; the parameters of '

@@ -241,7 +241,7 @@ def _started() -> Inversion:
 
 
 def run(args: list[str] | None = None) -> int:
-    """Run the node until SIGINT or SIGTERM; return the exit code."""
+    """Run the node until a signal ends it; return the exit code."""
     code = starting.asked_for_help('inversion', 'Fits the joint states that it hears.', SPECS,
                                    args)
     return starting.run(_started, NAME, args) if code is None else code

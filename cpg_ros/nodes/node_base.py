@@ -25,10 +25,11 @@ import traceback
 from typing import Any
 
 from cpg_ros.errors import CpgError
+from cpg_ros.nodes.log_queue import NO_FILE, QUEUE, QueuedLogger
 from cpg_ros.nodes.parameter_services import StrictParameterService
 from cpg_ros.nodes.parameter_spec import as_doubles, as_list, kind_of, Spec
 from cpg_ros.nodes.real_time import leave_shared_memory
-from cpg_ros.nodes.shutdown import ended
+from cpg_ros.nodes.shutdown import ended, endings
 import rclpy
 from rclpy.exceptions import (
     InvalidParameterTypeException,
@@ -37,7 +38,6 @@ from rclpy.exceptions import (
     ParameterException,
 )
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
-from rclpy.logging import get_logger
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.signals import SignalHandlerOptions
@@ -63,7 +63,8 @@ class StartedNode(Node):
     """
 
     def __init__(self, name: str, **options: Any) -> None:
-        super().__init__(name, start_parameter_services=False, **options)
+        super().__init__(name, start_parameter_services=False, enable_rosout=False, **options)
+        self._logger = QueuedLogger.of(self)
         self.parameter_service = StrictParameterService(self)
         self._doubles: set[str] = set()
         self.add_pre_set_parameters_callback(self._complete)
@@ -206,11 +207,12 @@ def _domain() -> str:
 
 
 def run(make: Callable[[], StartedNode], name: str, args: list[str] | None) -> int:
-    """Run a node until SIGINT or SIGTERM, or until it stops itself; return the exit code."""
+    """Run a node until a signal ends it, or until it stops itself; return the exit code."""
     def leave(*_: object) -> None:
         raise SystemExit(0)
 
-    for number in (signal.SIGINT, signal.SIGTERM):
+    ending = endings()
+    for number in ending:
         signal.signal(number, leave)
     # The publishing thread must not wait long for one that computes in Python.
     sys.setswitchinterval(2e-4)
@@ -218,21 +220,29 @@ def run(make: Callable[[], StartedNode], name: str, args: list[str] | None) -> i
         print(f'{name}: {wrong}', file=sys.stderr)
         return 2
     leave_shared_memory()
+    words = sys.argv if args is None else args
     try:
-        rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
+        QUEUE.start(name, words)
+    except OSError as error:
+        print(f'{name}: no process that writes the log can be started: {error.strerror}',
+              file=sys.stderr)
+        return 1
+    try:
+        rclpy.init(args=[*words, '--ros-args', NO_FILE],
+                   signal_handler_options=SignalHandlerOptions.NO)
     except RuntimeError as error:
         print(f'{name}: ROS arguments: {_first(error)}', file=sys.stderr)
         return 2
     try:
         node = make()
     except StartError as error:
-        get_logger(name).fatal(str(error))
+        QueuedLogger(name).fatal(str(error))
         rclpy.shutdown()
         return 1
     # An Event may not be set here: a signal that comes while it is being waited for, or while
     # another one sets it, would wait for ever for the lock that its own thread holds.
     signals: list[int] = []
-    for number in (signal.SIGINT, signal.SIGTERM):
+    for number in ending:
         signal.signal(number, lambda number, _: signals.append(number))
     executor = SingleThreadedExecutor()
     executor.add_node(node)
@@ -248,7 +258,7 @@ def run(make: Callable[[], StartedNode], name: str, args: list[str] | None) -> i
     node.stop.set()
     node.parameter_service.end()
     node.finish()
-    for number in (signal.SIGINT, signal.SIGTERM):
+    for number in ending:
         # It ends already: a second one, while the interpreter winds up, would kill it.
         signal.signal(number, signal.SIG_IGN)
     executor.shutdown(timeout_sec=0.1)

@@ -21,6 +21,7 @@ import traceback
 from typing import Any
 import weakref
 
+from cpg_ros.nodes.bounded_request import bounded
 from cpg_ros.nodes.unserved import Unserved
 from rcl_interfaces import srv
 from rcl_interfaces.msg import Parameter as ParameterMessage
@@ -33,8 +34,19 @@ from rclpy.parameter_service import ParameterService
 from rclpy.qos import qos_profile_parameters
 from rclpy.service import Service
 
+#: Names or values in a request at most; no node has nearly as many parameters.
+MOST = 1000
 #: How often it is seen whether the node is to end, ns.
 LOOK = 100_000_000
+
+
+#: What is taken instead of a request.
+_BOUNDED = {kind: bounded(kind, MOST)
+            for kind in (srv.SetParameters, srv.SetParametersAtomically)}
+
+
+def _too_many(count: int) -> str:
+    return f'{count} parameters in one request: at most {MOST} are allowed'
 
 
 def _refused(reason: str) -> SetParametersResult:
@@ -55,9 +67,9 @@ class StrictParameterService(ParameterService):
 
     The executor has nothing to do with it and stays free for what must not wait, such as a stop.
     Of several changes of the same parameters that wait, only the last one is judged. Values of no
-    known type and unknown names are refused with a reason: rclpy 7.1 lets the exception of the
-    first out of the executor, so that one request ends the node, and answers the second without
-    the name.
+    known type, unknown names and more than MOST of them are refused with a reason: rclpy 7.1 lets
+    the exception of the first out of the executor, so that one request ends the node, and answers
+    the second without the name.
 
     Attributes:
         thread: judges and applies what is asked for, once it is started.
@@ -73,7 +85,7 @@ class StrictParameterService(ParameterService):
                 (srv.GetParameters, self._get_parameters_callback),
                 (srv.GetParameterTypes, self._get_parameter_types_callback),
                 (srv.ListParameters, self._list_parameters_callback)):
-            self._serve(kind, answer, group)
+            self._serve(kind, partial(self._counted, answer), group)
         own = Unserved()
         self._each = self._serve(srv.SetParameters, _untaken, own)
         self._together = self._serve(srv.SetParametersAtomically, _untaken, own)
@@ -85,6 +97,15 @@ class StrictParameterService(ParameterService):
         name = ''.join(f'_{c.lower()}' if c.isupper() else c for c in kind.__name__)
         return node.create_service(kind, f'{node.get_name()}/{name[1:]}', answer,
                                    qos_profile=qos_profile_parameters, callback_group=group)
+
+    def _counted(self, answer: Callable, request: Any, response: Any) -> Any:
+        """Answer requests for what there is, those of too many names with an empty response."""
+        names = request.prefixes if hasattr(request, 'prefixes') else request.names
+        if len(names) <= MOST:
+            return answer(request, response)
+        self._get_node().get_logger().warning(
+            f'{type(request).__name__}: {_too_many(len(names))}', throttle_duration_sec=1.0)
+        return response
 
     def end(self) -> None:
         """Judge nothing more but what is under way."""
@@ -123,10 +144,18 @@ class StrictParameterService(ParameterService):
             kind: Any = service.srv_type
             while True:
                 with service.handle:
-                    request, header = service.handle.service_take_request(kind.Request)
+                    request, header = service.handle.service_take_request(_BOUNDED[kind])
                 if header is None:
                     break
                 response = kind.Response()
+                if isinstance(request, int):
+                    refused = _refused(_too_many(request))
+                    if service is self._together:
+                        response.result = refused
+                    else:
+                        response.results = [refused]
+                    service.send_response(response, header)
+                    continue
                 if service is self._together:
                     def tell(results: list, response: Any = response) -> None:
                         response.result, = results

@@ -26,6 +26,7 @@ from cpg_ros.nodes.lockstep import Lockstep
 from cpg_ros.nodes.node_base import asked_for_help, run, StartedNode, StartError
 from cpg_ros.nodes.parameter_spec import Spec
 from cpg_ros.nodes.sensor_publishers import Measurements
+from cpg_ros.nodes.shutdown import endings
 from cpg_ros.robots.robot import Robot
 from cpg_ros.robots.robot_file import find_robot, RobotError
 from cpg_ros.simulation.body import Body
@@ -323,7 +324,7 @@ class RobotSim(StartedNode):
         factor = self._now / self._rate / spent if spent else 0.0
         self.get_logger().info(f'{self._summary()}, {factor:.2f} times real time')
         hurried: list[int] = []
-        for number in (signal.SIGINT, signal.SIGTERM):
+        for number in endings():
             signal.signal(number, lambda number, _: hurried.append(number))
         try:
             for path in self._diary.write(self._value('model'), lambda: bool(hurried)):
@@ -334,7 +335,7 @@ class RobotSim(StartedNode):
 
 
 def main(args: list[str] | None = None) -> int:
-    """Run the node until SIGINT or SIGTERM, or its duration is over; return the exit code."""
+    """Run the node until a signal ends it, or its duration is over; return the exit code."""
     code = asked_for_help(NAME, 'Simulates a robot that a generator moves.', SPECS, args)
     return run(RobotSim, NAME, args) if code is None else code
 

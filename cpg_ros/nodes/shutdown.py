@@ -12,14 +12,22 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""How a node ends while one of its threads is still at work."""
+"""Which signals end a node, and how it ends while one of its threads is still at work."""
 
 import os
-import sys
+import signal
 import threading
+
+from cpg_ros.nodes.log_queue import QUEUE
 
 #: Seconds that a thread gets to come to its end.
 PATIENCE = 0.2
+
+
+def endings() -> list[signal.Signals]:
+    """Return the signals that end a node: that a terminal is gone does not if it began so."""
+    return [number for number in (signal.SIGINT, signal.SIGTERM, signal.SIGQUIT, signal.SIGHUP)
+            if number != signal.SIGHUP or signal.getsignal(number) != signal.SIG_IGN]
 
 
 def ended(code: int, *threads: threading.Thread | None) -> int:
@@ -31,7 +39,6 @@ def ended(code: int, *threads: threading.Thread | None) -> int:
     for thread in filter(None, threads):
         thread.join(PATIENCE)
         if thread.is_alive():
-            sys.stdout.flush()
-            sys.stderr.flush()
+            QUEUE.drain()
             os._exit(code)
     return code

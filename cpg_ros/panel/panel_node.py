@@ -245,7 +245,7 @@ class Panel(StartedNode):
 
 
 def main(args: list[str] | None = None) -> int:
-    """Run the node until SIGINT or SIGTERM; return the exit code."""
+    """Run the node until a signal ends it; return the exit code."""
     code = asked_for_help('panel', 'Shows, drives and records what is on the graph in a browser.',
                           SPECS, args)
     return run(Panel, NAME, args) if code is None else code

@@ -20,7 +20,10 @@ import os
 import signal
 import sys
 from types import FrameType
+from typing import NoReturn
 
+#: The signals by which users, terminals and launch files end a process.
+ENDINGS = signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT
 #: Executable -> module whose ``main`` it runs.
 PLACES = {'generator': 'nodes.generator', 'robot_sim': 'nodes.robot_sim',
           'unitree_bridge': 'nodes.unitree.bridge', 'panel': 'panel.panel_node',
@@ -31,15 +34,23 @@ PLACES = {'generator': 'nodes.generator', 'robot_sim': 'nodes.robot_sim',
 
 def start(name: str) -> int:
     """Run an executable on the words of the command line; return its exit code."""
-    def leave(number: int, _: FrameType | None) -> None:
+    def leave(number: int, _: FrameType | None = None) -> NoReturn:
         # An exception amid the loading of compiled code would become another error there.
         print(f'{name}: stopped', file=sys.stderr, flush=True)
         os._exit(128 + number)
 
-    before = signal.signal(signal.SIGINT, leave)
+    heeded = [number for number in ENDINGS if signal.getsignal(number) != signal.SIG_IGN]
+    for number in heeded:
+        signal.signal(number, leave)
     main = import_module(f'cpg_ros.{PLACES[name]}').main
-    signal.signal(signal.SIGINT, before)
-    return main()
+    try:
+        for number in heeded:
+            signal.signal(number, signal.default_int_handler if number == signal.SIGINT
+                          else signal.SIG_DFL)
+        return main()
+    except KeyboardInterrupt:
+        # What it runs has not begun to handle it.
+        return leave(signal.SIGINT)
 
 
 (generator, robot_sim, unitree_bridge, panel, inversion, cpg, demo, analyze, check_robot,

@@ -26,7 +26,9 @@ from typing import Any
 from cpg_ros.errors import CpgError
 from cpg_ros.nodes.command_topics import Commands, KINDS
 from cpg_ros.nodes.deadline_thread import Ticker
+from cpg_ros.nodes.log_queue import QUEUE
 from cpg_ros.nodes.node_base import asked_for_help, run, StartedNode, StartError
+from cpg_ros.nodes.shutdown import endings
 from cpg_ros.nodes.unitree.interfaces import message
 from cpg_ros.nodes.unitree.parameters import SPECS
 from cpg_ros.nodes.unitree.robot_graph import best_effort, BRIDGE, Others, quality
@@ -43,6 +45,7 @@ from cpg_ros.unitree.supervisor import DRIVEN, Phase, Supervisor
 from diagnostic_msgs.msg import DiagnosticStatus
 from rclpy.clock import Clock
 from rclpy.clock_type import ClockType
+from rclpy.impl.logging_severity import LoggingSeverity
 from rclpy.parameter import Parameter
 from rclpy.publisher import Publisher
 from rclpy.qos import DurabilityPolicy, QoSProfile
@@ -128,14 +131,9 @@ class UnitreeBridge(StartedNode):
 
     def _tell(self, phase: Phase, reason: str) -> None:
         """Say what the robot is made to do now, and why."""
-        text = f'{phase.value}: {reason}'
-        # rclpy knows a call by its line, and wants one severity of it.
-        if phase is Phase.DAMPING:
-            self.get_logger().error(text)
-        elif phase is Phase.SITTING:
-            self.get_logger().warning(text)
-        else:
-            self.get_logger().info(text)
+        severity = {Phase.DAMPING: LoggingSeverity.ERROR, Phase.SITTING: LoggingSeverity.WARN}
+        self.get_logger().log(f'{phase.value}: {reason}',
+                              severity.get(phase, LoggingSeverity.INFO))
         self._phase.publish(String(data=phase.value))
 
     # -- the thread -----------------------------------------------------------------------
@@ -276,7 +274,8 @@ class UnitreeBridge(StartedNode):
             'phase': phase.value, 'ticks in the last second': ticks,
             'states in the last second': received, 'commands in the last second': sent,
             'late ticks': ticker.late, 'dropped ticks': ticker.dropped,
-            'worst delay of a tick [ms]': f'{1e3 * ticker.worst:.3f}'})
+            'worst delay of a tick [ms]': f'{1e3 * ticker.worst:.3f}',
+            'log lines dropped': QUEUE.dropped})
         if received:
             self._sensors.publish_battery(self.get_clock().now().nanoseconds)
         if self._dry and phase is not Phase.IDLE:
@@ -289,7 +288,7 @@ class UnitreeBridge(StartedNode):
 
     def begin(self) -> None:
         """Start the thread, and lead the robot to its stand unless that waits for ~/start."""
-        for number in (signal.SIGINT, signal.SIGTERM):
+        for number in endings():
             signal.signal(number, self._leave)
         self.get_logger().info(
             f"{'dry run: ' * self._dry}a {self._value('model')} at {self._value('rate'):g} Hz; "
@@ -320,7 +319,7 @@ class UnitreeBridge(StartedNode):
 
 
 def main(args: list[str] | None = None) -> int:
-    """Run the node until SIGINT or SIGTERM; return the exit code."""
+    """Run the node until a signal ends it; return the exit code."""
     code = asked_for_help(BRIDGE, 'Leads a Unitree robot by what a generator publishes.', SPECS,
                           args)
     return run(UnitreeBridge, BRIDGE, args) if code is None else code

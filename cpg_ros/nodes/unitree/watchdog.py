@@ -26,6 +26,7 @@ import socket
 import sys
 import time
 
+from cpg_ros.nodes.log_queue import NO_FILE, QUEUE, QueuedLogger
 from cpg_ros.nodes.unitree.interfaces import message
 from cpg_ros.nodes.unitree.robot_graph import quality, WATCHDOG
 from cpg_ros.nodes.unitree.watchdog_link import address
@@ -76,14 +77,16 @@ def main(args: list[str]) -> int:
     domain, topic, period, process = int(args[0]), args[1], float(args[2]), int(args[3])
     # Ctrl-C in the bridge's terminal is the bridge's to handle.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    rclpy.init(domain_id=domain, signal_handler_options=SignalHandlerOptions.NO)
+    QUEUE.start(WATCHDOG, [])
+    rclpy.init(args=['--ros-args', NO_FILE], domain_id=domain,
+               signal_handler_options=SignalHandlerOptions.NO)
     node = rclpy.create_node(WATCHDOG, enable_rosout=False, start_parameter_services=False,
                              use_global_arguments=False)
     publisher = node.create_publisher(message('unitree_go/LowCmd'), topic, quality())
     with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as line:
         line.bind(address('watchdog', domain, topic))
         line.setblocking(False)
-        watch(line, publisher, period, process, node.get_logger())
+        watch(line, publisher, period, process, QueuedLogger(node.get_logger().name))
     rclpy.shutdown()
     return 0
 
