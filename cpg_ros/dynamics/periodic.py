@@ -21,6 +21,7 @@ from functools import cached_property, lru_cache
 from cpg_ros.dynamics.arclength import NoOrbit
 from cpg_ros.errors import InputError
 from cpg_ros.networks.network import Network
+from cpg_ros.networks.stated_gait import other_gait
 from cpg_ros.networks.symmetry import Symmetry
 import numpy as np
 
@@ -132,7 +133,8 @@ def check_values(network: Network, gait: str) -> None:
 
     Raises:
         InputError: a parameter is not finite, or the delay not positive.
-        NoOrbit: weights differ that the gait's symmetry needs to be equal.
+        NoOrbit: weights differ that the gait's symmetry needs to be equal, or the parameters
+            state the phases of another gait.
 
     """
     for name, value in network.as_dict().items():
@@ -143,6 +145,8 @@ def check_values(network: Network, gait: str) -> None:
     broken = network.broken(gait)
     if broken:
         raise NoOrbit(f'no {gait} with these weights: its symmetry needs {broken} to be equal')
+    if other := other_gait(network, gait):
+        raise NoOrbit(other)
 
 
 def richer(orbit: Orbit) -> str:

@@ -20,7 +20,7 @@ which the legs read (x or v), then the second one (w or u). All three networks h
 """
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
 from functools import cache
 from typing import Any, ClassVar, Literal, NamedTuple, TypeVar
@@ -34,11 +34,7 @@ from cpg_ros.networks.symmetry import Symmetry
 from cpg_ros.networks.terms import Number
 import numpy as np
 
-__all__ = ['Network', 'Preset', 'Range', 'footfall_order', 'known']
-
-#: Pairs of legs from the head on.
-GIRDLES = ('fore', 'middle', 'hind')
-
+__all__ = ['Network', 'Preset', 'Range', 'known']
 
 AnyNetwork = TypeVar('AnyNetwork', bound='Network')
 
@@ -92,7 +88,8 @@ class Network(ABC):
         couplings: parameters without which no cell hears another.
         offsets: leg -> the parameter that states by how many cycles it is ahead, where any phases
             are a gait and no symmetry tells them.
-        unnamed: the gait with whatever phases, of such a network.
+        unnamed: the gait whose phases have no name, of such a network.
+        rests: whether a cell without input has an equilibrium, from which gaits emerge.
         usual_gait: that it starts with; a gait's own name is that of its usual preset.
         usual_robot: file that it starts with, or name of a shipped one.
         free: parameters or groups that are usually fitted to a recording.
@@ -126,6 +123,7 @@ class Network(ABC):
     couplings: ClassVar[tuple[str, ...]] = ()
     offsets: ClassVar[dict[str, str]] = {}
     unnamed: ClassVar[str] = ''
+    rests: ClassVar[bool] = True
     usual_gait: ClassVar[str]
     usual_robot: ClassVar[str] = ''
     free: ClassVar[tuple[str, ...]]
@@ -321,21 +319,6 @@ class Network(ABC):
 @cache
 def _names(network: type[Network]) -> tuple[str, ...]:
     return tuple(field.name for field in fields(network))  # type: ignore[arg-type]
-
-
-def footfall_order(legs: Iterable[str], sides: Mapping[str, str], girdles: Mapping[str, str]
-                   ) -> list[str]:
-    """Sort legs as footfall diagrams show them: fore before hind, left before right.
-
-    With more than four legs those of a side stay together, so that waves are seen.
-    """
-    # Legs stand from hind to fore: those of middle pairs are told by their order alone.
-    listed = list(legs)[::-1]
-    rank = [GIRDLES.index(girdles.get(leg, 'fore')) for leg in listed]
-    right = [sides.get(leg) == 'right' for leg in listed]
-    key = list(zip(right, rank, strict=True) if len(listed) > 4 else
-               zip(rank, right, strict=True))
-    return [listed[k] for k in sorted(range(len(listed)), key=lambda k: key[k])]
 
 
 def known(gait: str, gaits: tuple[str, ...]) -> str:
