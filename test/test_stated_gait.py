@@ -20,7 +20,7 @@ import json
 from cpg_ros.atlas.chart import chart_of
 from cpg_ros.atlas.hopf_curves import hopf_curves
 from cpg_ros.atlas.row_job import assess_row, NONE, Row, STABLE
-from cpg_ros.dynamics.equilibrium import equilibria, equilibrium, NoEquilibrium
+from cpg_ros.dynamics.equilibrium import equilibrium, NoEquilibrium
 from cpg_ros.dynamics.gait_assessment import verdicts
 from cpg_ros.dynamics.orbit import NoOrbit, solve_orbit
 from cpg_ros.integration.simulate import simulate
@@ -44,13 +44,14 @@ FOOTFALLS = {'amble': (0, 0.5, 0.125, 0.625), 'canter_left': (1 / 3, 0, 2 / 3, 1
              'canter_right': (0, 1 / 3, 1 / 3, 2 / 3), 'transverse_gallop': (0, 0.1, 0.5, 0.6),
              'rotary_gallop': (0.1, 0, 0.5, 0.6), 'half_bound': (0, 0, 0.4, 0.6),
              'unnamed': (0, 0.5, 0.375, 0.875)}
-PHASE = FOUR | {gait: [tuple(-fall for fall in falls)] for gait, falls in FOOTFALLS.items()}
+PHASE = {gait: FOUR[gait] for gait in FOUR if gait != 'jump'} | {
+    gait: [tuple(-fall for fall in falls)] for gait, falls in FOOTFALLS.items()}
 #: Sixths of a cycle by which LH RH LM RM LF RF lead (Wilson 1966; Golubitsky et al. 1999).
 SIXTHS = {'tripod': (0, 3, 3, 0, 0, 3), 'ripple': (0, 3, 4, 1, 2, 5), 'wave': (0, 3, 5, 2, 4, 1),
           'reverse_ripple': (0, 3, 2, 5, 4, 1), 'reverse_wave': (0, 3, 1, 4, 2, 5),
           'pace': (0, 3, 0, 3, 0, 3), 'pronk': (0, 0, 0, 0, 0, 0), 'lurch': (0, 0, 3, 3, 0, 0),
           'inchworm': (0, 0, 4, 4, 2, 2), 'caterpillar': (0, 0, 5, 5, 4, 4),
-          'unnamed': (0, 3, -1.8, 1.2, -3.6, -0.6)}
+          'unnamed': (0, 3, -1.5, 1.5, -3, 0)}
 SIX = {gait: [tuple(one / 6 for one in sixths)] for gait, sixths in SIXTHS.items()}
 #: Of the biped: of its two legs, or where these move differently, of two of its cells.
 PAIRS = {'walk': (0, 1, 0.5), 'run': (0, 1, 0.5), 'two_legged_jump': (0, 1, 0.0),
@@ -96,7 +97,7 @@ def test_what_is_found_is_the_gait_asked_for_or_nothing_is(name):
     assert set(found) == set(network.gaits())
 
 
-@pytest.mark.parametrize('name', ['phase', 'phase6'])
+@pytest.mark.parametrize('name', ['phase', 'phase6', 'phase2', 'phase8'])
 def test_phase_oscillators_have_one_gait_at_a_set(name):
     for gait, preset in PRESETS[name].items():
         found = verdicts(preset.network)
@@ -159,7 +160,6 @@ def test_a_row_of_an_atlas_ends_where_the_offsets_make_another_gait():
 
 def test_an_atlas_seeks_no_equilibrium_where_there_is_none(monkeypatch):
     trot = PRESETS['phase']['trot'].network
-    assert not len(equilibria(trot))
     monkeypatch.setattr('cpg_ros.dynamics.equilibrium.Quotient.newton_from_all', None)
     chart = chart_of('phase', trot, [('w', (0.1, 5.0)), ('nu', (0.5, 2.0))], (9, 9))
     assert hopf_curves((chart, trot.gaits())) == []

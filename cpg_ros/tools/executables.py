@@ -14,7 +14,6 @@
 
 """The executables: each loads what it runs, and can be interrupted while it does."""
 
-from functools import partial
 from importlib import import_module
 import os
 import signal
@@ -39,8 +38,75 @@ def start(name: str) -> int:
     before = signal.signal(signal.SIGINT, leave)
     main = import_module(f'cpg_ros.{PLACES[name]}').main
     signal.signal(signal.SIGINT, before)
-    return main()
+    code: int = main()
+    return code
 
 
-(generator, robot_sim, unitree_bridge, panel, inversion, cpg, demo, analyze, check_robot,
- optimize, reproduce, tune, calibrate, atlas) = (partial(start, name) for name in PLACES)
+def generator() -> int:
+    """Run the executable generator; return its exit code."""
+    return start('generator')
+
+
+def robot_sim() -> int:
+    """Run the executable robot_sim; return its exit code."""
+    return start('robot_sim')
+
+
+def unitree_bridge() -> int:
+    """Run the executable unitree_bridge; return its exit code."""
+    return start('unitree_bridge')
+
+
+def panel() -> int:
+    """Run the executable panel; return its exit code."""
+    return start('panel')
+
+
+def inversion() -> int:
+    """Run the executable inversion; return its exit code."""
+    return start('inversion')
+
+
+def cpg() -> int:
+    """Run the executable cpg; return its exit code."""
+    return start('cpg')
+
+
+def demo() -> int:
+    """Run the executable demo; return its exit code."""
+    return start('demo')
+
+
+def analyze() -> int:
+    """Run the executable analyze; return its exit code."""
+    return start('analyze')
+
+
+def check_robot() -> int:
+    """Run the executable check_robot; return its exit code."""
+    return start('check_robot')
+
+
+def optimize() -> int:
+    """Run the executable optimize; return its exit code."""
+    return start('optimize')
+
+
+def reproduce() -> int:
+    """Run the executable reproduce; return its exit code."""
+    return start('reproduce')
+
+
+def tune() -> int:
+    """Run the executable tune; return its exit code."""
+    return start('tune')
+
+
+def calibrate() -> int:
+    """Run the executable calibrate; return its exit code."""
+    return start('calibrate')
+
+
+def atlas() -> int:
+    """Run the executable atlas; return its exit code."""
+    return start('atlas')

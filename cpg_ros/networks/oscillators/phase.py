@@ -104,7 +104,9 @@ class PhaseOscillators(Network):
             gaits = {gait: tuple(-(i // 2 * j / legs + i % 2 * k / 2.0) % 1.0
                                  for i in range(legs))
                      for gait, (j, k) in ring_gaits(legs).items()}
-        between = tuple(0.5 * (i % 2) + 0.3 * (i // 2) for i in range(legs))
+        # Between the two waves that come to the legs of a side one after the other.
+        between = (0.0, 0.25) if legs == 2 else tuple(
+            (0.5 * (i % 2) + 1.5 * (i // 2) / legs) % 1.0 for i in range(legs))
         return {**stated, 'footfalls': {**gaits, 'unnamed': between},
                 'usual_gait': next(iter(gaits)), 'fields': tuple(stated['offsets'].values()),
                 'usual_robot': {2: 'biped', 6: 'hexapod'}.get(legs, '')}
