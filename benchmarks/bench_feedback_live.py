@@ -138,7 +138,7 @@ def walked(seconds: float, feedback: bool) -> dict[str, object]:
     probe = Probe()
     try:
         with Process(SIM, robot='unitree_go2').wait_for('simulating') as sim, \
-                node(feedback=str(feedback).lower()) as rhythm:
+                node(**{'feedback.enabled': str(feedback).lower()}) as rhythm:
             probe.spin(4.0)
             probe.sensed.clear()
             probe.told.clear()
@@ -161,7 +161,7 @@ def faults(seconds: float) -> dict[str, bool]:
     topics = {f'feedback.{name}_topic': f'relay/{topic}' for name, topic in (
         ('imu', 'imu'), ('joint_states', 'joint_states'), ('contacts', 'foot_contacts'))}
     with Process(SIM, robot='unitree_go2').wait_for('simulating'), \
-            node(feedback='true', **topics):
+            node(**{'feedback.enabled': 'true'}, **topics):
         probe.spin(4.0)
         for topic in TOPICS:
             for how in FAULTS:

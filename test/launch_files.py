@@ -21,7 +21,7 @@ from types import ModuleType, SimpleNamespace
 
 from ament_index_python.packages import get_package_share_directory
 from cpg_ros.networks.registry import NETWORKS, PRESETS
-from cpg_ros.nodes.feedback_parameters import SWITCH
+from cpg_ros.nodes.feedback_parameters import ENABLED, SWITCH
 from cpg_ros.nodes.generator_parameters import Planner, specs
 from cpg_ros.robots.robot_file import find_robot
 
@@ -43,7 +43,7 @@ def of_generator(network):
     """Parameters of the generator: name -> spec."""
     kind = NETWORKS[network]
     planner = Planner(kind, PRESETS[network], find_robot(kind.usual_robot))
-    return specs(kind) | planner.specs(kind.usual_gait) | {'feedback': SWITCH}
+    return specs(kind) | planner.specs(kind.usual_gait) | {ENABLED: SWITCH}
 
 
 class Stub:

@@ -53,7 +53,7 @@ def walk(*parameters, seconds=10.0, bag=None):
                        domain=domain, executable=EXECUTABLE.with_name('robot_sim'))
         ending.append(body)
         ending.append(Process('-p', 'use_sim_time:=true', '-p', 'rate:=500.0',
-                              '-p', "combined_topic:=''", '-p', 'feedback:=false',
+                              '-p', "combined_topic:=''", '-p', 'feedback.enabled:=false',
                               *parameters, domain=domain))
         code = body.wait()
         if bag is not None:

@@ -205,7 +205,7 @@ def test_go2_robot_is_on_the_robots_network(described, given, domain, switch, co
     generator, bridge = (node_of(found, name) for name in ('generator', 'unitree_bridge'))
     assert parameters(found, generator) == {
         'network': 'delayed', 'gait': 'walk', 'robot': 'unitree_go2', 'rate': 500.0,
-        'combined_topic': '', 'cmd_vel': False, 'feedback': False, 'command': command}
+        'combined_topic': '', 'cmd_vel': False, 'feedback.enabled': False, 'command': command}
     to_bridge = parameters(found, bridge)
     assert to_bridge['motion_switcher'] is switch
     assert to_bridge['command'] == given.get('command', 'forward_position')

@@ -27,7 +27,7 @@ from cpg_ros.errors import CpgError
 from cpg_ros.gaits.leg_phases import named
 from cpg_ros.integration.simulate import simulate
 from cpg_ros.networks.delayed import Delayed, PRESETS
-from cpg_ros.networks.network import footfall_order
+from cpg_ros.networks.leg_numbers import footfall_order
 from cpg_ros.networks.parameter_line import ParameterLine
 from cpg_ros.networks.registry import find_network, NETWORKS, numbered
 from cpg_ros.networks.symmetry import Symmetry

@@ -46,8 +46,8 @@ def lockstep():
 
         def generator():
             one = Process('-p', 'use_sim_time:=true', '-p', 'robot:=unitree_go2', '-p',
-                          'rate:=250.0', '-p', "combined_topic:=''", '-p', 'feedback:=false',
-                          domain=body.domain)
+                          'rate:=250.0', '-p', "combined_topic:=''",
+                          '-p', 'feedback.enabled:=false', domain=body.domain)
             ending.append(one)
             return one
         return body, watcher, generator

@@ -29,6 +29,7 @@ from cpg_ros.motion.plan import plan
 from cpg_ros.networks.oscillators import shipped
 from cpg_ros.networks.parameter_line import ParameterLine
 from cpg_ros.networks.registry import NETWORKS, PRESETS
+from cpg_ros.networks.stated_gait import stated_gait
 from cpg_ros.robots.robot_file import find_robot
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -135,7 +136,7 @@ offsets = st.lists(st.floats(-0.5, 0.5), min_size=4, max_size=4)
        st.floats(0.05, 3.0))
 def test_any_phases_are_a_gait(phases, nu, r, a, w):
     network = NETWORKS['phase'](nu, r, a, w, *phases)
-    orbit = solve_orbit(network, 'unnamed')
+    orbit = solve_orbit(network, stated_gait(network))
     assert orbit.period == pytest.approx(1.0 / nu, rel=1e-9)
     assert orbit.peak == pytest.approx(r, rel=1e-9)
     assert off(orbit.phases, np.array(phases)) < 1e-12

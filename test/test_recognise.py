@@ -14,7 +14,8 @@
 
 """The gait, H and K of signals: with noise, uneven samples, and none to be found."""
 
-from cpg_ros.gaits.recognition import nearest_gait, recognise
+from cpg_ros.gaits.recognition import recognise
+from cpg_ros.networks.stated_gait import nearest_gait
 from cpg_ros.networks.symmetry import D2, Symmetry, Z4_Z2
 from hypothesis import given, settings
 from hypothesis import strategies as st

@@ -60,7 +60,7 @@ class Walk:
     def start_generator(self):
         self.generator = Process(*(word for name in (
             'robot:=unitree_go2', 'rate:=500.0', "combined_topic:=''",
-            'feedback:=false', 'gait:=trot', f'frequency:={self._frequency}',
+            'feedback.enabled:=false', 'gait:=trot', f'frequency:={self._frequency}',
             'command:=forward_position', 'exclusive:=false') for word in ('-p', name)),
             domain=self.domain)
 

@@ -33,6 +33,7 @@ from cpg_ros.dynamics.stability import RATE, stability
 from cpg_ros.errors import CpgError
 from cpg_ros.integration.simulate import simulate
 from cpg_ros.networks.network import Network
+from cpg_ros.networks.stated_gait import other_gait
 import numpy as np
 from scipy.sparse.linalg import ArpackError, eigs, LinearOperator
 
@@ -117,7 +118,7 @@ class _Finder:
 
     def _orbits(self, network: Network, column: int, value: float) -> Iterator[Orbit]:
         gait = self.row.gait
-        if network.broken(gait):
+        if network.broken(gait) or other_gait(network, gait):
             return
         if self.last is not None:
             with suppress(NoOrbit):

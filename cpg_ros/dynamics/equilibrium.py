@@ -232,13 +232,15 @@ def equilibrium(network: Network) -> np.ndarray:
 
     Raises:
         NoEquilibrium: it is lost in a fold on the way, or the uncoupled cell has several
-            equilibria.
+            equilibria, or none.
         InputError: a parameter is not finite.
 
     """
     if odd(network):
         return np.zeros(network.variables)
     _check(network)
+    if not network.rests:
+        raise NoEquilibrium('an uncoupled cell oscillates from any state: there is no stand')
     known = network.at_rest()
     if known is not None:
         return known

@@ -62,6 +62,8 @@ def hopf_points(network: Network, line: ParameterLine, low: float, high: float
     """
     if not (np.isfinite(low) and np.isfinite(high) and low < high):
         raise InputError(f'low {low} must be less than high {high}')
+    if not network.rests:
+        equilibrium(network)
     delay = network.delay_parameter
     if min(line.at(network, value).delay for value in (low, high)) < 0.0:
         raise InputError(f'{line} from {low:g} to {high:g} makes {delay} negative')

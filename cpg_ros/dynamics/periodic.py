@@ -17,10 +17,12 @@
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
+import math
 
 from cpg_ros.dynamics.arclength import NoOrbit
 from cpg_ros.errors import InputError
 from cpg_ros.networks.network import Network
+from cpg_ros.networks.stated_gait import other_gait
 from cpg_ros.networks.symmetry import Symmetry
 import numpy as np
 
@@ -28,8 +30,9 @@ __all__ = ['NoOrbit', 'Orbit', 'added_symmetry', 'check_values', 'richer']
 
 #: Points of a cycle among which extremes are looked for before they are refined.
 POINTS = 1024
-#: Points of a cycle at which signals are compared, at least.
-COMPARED = 24
+#: Points of a cycle at which signals are compared, at least; and parts of a cycle, of which no
+#: orbit may repeat one.
+COMPARED, PARTS = 60, (2, 3, 5)
 #: Two signals this close, over their range, are one.
 SAME = 1e-4
 
@@ -132,7 +135,8 @@ def check_values(network: Network, gait: str) -> None:
 
     Raises:
         InputError: a parameter is not finite, or the delay not positive.
-        NoOrbit: weights differ that the gait's symmetry needs to be equal.
+        NoOrbit: weights differ that the gait's symmetry needs to be equal, or the parameters
+            state the phases of another gait.
 
     """
     for name, value in network.as_dict().items():
@@ -143,18 +147,23 @@ def check_values(network: Network, gait: str) -> None:
     broken = network.broken(gait)
     if broken:
         raise NoOrbit(f'no {gait} with these weights: its symmetry needs {broken} to be equal')
+    if other := other_gait(network, gait):
+        raise NoOrbit(other)
 
 
 def richer(orbit: Orbit) -> str:
     """Name a symmetry that an orbit has beyond its gait's, or '' if it has none.
 
     Newton's method may end on an orbit with more symmetry, which every equation of the gait
-    also holds for: a walk is a skip whose two waveforms agree.
+    also holds for: a walk is a skip whose two waveforms agree; or it goes round an orbit several
+    times, whose shifts are then others.
     """
     # A whole number of them for every shift that there may be.
-    exponent = orbit.symmetry.group.exponent
-    points = exponent * -(-COMPARED // exponent)
+    points = math.lcm(orbit.symmetry.group.exponent, COMPARED)
     x = orbit(np.arange(points) / points * orbit.period)[:, :orbit.network.cells]
+    for parts in PARTS:
+        if np.abs(x - np.roll(x, points // parts, axis=0)).max() < SAME * np.ptp(x):
+            return f'it repeats {parts} times'
     return added_symmetry(orbit.symmetry, x, SAME)
 
 

@@ -28,13 +28,11 @@ from typing import Any
 
 from cpg_ros.gaits.insect_legs import foot_phases
 from cpg_ros.gaits.leg_names import role_of
-from cpg_ros.gaits.recognition import nearest_gait, recognise
+from cpg_ros.gaits.recognition import recognise
 from cpg_ros.networks.network import Network
+from cpg_ros.networks.stated_gait import nearest_gait, TOLERANCE
 import numpy as np
 
-#: Largest distance of a gait that is one, RMS over the legs in cycles. A quarter of the way from
-#: one gait to the next has about 0.05.
-TOLERANCE = 0.06
 #: Places at which shifts are tried.
 GRID = 1024
 #: Joints whose mean angles are this much larger than what they move by RMS have a sign.

@@ -34,6 +34,7 @@ from cpg_ros.networks.registry import (
     SHIPPED,
     with_legs_of,
 )
+from cpg_ros.networks.stated_gait import other_gait
 from cpg_ros.recordings.recording import Recording
 from cpg_ros.robots.robot import Robot
 import numpy as np
@@ -238,10 +239,13 @@ def inverted(recording: Recording, robot: Robot | None = None, network: str = ''
                 'same', *recording.notes, *stride.notes, *stride.doubts)))
         if not stride.gait and not between:
             warnings.append(_none_of(kind, stride))
-    elif stride.gait != gait:
+    elif (stride.gait or kind.unnamed) != gait:
         warnings.append(f'the recorded phases are those of {stride.gait or "none of the gaits"}, '
                         f'not of {gait}')
-    parameters = preset_of(kind.name, preset or gait).network.with_phases(stride.phases)
+    parameters = preset_of(kind.name, preset or gait).network
+    as_recorded = parameters.with_phases(stride.phases)
+    if not other_gait(as_recorded, gait):
+        parameters = as_recorded
     fit, given_up = fit_at_all(stride, cells, parameters, gait, free, order, starts, done)
     fit = replace(fit, parameters={**_phases_as_estimates(fit, stride), **fit.parameters})
     found = Inverted(recording, read, legs, stride, fit,

@@ -20,4 +20,4 @@ Imports ``files``; knows nothing of ROS.
 __all__ = ['biped', 'cell', 'delayed', 'derivation', 'equations', 'field', 'generated',
            'hk_theorem', 'leg_numbers', 'leg_pairs', 'morris_lecar', 'network', 'network_check',
            'network_definition', 'oscillators', 'parameter_line', 'preset_files', 'quadruped',
-           'registry', 'rings', 'symmetry', 'terms']
+           'registry', 'rings', 'stated_gait', 'symmetry', 'terms']

@@ -23,6 +23,7 @@ rh, lf, rf); six have a middle pair, lm and rm, between them. More are counted o
 the foremost, l1 r1 l2 r2 ..., as arachnologists do.
 """
 
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cache
 import re
@@ -32,6 +33,8 @@ from cpg_ros.errors import InputError
 from cpg_ros.networks.network_definition import AnyDefinition, leg_count
 
 BIPED = ('left', 'right')
+#: Pairs of legs from the head on.
+GIRDLES = ('fore', 'middle', 'hind')
 #: Most legs that a network can be asked for.
 MOST = 32
 
@@ -115,3 +118,18 @@ def parted(name: str) -> tuple[str, int] | None:
     """Split a name such as 'delayed6' into that of the family and the number of legs."""
     found = _NUMBERED.fullmatch(name)
     return (found['family'], int(found['legs'])) if found and len(found['legs']) < 4 else None
+
+
+def footfall_order(legs: Iterable[str], sides: Mapping[str, str], girdles: Mapping[str, str]
+                   ) -> list[str]:
+    """Sort legs as footfall diagrams show them: fore before hind, left before right.
+
+    With more than four legs those of a side stay together, so that waves are seen.
+    """
+    # Legs stand from hind to fore: those of middle pairs are told by their order alone.
+    listed = list(legs)[::-1]
+    rank = [GIRDLES.index(girdles.get(leg, 'fore')) for leg in listed]
+    right = [sides.get(leg) == 'right' for leg in listed]
+    key = list(zip(right, rank, strict=True) if len(listed) > 4 else
+               zip(rank, right, strict=True))
+    return [listed[k] for k in sorted(range(len(listed)), key=lambda k: key[k])]

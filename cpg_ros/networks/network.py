@@ -18,7 +18,7 @@ What it states of its parameters, cells and equations is in network_definition.
 """
 
 from abc import abstractmethod
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any, NamedTuple, TypeAlias, TypeVar
 
@@ -31,10 +31,7 @@ from cpg_ros.networks.network_definition import leg_count, NetworkDefinition, Ra
 from cpg_ros.networks.symmetry import Symmetry
 import numpy as np
 
-__all__ = ['Network', 'Preset', 'Range', 'footfall_order', 'known']
-
-#: Pairs of legs from the head on.
-GIRDLES = ('fore', 'middle', 'hind')
+__all__ = ['Network', 'Preset', 'Range', 'known']
 
 AnyNetwork = TypeVar('AnyNetwork', bound='Network')
 Preset: TypeAlias = preset_files.Preset['Network']
@@ -174,21 +171,6 @@ class Network(NetworkDefinition):
         apart = {float((symmetry.phases[b] - symmetry.phases[a]) % 1.0) for a, b in pairs}
         return ('run-like' if alike and apart == {0.0} else
                 'walk-like' if alike and apart == {0.5} else 'neither')
-
-
-def footfall_order(legs: Iterable[str], sides: Mapping[str, str], girdles: Mapping[str, str]
-                   ) -> list[str]:
-    """Sort legs as footfall diagrams show them: fore before hind, left before right.
-
-    With more than four legs those of a side stay together, so that waves are seen.
-    """
-    # Legs stand from hind to fore: those of middle pairs are told by their order alone.
-    listed = list(legs)[::-1]
-    rank = [GIRDLES.index(girdles.get(leg, 'fore')) for leg in listed]
-    right = [sides.get(leg) == 'right' for leg in listed]
-    key = list(zip(right, rank, strict=True) if len(listed) > 4 else
-               zip(rank, right, strict=True))
-    return [listed[k] for k in sorted(range(len(listed)), key=lambda k: key[k])]
 
 
 def known(gait: str, gaits: tuple[str, ...]) -> str:

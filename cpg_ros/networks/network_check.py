@@ -18,7 +18,8 @@ from collections.abc import Iterator
 from itertools import chain
 from typing import Any
 
-from cpg_ros.networks.network import GIRDLES, Network
+from cpg_ros.networks.leg_numbers import GIRDLES
+from cpg_ros.networks.network import Network
 from cpg_ros.networks.parameter_line import ParameterLine
 
 #: What every network has to state.

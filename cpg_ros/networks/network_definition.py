@@ -70,7 +70,8 @@ class NetworkDefinition(ABC):
         couplings: parameters without which no cell hears another.
         offsets: leg -> the parameter that states by how many cycles it is ahead, where any phases
             are a gait and no symmetry tells them.
-        unnamed: the gait with whatever phases, of such a network.
+        unnamed: the gait whose phases have no name, of such a network.
+        rests: whether a cell without input has an equilibrium, from which gaits emerge.
         usual_gait: that it starts with; a gait's own name is that of its usual preset.
         usual_robot: file that it starts with, or name of a shipped one.
         free: parameters or groups that are usually fitted to a recording.
@@ -104,6 +105,7 @@ class NetworkDefinition(ABC):
     couplings: ClassVar[tuple[str, ...]] = ()
     offsets: ClassVar[dict[str, str]] = {}
     unnamed: ClassVar[str] = ''
+    rests: ClassVar[bool] = True
     usual_gait: ClassVar[str]
     usual_robot: ClassVar[str] = ''
     free: ClassVar[tuple[str, ...]]

@@ -27,6 +27,9 @@ PREFIX = 'feedback.'
 RANGE = 10.0
 
 
+#: The switch, which has been PREFIX without its dot: no name is the beginning of another, or
+#: ``ros2 param dump`` could not nest them.
+ENABLED, FORMER = f'{PREFIX}enabled', PREFIX.rstrip('.')
 #: Where it cannot be, it is off unless asked for.
 SWITCH = Spec(True, "correct the gait by the robot's sensors; false by default if the robot file "
               'is not calibrated, or if the generator itself publishes the topic joint_states '

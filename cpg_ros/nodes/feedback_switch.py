@@ -26,14 +26,11 @@ from cpg_ros.motion.plan import Program
 from cpg_ros.motion.steering import Drive
 from cpg_ros.nodes import feedback_parameters
 from cpg_ros.nodes.feedback_loop import FeedbackLoop, Motion
-from cpg_ros.nodes.feedback_parameters import PREFIX
+from cpg_ros.nodes.feedback_parameters import ENABLED, PREFIX
 from cpg_ros.nodes.parameter_spec import Spec
 from cpg_ros.nodes.senses_input import SensesInput
 from cpg_ros.robots.robot import Robot
 from rclpy.parameter import Parameter
-
-#: The switch itself.
-NAME = 'feedback'
 
 
 def uncalibrated(robot: Robot) -> str:
@@ -104,13 +101,13 @@ class FeedbackSwitch:
 
     def judge(self, parameters: Sequence[Parameter]) -> str:
         """Say why a batch of changes cannot be, or ''."""
-        asked = any(one.name == NAME and one.value is True for one in parameters)
+        asked = any(one.name == ENABLED and one.value is True for one in parameters)
         obstacle = self.obstacle() if asked else ''
         return f'no feedback: {obstacle}' if obstacle else ''
 
     def apply(self) -> None:
         """Do as the parameters say."""
-        wanted = self._node.get_parameter(NAME).value and not self.obstacle()
+        wanted = self._node.get_parameter(ENABLED).value and not self.obstacle()
         if wanted and self.loop is None:
             robot, pattern = self._pattern.robot, self._pattern
             began, geometry = time.monotonic(), geometry_of(robot)

@@ -29,6 +29,7 @@ from cpg_ros.nodes.cells_publisher import Cells
 from cpg_ros.nodes.cmd_vel import CmdVel
 from cpg_ros.nodes.deadline_thread import Ticker
 from cpg_ros.nodes.diagnostics import Diagnostics
+from cpg_ros.nodes.feedback_parameters import ENABLED, FORMER, PREFIX
 from cpg_ros.nodes.feedback_switch import FeedbackSwitch, usual
 from cpg_ros.nodes.generator_parameters import (
     COMMANDS,
@@ -102,7 +103,9 @@ class Generator(StartedNode):
         self._planner = Planner(network, presets, robot, self._value('cmd_vel'))
         for name, spec in feedback_parameters.SPECS.items():
             self._declare(name, spec)
-        self._declare('feedback', usual(self, robot, self._value('combined_topic')))
+        if FORMER in self._parameter_overrides:
+            raise StartError(f"there is no parameter '{FORMER}': it is '{ENABLED}'")
+        self._declare(ENABLED, usual(self, robot, self._value('combined_topic')))
         self._one_of('feedback.contacts', CONTACTS)
         self._given_groups()
         for name, spec in self._planner.specs(self._value('gait')).items():
@@ -204,7 +207,7 @@ class Generator(StartedNode):
             if self._cmd_vel:
                 self._cmd_vel.follow(program)
             self._announce()
-        if any(p.name.startswith('feedback') for p in parameters):
+        if any(p.name.startswith(PREFIX) for p in parameters):
             self._feedback.apply()
 
     def _announce(self) -> None:
@@ -230,7 +233,7 @@ class Generator(StartedNode):
         """
         switch = FeedbackSwitch(self, self.pattern, self._motion, self._outputs.topics)
         obstacle = switch.obstacle()
-        if obstacle and self._value('feedback'):
+        if obstacle and self._value(ENABLED):
             raise StartError(f'no feedback: {obstacle}')
         switch.apply()
         return switch
@@ -331,7 +334,7 @@ class Generator(StartedNode):
 def main(args: list[str] | None = None) -> int:
     """Run the node until a signal ends it; return the exit code."""
     known = {'network': NETWORK, **specs(find_network(NETWORK.default)),
-             'feedback': feedback_parameters.SWITCH, **feedback_parameters.TOPICS}
+             ENABLED: feedback_parameters.SWITCH, **feedback_parameters.TOPICS}
     code = asked_for_help('generator', 'Publishes the joint states of a gait; the parameters of '
                           "the networks and the feedback's gains are listed by ros2 param "
                           'describe.', known, args)

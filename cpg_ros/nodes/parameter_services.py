@@ -204,7 +204,9 @@ class StrictParameterService(ParameterService):
                 raise ValueError(f'{message.name}: {error}') from error
         for parameter in parameters:
             if not self._get_node().has_parameter(parameter.name):
-                raise ValueError(f"there is no parameter '{parameter.name}'")
+                switch = f'{parameter.name}.enabled'
+                raise ValueError(f"there is no parameter '{parameter.name}'" + (
+                    f": it is '{switch}'" if self._get_node().has_parameter(switch) else ''))
         return parameters
 
     def _judged(self, batch: _Batch) -> SetParametersResult:

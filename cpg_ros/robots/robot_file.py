@@ -27,7 +27,7 @@ from cpg_ros.errors import CpgError
 from cpg_ros.files.atomic_write import write_atomically
 from cpg_ros.files.shared_resources import share
 from cpg_ros.files.yaml_reader import Reader, shown
-from cpg_ros.networks.network import GIRDLES
+from cpg_ros.networks.leg_numbers import GIRDLES
 from cpg_ros.networks.registry import find_network, NetworkError, NETWORKS, reference
 from cpg_ros.robots.body_keys import (
     efference_tree,

@@ -19,7 +19,7 @@ from collections.abc import Callable
 import math
 from pathlib import Path
 
-from cpg_ros.networks.network import footfall_order
+from cpg_ros.networks.leg_numbers import footfall_order
 from cpg_ros.simulation.body import Body
 from cpg_ros.simulation.robot_model import legs, load, SimulationError
 from cpg_ros.simulation.terrain import add_ground, lay, Terrain

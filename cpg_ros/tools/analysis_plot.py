@@ -14,8 +14,9 @@
 
 """The picture of ``analyze --plot``: branches, roots, trajectories and footfalls."""
 
+from functools import cache
 import io
-from itertools import pairwise
+from itertools import chain, count, pairwise
 from typing import Literal
 
 from cpg_ros.dynamics.bifurcation import bifurcations
@@ -25,19 +26,26 @@ from cpg_ros.dynamics.hopf import HopfPoint
 from cpg_ros.dynamics.orbit import NoOrbit, Orbit
 from cpg_ros.errors import InputError
 from cpg_ros.files.progress_bar import progress_bar
+from cpg_ros.networks.network import Network
 from cpg_ros.tools import gait_diagram as footfall
 from cpg_ros.tools.analysis_report import Analysis
 import matplotlib
 from matplotlib.axes import Axes
+from matplotlib.colors import hsv_to_rgb, to_hex
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 import numpy as np
 from scipy.interpolate import Akima1DInterpolator
 
+#: Of the gaits of the four-legged and two-legged networks.
 COLOURS = {'pronk': '#805ad5', 'pace': '#2f855a', 'bound': '#b7791f', 'trot': '#c53030',
            'jump': '#00838f', 'walk': '#2b6cb0', 'run': '#c53030', 'two_legged_jump': '#00838f',
            'two_legged_hop': '#805ad5', 'skip': '#2f855a', 'gallop': '#b7791f',
-           'hesitation_walk': '#97266d', 'asymmetric_hop': '#4a5568', 'one_legged_hop': '#975a16'}
+           'hesitation_walk': '#97266d', 'asymmetric_hop': '#718096', 'one_legged_hop': '#975a16'}
+#: Of other gaits, in their network's order; what is no gait is grey.
+FURTHER = ('#e53e8f', '#00a37a', '#5a67d8', '#a3a300', '#7b341e', '#38b2ff', '#ff8c42',
+           '#b794f4', '#9ae600', '#f56565', '#234e52', '#d6bcfa', '#ffd166', '#1a365d')
+GREY = '#4a5568'
 #: Lines of what attracts by itself, with a symmetry lock, and not at all.
 STYLES: tuple[tuple[Literal['-', '--', ':'], str], ...] = (
     ('-', 'stable'), ('--', 'stable with a lock'), (':', 'unstable'))
@@ -54,8 +62,22 @@ VISIBLE = 0.05
 ROOTS = 7
 
 
-def _colour(gait: str) -> str:
-    return COLOURS.get(gait, '#4a5568')
+@cache
+def colours(network: type[Network]) -> dict[str, str]:
+    """Return a colour for each of a network's gaits, no two of one colour."""
+    hues = (to_hex(tuple(hsv_to_rgb((0.618 * n % 1.0, 0.7, 0.8)))) for n in count())
+    spare = chain(FURTHER, hues)
+    found: dict[str, str] = {}
+    for gait in sorted(network.gaits(), key=lambda one: one not in COLOURS):
+        colour = COLOURS.get(gait, '')
+        while not colour or colour in found.values():
+            colour = next(spare)
+        found[gait] = colour
+    return found
+
+
+def _colour(analysis: Analysis, gait: str) -> str:
+    return colours(type(analysis.network)).get(gait, GREY)
 
 
 def branches(analysis: Analysis) -> list[tuple[str, Branch]]:
@@ -142,27 +164,30 @@ def _draw_branches(axes: Axes, analysis: Analysis) -> None:
                              1 if spectra[-1].leading_within < ATTRACTS else 2)
                 done += 1
                 bar(done)
-            _draw_branch(axes, branch, kinds, _colour(gait))
+            _draw_branch(axes, branch, kinds, _colour(analysis, gait))
             shown.add(gait)
             for one in bifurcations(branch, spectra, VISIBLE):
                 axes.plot(one.value, one.point.amplitude, marker=CROSSINGS[one.kind], markersize=6,
-                          color=_colour(gait), markerfacecolor=axes.get_facecolor())
+                          color=_colour(analysis, gait), markerfacecolor=axes.get_facecolor())
                 met[one.kind] = CROSSINGS[one.kind]
             for end, last in zip(branch.ends, (branch.points[0], branch.points[-1]), strict=True):
                 if end.why == 'period':
-                    axes.plot(last.value, last.amplitude, marker='x', color=_colour(gait))
+                    axes.plot(last.value, last.amplitude, marker='x',
+                              color=_colour(analysis, gait))
                     met['period grows'] = 'x'
     for point in _on_line(analysis):
-        axes.plot(point.value, 0.0, marker='o', color=_colour(point.gait), markersize=5,
+        axes.plot(point.value, 0.0, marker='o', color=_colour(analysis, point.gait), markersize=5,
                   clip_on=False)
         shown.add(point.gait)
     here = analysis.along.value(analysis.network)
     axes.axvline(here, color='#a0aec0', linewidth=1.0, zorder=0)
     for verdict in analysis.existing:
-        axes.plot(here, verdict.amplitude, marker='D', color=_colour(verdict.gait), markersize=6)
+        axes.plot(here, verdict.amplitude, marker='D', color=_colour(analysis, verdict.gait),
+                  markersize=6)
         shown.add(verdict.gait)
-    handles = [Line2D([], [], color=_colour(gait), label=gait.replace('_', ' '))
-               for gait in dict.fromkeys([*COLOURS, *sorted(shown)]) if gait in shown]
+    handles = [Line2D([], [], color=_colour(analysis, gait), label=gait.replace('_', ' '))
+               for gait in dict.fromkeys([*colours(type(analysis.network)), *sorted(shown)])
+               if gait in shown]
     # Of the text's colour, which differs on a dark page.
     plain = matplotlib.rcParams['text.color']
     handles += [Line2D([], [], color=plain, linestyle=style, label=label)
@@ -184,7 +209,8 @@ def _draw_branches(axes: Axes, analysis: Analysis) -> None:
 def _draw_roots(axes: Axes, analysis: Analysis) -> None:
     for block in analysis.blocks:
         roots = block.roots(ROOTS)
-        axes.plot(roots.real, roots.imag, 'o', color=_colour(block.gait), alpha=0.8, markersize=5)
+        axes.plot(roots.real, roots.imag, 'o', color=_colour(analysis, block.gait), alpha=0.8,
+                  markersize=5)
     title = 'Characteristic roots of rest' if analysis.delay else 'Eigenvalues of the stand'
     axes.axvline(0.0, color='#718096', linewidth=1.0, zorder=0)
     axes.set_xlabel('real part [1/model time]')
@@ -203,7 +229,7 @@ def _draw_trajectories(axes: Axes, analysis: Analysis) -> None:
         middle = cells.max() - size
         for cell, style in enumerate(('-', '--', '-.', ':')):
             axes.plot(times / orbit.period, height + (cells[:, cell] - middle) / size, style,
-                      color=_colour(verdict.gait), linewidth=1.1,
+                      color=_colour(analysis, verdict.gait), linewidth=1.1,
                       label=f'x{cell + 1}' if row == 0 else None)
         axes.text(0.01, height + 1.03, f'{verdict.gait.replace("_", " ")}: period '
                   f'{orbit.period:.4f}, swing {2.0 * size:.3f}', fontsize=7)

@@ -21,7 +21,6 @@ centre manifold, in the full network, and with the symmetry lock.
 
 from argparse import Namespace, RawDescriptionHelpFormatter
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 import sys
 
@@ -30,11 +29,11 @@ from cpg_ros.errors import CpgError, InputError
 from cpg_ros.files.atomic_write import write_atomically
 from cpg_ros.files.plain_text import as_json
 from cpg_ros.files.progress_bar import progress_bar
-from cpg_ros.networks.network import Network
 from cpg_ros.networks.parameter_line import ParameterLine
-from cpg_ros.networks.registry import find_network, NetworkError, SHIPPED
+from cpg_ros.networks.registry import SHIPPED
 from cpg_ros.tools.analysis_report import Analysis
-from cpg_ros.tools.arguments import assignment, interval, number, Parser, say, twice
+from cpg_ros.tools.arguments import interval, number, Parser, say
+from cpg_ros.tools.network_options import add_network_options, chosen_network
 import numpy as np
 
 DESCRIPTION = """\
@@ -50,22 +49,12 @@ examples:
 exit codes: 0 analysed (even if no gait was found), 2 invalid arguments."""
 #: Delays beyond which no Hopf points are looked for, model time.
 LONGEST = 100.0
-#: No parameter is larger: beyond, the arithmetic breaks down before it tells anything.
-LARGEST = 1e6
 
 
 def _parser() -> Parser:
     parser = Parser(prog='analyze', description=DESCRIPTION, epilog=EPILOG,
                     formatter_class=RawDescriptionHelpFormatter)
-    parser.add_argument('--network', default='delayed', metavar='NAME',
-                        help=f'{", ".join(SHIPPED)}, or the path of a Python file that defines '
-                        'one (default: %(default)s)')
-    parser.add_argument('--preset', metavar='NAME', help='shipped preset that supplies the '
-                        'parameters not given by --set (default: ' + ', '.join(
-                            f'{name} {kind.usual_gait}' for name, kind in SHIPPED.items()) + ')')
-    parser.add_argument('--set', nargs='+', action='extend', default=[], type=assignment,
-                        metavar='PARAMETER=VALUE', help='parameter values, such as c=6.5 tau=0.4; '
-                        'w_a sets all four weights of the biped')
+    add_network_options(parser)
     parser.add_argument('--longest-delay', type=number, metavar='TAU', help='find Hopf points of '
                         'the delayed network up to this delay, model time (default: twice tau)')
     parser.add_argument('--along', metavar='PARAMETERS', help='parameters to vary for the Hopf '
@@ -83,52 +72,10 @@ def _parser() -> Parser:
     return parser
 
 
-def parameters(name: str, preset: str | None, changes: list[tuple[str, float]]) -> Network:
-    """Return a network with a preset's parameters, some of them changed.
-
-    Raises:
-        InputError: an unknown name, or a value that makes no sense; the message says which.
-
-    """
-    try:
-        kind = find_network(name)
-    except NetworkError as error:
-        raise InputError(f'--network: {error}') from error
-    presets = kind.presets()
-    chosen = kind.usual_gait if preset is None else preset
-    if chosen not in presets:
-        raise InputError(f"--preset: '{chosen}' is not one of {', '.join(presets)}")
-    network = presets[chosen].network
-    given = [member for key, _ in changes for member in kind.groups.get(key, (key,))]
-    if twice(given):
-        raise InputError(f'--set: {twice(given)} is given twice')
-    for key, value in changes:
-        if key not in (*kind.parameters(), *kind.groups):
-            known = ', '.join((*kind.groups, *kind.parameters()))
-            raise InputError(f"--set: '{key}' is not a parameter of the {kind.name} network: "
-                             f'{known}')
-        if not np.isfinite(value):
-            raise InputError(f'--set: {key} is {value:g}, it must be finite')
-        if abs(value) > LARGEST:
-            raise InputError(f'--set: {key} is {value:g}, it must be at most {LARGEST:g}')
-        members = kind.groups.get(key, (key,))
-        network = replace(network, **dict.fromkeys(members, value))  # type: ignore[type-var]
-    delay = kind.delay_parameter
-    if delay and network.delay <= 0.0:
-        raise InputError(f'--set: {delay} is {network.delay:g}, a delay must be positive')
-    if network.delay > kind.longest_delay > 0.0:
-        raise InputError(f'--set: {delay} is {network.delay:g}, delays go up to '
-                         f'{kind.longest_delay:g}: use another unit of time')
-    for key, lost in kind.needed.items():
-        if network.as_dict()[key] == 0.0:
-            raise InputError(f'--set: {key} is 0: {lost}')
-    return network
-
-
 def _analysed(chosen: Namespace) -> Analysis:
     if chosen.plot is not None and not chosen.plot.absolute().parent.is_dir():
         raise InputError(f'--plot: there is no folder {chosen.plot.parent}')
-    network = parameters(chosen.network, chosen.preset, chosen.set)
+    network = chosen_network(chosen.network, chosen.preset, chosen.set)
     longest = 2.0 * network.delay if chosen.longest_delay is None else chosen.longest_delay
     if not 0.0 <= longest <= LONGEST:
         raise InputError(f'--longest-delay: {longest:g} is not from 0 to {LONGEST:g}')

@@ -20,7 +20,6 @@ its refinement need, follows the exact boundaries, and draws the map.
 
 import argparse
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import replace
 from itertools import chain
 from pathlib import Path
 import sys
@@ -34,15 +33,15 @@ from cpg_ros.atlas.orbit_curves import edges, orbit_curves
 from cpg_ros.atlas.refinement import refined, Sheet
 from cpg_ros.atlas.row_job import assess_row, Row
 from cpg_ros.atlas.stored import Stored
-from cpg_ros.errors import CpgError, InputError
+from cpg_ros.errors import CpgError
 from cpg_ros.fleet.executors import Fleet
 from cpg_ros.fleet.options import add_options, working
 from cpg_ros.fleet.outcomes import outcomes
 from cpg_ros.fleet.results_table import library
 from cpg_ros.fleet.tally import Tally
 from cpg_ros.networks.network import known
-from cpg_ros.networks.registry import find_network
-from cpg_ros.tools.arguments import assignment, interval, Parser, say, twice
+from cpg_ros.tools.arguments import interval, Parser, say, twice
+from cpg_ros.tools.network_options import add_network_options, chosen_network
 
 DESCRIPTION = """\
 Map where a network's gaits live over two parameters: whether each exists and is stable, with what
@@ -73,14 +72,9 @@ def _points(text: str) -> tuple[int, int]:
 def _parser() -> Parser:
     parser = Parser(prog='atlas', description=DESCRIPTION, epilog=EPILOG,
                     formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument('--network', default='delayed', metavar='NAME', help='a shipped network, '
-                        'or the path of a Python file with one (default: %(default)s)')
+    add_network_options(parser)
     parser.add_argument('--over', nargs=2, required=True, type=_over, metavar='PARAMETER=LOW:HIGH',
                         help='the two parameters, or lines of them, such as alpha=beta=0:0.5')
-    parser.add_argument('--preset', metavar='NAME', help='shipped preset that supplies the other '
-                        "parameters (default: the usual gait's)")
-    parser.add_argument('--set', nargs='+', action='extend', default=[], type=assignment,
-                        metavar='PARAMETER=VALUE', help='values of other parameters')
     parser.add_argument('--gaits', nargs='+', default=[], metavar='GAIT',
                         help='gaits to map (default: all)')
     parser.add_argument('--points', type=_points, default=(200, 200), metavar='NxM',
@@ -98,20 +92,11 @@ def _note(line: str) -> None:
 
 
 def _planned(chosen: argparse.Namespace) -> tuple[Chart, tuple[str, ...]]:
-    kind = find_network(chosen.network)
-    presets = kind.presets()
-    preset = chosen.preset or kind.usual_gait
-    if preset not in presets:
-        raise InputError(f"'{preset}' is not one of the presets {', '.join(presets)}")
-    base = presets[preset].network
-    for name, value in chosen.set:
-        if name not in base.parameters():
-            raise InputError(f"'{name}' is not one of {', '.join(base.parameters())}")
-        base = replace(base, **{name: value})  # type: ignore[type-var]
+    base = chosen_network(chosen.network, chosen.preset, chosen.set)
     for gait in chosen.gaits:
-        known(gait, kind.gaits())
+        known(gait, base.gaits())
     return (chart_of(chosen.network, base, chosen.over, chosen.points),
-            tuple(chosen.gaits or kind.gaits()))
+            tuple(chosen.gaits or base.gaits()))
 
 
 def drawn(chart: Chart, gaits: tuple[str, ...], fleet: Fleet, folder: Path
@@ -171,7 +156,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Draw an atlas; return the exit code."""
     parser = _parser()
     chosen = parser.parse_args(sys.argv[1:] if arguments is None else arguments)
-    if name := twice([name for name, _ in chosen.set]) or twice(chosen.gaits):
+    if name := twice(chosen.gaits):
         parser.error(f'{name} is given twice')
     try:
         library()

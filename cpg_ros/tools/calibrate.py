@@ -27,6 +27,8 @@ from cpg_ros.calibration.recorded_efference import Calibrated, efference_from, w
 from cpg_ros.calibration.walk_recording import read_walk, TYPES
 from cpg_ros.errors import CpgError
 from cpg_ros.files.plain_text import table
+from cpg_ros.gaits.stride import NoSteadyGait
+from cpg_ros.motion.plan import Refused
 from cpg_ros.robots.robot import Robot
 from cpg_ros.robots.robot_file import find_robot, write_robot
 from cpg_ros.tools.arguments import Parser, say
@@ -123,7 +125,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         write_robot(out, robot, _comment(Path(chosen.robot)))
     except (CpgError, OSError) as error:
         print(f'calibrate: {error}', file=sys.stderr)
-        return 1 if type(error).__name__ in ('NoSteadyGait', 'Refused') else 2
+        return 1 if isinstance(error, NoSteadyGait | Refused) else 2
     except KeyboardInterrupt:
         print('calibrate: stopped, nothing written', file=sys.stderr)
         return 130

@@ -24,7 +24,7 @@ from rclpy.node import Node
 
 #: What robot_sim and the generator are told, beside what every demonstration tells them.
 GROUND = ('-p', 'terrain:=course', '-p', 'terrain_size:=0.05')
-GENERATOR = ('-p', 'cmd_vel:=true', '-p', 'feedback:=true')
+GENERATOR = ('-p', 'cmd_vel:=true', '-p', 'feedback.enabled:=true')
 #: Where what begins, m.
 STAGES = ((0.6, 'rough ground'), (3.0, 'a ramp up'), (4.2, 'and down'), (5.5, 'blocks'))
 #: Where the robot is pushed to the left, or to the right with a minus, N s.

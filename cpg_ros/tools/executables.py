@@ -14,7 +14,6 @@
 
 """The executables: each loads what it runs, and can be interrupted while it does."""
 
-from functools import partial
 from importlib import import_module
 import os
 import signal
@@ -43,6 +42,7 @@ def start(name: str) -> int:
     for number in heeded:
         signal.signal(number, leave)
     main = import_module(f'cpg_ros.{PLACES[name]}').main
+<<<<<<< HEAD
     try:
         for number in heeded:
             signal.signal(number, signal.default_int_handler if number == signal.SIGINT
@@ -51,7 +51,78 @@ def start(name: str) -> int:
     except KeyboardInterrupt:
         # What it runs has not begun to handle it.
         return leave(signal.SIGINT)
+=======
+    signal.signal(signal.SIGINT, before)
+    code: int = main()
+    return code
+>>>>>>> verdicts
 
 
-(generator, robot_sim, unitree_bridge, panel, inversion, cpg, demo, analyze, check_robot,
- optimize, reproduce, tune, calibrate, atlas) = (partial(start, name) for name in PLACES)
+def generator() -> int:
+    """Run the executable generator; return its exit code."""
+    return start('generator')
+
+
+def robot_sim() -> int:
+    """Run the executable robot_sim; return its exit code."""
+    return start('robot_sim')
+
+
+def unitree_bridge() -> int:
+    """Run the executable unitree_bridge; return its exit code."""
+    return start('unitree_bridge')
+
+
+def panel() -> int:
+    """Run the executable panel; return its exit code."""
+    return start('panel')
+
+
+def inversion() -> int:
+    """Run the executable inversion; return its exit code."""
+    return start('inversion')
+
+
+def cpg() -> int:
+    """Run the executable cpg; return its exit code."""
+    return start('cpg')
+
+
+def demo() -> int:
+    """Run the executable demo; return its exit code."""
+    return start('demo')
+
+
+def analyze() -> int:
+    """Run the executable analyze; return its exit code."""
+    return start('analyze')
+
+
+def check_robot() -> int:
+    """Run the executable check_robot; return its exit code."""
+    return start('check_robot')
+
+
+def optimize() -> int:
+    """Run the executable optimize; return its exit code."""
+    return start('optimize')
+
+
+def reproduce() -> int:
+    """Run the executable reproduce; return its exit code."""
+    return start('reproduce')
+
+
+def tune() -> int:
+    """Run the executable tune; return its exit code."""
+    return start('tune')
+
+
+def calibrate() -> int:
+    """Run the executable calibrate; return its exit code."""
+    return start('calibrate')
+
+
+def atlas() -> int:
+    """Run the executable atlas; return its exit code."""
+    return start('atlas')

@@ -27,7 +27,8 @@ import sys
 from cpg_ros.dynamics.orbit import Orbit, solve_preset
 from cpg_ros.errors import CpgError, InputError
 from cpg_ros.motion.phase_readout import evaluate, phase_map
-from cpg_ros.networks.network import footfall_order, Network
+from cpg_ros.networks.leg_numbers import footfall_order
+from cpg_ros.networks.network import Network
 from cpg_ros.networks.registry import find_network, SHIPPED
 from cpg_ros.robots.robot import HARMONICS
 import matplotlib

@@ -105,7 +105,7 @@ def parameters(what: str) -> str:
                            **generator_parameters.specs(usual), **frequency})
     exclusive = parameter_rows({'exclusive': generator_parameters.exclusive('none')})[0]
     exclusive[2] = '`true` with `command`, else `false`'
-    feedback = parameter_rows({'feedback': feedback_parameters.SWITCH})
+    feedback = parameter_rows({feedback_parameters.ENABLED: feedback_parameters.SWITCH})
     return table(HEAD, [*rows, exclusive, *feedback])
 
 

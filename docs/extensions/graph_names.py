@@ -33,7 +33,7 @@ KINDS: dict[str, tuple[Callable[[], StartedNode], tuple[dict[str, str], ...]]] =
         {'command': 'joint_trajectory', 'exclusive': 'false', 'robot': 'unitree_go2',
          'cmd_vel': 'true'},
         {'command': 'forward_position', 'exclusive': 'false', 'combined_topic': '""'},
-        {'robot': 'unitree_go2', 'feedback': 'true', 'combined_topic': '""'})),
+        {'robot': 'unitree_go2', 'feedback.enabled': 'true', 'combined_topic': '""'})),
     'robot_sim': (RobotSim, ({'clock': 'true'}, {'command': 'joint_trajectory'},
                              {'command': 'forward_position'})),
     'unitree_bridge': (UnitreeBridge, ({}, {'command': 'joint_trajectory'},

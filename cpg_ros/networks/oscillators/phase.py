@@ -38,6 +38,7 @@ from cpg_ros.networks.cell import Cell
 from cpg_ros.networks.leg_numbers import leg_names, places
 from cpg_ros.networks.network import known, Network, Preset, Range
 from cpg_ros.networks.rings import ring_gaits
+from cpg_ros.networks.stated_gait import stated_gait
 from cpg_ros.networks.symmetry import Group, Symmetry
 from cpg_ros.networks.terms import cos, Number, sin, sqrt
 import numpy as np
@@ -87,6 +88,7 @@ class PhaseOscillators(Network):
     step: ClassVar[float] = 0.0025
     couplings: ClassVar[tuple[str, ...]] = ('w',)
     unnamed: ClassVar[str] = 'unnamed'
+    rests: ClassVar[bool] = False
     #: The phases are given, and a readout does not depend on the other parameters.
     free: ClassVar[tuple[str, ...]] = ()
     line: ClassVar[str] = 'w'
@@ -102,7 +104,9 @@ class PhaseOscillators(Network):
             gaits = {gait: tuple(-(i // 2 * j / legs + i % 2 * k / 2.0) % 1.0
                                  for i in range(legs))
                      for gait, (j, k) in ring_gaits(legs).items()}
-        between = tuple(0.5 * (i % 2) + 0.3 * (i // 2) for i in range(legs))
+        # Between the two waves that come to the legs of a side one after the other.
+        between = (0.0, 0.25) if legs == 2 else tuple(
+            (0.5 * (i % 2) + 1.5 * (i // 2) / legs) % 1.0 for i in range(legs))
         return {**stated, 'footfalls': {**gaits, 'unnamed': between},
                 'usual_gait': next(iter(gaits)), 'fields': tuple(stated['offsets'].values()),
                 'usual_robot': {2: 'biped', 6: 'hexapod'}.get(legs, '')}
@@ -128,14 +132,15 @@ class PhaseOscillators(Network):
         return tuple(cls.footfalls)
 
     def symmetry(self, gait: str) -> Symmetry:
-        """Return the same for every gait: no symmetry, and the phases that the offsets state.
+        """Return no symmetry, and the gait's phases: as the offsets state it, if they do.
 
         Raises:
             ValueError: there is no gait of this name.
 
         """
         known(gait, self.gaits())
-        return _alone(self.cells).led(self.leads)
+        own = self if stated_gait(self) == gait else self.presets()[gait].network
+        return _alone(self.cells).led(own.leads)
 
     def on_orbit(self, gait: str) -> tuple[np.ndarray, float]:
         """Return the gait's state where the first leg's oscillator peaks, and the period."""
