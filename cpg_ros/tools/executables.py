@@ -42,20 +42,15 @@ def start(name: str) -> int:
     for number in heeded:
         signal.signal(number, leave)
     main = import_module(f'cpg_ros.{PLACES[name]}').main
-<<<<<<< HEAD
     try:
         for number in heeded:
             signal.signal(number, signal.default_int_handler if number == signal.SIGINT
                           else signal.SIG_DFL)
-        return main()
+        code: int = main()
     except KeyboardInterrupt:
         # What it runs has not begun to handle it.
         return leave(signal.SIGINT)
-=======
-    signal.signal(signal.SIGINT, before)
-    code: int = main()
     return code
->>>>>>> verdicts
 
 
 def generator() -> int:
