@@ -12,10 +12,10 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Files and terminals: YAML that people write, atomic writes, shipped resources, progress.
+"""Files, terminals and addresses: YAML, atomic writes, shipped resources, progress, loopback.
 
 Imports nothing of the package; knows nothing of ROS.
 """
 
-__all__ = ['atomic_write', 'page_style', 'plain_text', 'progress_bar', 'shared_resources',
-           'yaml_reader']
+__all__ = ['atomic_write', 'loopback', 'page_style', 'plain_text', 'progress_bar',
+           'shared_resources', 'yaml_reader']
