@@ -27,6 +27,26 @@ from processes import enter_workspace
 sys.path.append(str(ROOT / 'test'))
 
 
+def killed_together(walk, mend, kill, times: int) -> dict:
+    """Kill bridge and watchdog as often as asked; return what the robot has seen from then on."""
+    left, held = [], []
+    for _ in range(2 * times):
+        if len(left) == times:
+            break
+        try:
+            walk.walking()
+        except AssertionError as error:
+            # The machine made it damp before.
+            log(str(error).splitlines()[-1][-200:])
+            continue
+        sent, holds = kill(walk)
+        left.append(sent)
+        held.append(holds)
+        mend(walk)
+    return {'times': len(left), 'commands after 0.1 s': sum(left),
+            'holds its last command': sum(held)}
+
+
 def main() -> None:
     """Walk, break something, see what happens, mend it; as often as asked."""
     parser = argparse.ArgumentParser(description=__doc__)
@@ -36,7 +56,7 @@ def main() -> None:
     parser.add_argument('--patient', action='store_true', help='time limits for a busy machine')
     given = parser.parse_args()
     enter_workspace()
-    from unitree_faults import FAULTS, inflict, mend, Walk
+    from unitree_faults import bridge_and_watchdog_killed, FAULTS, inflict, mend, Walk
     limits = ('state_timeout:=0.2', 'target_timeout:=0.3') if given.patient else ()
     found = {}
     for fault, (within, sitting) in FAULTS.items():
@@ -75,6 +95,14 @@ def main() -> None:
             'largest_torque_of_limit': float(table[:, 2].max(initial=0)),
             'largest_step_nm': float(table[:, 3].max(initial=0)), 'restarts': restarts}
         log(f'{fault.__name__}: {found[fault.__name__]}')
+    if given.only in bridge_and_watchdog_killed.__name__:
+        walk = Walk(*limits, frequency=given.frequency)
+        try:
+            found['bridge_and_watchdog_killed'] = killed_together(
+                walk, mend, bridge_and_watchdog_killed, given.times)
+            log(f"bridge_and_watchdog_killed: {found['bridge_and_watchdog_killed']}")
+        finally:
+            walk.end()
     emit(benchmark='unitree_faults', patient=given.patient, frequency=given.frequency,
          faults=found)
 

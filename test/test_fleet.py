@@ -14,19 +14,24 @@
 
 """Many jobs: on processes, on a dask cluster, through deaths of workers; and their progress."""
 
+from argparse import ArgumentParser
 from concurrent.futures import ThreadPoolExecutor
 import io
 import itertools
 from pathlib import Path
+import shutil
 import subprocess
 import sys
 import time
+from urllib.parse import urlsplit
 
 import cpg_ros
 from cpg_ros.errors import InputError
 from cpg_ros.fleet.executors import cluster, NoCluster, processes
+from cpg_ros.fleet.options import add_options, working
 from cpg_ros.fleet.outcomes import outcomes, WorkerDied
 from cpg_ros.fleet.tally import Tally
+from cpg_ros.fleet.tls import Certificates
 from fleet_jobs import dask_cluster, deadly, odd_ones_fail, slow_square, square
 from hypothesis import given
 from hypothesis import strategies as st
@@ -114,6 +119,86 @@ def test_an_address_where_nothing_answers(tmp_path):
          'tcp://127.0.0.1:1'], capture_output=True, text=True, timeout=60)
     assert found.returncode == 2
     assert found.stderr == 'inversion: no dask scheduler answers at tcp://127.0.0.1:1\n'
+
+
+def certificates(folder):
+    """Make an authority and a certificate that it signs, by openssl; return CA, CERT, KEY."""
+    def openssl(*words):
+        subprocess.run(['openssl', *words], cwd=folder, check=True, capture_output=True)
+
+    key = '-newkey', 'ec', '-pkeyopt', 'ec_paramgen_curve:prime256v1', '-nodes'
+    openssl('req', '-x509', *key, '-keyout', 'ca.key', '-out', 'ca.pem', '-subj', '/CN=authority',
+            '-days', '2')
+    openssl('req', *key, '-keyout', 'key.pem', '-out', 'request.pem', '-subj', '/CN=cluster')
+    openssl('x509', '-req', '-in', 'request.pem', '-CA', 'ca.pem', '-CAkey', 'ca.key',
+            '-CAcreateserial', '-out', 'cert.pem', '-days', '2')
+    return [str(folder / name) for name in ('ca.pem', 'cert.pem', 'key.pem')]
+
+
+def dask_here(**options):
+    """Return a scheduler and one worker in this process."""
+    local = pytest.importorskip('distributed').LocalCluster
+    return local(n_workers=1, threads_per_worker=1, processes=False, dashboard_address=None,
+                 **options)
+
+
+@pytest.mark.skipif(shutil.which('openssl') is None, reason='openssl is not installed')
+def test_a_cluster_with_tls(tmp_path):
+    pytest.importorskip('distributed')
+    from distributed import Security
+    (ours := tmp_path / 'ours').mkdir()
+    (others := tmp_path / 'others').mkdir()
+    own, said = certificates(ours), []
+    roles = {f'tls_{role}_{kind}': file for role in ('client', 'scheduler', 'worker')
+             for kind, file in zip(('cert', 'key'), own[1:], strict=True)}
+    safe = Security(tls_ca_file=own[0], require_encryption=True, **roles)
+    with dask_here(security=safe, host='127.0.0.1', protocol='tls://') as local:
+        address = local.scheduler_address
+        parser = ArgumentParser()
+        add_options(parser)
+        with working(parser.parse_args(['--dask', address, '--tls', *own]), '',
+                     said.append) as fleet:
+            assert list(fleet.map(square, range(5))) == [0, 1, 4, 9, 16]
+        assert address.startswith('tls://') and not said
+        with pytest.raises(InputError, match='needs --tls CA CERT KEY'):
+            cluster(address)
+        with pytest.raises(NoCluster, match=r'answers at .* to these certificates'):
+            cluster(address, certificates=Certificates(*certificates(others)))
+        with pytest.raises(NoCluster, match='no dask scheduler answers'):
+            cluster(address.replace('tls', 'tcp'))
+        for wrong, match in (((own[0], own[1], own[0]), 'cannot be used'),
+                             ((own[0], own[1], 'none.pem'), 'none.pem: no such file')):
+            with pytest.raises(InputError, match=match):
+                cluster(address, certificates=Certificates(*wrong))
+
+
+@pytest.mark.parametrize(('words', 'said'), [
+    (['--tls', 'a', 'b', 'c'], 'argument --tls: it needs --dask'),
+    (['--dask', 'tcp://x:1', '--tls', 'a', 'b', 'c'], "that begins with tls://, not 'tcp://x:1'")])
+def test_certificates_without_an_address_for_them(words, said):
+    pytest.importorskip('distributed')
+    parser = ArgumentParser()
+    add_options(parser)
+    with (pytest.raises(InputError, match=said),
+          working(parser.parse_args(words), '', lambda line: None)):
+        pass
+
+
+def test_a_scheduler_that_others_reach_without_tls_is_warned_of_once():
+    said = []
+    with dask_here(host='0.0.0.0', protocol='tcp://') as local:
+        port = urlsplit(local.scheduler_address).port
+        with cluster(f'tcp://127.0.0.1:{port}', said.append) as fleet:
+            assert list(fleet.map(square, range(3))) == [0, 1, 4]
+            fleet.renew()
+    warnings = [line for line in said if line.startswith('warning: ')]
+    assert len(warnings) == 1 and 'without TLS' in warnings[0]
+
+
+def test_one_on_loopback_is_not(dask):
+    said = []
+    cluster(dask.address, said.append).shutdown()
+    assert not said
 
 
 def test_dask_gives_what_processes_give_through_deaths_and_a_restart(dask):

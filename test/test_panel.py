@@ -33,7 +33,6 @@ pytest.importorskip('websockets')
 
 from graph import free_domain, Process, until  # noqa: E402, I100
 from panel_client import Client, PANEL, start_panel, steered_robot  # noqa: E402
-from websockets.exceptions import InvalidStatus  # noqa: E402
 
 
 @pytest.fixture(scope='module')
@@ -241,23 +240,6 @@ def test_a_flood_is_cut_off(rig):
     until(lambda: one.closed == '1008', 'the end of it')
 
 
-def test_it_asks_for_its_token(rig):
-    generator = rig[0]
-    panel, address = start_panel(generator.domain, '-p', 'token:=s3cret', '-p', 'host:=0.0.0.0',
-                                 '-r', '__node:=other_panel')
-    try:
-        port = urlsplit(address).port
-        assert address.endswith('?token=s3cret')
-        here = f'http://127.0.0.1:{port}/'
-        for query in ('', '?token=', '?token=s3cre', '?token=S3CRET'):
-            with pytest.raises(InvalidStatus, match='403'):
-                Client(here + query)
-        assert get(here, '/bags/panel_1.zip')[0].status == 403
-        Client(here + '?token=s3cret').ready().end()
-    finally:
-        panel.end()
-
-
 def run(*words):
     variables = dict(os.environ, ROS_DOMAIN_ID=str(free_domain()))
     return subprocess.run([PANEL, '--ros-args', *words], env=variables, text=True, timeout=60,
@@ -269,6 +251,8 @@ def test_it_does_not_start_where_it_must_not(tmp_path):
         port = taken.getsockname()[1]
         for words, said in (
                 (('-p', 'host:=0.0.0.0'), 'set the parameter token'),
+                (('-p', 'host:=0.0.0.0', '-p', 'token:=short'), 'token:=auto makes one'),
+                (('-p', 'host:=0.0.0.0', '-p', 'token:=auto'), 'there is none: make one'),
                 (('-p', f'port:={port}'), 'Address already in use'),
                 (('-p', f'urdf:={tmp_path}/no.urdf'), 'No such file'),
                 (('-p', 'port:=70000'), '70000 is not from 0 to 65535')):

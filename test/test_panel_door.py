@@ -20,8 +20,9 @@ import pytest
 
 pytest.importorskip('websockets')
 
-from cpg_ros.panel.controls import choices, unit  # noqa: E402, I100
-from cpg_ros.panel.door import Door, DoorError, is_loopback  # noqa: E402
+from cpg_ros.files.loopback import is_loopback  # noqa: E402, I100
+from cpg_ros.panel.controls import choices, unit  # noqa: E402
+from cpg_ros.panel.door import Delays, Door, DoorError, PEERS, token_for  # noqa: E402
 from cpg_ros.panel.requests import LONGEST, read, RequestError  # noqa: E402
 
 
@@ -33,10 +34,47 @@ def test_what_is_loopback(host, only_here):
     assert is_loopback(host) == only_here
 
 
-def test_another_host_needs_a_token():
-    with pytest.raises(DoorError, match=r"host '0\.0\.0\.0'.* set the parameter token"):
-        Door('0.0.0.0', '')
-    Door('0.0.0.0', 'word')
+LONG = 'a_token-of-128-bits_22'
+
+
+@pytest.mark.parametrize(('wish', 'said'), [
+    ('', r"host '0\.0\.0\.0'.* set the parameter token"), ('word', 'the token has 4 characters'),
+    ('x' * 21, 'token:=auto makes one'), ('auto', 'there is none: make one')])
+def test_another_host_needs_a_token_that_cannot_be_guessed(wish, said):
+    with pytest.raises(DoorError, match=said):
+        token_for('0.0.0.0', wish, terminal=False)
+
+
+def test_tokens():
+    assert token_for('0.0.0.0', LONG, terminal=False) == LONG
+    assert token_for('127.0.0.1', '', terminal=False) == ''
+    assert token_for('127.0.0.1', 'word', terminal=False) == 'word'
+    made = {token_for('0.0.0.0', 'auto', terminal=True) for _ in range(100)}
+    # 6 bits a character.
+    assert len(made) == 100 and all(6 * len(one) >= 128 for one in made)
+
+
+def test_wrong_tokens_make_their_own_peer_wait_longer_and_longer():
+    delays, now, waits = Delays(), 100.0, []
+    for _ in range(7):
+        waits.append(delays.wrong('10.0.0.1', now))
+        assert delays.waits('10.0.0.1', now + 0.99 * waits[-1])
+        assert not delays.waits('10.0.0.2', now)
+        now += waits[-1]
+        assert not delays.waits('10.0.0.1', now)
+    assert waits == [0.25, 0.5, 1.0, 2.0, 4.0, 4.0, 4.0]
+    assert delays.wrong('10.0.0.1', now + 61.0) == 0.25
+    # A network of IPv6 is one peer.
+    delays.wrong('2001:db8::1', now)
+    assert delays.waits('2001:db8::ffff', now) and not delays.waits('2001:db8:1::1', now)
+
+
+def test_the_memory_of_wrong_tokens_is_bounded():
+    delays = Delays()
+    for k in range(3 * PEERS):
+        delays.wrong(f'10.0.{k // 256}.{k % 256}', 100.0)
+    assert sum(delays.waits(f'10.0.{k // 256}.{k % 256}', 100.0)
+               for k in range(3 * PEERS)) == PEERS
 
 
 @pytest.mark.parametrize(('path', 'host', 'origin', 'said'), [
@@ -50,18 +88,18 @@ def test_another_host_needs_a_token():
     ('/socket', 'evil.example:8080', 'http://evil.example:8080', 'not a name of this machine'),
     ('/socket', '', '', 'not a name of this machine')])
 def test_on_loopback_pages_of_this_machine_come_in(path, host, origin, said):
-    found = Door('127.0.0.1', '').refuses(path, host, origin)
+    found = Door('').refuses(path, host, origin)
     assert (said in found) if said else not found
 
 
 @pytest.mark.parametrize('query', ['', '?token=', '?token=wor', '?token=wordy', '?token=WORD',
                                    '?Token=word', '?token=w%00ord', '?token=\udcff'])
 def test_a_wrong_token_does_not(query):
-    assert 'token' in Door('0.0.0.0', 'word').refuses(f'/socket{query}', 'robot:8080', '')
+    assert 'token' in Door('word').refuses(f'/socket{query}', 'robot:8080', '')
 
 
 def test_the_token_does_from_anywhere_but_another_sites_page():
-    door = Door('0.0.0.0', 'a b&c')
+    door = Door('a b&c')
     assert not door.refuses('/socket?token=a%20b%26c', 'robot:8080', 'http://robot:8080')
     assert door.refuses('/socket?token=a%20b%26c', 'robot:8080', 'http://evil.example')
 

@@ -19,13 +19,22 @@ import os
 import signal
 import time
 
-from graph import Process, until
+from graph import free_domain, Process, until
 import numpy as np
 import pytest
 from sensor_msgs.msg import BatteryState, Imu
+from stand_in import StandIn
 from std_msgs.msg import Float64MultiArray
 from std_srvs.srv import Trigger
-from unitree_faults import BRIDGE, FAULTS, inflict, mend, Walk
+from unitree_faults import (
+    BRIDGE,
+    bridge_and_watchdog_killed,
+    FAULTS,
+    inflict,
+    mend,
+    Stranger,
+    Walk,
+)
 
 for name, how in (('unitree_go', "'make unitree' has not been run"),
                   ('mujoco', 'the extra [sim] is not installed')):
@@ -38,6 +47,8 @@ if not os.environ.get('CPG_REAL_TIME'):
 
 #: A loaded machine stalls processes for longer than a robot could be left alone.
 PATIENT = 'state_timeout:=0.2', 'target_timeout:=0.3'
+needs_root = pytest.mark.skipif(os.geteuid() != 0, reason='only root can start what another user '
+                                'runs')
 
 
 @pytest.fixture(scope='module')
@@ -93,6 +104,14 @@ def test_what_happens_on_a_fault(walk, fault):
         mend(walk)
 
 
+def test_bridge_and_watchdog_killed_together_leave_the_last_command(walk):
+    walk.walking()
+    try:
+        assert bridge_and_watchdog_killed(walk) == (0, True)
+    finally:
+        mend(walk)
+
+
 @pytest.mark.parametrize('how', ['service', 'button'])
 def test_stop_is_at_once(walk, how):
     walk.walking()
@@ -115,6 +134,32 @@ def test_another_bridge_on_the_computer_is_refused(walk):
     process = alone(domain=walk.domain)
     assert process.wait() == 1
     assert 'another bridge on this computer' in process.log and len(process.lines) == 1
+    assert f': process {walk.bridge.pid} of user ' in process.log
+
+
+@needs_root
+def test_another_users_bridge_is_named():
+    domain = free_domain()
+    with Stranger('take', 'bridge', domain) as stranger:
+        process = alone(domain=domain)
+        assert process.wait() == 1
+    assert f'process {stranger.pid} of user nobody' in process.log and len(process.lines) == 1
+
+
+@needs_root
+def test_another_users_watchdog_is_not_trusted():
+    domain = free_domain()
+    with Stranger('take', 'watchdog', domain) as stranger:
+        robot = StandIn(domain)
+        robot.start()
+        process = alone('motion_switcher:=false', *PATIENT, domain=domain)
+        try:
+            process.wait_for('not started: what answers as the watchdog of this robot is process '
+                             f'{stranger.pid} of user nobody, another user than the bridge')
+            assert 'rising' not in process.log
+        finally:
+            process.end()
+            robot.end()
 
 
 def test_another_publisher_is_refused_and_sits_it_down(walk):

@@ -16,11 +16,15 @@
 
 import contextlib
 import math
+import os
+from pathlib import Path
 import signal
 import socket
+import struct
+import subprocess
+import sys
 import time
 
-from cpg_ros.nodes.unitree.watchdog_link import address
 from cpg_ros.unitree.vigil import Vigil
 from graph import EXECUTABLE, free_domain, Process, until, Watcher
 import numpy as np
@@ -31,6 +35,36 @@ from std_srvs.srv import Trigger
 
 BRIDGE = EXECUTABLE.with_name('unitree_bridge')
 COMMANDS = 'forward_position_controller/commands'
+
+
+def name_of(kind, domain):
+    """Return the name of a socket of the bridge or the watchdog in the abstract name space."""
+    return f'\0cpg_ros/unitree/{kind}/{domain}/lowcmd'
+
+
+class Stranger:
+    """A process of another user: feeds a watchdog, or takes its name or the bridge's.
+
+    Use as a context; only root can start one.
+    """
+
+    def __init__(self, does, kind, domain):
+        self._process = subprocess.Popen(
+            [sys.executable, str(Path(__file__).with_name('unitree_stranger.py')), does,
+             name_of(kind, domain)[1:]], stdout=subprocess.PIPE)
+        assert self._process.stdout.readline(), 'it does not run'
+
+    @property
+    def pid(self):
+        return self._process.pid
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self._process.kill()
+        self._process.wait()
+        self._process.stdout.close()
 
 
 class Walk:
@@ -111,14 +145,26 @@ class Walk:
         rows = self.robot.since(instant)
         return rows[np.flatnonzero(rows[:, 1] > 0.0).max(initial=-1) + 1, 0] - instant
 
+    def to_watchdog(self):
+        """Return a connection to the watchdog."""
+        line = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        line.connect(name_of('watchdog', self.domain))
+        return line
+
+    @property
+    def watchdog(self):
+        """The watchdog's process."""
+        with self.to_watchdog() as line:
+            return struct.unpack('3i', line.getsockopt(
+                socket.SOL_SOCKET, socket.SO_PEERCRED, 12))[0]
+
     def end(self):
         for one in (self.generator, self.bridge):
             one.signal(signal.SIGCONT) if one.alive else None
         self.bridge.end()
         # A bridge that has never driven leaves the watchdog of the one before at work.
-        with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as line, contextlib.suppress(
-                ConnectionRefusedError):
-            line.sendto(Vigil.END, address('watchdog', self.domain, '/lowcmd'))
+        with contextlib.suppress(ConnectionRefusedError), self.to_watchdog() as line:
+            line.send(Vigil.END)
         for one in (self.generator, self.watcher, self.robot):
             one.end()
 
@@ -167,6 +213,35 @@ def bridge_killed(walk):
     return time.monotonic()
 
 
+def fed_by_another_user(walk):
+    """Stop the bridge while another user's process says what a living bridge would."""
+    with Stranger('feed', 'watchdog', walk.domain):
+        time.sleep(0.2)
+        walk.bridge.signal(signal.SIGSTOP)
+        instant = time.monotonic()
+        time.sleep(0.5)
+        damped = walk.robot.damped
+        walk.bridge.signal(signal.SIGCONT)
+        assert damped, 'a watchdog that another user feeds does not damp'
+        until(lambda: walk.phase == 'damping', 'damping')
+    return instant
+
+
+def bridge_and_watchdog_killed(walk):
+    """Kill both at once; return the number of commands after 0.1 s, and whether joints are held.
+
+    Nothing of ours is left to send: the stand-in keeps the last command, as Unitree's simulators.
+    """
+    watchdog = walk.watchdog
+    walk.bridge.signal(signal.SIGSTOP)
+    # Stopped first: the watchdog would see the bridge go, and send once.
+    os.kill(watchdog, signal.SIGKILL)
+    walk.bridge.signal(signal.SIGKILL)
+    instant = time.monotonic()
+    time.sleep(1.1)
+    return len(walk.robot.since(instant + 0.1)), bool(walk.robot.commands[-1, 1] > 0.0)
+
+
 def network_cut(walk):
     walk.robot.cut = True
     time.sleep(1.0)
@@ -185,6 +260,8 @@ FAULTS = {generator_killed: (1.6 + 0.1, 0.1), generator_stopped: (1.6 + 0.1, 0.1
           target_leaps: (1.6 + 0.1, 0.1), state_frozen: (0.04, None), tilt: (0.02, None),
           bridge_killed: (0.02, None), network_cut: (0.02, None),
           interrupted: (0.5 + 1.5 + 0.1, 0.02)}
+if os.geteuid() == 0:
+    FAULTS[fed_by_another_user] = (0.02, None)
 
 
 def mend(walk):

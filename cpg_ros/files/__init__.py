@@ -12,10 +12,10 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Files and terminals: YAML that people write, atomic writes, caches, resources, progress.
+"""Files, terminals and addresses: YAML, atomic writes, caches, resources, progress, loopback.
 
 Imports nothing of the package; knows nothing of ROS.
 """
 
-__all__ = ['atomic_write', 'cache_folder', 'page_style', 'plain_text', 'progress_bar',
+__all__ = ['atomic_write', 'cache_folder', 'loopback', 'page_style', 'plain_text', 'progress_bar',
            'shared_resources', 'yaml_reader']

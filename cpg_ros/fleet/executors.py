@@ -36,6 +36,7 @@ from cpg_ros.errors import CpgError, InputError
 from cpg_ros.fleet.outcomes import in_order
 from cpg_ros.fleet.renewable_executor import RenewableExecutor
 from cpg_ros.fleet.tally import Tally
+from cpg_ros.fleet.tls import Certificates, exposed, security, TLS
 
 #: Within this many seconds an address answers, or is said not to; and a scheduler that was lost
 #: is waited for so long.
@@ -122,15 +123,18 @@ def _package() -> str:
     return cpg_ros.__file__ or ''
 
 
-def cluster(address: str, say: Callable[[str], None] = lambda line: None) -> Fleet:
+def cluster(address: str, say: Callable[[str], None] = lambda line: None,
+            certificates: Certificates | None = None) -> Fleet:
     """Return a fleet of the workers of a dask cluster.
 
     Args:
-        address: of its scheduler, such as tcp://head:8786.
-        say: takes a line when the scheduler is lost and when it is back.
+        address: of its scheduler, such as tcp://127.0.0.1:8786 or tls://head:8786.
+        say: takes a line when the scheduler is lost and when it is back, and one when other
+            machines reach it without TLS.
+        certificates: for TLS; None for those of dask's configuration.
 
     Raises:
-        InputError: the address is none.
+        InputError: the address is none, or the certificates cannot be used.
         NotInstalled: dask is missing.
         NoCluster: nothing answers, there are no workers, or they do not
             have the package.
@@ -147,11 +151,13 @@ def cluster(address: str, say: Callable[[str], None] = lambda line: None) -> Fle
     for name in ('distributed', 'distributed.core', 'distributed.client', 'distributed.comm'):
         logging.getLogger(name).setLevel(logging.CRITICAL)
     held: list[Any] = []
+    own: list[str] = []
+    safe = security(address, certificates)
 
     def connect(seconds: float) -> tuple[Executor, int]:
         # A client that has not come to be takes its time to go.
-        _answers(address, seconds)
-        client = Client(address, timeout=seconds, set_as_default=False)
+        own[:] = [_answers(address, seconds, safe)]
+        client = Client(address, timeout=seconds, set_as_default=False, security=safe)
         held[:] = [client]
         threads = sum(client.nthreads().values())
         return (client.get_executor(pure=False), AHEAD * (threads or EXPECTED))
@@ -177,6 +183,9 @@ def cluster(address: str, say: Callable[[str], None] = lambda line: None) -> Fle
         _leave(held)
 
     fleet = Fleet(*connect(ANSWERS), again, close)
+    if where := exposed(address, *own):
+        say(f'warning: the scheduler at {where} can be reached from other machines without TLS: '
+            'whoever reaches it can run any program on its workers and here')
     try:
         _workers_checked(held[0], address)
     except NoCluster:
@@ -185,8 +194,8 @@ def cluster(address: str, say: Callable[[str], None] = lambda line: None) -> Fle
     return fleet
 
 
-def _answers(address: str, seconds: float) -> None:
-    """See that a scheduler answers at an address.
+def _answers(address: str, seconds: float, safe: Any) -> str:
+    """See that a scheduler answers at an address; return the address that it gives itself.
 
     Raises:
         InputError: it is no address.
@@ -196,7 +205,8 @@ def _answers(address: str, seconds: float) -> None:
     from distributed.comm.core import connect
 
     async def ask() -> Any:
-        comm = await connect(address, timeout=seconds, deserialize=False)
+        comm = await connect(address, timeout=seconds, deserialize=False,
+                             **safe.get_connection_args('client'))
         try:
             await comm.write({'op': 'identity', 'reply': True})
             return await comm.read()
@@ -206,7 +216,8 @@ def _answers(address: str, seconds: float) -> None:
     try:
         found = asyncio.run(asyncio.wait_for(ask(), seconds))
     except (OSError, TimeoutError, asyncio.TimeoutError) as error:
-        raise NoCluster(f'no dask scheduler answers at {address}') from error
+        raise NoCluster(f'no dask scheduler answers at {address}' + (
+            ' to these certificates' if address.startswith(TLS) else '')) from error
     except (ValueError, RuntimeError, ImportError) as error:
         raise InputError(f'{address}: {" ".join(str(error).split())}') from error
     # What speaks another language is taken for a message of any length.
@@ -214,6 +225,7 @@ def _answers(address: str, seconds: float) -> None:
         raise NoCluster(f'what answers at {address} is not a dask scheduler') from error
     if not isinstance(found, dict) or found.get('type') != 'Scheduler':
         raise NoCluster(f'what answers at {address} is not a dask scheduler')
+    return str(found.get('address', address))
 
 
 def _leave(held: list[Any]) -> None:

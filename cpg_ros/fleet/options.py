@@ -20,32 +20,40 @@ from contextlib import contextmanager
 
 from cpg_ros.errors import InputError
 from cpg_ros.fleet.executors import cluster, Fleet, processes
+from cpg_ros.fleet.tls import Certificates
 
 #: More processes than this are a mistake.
 MOST = 1024
 
 
 def add_options(parser: ArgumentParser) -> None:
-    """Add --jobs and --dask."""
+    """Add --jobs, --dask, and what goes with it."""
     where = parser.add_mutually_exclusive_group()
     where.add_argument('--jobs', type=int, default=0, metavar='N', help='worker processes on '
                        'this machine (default: one per core); the results do not depend on the '
                        'number')
     where.add_argument('--dask', metavar='ADDRESS', help="scheduler of a dask cluster to use "
                        "instead, such as tcp://head:8786 (pip install 'cpg-ros[fleet]')")
+    parser.add_argument('--tls', nargs=3, metavar=('CA', 'CERT', 'KEY'), help="for --dask "
+                        "tls://...: certificate of the cluster's own authority, this client's "
+                        'certificate and its key, as PEM files')
 
 
 def chosen_fleet(chosen: Namespace, say: Callable[[str], None]) -> Fleet:
     """Return the fleet that the options ask for.
 
     Raises:
-        InputError: a number of processes that cannot be.
+        InputError: a number of processes that cannot be, or certificates that cannot be used.
         NoCluster: nothing answers at the address.
 
     """
     if not 0 <= chosen.jobs <= MOST:
         raise InputError(f'argument --jobs: {chosen.jobs} is not between 0 and {MOST}')
-    return cluster(chosen.dask, say) if chosen.dask else processes(chosen.jobs)
+    if chosen.tls and not chosen.dask:
+        raise InputError('argument --tls: it needs --dask')
+    if not chosen.dask:
+        return processes(chosen.jobs)
+    return cluster(chosen.dask, say, Certificates(*chosen.tls) if chosen.tls else None)
 
 
 @contextmanager

@@ -14,40 +14,65 @@
 
 """Who may come in: on loopback pages of this machine, elsewhere those who have the token."""
 
+from collections import OrderedDict
 import hmac
 import ipaddress
+import secrets
 from urllib.parse import parse_qs, urlsplit
 
 from cpg_ros.errors import CpgError
+from cpg_ros.files.loopback import is_loopback
+
+#: In place of a token: make one of 128 bits, and show it in the terminal.
+AUTO = 'auto'
+#: Characters of a token, at least: as many as those of one of 128 bits, 6 bits each.
+SHORTEST = 22
+#: How to make a token.
+RECIPE = 'python3 -c "import secrets; print(secrets.token_urlsafe(16))"'
+#: After a wrong token a peer waits, s; twice as long after each more, up to the last; it is
+#: forgiven after this time without one. So many peers are remembered, and of IPv6 so many bits.
+FIRST_WAIT, LONGEST_WAIT, FORGIVEN, PEERS, PREFIX = 0.25, 4.0, 60.0, 1024, 64
+#: Why a request is refused that guesses.
+WRONG = 'the token is wrong'
 
 
 class DoorError(CpgError):
     """It would be open to everybody; one line for the user."""
 
 
-def is_loopback(host: str) -> bool:
-    """Tell whether only this machine can reach a host: a name or an address, without a port."""
-    if host == 'localhost':
-        return True
-    try:
-        return ipaddress.ip_address(host).is_loopback
-    except ValueError:
-        return False
+def token_for(host: str, wish: str, terminal: bool) -> str:
+    """Return the token to ask for; '' for none.
+
+    Args:
+        host: to listen on.
+        wish: the user's: a token, ``auto`` for a new one, or '' for none.
+        terminal: whether there is one to show a new token in.
+
+    Raises:
+        DoorError: others than this machine could come in without a token, or with one that can
+            be guessed; or nobody would see a new one.
+
+    """
+    if wish == AUTO:
+        if not terminal:
+            raise DoorError(f'token:={AUTO} shows the token in the terminal, and there is none: '
+                            f'make one ({RECIPE}) and set it in a parameter file')
+        return secrets.token_urlsafe(16)
+    if not is_loopback(host):
+        if not wish:
+            raise DoorError(f"host '{host}' can be reached from other machines: set the parameter "
+                            f'token to protect it; token:={AUTO} makes one')
+        if len(wish) < SHORTEST:
+            raise DoorError(f'the token has {len(wish)} characters, and can be guessed: it needs '
+                            f'{SHORTEST}; token:={AUTO} makes one, or: {RECIPE}')
+    return wish
 
 
 class Door:
     """Looks at each request before anything of it is read."""
 
-    def __init__(self, host: str, token: str) -> None:
-        """Be the door of an address.
-
-        Raises:
-            DoorError: others than this machine could come in, and no token is asked for.
-
-        """
-        if not is_loopback(host) and not token:
-            raise DoorError(f"host '{host}' can be reached from other machines: set the parameter "
-                            'token to protect it')
+    def __init__(self, token: str) -> None:
+        """Be the door of a server; ``token`` as of ``token_for``."""
         self._token = token.encode()
 
     def refuses(self, path: str, host: str, origin: str) -> str:
@@ -64,9 +89,44 @@ class Door:
             return 'the request comes from a page of another site'
         if self._token:
             given = parse_qs(urlsplit(path).query).get('token', [''])[0]
+            if not given:
+                return 'the token is missing'
             if not hmac.compare_digest(given.encode(errors='replace'), self._token):
-                return 'the token is missing or wrong'
+                return WRONG
         # A name that its owner lets point at this machine (DNS rebinding) is another site's, too.
         elif not is_loopback(urlsplit(f'//{host}').hostname or ''):
             return f"'{host[:80]}' is not a name of this machine"
         return ''
+
+
+class Delays:
+    """Makes each peer wait after wrong tokens, without a thought for the others."""
+
+    def __init__(self) -> None:
+        # Peer -> how long it waits, and until when, both s; who was wrong last comes last.
+        self._peers: OrderedDict[str, tuple[float, float]] = OrderedDict()
+
+    def waits(self, address: str, now: float) -> bool:
+        """Tell whether a peer waits for an answer: another token of it is not looked at."""
+        return now < self._peers.get(_peer(address), (0.0, now))[1]
+
+    def wrong(self, address: str, now: float) -> float:
+        """Take a wrong token of a peer that does not wait; return for how long it does now, s."""
+        wait, until = self._peers.pop(_peer(address), (0.0, now))
+        wait = FIRST_WAIT if now - until > FORGIVEN else min(max(2.0 * wait, FIRST_WAIT),
+                                                             LONGEST_WAIT)
+        self._peers[_peer(address)] = wait, now + wait
+        if len(self._peers) > PEERS:
+            self._peers.popitem(last=False)
+        return wait
+
+
+def _peer(address: str) -> str:
+    """Return whose an address is: whoever has one of IPv6 has all of its network."""
+    try:
+        found = ipaddress.ip_address(address.partition('%')[0])
+    except ValueError:
+        return address
+    if found.version == 4:
+        return address
+    return str(ipaddress.ip_network((found, PREFIX), strict=False))

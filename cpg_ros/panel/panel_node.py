@@ -15,6 +15,7 @@
 """The node ``cpg_panel``: a page in the browser for every generator on the graph."""
 
 import asyncio
+import functools
 from pathlib import Path
 import socket
 import sys
@@ -23,10 +24,11 @@ import traceback
 from typing import Any
 
 from cpg_ros.errors import CpgError
+from cpg_ros.files.loopback import is_loopback
 from cpg_ros.nodes.node_base import asked_for_help, run, StartedNode, StartError
 from cpg_ros.nodes.parameter_spec import Spec
 from cpg_ros.panel import requests, shape_source
-from cpg_ros.panel.door import Door, DoorError, is_loopback
+from cpg_ros.panel.door import Door, DoorError, token_for
 from cpg_ros.panel.graph import Graph, look
 from cpg_ros.panel.orders import Orders
 from cpg_ros.panel.pages import Page, Pages, SLOW
@@ -46,8 +48,8 @@ SPECS = {
     'host': Spec('127.0.0.1', 'address to listen on; an address that other machines can reach '
                  'needs a token', read_only=True),
     'port': Spec(8080, 'port to listen on; 0 for any free one', 0, 65535, read_only=True),
-    'token': Spec('', 'token required in the page address, as ?token=WORD; empty for none',
-                  read_only=True),
+    'token': Spec('', 'token required in the page address, as ?token=WORD; auto: make one, shown '
+                  'in the terminal; empty: none', read_only=True),
     'urdf': Spec('', "URDF file with the robot's shape; if empty, robot_description, the "
                  "simulation's model or a stick figure is used", read_only=True),
     'max_speed': Spec(0.5, 'maximum speed of the steering pad [m/s]', 0.0, 5.0, True),
@@ -70,7 +72,8 @@ class Panel(StartedNode):
         for name, spec in SPECS.items():
             self._declare(name, spec)
         try:
-            door = Door(self._value('host'), self._value('token'))
+            self._token = token_for(self._value('host'), self._value('token'),
+                                    sys.stderr.isatty())
             shape_source.check(self._value('urdf'))
         except CpgError as error:
             kind = '' if isinstance(error, DoorError) else 'urdf: '
@@ -89,7 +92,7 @@ class Panel(StartedNode):
             round(1e6 * self._value('recording_limit')),
             lambda why: self._pages.later(self._recorded, why))
         self._orders = Orders(self._pages, self._calls, self._recorder, self._recorded)
-        self._server = WebServer(door, self._pages, self._recorder.packed, self._come,
+        self._server = WebServer(Door(self._token), self._pages, self._recorder.packed, self._come,
                                  self._asked, self._gone)
         self.thread = threading.Thread(target=self._run, name='pages', daemon=True)
         self._warn_of_unknown()
@@ -122,11 +125,15 @@ class Panel(StartedNode):
     async def _serve(self) -> None:
         self._pages.begin()
         server, port = await self._server.start(self._value('host'), self._value('port'))
-        token = '?token=' + self._value('token') if self._value('token') else ''
         host = self._value('host')
         shown = socket.gethostname() if host in ('0.0.0.0', '::') else host
         shown = f'[{shown}]' if ':' in shown else shown
-        self.get_logger().info(f'watch and drive it in a browser: http://{shown}:{port}/{token}')
+        self.get_logger().info(f'watch and drive it in a browser: http://{shown}:{port}/'
+                               + ' with ?token=WORD' * bool(self._token))
+        if self._token and sys.stderr.isatty():
+            # Not by the log, which is kept in files; and a terminal may be stopped.
+            asyncio.get_running_loop().run_in_executor(None, functools.partial(
+                print, f'http://{shown}:{port}/?token={self._token}', file=sys.stderr))
         if not is_loopback(host):
             self.get_logger().warning('anyone on this network who has the token can '
                                       'open the page, and nothing is encrypted')

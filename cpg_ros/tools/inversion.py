@@ -120,9 +120,9 @@ def _checked(parser: Parser, chosen: Namespace) -> None:
     """Refuse what can be refused before any work."""
     if chosen.bags is not None:
         _checked_many(parser, chosen)
-    elif chosen.jobs or chosen.dask or chosen.watch:
-        option = 'watch' if chosen.watch else 'dask' if chosen.dask else 'jobs'
-        parser.error(f'argument --{option}: one recording is one job; see --bags')
+    elif given := [option for option in ('watch', 'dask', 'tls', 'jobs')
+                    if getattr(chosen, option)]:
+        parser.error(f'argument --{given[0]}: one recording is one job; see --bags')
     check_reading_options(parser, chosen)
     if chosen.bags is None:
         _checked_files(parser, chosen)

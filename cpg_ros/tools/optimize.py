@@ -122,7 +122,7 @@ def table(front: Front) -> str:
 
 def _executor(chosen: argparse.Namespace) -> AbstractContextManager[Executor | None]:
     """Where the islands are: a single one is in this process, if nothing else is asked for."""
-    if chosen.islands < 2 and not chosen.dask:
+    if chosen.islands < 2 and not (chosen.dask or chosen.tls):
         return nullcontext()
     return working(chosen, 'epochs of islands', _note)
 

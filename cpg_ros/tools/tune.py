@@ -156,7 +156,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _executor(chosen: argparse.Namespace) -> AbstractContextManager[Executor | None]:
     """Where the searches are: a single one is in this process, and has all cores."""
-    if len(chosen.gaits) * chosen.seeds == 1 and not chosen.dask:
+    if len(chosen.gaits) * chosen.seeds == 1 and not (chosen.dask or chosen.tls):
         return nullcontext()
     return working(chosen, 'searches', _note)
 

@@ -18,7 +18,6 @@ from collections import deque
 from collections.abc import Callable
 import math
 import signal
-import socket
 import sys
 import time
 from typing import Any
@@ -30,11 +29,12 @@ from cpg_ros.nodes.log_queue import QUEUE
 from cpg_ros.nodes.node_base import asked_for_help, run, StartedNode, StartError
 from cpg_ros.nodes.shutdown import endings
 from cpg_ros.nodes.unitree.interfaces import message
+from cpg_ros.nodes.unitree.local_socket import address, listening, NameTaken
 from cpg_ros.nodes.unitree.parameters import SPECS
 from cpg_ros.nodes.unitree.robot_graph import best_effort, BRIDGE, Others, quality
 from cpg_ros.nodes.unitree.sensors import Sensors
 from cpg_ros.nodes.unitree.start import Start
-from cpg_ros.nodes.unitree.watchdog_link import address, WatchdogLink
+from cpg_ros.nodes.unitree.watchdog_link import WatchdogLink
 from cpg_ros.nodes.unserved import subscribe, taken
 from cpg_ros.robots.robot_file import find_robot
 from cpg_ros.unitree.low_state import BUTTONS
@@ -92,16 +92,15 @@ class UnitreeBridge(StartedNode):
         self._changes: deque[tuple[Phase, str]] = deque()
         self._supervisor = Supervisor(settings, lambda *change: self._changes.append(change))
         topic = self.resolve_topic_name('/lowcmd')
-        self._lock = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
         self._dry, domain = value('dry_run'), self.context.get_domain_id()
         self._publisher: Publisher | None = None
         self._watchdog: WatchdogLink | None = None
         if not self._dry:
             try:
-                self._lock.bind(address('bridge', domain, topic))
-            except OSError as error:
+                self._lock = listening(address('bridge', domain, topic))
+            except NameTaken as error:
                 raise StartError(f'another bridge on this computer commands the robot on {topic} '
-                                 f'in domain {domain} already') from error
+                                 f'in domain {domain} already: {error}') from error
             self._publisher = self.create_publisher(kinds[0], topic, quality())
             self._watchdog = WatchdogLink(domain, topic, period)
         self._announcements = Announcements(domain)

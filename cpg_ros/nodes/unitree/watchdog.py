@@ -16,10 +16,11 @@
 
 The bridge starts it: python -m cpg_ros.nodes.unitree.watchdog DOMAIN TOPIC PERIOD PROCESS. It ends
 when a bridge says that the robot rests, or when the bridge is gone before it ever drove the robot.
+It hears processes of its own user only.
 """
 
-import contextlib
 import os
+from pathlib import Path
 import select
 import signal
 import socket
@@ -28,8 +29,9 @@ import time
 
 from cpg_ros.nodes.log_queue import NO_FILE, QUEUE, QueuedLogger
 from cpg_ros.nodes.unitree.interfaces import message
+from cpg_ros.nodes.unitree.local_socket import address, listening, NameTaken, of_this_user
 from cpg_ros.nodes.unitree.robot_graph import quality, WATCHDOG
-from cpg_ros.nodes.unitree.watchdog_link import address
+from cpg_ros.nodes.unitree.watchdog_link import NAME_TAKEN
 from cpg_ros.unitree.low_cmd import LowCmd
 from cpg_ros.unitree.vigil import Vigil
 import rclpy
@@ -39,6 +41,8 @@ from rclpy.signals import SignalHandlerOptions
 
 #: How often it looks whether a bridge that has not driven yet is there, s.
 LOOK = 1.0
+#: With this score the kernel ends it last, or not at all, when memory runs out: see proc(5).
+SPARED = '-1000'
 
 
 def alive(process: int) -> bool:
@@ -50,19 +54,59 @@ def alive(process: int) -> bool:
     return True
 
 
-def watch(line: socket.socket, publisher: Publisher, period: float, process: int,
+def spared() -> bool:
+    """Ask the kernel to spare this process when memory runs out; tell whether it will."""
+    try:
+        Path('/proc/self/oom_score_adj').write_text(SPARED)
+    except OSError:
+        return False
+    return True
+
+
+def hear(line: socket.socket, vigil: Vigil) -> bool:
+    """Take what has come over a connection; tell whether it is still open."""
+    # Of what waits, the last word counts: ticks that were late are no sign of life.
+    while not vigil.over:
+        try:
+            word = line.recv(1024)
+        except BlockingIOError:
+            return True
+        except ConnectionResetError:
+            return False
+        if not word:
+            return False
+        vigil.hear(word, time.monotonic())
+    return True
+
+
+def accept(listener: socket.socket) -> list[socket.socket]:
+    """Return the connection that waits, if it is one of this user."""
+    try:
+        line, _ = listener.accept()
+    # It may have gone again.
+    except OSError:
+        return []
+    line.setblocking(False)
+    if of_this_user(line):
+        return [line]
+    line.close()
+    return []
+
+
+def watch(listener: socket.socket, publisher: Publisher, period: float, process: int,
           told: RcutilsLogger) -> None:
     """Damp whenever ticks are missing, until the end is told."""
-    vigil, command = Vigil(period), LowCmd()
+    vigil, command, lines = Vigil(period), LowCmd(), [listener]
     while not vigil.over:
         wait = vigil.wait(time.monotonic())
-        ready, _, _ = select.select([line], [], [], LOOK if wait is None else wait)
-        if ready:
-            # Of what waits, the last word counts: ticks that were late are no sign of life.
-            with contextlib.suppress(BlockingIOError):
-                while not vigil.over:
-                    vigil.hear(line.recv(1024), time.monotonic())
-        elif wait is None and not alive(process):
+        ready, _, _ = select.select(lines, [], [], LOOK if wait is None else wait)
+        for line in ready:
+            if line is listener:
+                lines += accept(listener)
+            elif not hear(line, vigil):
+                line.close()
+                lines.remove(line)
+        if not ready and wait is None and not alive(process):
             return
         if vigil.due(time.monotonic()):
             before = vigil.alarms
@@ -83,10 +127,16 @@ def main(args: list[str]) -> int:
     node = rclpy.create_node(WATCHDOG, enable_rosout=False, start_parameter_services=False,
                              use_global_arguments=False)
     publisher = node.create_publisher(message('unitree_go/LowCmd'), topic, quality())
-    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as line:
-        line.bind(address('watchdog', domain, topic))
-        line.setblocking(False)
-        watch(line, publisher, period, process, QueuedLogger(node.get_logger().name))
+    logger = QueuedLogger(node.get_logger().name)
+    if not spared():
+        logger.info('this process may be ended when memory runs out: it lacks CAP_SYS_RESOURCE')
+    try:
+        listener = listening(address('watchdog', domain, topic))
+    except NameTaken:
+        rclpy.shutdown()
+        return NAME_TAKEN
+    with listener:
+        watch(listener, publisher, period, process, logger)
     rclpy.shutdown()
     return 0
 

@@ -16,11 +16,12 @@
 
 import contextlib
 import os
-import socket
 import subprocess
 import sys
 import time
 
+from cpg_ros.errors import CpgError
+from cpg_ros.nodes.unitree.local_socket import address, of_this_user, peer, unconnected
 from cpg_ros.unitree.vigil import Vigil
 import numpy as np
 
@@ -28,57 +29,73 @@ import numpy as np
 READY = 20.0
 #: One that reads nothing for this long hangs, s.
 HANGS = 0.5
+#: Exit code of a watchdog whose name another program has.
+NAME_TAKEN = 3
 
 
-def address(kind: str, domain: int, topic: str) -> str:
-    """Return the name of a socket of this machine, one for each robot that is commanded.
-
-    Args:
-        kind: of whom: ``bridge`` or ``watchdog``.
-        domain: of ROS.
-        topic: on which commands are sent, resolved.
-
-    """
-    return f'\0cpg_ros/unitree/{kind}/{domain}{topic}'
+class NotOurs(CpgError):
+    """What listens under the watchdog's name belongs to another user; one line for the user."""
 
 
 class WatchdogLink:
-    """A socket to a process that damps the robot when it hears nothing.
+    """A connection to a process that damps the robot when it hears nothing.
 
-    A watchdog outlives its bridge; the next bridge for the same robot takes it over.
+    A watchdog outlives its bridge; the next bridge of its user for the same robot takes it over.
     """
 
     def __init__(self, domain: int, topic: str, period: float) -> None:
-        """Prepare; arguments as of ``address``, and the bridge's period in s."""
+        """Prepare; arguments as of ``local_socket.address``, and the bridge's period in s."""
         self._address = address('watchdog', domain, topic)
         self._command = [sys.executable, '-m', 'cpg_ros.nodes.unitree.watchdog', str(domain),
                          topic, str(period), str(os.getpid())]
-        self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
-        self._socket.setblocking(False)
+        self._socket = unconnected()
         self._process: subprocess.Popen | None = None
         self._read = float('inf')
         self._told = False
 
     def start(self) -> str:
         """Start a watchdog, or find one that is there; return why not, or ''."""
-        if self._connected():
-            return ''
-        # A session of its own: what ends the bridge and its launch must not end it.
-        self._process = subprocess.Popen(self._command, start_new_session=True,
-                                         stdin=subprocess.DEVNULL)
-        end = time.monotonic() + READY
-        while not self._connected():
-            if self._process.poll() is not None or time.monotonic() > end:
-                return 'the watchdog does not start'
-            time.sleep(0.05)
+        try:
+            if self._connected():
+                return ''
+            # A session of its own: what ends the bridge and its launch must not end it.
+            self._process = subprocess.Popen(self._command, start_new_session=True,
+                                             stdin=subprocess.DEVNULL)
+            end = time.monotonic() + READY
+            while not self._connected():
+                if (code := self._process.poll()) is not None or time.monotonic() > end:
+                    return 'the watchdog does not start' + (
+                        ': another program on this computer has taken its name and does not '
+                        'answer' if code == NAME_TAKEN else '')
+                time.sleep(0.05)
+        except NotOurs as error:
+            return str(error)
         return ''
 
     def _connected(self) -> bool:
-        try:
-            self._socket.connect(self._address)
+        """Connect to a watchdog, or tell whether it is connected.
+
+        Raises:
+            NotOurs: another user's process would hear the bridge, and not damp the robot.
+
+        """
+        with contextlib.suppress(OSError):
             self._socket.send(Vigil.HELLO)
-        except (ConnectionRefusedError, FileNotFoundError):
+            return True
+        line, before = unconnected(), self._socket
+        try:
+            line.connect(self._address)
+        # All that may wait do wait: it is asked again.
+        except (ConnectionRefusedError, BlockingIOError):
+            line.close()
             return False
+        if not of_this_user(line):
+            who = peer(line)
+            line.close()
+            raise NotOurs(f'what answers as the watchdog of this robot is {who}, another user '
+                          'than the bridge: end it')
+        self._socket = line
+        before.close()
         return True
 
     def tick(self, kd: np.ndarray, now: float) -> str:
