@@ -20,7 +20,7 @@ import json
 import time
 from typing import Any
 
-from cpg_ros.panel.door import is_loopback
+from cpg_ros.files.loopback import is_loopback
 from websockets.asyncio.server import broadcast, ServerConnection
 
 #: Pages at once that see and do everything, and more that can only stop the robot.

@@ -13,6 +13,7 @@
 # limitations under the License.
 """Steering with a dead man: the robot walks only as long as somebody holds on."""
 
+
 from collections.abc import Callable
 import math
 from typing import Any
