@@ -23,7 +23,7 @@ from pkgutil import iter_modules
 
 from cpg_ros.networks.network import Network
 
-__all__ = ['hopf', 'matsuoka', 'phase', 'shipped']
+__all__ = ['hopf', 'matsuoka', 'phase']
 
 
 def shipped() -> list[type[Network]]:
