@@ -29,6 +29,7 @@ from cpg_ros.nodes.parameter_services import StrictParameterService
 from cpg_ros.nodes.parameter_spec import as_doubles, as_list, kind_of, Spec
 from cpg_ros.nodes.real_time import leave_shared_memory
 from cpg_ros.nodes.shutdown import ended
+from rcl_interfaces.msg import ParameterDescriptor, ParameterType
 import rclpy
 from rclpy.exceptions import (
     InvalidParameterTypeException,
@@ -66,6 +67,10 @@ class StartedNode(Node):
         super().__init__(name, start_parameter_services=False, **options)
         self.parameter_service = StrictParameterService(self)
         self._doubles: set[str] = set()
+        # Its clock cannot change under a thread at work.
+        self.set_descriptor('use_sim_time', ParameterDescriptor(
+            description='follow /clock; set at start', type=ParameterType.PARAMETER_BOOL,
+            read_only=True))
         self.add_pre_set_parameters_callback(self._complete)
         self.failure: BaseException | None = None
         self.thread: threading.Thread | None = None
