@@ -66,7 +66,7 @@ def test_simulated_time_sets_the_pace_and_pauses(simulated):
 
 
 def check(samples, rate):
-    """Hold each step between messages, which is that of one tick, against limits and velocities."""
+    """Hold each step between messages, that of one tick, against limits and velocities."""
     stamps, positions, velocities = map(np.array, zip(*samples, strict=True))
     steps = np.diff(positions, axis=0) * rate
     assert np.abs(steps).max() <= LIMIT * (1.0 + 1e-6)

@@ -118,7 +118,7 @@ class Ticker(threading.Thread):
         self._moved.set()
 
     def stop_moving(self) -> None:
-        """Go on by the steady clock, should ``/clock`` stand still, until ``stopping`` is False."""
+        """Tick by the steady clock, should ``/clock`` stand still, while ``stopping``."""
         self.stopping = True
         self._moved.set()
 
@@ -139,7 +139,7 @@ class Ticker(threading.Thread):
 
     def _run_steady(self, deadline: int, stamp: Callable[[int], int],
                     going: Callable[[], bool]) -> None:
-        """Tick by the steady clock from a deadline, ns, while going; stamp makes stamps of them."""
+        """Tick by the steady clock from a deadline, ns, while going; stamp gives its stamp."""
         ending = self._ending
         while not ending.is_set() and going():
             period = self._period()
