@@ -16,8 +16,8 @@
 
 ``requests`` is seeded and knows nothing of the node but its parameters' names and types;
 ``effect`` says what an answer must have done to the values. The benchmark and the tests use both.
-Never in a request: ``use_sim_time`` (it stops the clock), and a rate that may be accepted (a rate
-of 1 Hz is a fair wish, but it would hide whether publishing pauses).
+Never in a request: a rate that may be accepted (a rate of 1 Hz is a fair wish, but it would hide
+whether publishing pauses).
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -29,7 +29,6 @@ from rcl_interfaces.msg import Parameter, ParameterValue, SetParametersResult
 FIELDS = {1: 'bool_value', 2: 'integer_value', 3: 'double_value', 4: 'string_value',
           5: 'byte_array_value', 6: 'bool_array_value', 7: 'integer_array_value',
           8: 'double_array_value', 9: 'string_array_value'}
-LEFT_ALONE = ('use_sim_time',)
 NUMBERS = (math.nan, math.inf, -math.inf, -1.0, -0.0, 0.0, 1e-320, -1e-300, 1e-12, 1e9, -1e9, 1e18,
            1.7976931348623157e308, -1.7976931348623157e308, 0.285, 2.5e-3, 4.9999, 1e5)
 INTEGERS = (0, -1, 1, 7, 2**31, -2**31, 2**53 + 1, 2**63 - 1, -2**63)
@@ -99,7 +98,7 @@ def requests(types: Mapping[str, int], count: int, seed: int = 0
 
     """
     rng = random.Random(seed)
-    names = sorted(set(types) - set(LEFT_ALONE))
+    names = sorted(types)
     for _ in range(count):
         style = rng.randrange(20)
         if style == 0:

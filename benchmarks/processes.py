@@ -35,7 +35,7 @@ PR_SET_PDEATHSIG = 1
 LIBC = ctypes.CDLL(None)
 
 
-def _ends_with_us() -> None:
+def ends_with_us() -> None:
     """Have this process ended with its parent, however that ends.
 
     A generator that is left behind at a real-time priority is in the way of all that is measured
@@ -67,7 +67,7 @@ class Process:
             command = [*command, '--ros-args', *(word for name, value in parameters.items()
                                                  for word in ('-p', f'{name}:={value}'))]
         self._child = subprocess.Popen(command, stdout=self._log, stderr=subprocess.STDOUT,
-                                       preexec_fn=_ends_with_us)
+                                       preexec_fn=ends_with_us)
         self.pid = self._child.pid
 
     def __enter__(self) -> 'Process':

@@ -14,6 +14,7 @@
 
 """A network in real time: a ring of history, a fixed model step, constant memory."""
 
+from collections.abc import Callable
 import copy
 import math
 
@@ -125,3 +126,23 @@ class Stepper:
         """Add an offset, shape (components,), to the newest state; the history before it stays."""
         self._x[int(self._clock[0])] += offset
         self._kernels.set_slope(*self._fixed, int(self._clock[0]))
+
+    def superpose(self, motion: Callable[[np.ndarray], np.ndarray],
+                  slope: Callable[[np.ndarray], np.ndarray]) -> None:
+        """Add a motion to the newest state and to all of the history before it.
+
+        Unlike an offset to the newest state alone, it leaves no step that a delay brings back.
+
+        Args:
+            motion: of model times up to 0, that of the newest node; (n,) to (n, components).
+            slope: its derivative, per model time, likewise.
+
+        """
+        nodes, newest = len(self._x), int(self._clock[0])
+        times = (np.arange(nodes) - nodes + 1) * self.step
+        oldest_first = (newest + 1 + np.arange(nodes)) % nodes
+        self._x[oldest_first] += motion(times)
+        slopes = slope(times)
+        self._after[oldest_first] += slopes
+        self._before[oldest_first] += slopes
+        self._kernels.set_slope(*self._fixed, newest)

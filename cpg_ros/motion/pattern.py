@@ -37,6 +37,9 @@ import numpy as np
 
 #: Cross-fades and ramps are worked out at least this often (s), whatever the tick.
 SUBSTEP = 1e-3
+#: No ramp or cross-fade is shorter (s): the clock is slowed from substep to substep, and a joint
+#: that has to get up to speed within one would outrun its limit before that.
+SHORTEST = 0.05
 #: Most gaits fading into one another at once; a further one waits for a place.
 MOST_TRACKS = 4
 #: A joint may cover the shift between the stand and a gait at this many times it a second.
@@ -65,59 +68,63 @@ class Pattern:
         robot = program.robot
         self.robot, self.drive = robot, drive
         self._leg = robot.leg_of_joint
-        self.faults = 0
-        self.held = 0
+        self.faults = self.held = 0
         self.correct: Callable[[np.ndarray], np.ndarray] | None = None
         self.hurry = 1.0
         self._offset, self._lower = robot.column('offset'), robot.column('lower')
         self._upper, self._limit = robot.column('upper'), robot.column('velocity')
         self._requests: deque = deque()
         self._tracks = [Track(program, 0.0, drive)]
+        self.position, self.velocity = self._offset.copy(), np.zeros_like(self._offset)
         self.restart(ramp, enabled)
 
     def restart(self, ramp: float, enabled: bool = True) -> None:
-        """Begin anew from the stand at phase 0, with the newest program."""
+        """Begin anew at phase 0, with the newest program, from where the joints are."""
         newest = self._tracks[-1]
         newest.phase = 0.0
         newest.reseed()
         self._tracks = [newest]
-        self.position, self.velocity = self._offset.copy(), np.zeros_like(self._offset)
+        self.velocity[:] = 0.0
         self._wanted, self._rate = self.position.copy(), self.velocity.copy()
+        self._behind = np.zeros(self._offset.size, dtype=bool)
         self._corrected, self._correction = np.zeros((2, self._offset.size))
-        self._absorption = Absorption()
-        self._recovering = False
+        self._absorption, self._recovering = Absorption(), False
         self._slowing = self._slower = 1.0
         self._frequency = newest.program.frequency
         self._last_rate: np.ndarray | None = None
         self._resumption = Resumption()
-        # Where the joints were found, from the stand, and how they are led from there.
-        self._found = np.zeros_like(self._offset)
-        self._leading = self._led = 0.0
         self._ramp = Ramp()
-        self._ramp.go(float(enabled), max(ramp, SUBSTEP))
+        self._ramp.go(float(enabled), max(ramp, SHORTEST))
         self.enabled = enabled
+        self.start_from(self.position, ramp)
 
     def start_from(self, angles: np.ndarray, time: float) -> None:
         """Begin at these angles, rad, (joints,), and lead the joints to the stand in s or more.
 
         To be called before the first advance. No joint takes more than half of its speed limit.
         """
-        self._found = angles - self._offset
+        # Where the joints were found, from the stand, and what is left of that.
+        self._found, self._lead = angles - self._offset, Ramp(1.0)
         self.position[:] = np.clip(angles, self._lower, self._upper)
-        fastest = 1.5 * np.abs(self._found) / np.maximum(0.5 * self._limit, 1e-9)
-        self._leading, self._led = max(time, SUBSTEP, float(fastest.max())), 0.0
+        if self._found.any():
+            self._lead_in(time)
+
+    def _lead_in(self, time: float) -> None:
+        left = self._lead.level * np.abs(self._found)
+        fastest = float(np.max(1.5 * left / np.maximum(0.5 * self._limit, 1e-9)))
+        self._lead.go(0.0, max(time, SHORTEST, fastest))
 
     # -- asked from other threads ---------------------------------------------------------
 
     def apply(self, program: Program, transition: float) -> None:
         """Change to a program over a transition in s; 0 leaves it to the network's dynamics."""
         # Seeding an orbit takes its time: here, in the caller's thread, not in that of the ticks.
-        prepared = Track(program, max(transition, SUBSTEP), self.drive)
+        prepared = Track(program, max(transition, SHORTEST), self.drive)
         self._requests.append((program, prepared if transition > 0.0 else None))
 
     def enable(self, enabled: bool, ramp: float) -> None:
         """Ramp into the gait, or down to the stand, over a time in s."""
-        self._requests.append((enabled, max(ramp, SUBSTEP)))
+        self._requests.append((enabled, max(ramp, SHORTEST)))
 
     def steer(self, stride: np.ndarray, pace: float) -> None:
         """Ask for the legs' strides, shape (legs,), and the pace; see Drive.
@@ -167,7 +174,7 @@ class Pattern:
     @property
     def standing(self) -> bool:
         """Tell whether it is disabled and the ramp has ended."""
-        return not (self.enabled or self._ramp.level or self._requests or self._leading)
+        return not (self.enabled or self._ramp.level or self._requests or self._lead.active)
 
     @property
     def in_transition(self) -> bool:
@@ -188,7 +195,7 @@ class Pattern:
         slow = self._resumption
         clock, share = slow.advance(dt) if slow.active else (dt, 1.0)
         clock, share = self.hurry * clock, self.hurry * share
-        calm = (len(self._tracks) == 1 and not (self._ramp.active or self._leading)
+        calm = (len(self._tracks) == 1 and not (self._ramp.active or self._lead.active)
                 and not self._absorption.active)
         if not (calm and self._cruise(clock)):
             parts = max(1, math.ceil(clock / SUBSTEP - 1e-9))
@@ -206,7 +213,7 @@ class Pattern:
                 rate = before
             self._corrected, self._correction = now, before
         self.held += confine(wanted, rate, self._lower, self._upper, self._limit,
-                             dt, self.position, self.velocity) > 0
+                             dt, self.position, self.velocity, self._behind) > 0
 
     def resume(self, stall: float) -> None:
         """Go on after a stall in s from where the pattern stood, slowed in.
@@ -222,6 +229,8 @@ class Pattern:
             if isinstance(what, bool):
                 self.enabled = what
                 self._ramp.go(float(what), how)
+                if self._lead.active and not what:
+                    self._lead_in(how)
             elif how is None:
                 del self._tracks[:-1]
                 self._tracks[0].drift_to(what)
@@ -302,16 +311,16 @@ class Pattern:
         if self._ramp.active:
             moving = True
             # First to the stand: the gait swings about it, not about where the joints were.
-            if not self._leading:
+            if not self._lead.active:
                 self._ramp.advance(clock)
         if self._ramp.level != 1.0 or self._ramp.rate:
             rate = self._ramp.level * rate + self._ramp.rate * wanted
             wanted = self._ramp.level * wanted
         found = np.zeros_like(wanted)
-        if self._leading:
+        if self._lead.active:
             moving, found = True, self._found
-            left, left_rate = self._lead(clock)
-            wanted, rate = wanted + left * found, rate + left_rate * found
+            self._lead.advance(clock)
+            wanted, rate = wanted + self._lead.level * found, rate + self._lead.rate * found
         if moving:
             # The pattern slows where it would outrun the gaits at the next substep.
             bound = SHORT_OF * np.minimum(np.max([t.program.speed + SHIFTING * (
@@ -337,13 +346,3 @@ class Pattern:
         if self.drive is not None:
             rate += self.drive.rate[self._leg] * track.reach
         return rate
-
-    def _lead(self, clock: float) -> tuple[float, float]:
-        """Return the share of the way from where the joints were found that is left, its rate."""
-        self._led += clock
-        s = self._led / self._leading
-        if s >= 1.0:
-            self._leading = 0.0
-            return 0.0, 0.0
-        share, share_rate = smoothstep(s)
-        return 1.0 - share, -share_rate / self._leading

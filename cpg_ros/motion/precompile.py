@@ -70,7 +70,7 @@ def _run_all(name: str) -> None:
         observe_phases(stepper.now, 1.0, cells, np.zeros(1), np.ones((1, 4)), np.ones((1, 4)),
                        np.ones((1, 4, 4)), np.zeros((1, 2, 2)), joints, cells, weights, cells,
                        one, np.zeros((10, 1)), joints, joints, joints)
-    confine(joints, joints, joints, joints, joints, 1.0, joints, joints)
+    confine(joints, joints, joints, joints, joints, 1.0, joints, joints, np.zeros(1, dtype=bool))
     approach(joints, joints, 0.1, joints, joints)
     lengthen(joints, cells, joints, joints, joints, joints, joints)
     scale(1.0, 1.0, joints, cells, joints, joints, joints, joints, joints, joints)

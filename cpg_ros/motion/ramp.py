@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The ramp of a pattern between the stand and its gait: a level from 0 to 1."""
+"""The ramp of a pattern between the stand and its gait, or to the stand: a level from 0 to 1."""
 
 from collections import deque
 
@@ -23,13 +23,14 @@ class Ramp:
     """A level and its rate, on the way to where it was sent.
 
     Attributes:
-        level: 0 at the stand, 1 in the full gait.
+        level: 0 at the stand, 1 in the full gait, or where the joints were found.
         rate: its derivative, 1/s of the pattern's clock.
 
     """
 
-    def __init__(self) -> None:
-        self.level = self.rate = 0.0
+    def __init__(self, level: float = 0.0) -> None:
+        """Rest at a level."""
+        self.level, self.rate = level, 0.0
         self._parts: deque[tuple[float, float, float, float]] = deque()
         self._past = 0.0
 

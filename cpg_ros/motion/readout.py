@@ -100,11 +100,12 @@ def observe(now, peak, period, cells, weights, phases, leg_cells, wave, lead, an
 
 
 @entry
-def confine(wanted, wanted_rate, lower, upper, speed, dt, position, velocity):
+def confine(wanted, wanted_rate, lower, upper, speed, dt, position, velocity, behind):
     """Move position to the wanted one within the joints' limits; count those held back.
 
-    position is that of the last tick on entry. Where a limit bites, velocity is the
-    difference quotient, so that it stays the derivative of what is published.
+    position and behind, which joints were held back, are those of the last tick on entry. Where a
+    limit bites, and where a joint catches up, velocity is the difference quotient, so that it
+    stays the derivative of what is published.
     """
     held = 0
     for joint in range(position.shape[0]):
@@ -113,9 +114,13 @@ def confine(wanted, wanted_rate, lower, upper, speed, dt, position, velocity):
         new = min(max(wanted[joint], last - reach), last + reach)
         new = min(max(new, lower[joint]), upper[joint])
         rate = wanted_rate[joint]
-        if new != wanted[joint] or abs(rate) > speed[joint] * (1.0 + 1e-9):
+        short = new != wanted[joint]
+        if short or abs(rate) > speed[joint] * (1.0 + 1e-9):
             held += 1
             rate = (new - last) / dt if dt > 0.0 else 0.0
+        elif behind[joint]:
+            rate = (new - last) / dt if dt > 0.0 else 0.0
+        behind[joint] = short
         position[joint] = new
         velocity[joint] = min(max(rate, -speed[joint]), speed[joint])
     return held

@@ -127,10 +127,11 @@ class Track:
         orbit = program.orbit
         self.stepper.set(orbit.network, program.gain, orbit.symmetry)
         mean, basis = program.wave
-        ahead = (self.phase - program.readout.start) % 1.0
-        state, target = self.stepper.newest() - mean, orbit(np.array(ahead * orbit.period)) - mean
+        at = (self.phase - program.readout.start) % 1.0 * orbit.period
+        state, target = self.stepper.newest() - mean, orbit(np.array(at)) - mean
         if np.linalg.norm(basis @ state) < KICK * np.linalg.norm(basis @ target):
-            self.stepper.disturb(KICK * target)
+            self.stepper.superpose(lambda times: KICK * (orbit(at + times) - mean),
+                                   lambda times: KICK * orbit.derivative(at + times))
         # On to the node where the change is, so that all of it shows at once.
         self.stepper.advance(self.stepper.ahead)
         self.follow(program)

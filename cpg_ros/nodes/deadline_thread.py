@@ -30,6 +30,11 @@ STALL = 2
 COARSE = 0.05
 #: What makes up for lost time, as a simulation may, does so when behind by no more than this, s.
 MOST_BEHIND = 1.0
+#: Simulated time that steps back by no more than this (messages out of order, two publishers of
+#: /clock) is waited for until it is past where it was; further back is a jump, s.
+JITTER = 0.1
+#: A stop does not wait for a /clock that has stood still for this long by the steady clock, s.
+STOPPED = 0.2
 
 
 def system_offset() -> int:
@@ -56,12 +61,15 @@ class Ticker(threading.Thread):
     a period is made up for at once; after a stall the periods that have passed are left out,
     ``resume`` is told how long it was in s, and the next tick is at the next deadline. The stamp
     is that of the deadline. With simulated time the deadlines are instants of ``/clock``: it
-    pauses with the clock, and a jump back calls ``restart``.
+    pauses with the clock, and a jump back calls ``restart``; but after ``stop_moving`` it goes on
+    by the steady clock where ``/clock`` stands still for STOPPED s or jumps back.
 
     Attributes:
         ticks: ticks so far.
         late: those that began more than a period after their deadline.
         dropped: periods left out in stalls.
+        jumps: of simulated time back.
+        stopping: whether the ticks do not wait for ``/clock``; set False once all is at rest.
         worst: longest delay behind a deadline since it was last read, s.
 
     """
@@ -84,7 +92,8 @@ class Ticker(threading.Thread):
         """
         super().__init__(name='ticker', daemon=True)
         self.rate = rate
-        self.ticks = self.late = self.dropped = 0
+        self.ticks = self.late = self.dropped = self.jumps = 0
+        self.stopping = False
         self._worst = 0.0
         self._clock: Any = node.get_clock()
         self._tick, self._restart, self._failed = tick, restart, failed
@@ -108,25 +117,31 @@ class Ticker(threading.Thread):
         self._ending.set()
         self._moved.set()
 
+    def stop_moving(self) -> None:
+        """Tick by the steady clock, should ``/clock`` stand still, while ``stopping``."""
+        self.stopping = True
+        self._moved.set()
+
     def run(self) -> None:
         """Tick until ended; hand any exception to ``failed``."""
         try:
             self._begin()
-            while not self._ending.is_set():
-                if self._clock.ros_time_is_active:
-                    self._run_simulated()
-                else:
-                    self._run_steady()
+            if self._clock.ros_time_is_active:
+                self._run_simulated()
+            else:
+                self._run_steady(time.monotonic_ns(),
+                                 lambda deadline: deadline + system_offset(), lambda: True)
         except BaseException as error:
             self._failed(error)
 
     def _period(self) -> int:
         return round(1e9 / self.rate)
 
-    def _run_steady(self) -> None:
-        deadline = time.monotonic_ns()
-        ending, clock = self._ending, self._clock
-        while not ending.is_set() and not clock.ros_time_is_active:
+    def _run_steady(self, deadline: int, stamp: Callable[[int], int],
+                    going: Callable[[], bool]) -> None:
+        """Tick by the steady clock from a deadline, ns, while going; stamp gives its stamp."""
+        ending = self._ending
+        while not ending.is_set() and going():
             period = self._period()
             deadline += period
             behind = time.monotonic_ns() - deadline
@@ -141,7 +156,7 @@ class Ticker(threading.Thread):
             self.ticks += 1
             if behind > period:
                 self.late += 1
-            self._tick(period * 1e-9, deadline + system_offset())
+            self._tick(period * 1e-9, stamp(deadline))
 
     def _stalled(self, behind: int, period: int) -> tuple[int, bool]:
         """Return how far the deadline must leap, ns, and whether its tick is left out, too.
@@ -163,15 +178,28 @@ class Ticker(threading.Thread):
         return missed * period, skip
 
     def _run_simulated(self) -> None:
+        # The last tick's stamp, the latest time, and how far that went on; 0 before the first.
         deadline = last = step = 0
-        while not self._ending.is_set() and self._clock.ros_time_is_active:
-            self._moved.wait()
+        moved = time.monotonic()
+        while not self._ending.is_set():
+            left = moved + STOPPED - time.monotonic()
+            self._moved.wait(max(left, 0.0) if self.stopping and deadline else None)
             self._moved.clear()
             now = self._clock.now().nanoseconds
-            if now == 0:
+            back = last - now
+            if now > last:
+                moved = time.monotonic()
+            elif self.stopping and deadline and (
+                    back > JITTER * 1e9 or time.monotonic() >= moved + STOPPED):
+                deadline = self._stop_by_steady_clock(deadline)
+                # Time is taken as it comes next, wherever that is.
+                last, moved = 0, time.monotonic()
                 continue
-            if deadline == 0 or now < last:
-                if deadline:
+            if now == 0 or 0 <= back <= JITTER * 1e9:
+                continue
+            if last == 0 or back > 0:
+                if last:
+                    self.jumps += 1
                     self._restart()
                 deadline = last = now
             # A clock may be coarser than a period; a stall is a step unlike the one before.
@@ -187,3 +215,16 @@ class Ticker(threading.Thread):
                 deadline += period
                 self.ticks += 1
                 self._tick(period * 1e-9, deadline)
+
+    def _stop_by_steady_clock(self, stamp: int) -> int:
+        """Tick on from a stamp, ns, until all is at rest; return the last one."""
+        now = time.monotonic_ns()
+        ahead = stamp - now
+
+        def next_stamp(deadline: int) -> int:
+            nonlocal stamp
+            stamp = deadline + ahead
+            return stamp
+
+        self._run_steady(now, next_stamp, lambda: self.stopping)
+        return stamp

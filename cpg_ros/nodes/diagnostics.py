@@ -27,6 +27,9 @@ from rclpy.clock import Clock
 from rclpy.clock_type import ClockType
 from rclpy.node import Node
 
+#: Time between two warnings of jumps of simulated time in the log, s.
+QUIET = 5.0
+
 
 class Diagnostics:
     """Reports ERROR on a fault until the pattern is back, and on other publishers; else WARN.
@@ -49,8 +52,8 @@ class Diagnostics:
     def _counts(self) -> dict[str, int]:
         ticker, pattern = self._ticker, self._pattern
         return {'ticks': ticker.ticks, 'late ticks': ticker.late,
-                'dropped ticks': ticker.dropped, 'watchdog re-seeds': pattern.faults,
-                'ticks held by limits': pattern.held}
+                'dropped ticks': ticker.dropped, 'jumps back of simulated time': ticker.jumps,
+                'watchdog re-seeds': pattern.faults, 'ticks held by limits': pattern.held}
 
     def publish(self) -> None:
         """Publish one status."""
@@ -65,6 +68,10 @@ class Diagnostics:
                 text += ' (symmetry_gain is 0: no gait is stable)'
         elif self._rivals.text:
             level, text = DiagnosticStatus.ERROR, self._rivals.text
+        elif new['jumps back of simulated time']:
+            level = DiagnosticStatus.WARN
+            text = self._why_anew(new['jumps back of simulated time'])
+            self._node.get_logger().warning(text, throttle_duration_sec=QUIET)
         elif self._silent > 1.0 / self._ticker.rate:
             level, text = DiagnosticStatus.WARN, f'nothing is published: {self._why_silent()}'
         elif 100 * new['dropped ticks'] > new['ticks']:
@@ -98,6 +105,14 @@ class Diagnostics:
         message = DiagnosticArray(status=[status])
         message.header.stamp = self._node.get_clock().now().to_msg()
         self._publisher.publish(message)
+
+    def _why_anew(self, jumps: int) -> str:
+        publishers = self._node.count_publishers('/clock')
+        text = ('simulated time jumped back: starting again from the stand' if jumps == 1 else
+                f'simulated time jumped back {jumps} times in a second')
+        if publishers > 1:
+            text += f'; /clock has {publishers} publishers, stop all but one'
+        return text
 
     def _why_silent(self) -> str:
         clock: Any = self._node.get_clock()

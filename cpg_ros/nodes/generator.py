@@ -275,12 +275,16 @@ class Generator(StartedNode):
                 return response
             response.message += f' from {self._lead_to_the_stand()}'
             self.ticker.start()
+        if request.data:
+            self.ticker.stopping = False
         if self._cmd_vel:
             self._cmd_vel.enable(request.data)
             if request.data and not self._cmd_vel.walking:
                 response.message = 'enabled: standing until cmd_vel asks for motion'
         else:
             self.pattern.enable(request.data, ramp)
+        if not request.data:
+            self.ticker.stop_moving()
         self.get_logger().info(response.message)
         return response
 
@@ -298,9 +302,11 @@ class Generator(StartedNode):
         self._outputs.publish(stamp, dt, self.pattern.position, self.pattern.velocity,
                               self.pattern.phases)
         self._cells.publish(dt, self.pattern.state)
+        if self.ticker.stopping and self.pattern.standing:
+            self.ticker.stopping = False
 
     def _restart(self) -> None:
-        self.get_logger().warning('simulated time jumped back: starting again from the stand')
+        """Begin anew where simulated time jumped back; diagnostics warn, not the ticks' thread."""
         self.pattern.restart(self._value('ramp'), self.pattern.enabled)
         self._feedback.restart()
 
@@ -318,11 +324,12 @@ class Generator(StartedNode):
     def finish(self) -> None:
         """Ramp down to the stand, then stop publishing, within LAST_DEADLINE."""
         began = time.monotonic()
-        if self.failure is None and not self.pattern.standing:
+        if self.failure is None and self.ticker.ticks and not self.pattern.standing:
             self.get_logger().info(f'ramping down over {LAST_RAMP:g} s before the end')
             if self._cmd_vel:
                 self._cmd_vel.end()
             self.pattern.enable(False, LAST_RAMP)
+            self.ticker.stop_moving()
             while not self.pattern.standing and time.monotonic() < began + LAST_DEADLINE:
                 time.sleep(0.005)
             time.sleep(min(0.05, 1.0 / self.ticker.rate))

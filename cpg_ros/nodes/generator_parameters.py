@@ -52,7 +52,8 @@ def specs(network: type[Network]) -> dict[str, Spec]:
                      "0 for the gait's own", 0.0, 0.9),
         'transition': Spec(1.0, 'duration of a change of gait or parameters [s]; 0 leaves the '
                            "change to the network's own dynamics", 0.0, 30.0),
-        'ramp': Spec(1.0, 'duration of the ramp between the stand and the gait [s]', 0.0, 30.0),
+        'ramp': Spec(1.0, 'duration of the ramp between the stand and the gait [s]; 0 for as fast '
+                     "as the joints' velocity limits permit", 0.0, 30.0),
         'symmetry_gain': Spec(-1.0, 'gain of the symmetry lock [1/model time]; -1 chooses a gain '
                               "at which the gait attracts, 0 is the paper's model", -1.0, 200.0),
         'combined_topic': Spec('joint_states', 'topic with all joints in one message; empty for '

@@ -30,6 +30,7 @@ from cpg_ros.nodes.parameter_services import StrictParameterService
 from cpg_ros.nodes.parameter_spec import as_doubles, as_list, kind_of, Spec
 from cpg_ros.nodes.real_time import leave_shared_memory
 from cpg_ros.nodes.shutdown import ended, endings
+from rcl_interfaces.msg import ParameterDescriptor, ParameterType
 import rclpy
 from rclpy.exceptions import (
     InvalidParameterTypeException,
@@ -67,6 +68,10 @@ class StartedNode(Node):
         self._logger = QueuedLogger.of(self)
         self.parameter_service = StrictParameterService(self)
         self._doubles: set[str] = set()
+        # Its clock cannot change under a thread at work.
+        self.set_descriptor('use_sim_time', ParameterDescriptor(
+            description='follow /clock; set at start', type=ParameterType.PARAMETER_BOOL,
+            read_only=True))
         self.add_pre_set_parameters_callback(self._complete)
         self.failure: BaseException | None = None
         self.thread: threading.Thread | None = None

@@ -190,10 +190,10 @@ class StrictParameterService(ParameterService):
         return batches
 
     def _read(self, messages: Sequence[ParameterMessage]) -> list[Parameter]:
-        """Read parameters that the node has.
+        """Read parameters that the node has and that may be set while it runs.
 
         Raises:
-            ValueError: a value of no known type, or an unknown name.
+            ValueError: a value of no known type, an unknown name, or a read-only parameter.
 
         """
         parameters = []
@@ -207,6 +207,8 @@ class StrictParameterService(ParameterService):
                 switch = f'{parameter.name}.enabled'
                 raise ValueError(f"there is no parameter '{parameter.name}'" + (
                     f": it is '{switch}'" if self._get_node().has_parameter(switch) else ''))
+            if self._get_node().describe_parameter(parameter.name).read_only:
+                raise ValueError(f'{parameter.name} is read-only: set it when the node starts')
         return parameters
 
     def _judged(self, batch: _Batch) -> SetParametersResult:

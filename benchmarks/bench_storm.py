@@ -1,0 +1,239 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""A generator at 500 Hz of every network under storms of requests; all it publishes is checked.
+
+Parameters (hostile and fair), cmd_vel, ~/enable and SIGSTOP; with --pipe nobody reads the log
+during the second half of each storm, and the pipe is closed before its end.
+"""
+
+import argparse
+import os
+import random
+import signal
+import subprocess
+import threading
+import time
+
+from client import NoAnswer, ParameterClient
+from common import emit, log
+from geometry_msgs.msg import Twist
+from hostile import requests
+import numpy as np
+from processes import ends_with_us, enter_workspace, GENERATOR
+from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
+import rclpy
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.qos import QoSProfile
+from sensor_msgs.msg import JointState
+from std_srvs.srv import SetBool
+
+RATE = 500.0
+NETWORKS = ('delayed', 'quadruped', 'biped', 'hopf', 'matsuoka', 'phase')
+#: Robots that the networks move; the others move the generic quadruped.
+ROBOTS = {'delayed': 'unitree_go2', 'quadruped': 'unitree_go2', 'biped': 'biped'}
+STEERED = ('unitree_go2',)
+TYPES = {bool: ParameterType.PARAMETER_BOOL, int: ParameterType.PARAMETER_INTEGER,
+         float: ParameterType.PARAMETER_DOUBLE, str: ParameterType.PARAMETER_STRING}
+#: A node that does not end within this time is killed, s.
+PATIENCE = 5.0
+TARGETS = {'limits_crossed': 0, 'exit_code': 0}
+#: What a velocity may differ from those published before and after a step, share of the limit.
+TOLERANCE = 0.1
+
+
+class Piped:
+    """A generator whose log is a pipe that can be left unread, and closed."""
+
+    def __init__(self, **parameters: object) -> None:
+        words = [word for name, value in parameters.items() for word in ('-p', f'{name}:={value}')]
+        self.child = subprocess.Popen([*GENERATOR, '--ros-args', *words], stdout=subprocess.PIPE,
+                                      stderr=subprocess.STDOUT, preexec_fn=ends_with_us)
+        self.reading, self.output = threading.Event(), b''
+        self.reading.set()
+        threading.Thread(target=self._read, daemon=True).start()
+
+    def _read(self) -> None:
+        descriptor = self.child.stdout.fileno()
+        try:
+            while chunk := os.read(descriptor, 1 << 16):
+                self.output += chunk
+                self.reading.wait()
+        except OSError:
+            return
+
+    def wait_for(self, text: bytes) -> None:
+        """Wait until its log contains a text (the first start compiles)."""
+        deadline = time.monotonic() + 180.0
+        while text not in self.output:
+            if self.child.poll() is not None or time.monotonic() > deadline:
+                raise RuntimeError(f'no {text!r} in:\n{self.output.decode()}')
+            time.sleep(0.05)
+
+    def end(self) -> int | None:
+        """Interrupt it; return its exit code, or None if it had to be killed."""
+        self.child.send_signal(signal.SIGINT)
+        try:
+            return self.child.wait(PATIENCE)
+        except subprocess.TimeoutExpired:
+            self.child.kill()
+            self.child.wait()
+            return None
+
+
+class Checker:
+    """Listens to joint states in a thread of its own and holds each message against limits."""
+
+    def __init__(self, robot: str) -> None:
+        from cpg_ros.robots.robot_file import find_robot
+        joints = find_robot(robot).joints
+        self._limits = {joint.name: (joint.lower, joint.upper, joint.velocity)
+                        for joint in joints}
+        self.node = rclpy.create_node('checker')
+        self.node.create_subscription(JointState, 'joint_states', self._hear,
+                                      QoSProfile(depth=10000))
+        self.messages, self.crossed, self.fastest, self.off = 0, [], 0.0, 0.0
+        self._before: tuple[float, np.ndarray, np.ndarray] | None = None
+        self._executor = SingleThreadedExecutor()
+        self._executor.add_node(self.node)
+        self._ending = False
+        self._thread = threading.Thread(target=self._spin, daemon=True)
+        self._thread.start()
+
+    def _spin(self) -> None:
+        while not self._ending:
+            self._executor.spin_once(timeout_sec=0.1)
+
+    def _hear(self, message: JointState) -> None:
+        lower, upper, limit = np.array([self._limits[name] for name in message.name]).T
+        stamp = message.header.stamp.sec + 1e-9 * message.header.stamp.nanosec
+        position, velocity = np.array(message.position), np.array(message.velocity)
+        self.messages += 1
+        wrong = ''
+        if not (np.isfinite(position).all() and np.isfinite(velocity).all()):
+            wrong = 'not finite'
+        elif (position < lower - 1e-9).any() or (position > upper + 1e-9).any():
+            wrong = 'position'
+        elif (np.abs(velocity) > limit * (1.0 + 1e-9)).any():
+            wrong = 'published velocity'
+        elif self._before is not None:
+            then, old, before = self._before
+            # A message is a tick, however long the process was stopped before it.
+            step = (position - old) * RATE
+            self.fastest = max(self.fastest, float(np.max(np.abs(step) / limit)))
+            if stamp <= then or (np.abs(step) > limit * (1.0 + 1e-3)).any():
+                wrong = f'moved {np.max(np.abs(step) / limit):.3g} of the limit'
+            elif stamp - then < 1.5 / RATE:
+                low, high = np.minimum(before, velocity), np.maximum(before, velocity)
+                off = float(np.max(np.maximum(low - step, step - high) / limit))
+                self.off = max(self.off, off)
+                if off > TOLERANCE:
+                    wrong = f'velocity {off:.3g} of the limit beside the step'
+        if wrong:
+            self.crossed.append(f'{stamp:.3f}: {wrong}')
+        self._before = stamp, position, velocity
+
+    def end(self) -> None:
+        self._ending = True
+        self._thread.join()
+        self.node.destroy_node()
+
+
+def fair(rng: random.Random, gaits: list[str]) -> list[Parameter]:
+    """Return a batch that a user might send."""
+    name = rng.choice(['gait', 'frequency', 'ramp', 'transition', 'amplitude'])
+    if name == 'gait' and gaits:
+        return [Parameter(name=name, value=ParameterValue(
+            type=ParameterType.PARAMETER_STRING, string_value=rng.choice(gaits)))]
+    high = {'frequency': 3.0, 'amplitude': 1.2}.get(name, 0.5)
+    name = name if name != 'gait' else 'frequency'
+    number = rng.choice([0.0, rng.uniform(0.0, high)])
+    return [Parameter(name=name, value=ParameterValue(
+        type=ParameterType.PARAMETER_DOUBLE, double_value=number))]
+
+
+def storm(network: str, seconds: float, pipe: bool, seed: int) -> dict[str, object]:
+    from cpg_ros.networks.registry import PRESETS
+    rng = random.Random(f'{network} {seed}')
+    robot = ROBOTS.get(network, 'quadruped')
+    node = Piped(rate=RATE, network=network, robot=robot, ramp=0.2, feedback='false',
+                 cmd_vel=str(robot in STEERED).lower())
+    node.wait_for(b'publishing')
+    checker, client = Checker(robot), ParameterClient()
+    walk = client.node.create_publisher(Twist, 'cmd_vel', 10)
+    enable = client.node.create_client(SetBool, 'cpg_generator/enable')
+    names = [name for name in client.names() if not name.startswith('qos_overrides')]
+    values = client.get(names)
+    types = {name: TYPES[type(value)] for name, value in values.items() if type(value) in TYPES}
+    odd = requests(types, 1 << 30, seed)
+    gaits, counts = list(PRESETS[network]), dict.fromkeys(
+        ('requests', 'accepted', 'unanswered', 'stops', 'enables', 'cmd_vels'), 0)
+    began, closed = time.monotonic(), False
+    while (past := time.monotonic() - began) < seconds and node.child.poll() is None:
+        if pipe and past > seconds / 2:
+            node.reading.clear()
+        if pipe and past > 0.75 * seconds and not closed:
+            closed = True
+            node.child.stdout.close()
+            node.reading.set()
+        twist = Twist()
+        twist.linear.x, twist.angular.z = rng.uniform(-1.0, 1.0), rng.uniform(-1.0, 1.0)
+        walk.publish(twist)
+        counts['cmd_vels'] += 1
+        draw = rng.random()
+        if draw < 0.03:
+            node.child.send_signal(signal.SIGSTOP)
+            time.sleep(rng.uniform(0.001, 0.4))
+            node.child.send_signal(signal.SIGCONT)
+            counts['stops'] += 1
+        elif draw < 0.15:
+            enable.call_async(SetBool.Request(data=rng.random() < 0.7))
+            counts['enables'] += 1
+        atomically, batch = (True, fair(rng, gaits)) if draw > 0.5 else next(odd)
+        try:
+            results = client.set(batch, atomically)
+            counts['accepted'] += sum(result.successful for result in results)
+        except NoAnswer:
+            counts['unanswered'] += 1
+        counts['requests'] += 1
+    code = node.end()
+    time.sleep(0.5)
+    checker.end()
+    client.node.destroy_node()
+    log(f'{network}: {checker.messages} messages, {len(checker.crossed)} wrong, code {code}')
+    return {**counts, 'messages': checker.messages, 'limits_crossed': len(checker.crossed),
+            'first': checker.crossed[:3], 'fastest': checker.fastest,
+            'velocity_off': checker.off, 'exit_code': code}
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument('--seconds', type=float, default=100.0, help='of each network')
+    parser.add_argument('--pipe', action=argparse.BooleanOptionalAction, default=True,
+                        help='leave the log unread, then close its pipe (default: yes)')
+    parser.add_argument('--networks', nargs='+', default=NETWORKS, choices=NETWORKS)
+    parser.add_argument('--seed', type=int, default=0)
+    arguments = parser.parse_args()
+    enter_workspace()
+    rclpy.init(args=[])
+    found = {network: storm(network, arguments.seconds, arguments.pipe, arguments.seed)
+             for network in arguments.networks}
+    rclpy.shutdown()
+    emit(benchmark='storm', rate=RATE, seconds=arguments.seconds, pipe=arguments.pipe, **found,
+         targets=TARGETS, passed=all(one['messages'] > 0 and all(
+             one[key] == target for key, target in TARGETS.items()) for one in found.values()))
+
+
+if __name__ == '__main__':
+    main()
