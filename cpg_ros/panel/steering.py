@@ -11,6 +11,7 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
+
 """Steering with a dead man: the robot walks only as long as somebody holds on."""
 
 from collections.abc import Callable
