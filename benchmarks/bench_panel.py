@@ -174,11 +174,14 @@ def clicks(panel: Panel, count: int) -> dict[str, float]:
     with connect(panel.socket, max_size=None) as page:
         while '"controls"' not in page.recv():
             pass
+        stamp = None
         while not heard:
             rclpy.spin_once(node, timeout_sec=0.1)
         for k in range(count):
+            while stamp is None or time.monotonic() - stamp > 0.1:
+                stamp = json.loads(page.recv(timeout=1.0)).get('stamp', stamp)
             gait, began = ('walk', 'trot', 'pace')[k % 3], time.monotonic()
-            page.send(json.dumps({'do': 'set', 'name': 'gait', 'value': gait}))
+            page.send(json.dumps({'do': 'set', 'name': 'gait', 'value': gait, 'stamp': stamp}))
             while heard[-1][0] != gait and time.monotonic() < began + 5.0:
                 rclpy.spin_once(node, timeout_sec=0.1)
             if heard[-1][0] == gait:
@@ -198,7 +201,7 @@ def hostile(panel: Panel, count: int) -> dict[str, object]:
             with connect(panel.socket, max_size=None) as page:
                 page.send(HOSTILE[k % len(HOSTILE)])
                 for _ in range(200 if k % 50 == 0 else 0):
-                    page.send('{"do":"stop"}')
+                    page.send('{"do":"alive"}')
                 page.recv(timeout=1.0)
         except (WebSocketException, OSError, TimeoutError):
             continue

@@ -186,9 +186,9 @@ def test_a_link_with_a_delay_does_not_steer(rig, twists, open_page):
         page = open_page(link.address).ready()
         page.steer(4.0)
         page.send(do='steer', speed=0, turn=0)
-        until(lambda: (page.last['lease']['round_trip'] or 0.0) >= 4.0, 'the page says so')
-        time.sleep(2.5)
+        time.sleep(4.5)
         assert not moving(twists)
+        until(lambda: (page.last['lease']['round_trip'] or 0.0) >= 4.0, 'the page says so')
         page.send(do='enable', on=True)
         until(lambda: page.said, 'a reason')
         assert 'enable came up to 4' in page.said[-1] and 'the limit is 2 s' in page.said[-1]

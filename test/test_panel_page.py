@@ -16,6 +16,7 @@
 
 import re
 import shutil
+import time
 
 import pytest
 
@@ -24,7 +25,7 @@ pytest.importorskip('playwright', reason='playwright is not installed')
 
 from geometry_msgs.msg import Twist  # noqa: E402, I100
 from graph import Process, until, Watcher  # noqa: E402
-from panel_client import start_panel  # noqa: E402
+from panel_client import Client, Delay, start_panel  # noqa: E402
 from playwright.sync_api import sync_playwright  # noqa: E402
 
 CHROMIUM = shutil.which('chromium') or shutil.which('chromium-browser') or shutil.which(
@@ -87,6 +88,17 @@ def open_page(rig, browser):
     assert not wrong
 
 
+def holder(page):
+    """Return what the page says about who has control."""
+    return page.locator('#holder').inner_text()
+
+
+def take_over(page):
+    """Take over with a click, once another page has control."""
+    page.locator('#take-over').click()
+    until(lambda: holder(page) == 'This page has control.', 'control')
+
+
 def test_it_shows_the_robot_and_all_that_is_known_of_it(rig, open_page):
     page = open_page()
     assert page.locator('#source').inner_text() == "shape: model 'go2'"
@@ -113,6 +125,7 @@ def test_every_page_follows_clicks_and_keys(rig, open_page):
     gaits = rig[2].gaits
     one.locator('#gaits button[data-gait=walk]').click()
     until(lambda: gaits[-1] == 'walk', 'walk')
+    take_over(other)
     other.keyboard.press('2')
     until(lambda: gaits[-1] == 'trot', 'trot')
     for page in (one, other):
@@ -173,8 +186,104 @@ def test_the_robot_stops_when_the_page_lets_go(rig, open_page, how):
     elif how == 'closed':
         page.close()
     else:
-        page.evaluate("""() => { const end = Date.now() + 1500; while (Date.now() < end); }""")
+        page.evaluate("""() => { window.end = Date.now() + 1500; while (Date.now() < end); }""")
+        assert (0.0, 0.0) in rig[3]  # and it goes on only with a new press
+        time.sleep(0.2)
+        rig[3].clear()
+        time.sleep(0.5)
+        assert set(rig[3]) <= {(0.0, 0.0)}
+        return
     until(lambda: rig[3][-1] == (0.0, 0.0), 'the stop')
+
+
+def test_drawing_does_not_let_go(rig, open_page):
+    page = open_page()  # as on a machine without a graphics card
+    page.evaluate("""() => { const { scene } = panel, draw = scene.draw; scene.draw = (forces) => {
+        const end = Date.now() + 450; while (Date.now() < end); draw.call(scene, forces); }; }""")
+    time.sleep(1.0)
+    steered(rig, page)
+    rig[3].clear()
+    time.sleep(3.0)
+    assert len(rig[3]) > 60 and set(rig[3]) == {(0.5, 0.0)}
+    assert page.locator('#paused').is_visible()
+    page.keyboard.up('ArrowUp')
+    until(lambda: rig[3][-1] == (0.0, 0.0), 'the stop')
+
+
+def test_control_is_taken_over_by_a_click_that_both_pages_see(rig, open_page):
+    one, other = open_page(), open_page()
+    until(lambda: holder(one) == 'Nobody has control: the first command takes it.', 'nobody')
+    assert not one.locator('#take-over').is_visible()
+    steered(rig, one)
+    until(lambda: holder(one) == 'This page has control.', 'control without a click')
+    name = one.locator('#this-page').inner_text().removeprefix('this is ')
+    until(lambda: holder(other) == f'P{name[1:]} has control. This page only watches.', 'whose')
+    assert 'off' in other.locator('#pad').get_attribute('class')
+    assert other.locator('#steered').inner_text() == f'{name} has control'
+    take_over(other)  # while the key is down
+    name = other.locator('#this-page').inner_text().removeprefix('this is ')
+    until(lambda: holder(one) == f'P{name[1:]} took over. This page only watches.', 'the loss')
+    until(lambda: rig[3][-1] == (0.0, 0.0), 'the stop')
+    rig[3].clear()
+    time.sleep(0.5)
+    assert set(rig[3]) <= {(0.0, 0.0)}
+    steered(rig, other, 'ArrowDown')
+    assert rig[3][-1] == (-0.5, 0.0)
+    # Whoever only watches can stop the robot.
+    one.locator('#stop').click()
+    one.locator('#said p.told', has_text='ramping down').wait_for()
+    other.keyboard.up('ArrowDown')
+    other.locator('#enable').click()
+    other.locator('#release').click()
+    until(lambda: holder(one) == 'Nobody has control: the first command takes it.', 'nobody')
+
+
+def test_another_node_that_steers_is_shown_and_confirmed_by_a_click(rig, open_page):
+    page = open_page()
+    publisher = rig[2].node.create_publisher(Twist, '/cmd_vel', 10)
+    until(lambda: 'published by /watcher. To steer, take over.' in holder(page), 'the other')
+    assert 'off' in page.locator('#pad').get_attribute('class')
+    page.locator('#take-over').click()
+    until(lambda: '/watcher: both steer.' in holder(page), 'both')
+    assert steered(rig, page) == (0.5, 0.0)
+    page.keyboard.up('ArrowUp')
+    rig[2].node.destroy_publisher(publisher)
+    until(lambda: holder(page) == 'This page has control.', 'the end of it')
+
+
+def test_a_slow_link_is_shown(rig, browser):
+    link = Delay(rig[1], 0.4)
+    page = browser.new_page()
+    try:
+        page.goto(link.address)
+        slow = r'Link too slow to steer: 0\.[89] s \(limit 0\.3 s\)\.'
+        until(lambda: re.search(slow, holder(page)), 'the delay')
+        rig[3].clear()
+        page.keyboard.down('ArrowUp')
+        time.sleep(2.0)
+        assert not rig[3]
+    finally:
+        page.close()
+        link.end()
+
+
+def test_the_17th_page_can_only_stop(rig, open_page, browser):
+    others = [Client(rig[1]) for _ in range(16)]
+    page = browser.new_page()
+    try:
+        page.goto(rig[1])
+        until(lambda: '16 pages are already open: this one can only stop' in holder(page), 'why')
+        page.locator('#stop').click()
+        page.locator('#said p.told', has_text='ramping down').wait_for()
+        others.pop().end()
+        until(lambda: holder(page).startswith('Nobody has control'), 'full access')
+        until(lambda: page.evaluate('panel.frames > 0'), 'frames')
+        page.locator('#enable').click()
+        page.locator('#said p.told', has_text='enabled').wait_for()
+    finally:
+        page.close()
+        for one in others:
+            one.end()
 
 
 def test_the_pad_steers_with_a_finger(rig, open_page):

@@ -11,6 +11,7 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
+
 """Who may move a robot: at most one holder at a time, and anybody can take over."""
 
 from collections.abc import Hashable

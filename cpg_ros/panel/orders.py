@@ -105,7 +105,7 @@ class Orders:
             self._pages.say([lost], f'{page} has taken over; this page no longer moves the robot')
 
     def _steer(self, page: Page, view: RobotView, request: Request, now: float) -> None:
-        """Steer; why it is refused is shown once."""
+        """Steer; show once why that is refused, unless the loss of the lease has been shown."""
         if view.controls.value('cmd_vel') is not True:
             raise OrderError(f'{view.name} ignores cmd_vel; start it with cmd_vel:=true to steer')
         try:
@@ -113,7 +113,7 @@ class Orders:
                               request.values['turn'])
             page.refused = ''
         except LeaseError as error:
-            if str(error) != page.refused:
+            if not page.lost_to and str(error) != page.refused:
                 page.refused = str(error)
                 raise
 

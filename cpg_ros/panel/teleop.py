@@ -11,6 +11,7 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
+
 """One robot's lease, and the ``cmd_vel`` of the page that has it.
 
 The panel publishes on ``cmd_vel`` only while a page has the lease, and with a new publisher after

@@ -33,12 +33,13 @@ export class Lease {
 
   text() {
     const { now } = this, lines = [];
+    const holder = now.holder.replace(/^p/, 'P');
     if (now.stop_only) return ['16 pages are already open: this one can only stop the robot. '
       + 'It gets full access when another page closes.'];
     if (now.yours) lines.push('This page has control.');
     else if (!now.holder) lines.push('Nobody has control: the first command takes it.');
-    else if (now.lost_to === now.holder) lines.push(`${now.holder} took over. This page only watches.`);
-    else lines.push(`${now.holder} has control. This page only watches.`);
+    else if (now.lost_to === now.holder) lines.push(`${holder} took over. This page only watches.`);
+    else lines.push(`${holder} has control. This page only watches.`);
     if (now.others.length) {
       lines.push(`cmd_vel is also published by ${listed(now.others)}${now.confirmed
         ? ': both steer.' : '. To steer, take over.'}`);

@@ -2,7 +2,8 @@
 
 const TICK = 50;     // ms between two commands while the robot is steered
 const SILENT = 250;  // ms; a page that has stood still for this long has let go
-let socket = null, stamp = null, held = null, pending = null, busy = false, count = 0;
+const KEPT = 60;     // frames that wait for a page that draws slowly
+let socket = null, stamp = null, held = null, pending = [], busy = false, count = 0;
 let alive = performance.now(), ticked = alive, sent = 0;
 
 // A command carries the newest stamp that has come: the panel sees by it how old it may be.
@@ -21,26 +22,27 @@ function letGo() {
   held = null;
 }
 
-// Frames that come while the page draws become one.
+// Frames that come while the page draws go to it at once: none of its messages waits behind many.
 function pass() {
-  busy = pending !== null;
-  if (busy) postMessage(pending);
-  pending = null;
+  busy = pending.length > 0;
+  if (busy) postMessage({ type: 'frames', frames: pending });
+  pending = [];
 }
 
 function take(message) {
   if (message.stamp !== undefined) stamp = message.stamp;
   if (message.type === 'frame') {
-    pending = { ...pending, ...message };
+    pending = [...pending.slice(1 - KEPT), message];
     if (!busy) pass();
   } else if (message.type !== 'stamp') {
-    if (message.type === 'chosen') pending = null;
+    if (message.type === 'chosen') pending = [];
     postMessage(message);
   }
 }
 
 function connect(url) {
-  stamp = held = pending = null;
+  stamp = held = null;
+  pending = [];
   busy = false;
   socket = new WebSocket(url);
   socket.onopen = () => postMessage({ type: 'opened' });

@@ -155,11 +155,14 @@ const takes = {
     say(message.text, message.kind);
     if (message.kind === 'refused') parameters.restore();
   },
-  frame(message) {
-    frames++;
-    Object.assign(last, message);
-    plots.take(message);
+  frames(message) {
+    for (const frame of message.frames) {
+      frames++;
+      Object.assign(last, frame);
+      plots.take(frame);
+    }
     fresh = true;
+    link.postMessage({ drawn: true });
   },
 };
 
@@ -182,17 +185,14 @@ takes.closed = () => {
     : 'cannot connect: is the panel running, and is the token in the address right?', 'error');
   setTimeout(connect, 1000);
 };
-link.onmessage = ({ data }) => {
-  takes[data.type]?.(data);
-  if (data.type === 'frame') link.postMessage({ drawn: true });
-};
+link.onmessage = ({ data }) => takes[data.type]?.(data);
 // The link stops the robot if it does not hear that this thread runs.
 setInterval(() => link.postMessage({}), 50);
 
 // -- drawing ----------------------------------------------------------------------------------
 
 // Where a picture takes so long, ms, none is drawn while the robot is steered.
-const SLOW = 100;
+const SLOW = 150;
 let slowest = 0;
 const pauses = () => !!steering.held && slowest > SLOW;
 
