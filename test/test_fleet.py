@@ -32,7 +32,7 @@ from cpg_ros.fleet.options import add_options, working
 from cpg_ros.fleet.outcomes import outcomes, WorkerDied
 from cpg_ros.fleet.tally import Tally
 from cpg_ros.fleet.tls import Certificates
-from fleet_jobs import dask_cluster, deadly, odd_ones_fail, slow_square, square
+from fleet_jobs import dask_cluster, deadly, late_death, odd_ones_fail, slow_square, square
 from hypothesis import given
 from hypothesis import strategies as st
 import pytest
@@ -86,6 +86,14 @@ def test_a_worker_that_dies_costs_the_job_that_it_dies_of_and_no_other(two, tmp_
     assert isinstance(found.pop(13).error, WorkerDied)
     assert found.pop(str(tmp_path / 'mark')).value == 'survived'
     assert all(one.value == job for job, one in found.items())
+
+
+def test_no_job_joins_one_that_is_alone_because_its_worker_died():
+    # It would be lost with it.
+    with processes(1) as one:
+        found = {one.job: one for one in outcomes(one, late_death, [-1, -2, *range(4)])}
+    assert {job for job, one in found.items() if one.error} == {-1, -2}
+    assert [found[job].value for job in range(4)] == [0, 1, 2, 3]
 
 
 def test_workers_end_with_a_client_that_is_killed():

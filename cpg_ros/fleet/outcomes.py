@@ -78,6 +78,8 @@ class _Stream(Generic[Job]):
 
     def fill(self) -> None:
         """Hand over as many jobs as there is room for."""
+        if self.alone is not None and self.flying:
+            return
         if self.suspects:
             if not self.flying:
                 self.alone = self.suspects.popleft()
