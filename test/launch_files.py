@@ -57,7 +57,8 @@ class Stub:
         return self.arguments[0]
 
     def perform(self, context):
-        return context[self.name]
+        return context[self.name] if 'default' not in self.options else context.get(
+            self.name, self.options['default'])
 
 
 def describing(monkeypatch):
@@ -94,7 +95,7 @@ def describing(monkeypatch):
                 described.whole = True
             else:
                 described.includes.append(entity.arguments[0].arguments[0])
-        assert not set(given) - set(described.arguments) or name == 'rviz'
+        assert not set(given) - set(described.arguments) - {'feedback'} or name == 'rviz'
         context = {'namespace': '', 'params_file': '', 'use_sim_time': 'false', 'panel': 'false',
                    **described.arguments, **given}
         made = [one for function in functions for one in function(context) or ()]

@@ -196,3 +196,15 @@ def test_a_gait_that_is_born_on_a_steep_curve_is_found_beside_it():
 def test_planes_that_cannot_be(over, said):
     with pytest.raises(InputError, match=said):
         chart_of('delayed', TROT, over, (9, 9))
+
+
+def test_a_group_can_be_set_as_for_analyze(capsys):
+    words = ['--network', 'biped', '--preset', 'run', '--over', 'current=0.1:0.3', 'phi=0.2:0.4']
+    chart, _ = atlas._planned(atlas._parser().parse_args([*words, '--set', 'w_a=0.3']))
+    for name, value in PRESETS['biped']['run'].network.as_dict().items():
+        assert chart.base[name] == (0.3 if name in ('w_21', 'w_12', 'w_43', 'w_34') else value)
+    for given, said in ((['w_a=0.3', 'w_21=0.2'], 'w_21 is given twice'),
+                        (['speed=1'], "'speed' is not a parameter of the biped network"),
+                        (['w_a=inf'], 'it must be finite')):
+        assert atlas.main([*words, '--set', *given]) == 2
+        assert said in capsys.readouterr().err

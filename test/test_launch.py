@@ -178,6 +178,13 @@ def test_go2_speaks_one_command_and_takes_turns(described, given, command, monke
     assert 'on_exit' in simulation.options and 'on_exit' in generator.options
 
 
+@pytest.mark.parametrize('name', ['go2', 'go2_robot'])
+def test_a_former_argument_is_refused_with_the_new_one(described, name, monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(RuntimeError, match='no argument feedback: it is feedback'):
+        described(name, feedback='false')
+
+
 @pytest.mark.parametrize('name', ['generator', 'inversion', 'go2'])
 def test_a_page_comes_with_them_if_asked_for(described, name, monkeypatch, tmp_path):
     monkeypatch.chdir(tmp_path)

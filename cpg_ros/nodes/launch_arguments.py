@@ -30,6 +30,8 @@ WHAT = {int: 'a whole number', float: 'a number', bool: 'true or false', list: '
 #: Argument -> (default, type, what it is); each sets the parameter of the same name, but an
 #: empty one is left to the node.
 Arguments = Mapping[str, tuple[str, type, str]]
+#: Arguments that have been renamed; launch itself says nothing of one that it does not know.
+RENAMED = {'feedback': 'feedback.enabled'}
 
 
 def declared(arguments: Arguments) -> list[DeclareLaunchArgument]:
@@ -88,10 +90,13 @@ def started(context: LaunchContext, executable: str, name: str, arguments: Argum
         options: further ones of the action Node.
 
     Raises:
-        RuntimeError: an argument is not of the kind that it should be, or there is no such
-            params_file.
+        RuntimeError: an argument is not of the kind that it should be or has been renamed, or
+            there is no such params_file.
 
     """
+    for former, now in RENAMED.items():
+        if now in arguments and LaunchConfiguration(former, default='').perform(context):
+            raise RuntimeError(f'there is no argument {former}: it is {now}')
     given = {key: kind for key, (_, kind, _) in arguments.items()
              if LaunchConfiguration(key).perform(context)}
     for key, kind in given.items():
