@@ -17,10 +17,11 @@
 Imports every room but ``tools``.
 """
 
-__all__ = ['cells_publisher', 'cmd_vel', 'command_topics', 'deadline_thread', 'diagnostics',
+__all__ = ['bounded_request', 'cells_publisher', 'cmd_vel', 'command_topics', 'console',
+           'deadline_thread', 'diagnostics',
            'feedback_loop', 'feedback_parameters', 'feedback_switch', 'generator',
            'generator_parameters', 'inversion_node', 'joint_publishers', 'kernels',
-           'launch_arguments', 'lockstep', 'measured_pose', 'message_block', 'message_types',
+           'launch_arguments', 'lockstep', 'log_queue', 'measured_pose', 'message_block', 'message_types',
            'node_base', 'parameter_services', 'parameter_spec', 'raw_messages', 'real_time',
            'rivals', 'robot_sim', 'senses_input', 'sensor_publishers', 'shutdown', 'unitree',
            'unserved']
