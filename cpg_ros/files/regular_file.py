@@ -27,6 +27,7 @@ import stat
 from typing import BinaryIO
 
 from cpg_ros.errors import CpgError
+from cpg_ros.files.plain_text import printable
 
 #: Largest file that is read at once, bytes.
 LARGEST = 64_000_000
@@ -91,4 +92,4 @@ def read_bytes(path: str | Path, error: type[CpgError], what: str = '',
 
 def one_line(text: str) -> str:
     """Return a text as one line that can be printed, whatever bytes a file's name has."""
-    return ' '.join(text.split()).encode(errors='backslashreplace').decode()
+    return printable(' '.join(text.split()))

@@ -19,6 +19,7 @@ from typing import Any
 
 from cpg_ros.networks import generated
 from numba import config, njit, typeof
+from numba.core.caching import FunctionCache
 import numpy as np
 
 #: Whether machine code can be kept; numba reads where, if not beside its source.
@@ -30,10 +31,24 @@ config.reload_config()
 OPTIONS: dict[str, Any] = {'error_model': 'numpy', 'fastmath': {'contract'}, 'nogil': True}
 
 jit = njit(**OPTIONS)
-#: For entry points, whose machine code is kept on disk.
-entry = njit(cache=KEPT, **OPTIONS)
 #: For what is built into its caller, where a loop of known length can be unrolled.
 part = njit(inline='always', **OPTIONS)
+
+
+class _Disk(FunctionCache):
+    """Machine code on disk, as far as that takes it: numba would end with a full disk."""
+
+    def save_overload(self, sig, data):
+        with generated.keeping():
+            super().save_overload(sig, data)
+
+
+def entry(function, parallel: bool = False):
+    """Compile an entry point, whose machine code is kept on disk."""
+    made = njit(parallel=parallel, **OPTIONS)(function)
+    if KEPT:
+        made._cache = _Disk(made.py_func)
+    return made
 
 
 def bound(kernel, *arguments):

@@ -34,11 +34,11 @@ import math
 from types import FunctionType
 from typing import Any
 
-from cpg_ros.integration.jit import jit, KEPT, OPTIONS, part, renamed
+from cpg_ros.integration.jit import entry, jit, part, renamed
 from cpg_ros.networks import generated
 from cpg_ros.networks.equations import equations_of
 from cpg_ros.networks.network import Network
-from numba import njit, prange
+from numba import prange
 import numpy as np
 
 
@@ -296,7 +296,7 @@ def _cached(digest, network, components, **functions):
 
     def ready(function, parallel=False):
         mine = renamed(_with(function, functions), network)
-        return njit(cache=KEPT, parallel=parallel, **OPTIONS)(mine)
+        return entry(mine, parallel)
 
     return Kernels(ready(set_slope), ready(advance), ready(integrate_one), ready(integrate),
                    ready(integrate_many, parallel=True))

@@ -14,7 +14,7 @@
 
 """Code that is generated from a network's equations, kept on disk between processes."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 import contextlib
 from functools import cache
 import hashlib
@@ -57,6 +57,21 @@ def folder() -> Path | None:
         return place
     _LOGGER.warning('%s, nor in a temporary folder: it is compiled at every start', tried)
     return None
+
+
+@contextlib.contextmanager
+def keeping() -> Iterator[None]:
+    """Write into the folder; a disk that is full ends nothing, and is said once."""
+    try:
+        yield
+    except OSError as error:
+        _not_kept(error.strerror or str(error))
+
+
+@cache
+def _not_kept(why: str) -> None:
+    _LOGGER.warning('compiled code cannot be kept in %s: %s; it is compiled at every start until '
+                    'there is room', folder(), why)
 
 
 def _temporary() -> Path:
@@ -106,13 +121,16 @@ def load(name: str, write: Callable[[], str]) -> ModuleType:
     known = f'cpg_ros_generated_{name}'
     if known in sys.modules:
         return sys.modules[known]
-    if place is None:
-        module = sys.modules[known] = ModuleType(known)
-        exec(compile(write(), known, 'exec'), vars(module))
-        return module
-    path = place / f'{name}.py'
-    if not path.exists():
-        write_atomically(path, write())
+    path = None if place is None else place / f'{name}.py'
+    if path is None or not path.exists():
+        text = write()
+        with keeping():
+            if path is not None:
+                write_atomically(path, text)
+        if path is None or not path.exists():
+            module = sys.modules[known] = ModuleType(known)
+            exec(compile(text, known, 'exec'), vars(module))
+            return module
     spec = importlib.util.spec_from_file_location(known, path)
     assert spec is not None and spec.loader is not None
     module = importlib.util.module_from_spec(spec)

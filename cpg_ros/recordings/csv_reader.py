@@ -23,6 +23,7 @@ from itertools import chain, islice
 from pathlib import Path
 import re
 
+from cpg_ros.files.plain_text import printable
 from cpg_ros.files.progress_bar import progress_bar
 from cpg_ros.recordings.recording import (
     Chunk,
@@ -105,7 +106,8 @@ def read_csv(path: str | Path, unit: str | None = None, time: str | None = None,
                     yield chunk
                     bar(min(size, table.read))
 
-            recording = merged(chunks(), str(path), [column.joint for column in table.columns])
+            recording = merged(chunks(), printable(str(path)),
+                               [column.joint for column in table.columns])
     notes = [*table.notes, *(['lines that end in a delimiter'] if table.ended else [])]
     return replace(recording, notes=(*notes, *recording.notes))
 
