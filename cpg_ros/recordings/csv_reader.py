@@ -136,8 +136,9 @@ class _Table:
         while len(headers) > 2 and not headers[-1]:
             headers.pop()
         if len(headers) < 2:
-            raise RecordingError(f'{path}, line {self.line}: one column only, {headers[0]!r}; '
-                                 'a table has a time column and one per joint')
+            raise RecordingError(f'{path}, line {self.line}: one column only, '
+                                 f'{"".join(headers)!r}; a table has a time column and one per '
+                                 'joint')
         if all(_number(header) is not None for header in headers if header):
             raise RecordingError(f'{path}, line {self.line}: no header; the first line has to '
                                  'name the columns')
