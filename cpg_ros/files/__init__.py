@@ -17,5 +17,5 @@
 Imports nothing of the package; knows nothing of ROS.
 """
 
-__all__ = ['atomic_write', 'page_style', 'plain_text', 'progress_bar', 'shared_resources',
-           'yaml_reader']
+__all__ = ['atomic_write', 'page_style', 'plain_text', 'progress_bar', 'regular_file',
+           'shared_resources', 'xml_reader', 'yaml_reader']
