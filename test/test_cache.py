@@ -180,7 +180,9 @@ exec {generator} --ros-args -p gait:=walk
 """
 
 
-def test_a_node_walks_with_a_full_disk_under_the_cache(tmp_path):
+def test_a_node_walks_with_a_full_disk_under_the_cache(tmp_path, monkeypatch):
+    # It compiles, which takes minutes beside other tests.
+    monkeypatch.setattr('graph.PATIENCE', 300.0)
     place, other = tmp_path / 'place', tmp_path / 'other'
     place.mkdir()
     if subprocess.run(['unshare', '-m', 'mount', '-t', 'tmpfs', 'tmpfs', str(place)]).returncode:
