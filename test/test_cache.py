@@ -19,12 +19,14 @@ import fcntl
 import os
 from pathlib import Path
 import shutil
+import signal
 import subprocess
 import sys
 
 import cpg_ros
 from cpg_ros.files.cache_folder import KEPT
 from cpg_ros.files.shared_resources import share
+from graph import EXECUTABLE, Process
 import pytest
 
 WARM = 'from cpg_ros.motion.precompile import precompile; precompile({network!r})'
@@ -218,3 +220,58 @@ def test_it_starts_where_neither_the_package_nor_the_home_can_be_written(tmp_pat
                              else f': kept in {scratch / f"cpg_ros-{os.getuid()}"}')
     assert bool(seen[0]) is not nowhere
     assert seen[0] == seen[-1], 'the cache was not used'
+
+
+FULL = """
+import resource
+resource.setrlimit(resource.RLIMIT_FSIZE, ({room}, {room}))
+import cpg_ros
+from cpg_ros.motion.precompile import precompile
+precompile('delayed')
+"""
+
+
+def test_a_full_disk_under_the_cache_is_one_line(tmp_path):
+    # A file of ours that may have no byte more ends a write as a full disk does: with an OSError.
+    for room in (0, 20_000):
+        place = tmp_path / str(room)
+        run = subprocess.run([sys.executable, '-c', FULL.format(room=room)], text=True,
+                             capture_output=True, env=environment(NUMBA_CACHE_DIR=str(place)))
+        assert run.returncode == 0, run.stderr
+        (line,) = run.stderr.splitlines()
+        assert line.startswith(f'compiled code cannot be kept in {place}: File too large')
+        assert not list(place.rglob('*.tmp.*')) and not list(place.rglob('*.part'))
+    # Once there is room, what was cut off is not taken for code.
+    room = 10**9
+    run = subprocess.run([sys.executable, '-c', FULL.format(room=room)], capture_output=True,
+                         text=True, env=environment(NUMBA_CACHE_DIR=str(place)))
+    assert run.returncode == 0 and not run.stderr and list(place.rglob('*.nbc'))
+
+
+DISK = """
+mount -t tmpfs -o size=16k tmpfs {place} && cat /dev/zero > {place}/fill 2> {other}
+exec {generator} --ros-args -p gait:=walk
+"""
+
+
+def test_a_node_walks_with_a_full_disk_under_the_cache(tmp_path, monkeypatch):
+    # It compiles, which takes minutes beside other tests.
+    monkeypatch.setattr('graph.PATIENCE', 300.0)
+    place, other = tmp_path / 'place', tmp_path / 'other'
+    place.mkdir()
+    if subprocess.run(['unshare', '-m', 'mount', '-t', 'tmpfs', 'tmpfs', str(place)]).returncode:
+        pytest.skip('no file system can be mounted here')
+    script = tmp_path / 'full.sh'
+    script.write_text('#!/bin/sh\nexec unshare -m sh -c "' + DISK.format(
+        place=place, other=other, generator=EXECUTABLE) + '"\n')
+    script.chmod(0o755)
+    node = Process('-p', 'x:=0', executable=script, environment={'NUMBA_CACHE_DIR': str(place)})
+    try:
+        node.wait_for('publishing')
+        assert 'No space left on device' in other.read_text()
+        (line,) = [line for line in node.lines if 'cannot be kept' in line]
+        assert line.startswith(f'compiled code cannot be kept in {place}: No space left on device')
+        node.signal(signal.SIGINT)
+        assert node.wait() == 0 and 'Traceback' not in node.log
+    finally:
+        node.end()

@@ -200,3 +200,19 @@ def test_a_call_without_joint_states_is_answered(ending):
     ending.append(watcher)
     answer = watcher.call(Trigger, '/cpg_inversion/fit', Trigger.Request())
     assert not answer.success and answer.message == '/silent: no joint states came in'
+
+
+def test_a_network_file_can_be_named_at_the_start_only(ending, tmp_path):
+    # What names it later is on the graph, and need not be the user.
+    path = tmp_path / 'x.py'
+    path.write_text('raise SystemExit\n')
+    node = Process('-p', f'network:={path}', executable=INVERSION)
+    ending.append(node)
+    node.wait_for('listening to /joint_states')
+    watcher = Watcher(node.domain, '/cpg_inversion')
+    ending.append(watcher)
+    for name, allowed in ((str(tmp_path / 'y.py'), False), ('phase', True), (str(path), True),
+                          ('./y', False)):
+        (result,) = watcher.set(network=name)
+        assert result.successful is allowed, name
+        assert allowed or 'at the start only' in result.reason

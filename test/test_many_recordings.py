@@ -32,6 +32,7 @@ import numpy as np
 import pytest
 
 parquet = pytest.importorskip('pyarrow.parquet')
+INVERSION = [sys.executable, '-P', '-m', 'cpg_ros.tools.inversion']
 QUICK = Settings(network='delayed', free=('tau',), order=1)
 
 
@@ -147,6 +148,41 @@ def test_recordings_are_found_split_bags_as_one_and_results_not_at_all(tmp_path)
     assert digest(tmp_path / 'c' / 'monday.mcap') == digest(tmp_path / 'c' / 'tuesday.mcap')
 
 
+def test_names_that_are_not_utf8_cost_no_row(folder, tmp_path):
+    for name, text in ((b'w\xffalk.csv', table()), (b'bad\xfe.csv', ''), (b'two\nlines.csv', '')):
+        (folder / os.fsdecode(name)).write_text(text)
+    for begun in ('first', 'again'):
+        run = subprocess.run([*INVERSION, '--bags', str(folder), '--out', str(tmp_path / 'out'),
+                              '--network', 'delayed', '--free', 'tau', '--order', '1'],
+                             capture_output=True, text=True)
+        assert run.returncode == 0 and 'Traceback' not in run.stderr, (begun, run.stderr)
+        assert '7 recordings, 3 fitted' in run.stdout
+    rows = rows_of(tmp_path / 'out')
+    assert list(rows) == ['bad\\xfe.csv', 'empty.csv', 'pace.csv', 'trot.csv', 'two\nlines.csv',
+                          'words.csv', 'w\\xffalk.csv']
+    assert [row['gait'] for row in rows.values()] == ['', '', 'pace', 'trot', '', '', 'trot']
+    bad = rows['bad\\xfe.csv']
+    assert bad['reason'].endswith('bad\\xfe.csv: the file is empty')
+    with open(tmp_path / 'out' / 'table.csv', encoding='utf-8', newline='') as text:
+        assert [len(row) for row in csv.reader(text)] == [len(bad)] * 8
+    assert 'w\\xffalk.csv' in (tmp_path / 'out' / 'index.html').read_text(encoding='utf-8')
+
+
+def test_one_recording_whose_name_is_not_utf8(tmp_path):
+    path = tmp_path / os.fsdecode(b'w\xffalk.csv')
+    path.write_text(table())
+    out, report = tmp_path / 'fitted.yaml', tmp_path / 'fitted.html'
+    run = subprocess.run([*INVERSION, '--csv', str(path), '--network', 'delayed', '--free', 'tau',
+                          '--order', '1', '--out', str(out), '--report', str(report)],
+                         capture_output=True, text=True)
+    assert run.returncode == 0, run.stderr
+    assert all('w\\xffalk.csv' in file.read_text() for file in (out, report))
+    for option in ('--csv', '--bag'):
+        run = subprocess.run([*INVERSION, option, f'{path}x'], capture_output=True, text=True)
+        (line,) = run.stderr.splitlines()
+        assert run.returncode == 2 and line.startswith('inversion: ')
+
+
 def test_folders_that_will_not_do(folder, tmp_path):
     with pytest.raises(InputError, match='there is no such folder'):
         Folders([tmp_path / 'nowhere'], tmp_path / 'out', QUICK)
@@ -180,7 +216,7 @@ def test_ctrl_c_keeps_what_was_finished(folder, tmp_path):
     for k in range(40):
         (folder / f'more_{k}.csv').write_text(table(seed=k))
     out = tmp_path / 'out'
-    words = [sys.executable, '-P', '-m', 'cpg_ros.tools.inversion', '--bags', str(folder), '--out',
+    words = [*INVERSION, '--bags', str(folder), '--out',
              str(out), '--jobs', '1', '--network', 'delayed', '--free', 'tau', '--order', '1']
     # A shell that runs the tests in the background has them ignore it.
     running = subprocess.Popen(

@@ -18,4 +18,4 @@ Imports nothing of the package; knows nothing of ROS.
 """
 
 __all__ = ['atomic_write', 'cache_folder', 'loopback', 'page_style', 'plain_text', 'progress_bar',
-           'shared_resources', 'yaml_reader']
+           'regular_file', 'shared_resources', 'xml_reader', 'yaml_reader']

@@ -19,6 +19,7 @@ Contents that follow from something else are in another folder, so nothing in a 
 of date. What is no longer used is removed when a new folder is made.
 """
 
+from collections.abc import Iterator
 import contextlib
 import fcntl
 from functools import cache
@@ -64,6 +65,21 @@ def cache_folder(name: str) -> Path | None:
                         folder, error.strerror)
         return None
     return folder
+
+
+@contextlib.contextmanager
+def writing(folder: Path) -> Iterator[None]:
+    """Write into a folder of the cache; a disk that is full ends nothing, and is logged once."""
+    try:
+        yield
+    except OSError as error:
+        _warn(folder, error.strerror or str(error))
+
+
+@cache
+def _warn(folder: Path, reason: str) -> None:
+    _LOGGER.warning('compiled code cannot be kept in %s: %s; it is compiled at every start until '
+                    'there is room', folder, reason)
 
 
 @cache

@@ -16,7 +16,17 @@
 
 import json
 import math
+import re
 from typing import Any
+
+#: What Python makes of the bytes of a file's name that are not UTF-8.
+_BYTE = re.compile('[\udc80-\udcff]')
+
+
+def printable(text: str) -> str:
+    r"""Return a text as UTF-8 has it: bytes of names of files that are not stand as \xff."""
+    text = _BYTE.sub(lambda byte: f'\\x{ord(byte[0]) - 0xdc00:02x}', text)
+    return text.encode(errors='backslashreplace').decode()
 
 
 def finite(tree: Any) -> Any:

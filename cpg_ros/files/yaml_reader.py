@@ -20,11 +20,40 @@ from pathlib import Path
 from typing import Any
 
 from cpg_ros.errors import CpgError
+from cpg_ros.files.regular_file import one_line, read_bytes
 import yaml
+
+#: Nodes within one another, and nodes with those that aliases stand for, that are read.
+DEEPEST, MOST = 50, 1_000_000
+#: Largest YAML file that is read, bytes: a robot of a hundred joints has 30 thousand.
+LARGEST = 4_000_000
 
 
 class _UniqueKeys(yaml.SafeLoader):
-    """YAML without silently overwritten keys."""
+    """YAML without silently overwritten keys, of a bounded depth and size."""
+
+    def __init__(self, stream: str) -> None:
+        super().__init__(stream)
+        self._depth = self._nodes = 0
+        self._sizes: dict[int, int] = {}
+
+    def compose_node(self, parent: yaml.Node | None, index: int) -> yaml.Node | None:
+        """Count nodes: an alias is as many as what it stands for, which may hold aliases, too."""
+        event, before = self.peek_event(), self._nodes  # type: ignore[no-untyped-call]
+        mark, alias = event.start_mark, isinstance(event, yaml.AliasEvent)
+        self._depth += 1
+        if self._depth > DEEPEST:
+            raise yaml.composer.ComposerError(None, None, f'nested more than {DEEPEST} deep', mark)
+        node = super().compose_node(parent, index)
+        self._depth -= 1
+        if alias and id(node) not in self._sizes:
+            raise yaml.composer.ComposerError(None, None, 'an alias of what it is part of', mark)
+        self._nodes += self._sizes[id(node)] if alias else 1
+        if self._nodes > MOST:
+            raise yaml.composer.ComposerError(None, None, f'more than {MOST} nodes, with those '
+                                              'that aliases stand for', mark)
+        self._sizes.setdefault(id(node), self._nodes - before)
+        return node
 
     def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict:
         seen = set()
@@ -40,9 +69,27 @@ class _UniqueKeys(yaml.SafeLoader):
         return super().construct_mapping(node, deep)
 
 
+def parsed(text: str) -> Any:
+    """Parse YAML.
+
+    Raises:
+        yaml.YAMLError: it is none, is nested too deep or is too much, has a key twice or one that
+            is no name.
+
+    """
+    try:
+        return yaml.load(text, Loader=_UniqueKeys)
+    # What PyYAML lets pass of values that their tags do not fit: '!!int x', '2020-13-01'.
+    except (ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
+        raise yaml.YAMLError(f'a value cannot be used: {type(error).__name__}: {error}') from error
+
+
 def shown(value: Any) -> str:
     """Return a value as it is shown in a message."""
-    return 'nothing' if value is None else repr(value)[:60]
+    try:
+        return 'nothing' if value is None else repr(value)[:60]
+    except ValueError:  # whole numbers of thousands of digits
+        return 'a huge number'
 
 
 class Reader:
@@ -57,14 +104,13 @@ class Reader:
 
     def fail(self, where: str, why: str) -> CpgError:
         """Return the error that says where and why."""
-        return self.error(' '.join(f'{self.what} {self.path}: {where}: {why}'.split()))
+        return self.error(one_line(f'{self.what} {self.path}: {where}: {why}'))
 
     def tree(self) -> Any:
         """Parse the file."""
+        data = read_bytes(self.path, self.error, self.what, LARGEST)
         try:
-            return yaml.load(self.path.read_text(encoding='utf-8'), Loader=_UniqueKeys)
-        except OSError as error:
-            raise self.error(f'{self.what} {self.path}: {error.strerror}') from error
+            return parsed(data.decode())
         except (yaml.YAMLError, UnicodeDecodeError) as error:
             mark = getattr(error, 'problem_mark', None)
             line = f'line {mark.line + 1}' if mark else 'file'

@@ -16,6 +16,7 @@
 
 from collections.abc import Iterator, Sequence
 import hashlib
+import os
 from pathlib import Path
 
 from cpg_ros.errors import InputError
@@ -86,7 +87,7 @@ def digest(recording: Path) -> str:
     total = hashlib.sha256()
     for one in files_of(recording):
         size = one.stat().st_size
-        total.update(f'{one.name if recording.is_dir() else one.suffix}\n{size}\n'.encode())
+        total.update(os.fsencode(f'{one.name if recording.is_dir() else one.suffix}\n{size}\n'))
         with one.open('rb') as file:
             while block := file.read(BLOCK):
                 total.update(block)

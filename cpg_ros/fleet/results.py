@@ -20,11 +20,13 @@ Each is written beside and renamed, so that whatever ends the work ends it betwe
 from collections.abc import Iterator
 import hashlib
 import json
+import os
 from pathlib import Path
 from typing import Any
 
 from cpg_ros.errors import InputError
 from cpg_ros.files.atomic_write import write_atomically
+from cpg_ros.files.plain_text import printable
 from cpg_ros.fleet.recordings_found import RESULTS
 
 #: Folders of the rows and of the fitted files.
@@ -33,7 +35,7 @@ ROWS, FITTED = 'rows', 'fitted'
 
 def key(recording: Path) -> str:
     """What a recording's files are called here, by where it is."""
-    return hashlib.sha256(str(recording.resolve()).encode()).hexdigest()[:16]
+    return hashlib.sha256(os.fsencode(recording.resolve())).hexdigest()[:16]
 
 
 class Results:
@@ -89,7 +91,8 @@ class Results:
             # Of contents that it no longer has.
             for ending in ('.yaml', '_robot.yaml'):
                 (self.folder / FITTED / f'{self.name(recording)}{ending}').unlink(missing_ok=True)
-        kept = {'file': str(recording), 'settings': self.settings, **row,
+        kept = {'file': printable(str(recording)), 'settings': self.settings, **row,
+                'reason': printable(row['reason']),
                 'fitted': str(Path(FITTED, next(iter(files)))) if files else ''}
         write_atomically(self._place(recording), json.dumps(kept))
 

@@ -18,8 +18,10 @@ import math
 from pathlib import Path
 from typing import Any
 
+from cpg_ros.files.cache_folder import writing
 from cpg_ros.networks import generated
 from numba import config, njit, typeof
+from numba.core.caching import FunctionCache
 import numpy as np
 
 #: No division checks (they keep loops from being vectorised), fused multiply-add allowed,
@@ -29,6 +31,14 @@ OPTIONS: dict[str, Any] = {'error_model': 'numpy', 'fastmath': {'contract'}, 'no
 jit = njit(**OPTIONS)
 #: For what is built into its caller, where a loop of known length can be unrolled.
 part = njit(inline='always', **OPTIONS)
+
+
+class _Disk(FunctionCache):
+    """Machine code on disk, as far as there is room: numba would end with a full disk."""
+
+    def save_overload(self, sig, data):
+        with writing(Path(self.cache_path)):
+            super().save_overload(sig, data)
 
 
 def kept(function, folder: Path | None, **options):
@@ -46,7 +56,8 @@ def kept(function, folder: Path | None, **options):
         numba: Any = config
         others, numba.CACHE_DIR = numba.CACHE_DIR, str(folder)
         try:
-            compiled = njit(cache=True, **OPTIONS, **options)(function)
+            compiled = njit(**OPTIONS, **options)(function)
+            compiled._cache = _Disk(function)
         finally:
             numba.CACHE_DIR = others
         # Where the folder cannot be written numba tries others, whose code may be out of date.

@@ -23,7 +23,7 @@ import sys
 from types import ModuleType
 
 from cpg_ros.files.atomic_write import write_atomically
-from cpg_ros.files.cache_folder import cache_folder
+from cpg_ros.files.cache_folder import cache_folder, writing
 
 #: Subpackages with compiled code, and with the numbers that it takes from elsewhere.
 _COMPILED = ('networks', 'integration', 'dynamics', 'motion', 'feedback')
@@ -69,13 +69,16 @@ def load(key: str, name: str, write: Callable[[], str]) -> ModuleType:
     if known in sys.modules:
         return sys.modules[known]
     place = folder(key)
-    if place is None:
-        module = sys.modules[known] = ModuleType(known)
-        exec(compile(write(), known, 'exec'), vars(module))
-        return module
-    path = place / f'{name}.py'
-    if not path.exists():
-        write_atomically(path, write())
+    path = None if place is None else place / f'{name}.py'
+    if path is None or not path.exists():
+        text = write()
+        if place is not None and path is not None:
+            with writing(place):
+                write_atomically(path, text)
+        if path is None or not path.exists():
+            module = sys.modules[known] = ModuleType(known)
+            exec(compile(text, known, 'exec'), vars(module))
+            return module
     spec = importlib.util.spec_from_file_location(known, path)
     assert spec is not None and spec.loader is not None
     module = importlib.util.module_from_spec(spec)

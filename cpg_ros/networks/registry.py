@@ -32,12 +32,15 @@ from typing import TypeVar
 from zlib import crc32
 
 from cpg_ros.errors import CpgError, InputError
+from cpg_ros.files import regular_file
 from cpg_ros.networks import biped, delayed, oscillators, quadruped
 from cpg_ros.networks.leg_numbers import parted, with_legs
 from cpg_ros.networks.network import Network, Preset
 from cpg_ros.networks.network_check import flaw
 
 GROUP = 'cpg_ros.networks'
+#: Largest file of a network, bytes.
+LARGEST = 4_000_000
 _OWN: list[type[Network]] = [delayed.Delayed, quadruped.Quadruped, biped.Biped,
                              *oscillators.shipped()]
 #: Those that come with the package.
@@ -196,6 +199,8 @@ def _of_file(path: Path) -> type[Network]:
     spec = importlib.util.spec_from_file_location(name, path)
     if spec is None or spec.loader is None:
         raise NetworkError(f'{path}: it is not a Python file')
+    with regular_file.opened(path, NetworkError, largest=LARGEST):
+        pass
     module = sys.modules[name] = importlib.util.module_from_spec(spec)
     loader = spec.loader
     try:

@@ -28,6 +28,7 @@ from cpg_ros.files.atomic_write import write_atomically
 from cpg_ros.files.plain_text import finite
 from cpg_ros.inversion.parameter_files import write_fitted
 from cpg_ros.inversion.recording_fit import Inverted, inverted
+from cpg_ros.networks.registry import is_path
 from cpg_ros.nodes import node_base as starting
 from cpg_ros.nodes.node_base import StartedNode, StartError
 from cpg_ros.nodes.parameter_spec import Spec
@@ -35,7 +36,7 @@ from cpg_ros.recordings.live_buffer import Live
 from cpg_ros.recordings.servo import Servo
 from cpg_ros.robots.robot import Robot
 from cpg_ros.robots.robot_file import find_robot
-from rcl_interfaces.msg import ParameterDescriptor
+from rcl_interfaces.msg import ParameterDescriptor, SetParametersResult
 from rcl_interfaces.srv import SetParametersAtomically
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.exceptions import NameValidationException, ParameterException
@@ -61,7 +62,8 @@ SPECS = {
     'window': Spec(60.0, 'how much of the latest joint states to keep and fit [s]; 0 for all',
                    0.0, 3600.0),
     'every': Spec(0.0, 'interval between automatic fits [s]; 0 for none', 0.0, 3600.0),
-    'network': Spec('', "network to fit; if empty, the robot's, or one for the number of legs"),
+    'network': Spec('', "network to fit; if empty, the robot's, or one for the number of legs",
+                    constraints='a name, or at the start the path of a Python file'),
     'gait': Spec('', 'gait to fit; if empty, the recognised gait'),
     'preset': Spec('', 'shipped preset that supplies the parameters that are not free; if empty, '
                    "the gait's preset"),
@@ -107,9 +109,19 @@ class Inversion(StartedNode):
         self._timer: Timer | None = None
         self._busy = False
         self._often(self._value('every'))
+        self._network = self._value('network')
+        self.add_on_set_parameters_callback(self._allowed)
         self.add_post_set_parameters_callback(self._changed)
         self._warn_of_unknown()
         self.get_logger().info(f'listening to {", ".join(topics)}; call ~/fit')
+
+    def _allowed(self, parameters: list[Parameter]) -> SetParametersResult:
+        """Refuse to run a Python file that somebody on the graph names; the user may at start."""
+        refused = any(one.name == 'network' and isinstance(one.value, str) and is_path(one.value)
+                      and one.value != self._network for one in parameters)
+        return SetParametersResult(successful=not refused, reason=(
+            'network: the path of a Python file can be given at the start only'
+            if refused else ''))
 
     def _changed(self, parameters: list[Parameter]) -> None:
         for parameter in parameters:

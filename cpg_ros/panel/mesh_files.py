@@ -18,12 +18,11 @@ from pathlib import Path
 import re
 
 from cpg_ros.errors import CpgError
+from cpg_ros.files.regular_file import one_line, read_bytes
 import numpy as np
 
 #: Vertices closer than this are made one: a page draws a robot, not its screws, m.
 GRAIN = 0.008
-#: Largest file that is read, bytes.
-LARGEST = 64_000_000
 
 
 class MeshError(CpgError):
@@ -34,15 +33,11 @@ def read(path: Path) -> np.ndarray:
     """Read the triangles of a file, shape (n, 3, 3), in its own units.
 
     Raises:
-        MeshError: there is no such file, or it is of no kind that is read.
+        MeshError: there is no such file, it is no regular file, too large or empty, or of no
+            kind that is read.
 
     """
-    try:
-        if path.stat().st_size > LARGEST:
-            raise MeshError(f'{path}: more than {LARGEST // 1_000_000} MB')
-        data = path.read_bytes()
-    except OSError as error:
-        raise MeshError(f'{path}: {error.strerror}') from error
+    data = read_bytes(path, MeshError)
     try:
         if path.suffix.lower() == '.stl':
             found = _stl(data)
@@ -50,8 +45,12 @@ def read(path: Path) -> np.ndarray:
             found = _obj(data.decode(errors='replace'))
         else:
             raise MeshError(f"{path}: '{path.suffix}' is neither .stl nor .obj")
-    except (ValueError, IndexError) as error:
-        raise error if isinstance(error, MeshError) else MeshError(f'{path}: {error}') from error
+    except MeshError:
+        raise
+    except (ArithmeticError, LookupError, ValueError) as error:
+        raise MeshError(one_line(f'{path}: {error}')) from error
+    if not len(found):
+        raise MeshError(f'{path}: it has no triangles')
     if not np.isfinite(found).all():
         raise MeshError(f'{path}: a vertex is not finite')
     return found

@@ -51,7 +51,7 @@ SPECS = {
     'token': Spec('', 'token required in the page address, as ?token=WORD; auto: make one, shown '
                   'in the terminal; empty: none', read_only=True),
     'urdf': Spec('', "URDF file with the robot's shape; if empty, robot_description, the "
-                 "simulation's model or a stick figure is used", read_only=True),
+                 "simulation's model if it is shipped, or a stick figure is used", read_only=True),
     'max_speed': Spec(0.5, 'maximum speed of the steering pad [m/s]', 0.0, 5.0, True),
     'max_turn': Spec(0.6, 'maximum turning rate of the steering pad [rad/s]', 0.0, 5.0, True),
     'recordings': Spec('out/recordings', 'folder for recorded bags', read_only=True),

@@ -19,7 +19,7 @@ from typing import Any
 
 from cpg_ros.panel.graph import Graph, namespace
 from cpg_ros.panel.service_calls import Services
-from cpg_ros.panel.shape_source import is_known, Known
+from cpg_ros.panel.shape_source import Known, shipped_robot
 from cpg_ros.panel.topics import latched, Topic
 from rcl_interfaces.srv import GetParameters
 from rclpy.node import Node
@@ -62,12 +62,12 @@ async def ask(watch: Node, services: Services, graph: Graph, generator: str, rob
                                      GetParameters.Request(names=['model']))
         model = parameter_value_to_python(answer.values[0]) if answer.values else ''
     legs = {}
-    for topic, kind in () if is_known(robot) else sorted(graph.topics):
+    for topic, kind in () if shipped_robot(robot) is not None else sorted(graph.topics):
         leg = topic.removeprefix(f'{space}/').removesuffix('/joint_states')
         if kind == 'sensor_msgs/msg/JointState' and '/' not in leg and leg != 'joint_states':
             message = await _once(watch, JointState, topic)
             legs[leg] = list(message.name) if message else []
-    return Known(urdf, description, model or '', robot, legs)
+    return Known(urdf, description, model if isinstance(model, str) else '', robot, legs)
 
 
 async def _once(watch: Node, kind: type, name: str) -> Any:

@@ -19,11 +19,12 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from cpg_ros.errors import CpgError
+from cpg_ros.files.regular_file import one_line
 from cpg_ros.files.shared_resources import share
 from cpg_ros.panel import stick_figure, urdf_shape
 from cpg_ros.panel.body_shape import Shape
 from cpg_ros.robots.robot import Robot
-from cpg_ros.robots.robot_file import find_robot
+from cpg_ros.robots.robot_file import find_robot, RobotError
 from cpg_ros.robots.urdf import load_urdf
 
 #: Robot files of this package -> the model or the URDF that goes with each.
@@ -38,7 +39,7 @@ class Known:
         urdf: file that the user names, '' for none.
         description: text on ``robot_description``, '' for none.
         model: of the simulation, '' where none runs.
-        robot: robot file of the generator, a name or a path that may be another machine's.
+        robot: robot file of the generator, a name or a path, which is not opened.
         legs: leg -> joints, as their topics name them.
 
     """
@@ -50,13 +51,17 @@ class Known:
     legs: dict[str, list[str]] = field(default_factory=dict)
 
 
-def is_known(robot: str) -> bool:
-    """Tell whether a robot file can be read here."""
+def shipped_robot(name: str) -> Robot | None:
+    """Return a robot of this package, None for any other.
+
+    Whoever is on the graph can name a file, and a robot file can name a Python file with its
+    network: none that the graph names is opened here.
+    """
+    shipped = {file.stem for file in (share() / 'config').glob('*.yaml')}
     try:
-        find_robot(robot)
-    except (CpgError, OSError):
-        return False
-    return True
+        return find_robot(name) if name in shipped else None
+    except RobotError:  # what else is in that folder
+        return None
 
 
 def find(known: Known, said: Callable[[str], None]) -> Shape:
@@ -67,11 +72,7 @@ def find(known: Known, said: Callable[[str], None]) -> Shape:
         said: is told why a better one could not be had.
 
     """
-    robot: Robot | None = None
-    try:
-        robot = find_robot(known.robot)
-    except (CpgError, OSError) as error:
-        said(f'the robot file is not known here: {error}')
+    robot = shipped_robot(known.robot)
     for make in (_from_urdf, _from_description, _from_model):
         try:
             shape = make(known, robot, said)
@@ -82,6 +83,10 @@ def find(known: Known, said: Callable[[str], None]) -> Shape:
             _with_limits(shape, robot)
             _with_feet(shape, known, robot)
             return shape
+    if robot is None and known.robot:
+        said(one_line(f"drawn as a stick figure: '{known.robot[:200]}' is not one of the shipped "
+                      'robots, and the panel opens no file that a node names; publish '
+                      'robot_description, or start the panel with -p urdf:=FILE'))
     return _sticks(known, robot)
 
 
@@ -97,10 +102,19 @@ def _from_description(known: Known, _: Robot | None, said: Callable[[str], None]
 
 
 def _from_model(known: Known, robot: Robot | None, said: Callable[[str], None]) -> Shape | None:
-    model = known.model or SHIPPED.get(known.robot, '')
-    if not model or robot is None:
+    if robot is None:
         return None
-    if model.endswith('.urdf') and not known.model:
+    model = known.model
+    if '/' in model or model.endswith(('.xml', '.urdf')):
+        said(one_line(f"the model '{model[:200]}' is not drawn: the panel opens no file that a "
+                      'node names; publish robot_description, or start the panel with '
+                      '-p urdf:=FILE'))
+        model = ''
+    shipped = not model
+    model = model or SHIPPED.get(known.robot, '')
+    if not model:
+        return None
+    if shipped and model.endswith('.urdf'):
         return urdf_shape.from_file(share() / 'urdf' / model, said)
     from cpg_ros.panel.model_shape import from_model
     return from_model(model, robot)

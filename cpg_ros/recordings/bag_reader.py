@@ -21,6 +21,7 @@ The library `rosbags` reads the storage; positions come from the messages' bytes
 from collections.abc import Sequence
 from pathlib import Path
 
+from cpg_ros.files.plain_text import printable
 from cpg_ros.files.progress_bar import progress_bar
 from cpg_ros.recordings.bag_storage import files_of_bag, opened, STORAGES
 from cpg_ros.recordings.joint_streams import BATCH, recorded, Stream
@@ -53,6 +54,7 @@ def read_bag(path: str | Path, topics: Sequence[str] = (), joints: Sequence[str]
 
     """
     path = Path(path)
+    source = printable(f'{path}, ')
     with opened(path) as bag:
         streams = {topic: Stream(topic, joints, servo) for topic in bag.choose(topics)}
         expected = bag.expected()
@@ -63,16 +65,16 @@ def read_bag(path: str | Path, topics: Sequence[str] = (), joints: Sequence[str]
                 stream = streams[topic]
                 stream.add(received, message)
                 if len(stream.messages) == BATCH:
-                    stream.decode(f'{path}, ')
+                    stream.decode(source)
                     done += BATCH
                     bar(done)
         for stream in streams.values():
-            stream.decode(f'{path}, ')
-        notes = [*bag.notes, *(
+            stream.decode(source)
+        notes = [*map(printable, bag.notes), *(
             f"{topic}: {stream.count} messages, where the bag's metadata counts {expected[topic]}"
             for topic, stream in streams.items() if stream.count != expected[topic]), *(
             f'{topic}: no messages' for topic, stream in streams.items() if not stream.count)]
-    return recorded(list(streams.values()), joints, f'{path}, ', notes, some)
+    return recorded(list(streams.values()), joints, source, notes, some)
 
 
 BAG = RecordingFormat(

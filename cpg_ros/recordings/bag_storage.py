@@ -20,9 +20,11 @@ Whatever the library raises on a damaged bag ends here, as one line that names t
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, ExitStack
+import math
 from pathlib import Path
 import re
 
+from cpg_ros.files import regular_file
 from cpg_ros.recordings.bag_library import Reader, ReaderError
 from cpg_ros.recordings.cdr import JOINT_STATE
 from cpg_ros.recordings.recording import few, RecordingError
@@ -30,6 +32,8 @@ from cpg_ros.recordings.unfinished_mcap import UnfinishedPath, whole_part
 
 #: Endings of a bag's storage files, and the name of the file that describes them.
 STORAGES, METADATA = ('.mcap', '.db3'), 'metadata.yaml'
+#: Largest such file, bytes: a thousand topics have one of 2 MB.
+LARGEST_METADATA = 16_000_000
 
 
 class Bag:
@@ -98,6 +102,9 @@ def opened(path: Path) -> Iterator[Bag]:
     """
     try:
         files = _files(path)
+        for file in (path, *path.iterdir()) if path.is_dir() else (path,):
+            if not file.is_dir():
+                _check(file)
         notes = [f'{file}: its recorder did not finish it; what is whole before byte {end} is used'
                  for file in files if (end := whole_part(file)) is not None]
         whole = path.is_file() or (path / METADATA).exists()
@@ -118,6 +125,13 @@ def opened(path: Path) -> Iterator[Bag]:
             stack.callback(reader.close)
             readers.append(reader)
         yield Bag(path, readers, cut, notes)
+
+
+def _check(file: Path) -> None:
+    """Refuse pipes and devices, which hold the library up; bags of any size are read in pieces."""
+    largest = LARGEST_METADATA if file.name == METADATA else math.inf
+    with regular_file.opened(file, RecordingError, largest=largest):
+        pass
 
 
 def _files(path: Path) -> list[Path]:

@@ -23,6 +23,7 @@ from itertools import chain, islice
 from pathlib import Path
 import re
 
+from cpg_ros.files.plain_text import printable
 from cpg_ros.files.progress_bar import progress_bar
 from cpg_ros.recordings.recording import (
     Chunk,
@@ -106,7 +107,8 @@ def read_csv(path: str | Path, unit: str | None = None, time: str | None = None,
                     yield chunk
                     bar(min(size, table.read))
 
-            recording = merged(chunks(), str(path), [column.joint for column in table.columns])
+            recording = merged(chunks(), printable(str(path)),
+                               [column.joint for column in table.columns])
     notes = [*table.notes, *(['lines that end in a delimiter'] if table.ended else [])]
     return replace(recording, notes=(*notes, *recording.notes))
 
@@ -135,8 +137,9 @@ class _Table:
         while len(headers) > 2 and not headers[-1]:
             headers.pop()
         if len(headers) < 2:
-            raise RecordingError(f'{path}, line {self.line}: one column only, {headers[0]!r}; '
-                                 'a table has a time column and one per joint')
+            raise RecordingError(f'{path}, line {self.line}: one column only, '
+                                 f'{"".join(headers)!r}; a table has a time column and one per '
+                                 'joint')
         if all(_number(header) is not None for header in headers if header):
             raise RecordingError(f'{path}, line {self.line}: no header; the first line has to '
                                  'name the columns')

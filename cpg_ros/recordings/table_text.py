@@ -20,10 +20,14 @@ import gzip
 import io
 from pathlib import Path
 import re
+from typing import cast, IO
 import zlib
 
+from cpg_ros.files import regular_file
 from cpg_ros.recordings.recording import RecordingError
 
+#: Largest file, bytes, packed or not, and longest line, letters.
+LARGEST, LONGEST = 4_000_000_000, 1 << 17
 #: What a file packed by gzip begins with.
 GZIP = b'\x1f\x8b'
 #: The preamble of OpenSim's .mot and .sto files ends so, after this many lines at most.
@@ -34,20 +38,50 @@ UNIT = re.compile(r'[(\[]?\s*([a-zA-Z°%][a-zA-Z°%/^*.0-9]{0,11}|-|)\s*[)\]]?')
 COMMA = re.compile(r'\s*[-+]?\d*,\d+([eE][-+]?\d+)?\s*')
 
 
+class _Lines(io.TextIOWrapper):
+    """Text whose lines have a largest length: what has none is no table, and fills the memory.
+
+    Attributes:
+        path: of the file.
+
+    """
+
+    path = Path()
+
+    def readline(self, size: int | None = -1, /) -> str:  # type: ignore[override]
+        """Read a line.
+
+        Raises:
+            RecordingError: it is too long.
+
+        """
+        line = super().readline(LONGEST)
+        if len(line) == LONGEST:
+            raise RecordingError(f'{self.path}: not a table: a line has {LONGEST} letters or more')
+        return line
+
+    def __next__(self) -> str:  # type: ignore[override]
+        if line := self.readline():
+            return line
+        raise StopIteration
+
+
 @contextmanager
 def opened(path: Path) -> Iterator[io.TextIOBase]:
     """Open a text, packed by gzip or not.
 
     Raises:
-        RecordingError: it is cut or damaged, or no text; from within, too.
+        RecordingError: it is no regular file, cut or damaged, or no text; from within, too.
 
     """
     try:
-        with path.open('rb') as file:
+        with regular_file.opened(path, RecordingError, largest=LARGEST) as file:
             packed = file.read(2) == GZIP
-        with (gzip.open(path, 'rt', encoding='utf-8-sig', newline='') if packed
-              else path.open(encoding='utf-8-sig', newline='')) as text:
-            yield text
+            file.seek(0)
+            unpacked = gzip.GzipFile(fileobj=file) if packed else file
+            with _Lines(cast(IO[bytes], unpacked), encoding='utf-8-sig', newline='') as text:
+                text.path = path
+                yield text
     except (gzip.BadGzipFile, zlib.error, EOFError) as error:
         raise RecordingError(f'{path}: packed by gzip, and damaged: {error}') from error
     except OSError as error:

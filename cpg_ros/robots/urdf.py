@@ -18,18 +18,18 @@ Reads what a robot file is compared with and leaves the rest (meshes, sensors, g
 transmission blocks, whatever their prefixes) alone. URDF: https://wiki.ros.org/urdf/XML/joint.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 import math
 from pathlib import Path
-from xml.parsers import expat
+from xml.etree.ElementTree import Element
 
 from cpg_ros.errors import CpgError
+from cpg_ros.files.regular_file import one_line, read_bytes
+from cpg_ros.files.xml_reader import parse
 import numpy as np
 
 #: Kinds of joints that turn, which a cell can drive.
 TURNING = ('revolute', 'continuous')
-#: Children of a joint that are read, and their attributes.
-_PARTS = ('origin', 'axis', 'parent', 'child', 'limit', 'mimic')
 
 
 class UrdfError(CpgError):
@@ -71,106 +71,100 @@ class UrdfJoint:
         return '' if self.kind in TURNING else f'is {self.kind}'
 
 
-@dataclass
-class _Document:
-    """Collects joints while the file is parsed."""
+def bare(tag: str) -> str:
+    """Return a tag without its prefix."""
+    return tag.rpartition(':')[2]
 
-    path: Path
-    joints: dict[str, UrdfJoint] = field(default_factory=dict)
-    _open: list[str] = field(default_factory=list)
-    _parts: dict[str, dict[str, str]] = field(default_factory=dict)
 
-    def fail(self, why: str) -> UrdfError:
-        return UrdfError(' '.join(f'URDF {self.path}: {why}'.split()))
+def read_tree(path: str | Path) -> Element:
+    """Read a URDF file as XML.
 
-    def start(self, tag: str, attributes: dict[str, str]) -> None:
-        if tag.startswith('xacro:'):
-            raise self.fail(f'has <{tag}> in it: it is xacro, expand it first (xacro '
-                            f'{self.path.name} > robot.urdf)')
-        name = tag.rpartition(':')[2]
-        if not self._open and name != 'robot':
-            raise self.fail(f'its root is <{name}>, not <robot>: this is not a URDF')
-        self._open.append(name)
-        if self._open == ['robot', 'joint']:
-            self._parts = {'joint': attributes}
-        elif self._open[:2] == ['robot', 'joint'] and len(self._open) == 3 and name in _PARTS:
-            self._parts[name] = attributes
+    Raises:
+        UrdfError: the file cannot be read, is not XML, is xacro or is no URDF.
 
-    def end(self, _: str) -> None:
-        if self._open == ['robot', 'joint']:
-            joint = self._joint()
-            if joint.name in self.joints:
-                raise self.fail(f"the joint '{joint.name}' appears twice")
-            self.joints[joint.name] = joint
-        self._open.pop()
+    """
+    return parse_tree(read_bytes(path, UrdfError, 'URDF'), str(path))
 
-    def entity(self, name: str, *_: object) -> None:
-        raise self.fail(f"it declares the entity '{name}'; entities are not read")
 
-    def _joint(self) -> UrdfJoint:
-        own = self._parts['joint']
-        name, kind = own.get('name', '').strip(), own.get('type', '').strip()
-        if not name:
-            raise self.fail('a joint has no name')
-        if not kind:
-            raise self.fail(f"the joint '{name}' has no type")
-        limits = self._parts.get('limit', {})
-        bounded = kind in ('revolute', 'prismatic')
-        lower, upper, velocity = (self._numbers(name, 'limit', key, '0', 1)[0]
-                                  for key in ('lower', 'upper', 'velocity'))
-        if bounded and 'limit' not in self._parts:
-            raise self.fail(f"the joint '{name}' is {kind}, but has no <limit>")
-        return UrdfJoint(
-            name, kind, lower if bounded else -math.inf, upper if bounded else math.inf,
-            abs(velocity) if 'velocity' in limits and velocity else math.inf,
-            self._parts.get('mimic', {}).get('joint', ''),
-            self._parts.get('parent', {}).get('link', ''),
-            self._parts.get('child', {}).get('link', ''),
-            self._numbers(name, 'origin', 'xyz', '0 0 0', 3),
-            self._numbers(name, 'origin', 'rpy', '0 0 0', 3),
-            self._numbers(name, 'axis', 'xyz', '1 0 0', 3))
-
-    def _numbers(self, joint: str, part: str, key: str, default: str, count: int
-                 ) -> tuple[float, ...]:
-        text = self._parts.get(part, {}).get(key, default)
-        try:
-            values = tuple(float(word) for word in text.split())
-        except ValueError:
-            values = ()
-        if len(values) != count or any(value != value for value in values):
-            what = 'a number' if count == 1 else f'{count} numbers'
-            raise self.fail(f"the joint '{joint}': {part} {key}=\"{text[:40]}\" is not {what}")
-        return values
+def parse_tree(data: bytes, source: str) -> Element:
+    """Parse a URDF; errors as of ``read_tree``, which name the source."""
+    tree = parse(data, lambda why: _wrong(source, why))
+    for element in tree.iter():
+        if element.tag.startswith('xacro:'):
+            raise _wrong(source, f'has <{element.tag}> in it: it is xacro, expand it first (xacro '
+                         f'{Path(source).name} > robot.urdf)')
+    if bare(tree.tag) != 'robot':
+        raise _wrong(source, f'its root is <{tree.tag}>, not <robot>: this is not a URDF')
+    return tree
 
 
 def load_urdf(path: str | Path) -> dict[str, UrdfJoint]:
     """Read the joints of a URDF file, by name and in its order.
 
     Raises:
-        UrdfError: the file cannot be read, is not XML, is xacro, is no URDF, or a joint in it
-            is incomplete.
+        UrdfError: as of ``read_tree``, or a joint in the file is incomplete.
 
     """
-    path = Path(path)
-    document = _Document(path)
-    # Without namespaces: prefixes that are declared nowhere are usual in URDF files.
-    parser = expat.ParserCreate()
-    parser.StartElementHandler = document.start
-    parser.EndElementHandler = document.end
-    parser.EntityDeclHandler = document.entity
-    try:
-        parser.Parse(path.read_bytes(), True)
-    except OSError as error:
-        raise UrdfError(f'URDF {path}: {error.strerror}') from error
-    except expat.ExpatError as error:
-        raise document.fail(f'line {error.lineno}: {expat.ErrorString(error.code)}') from error
-    except UrdfError:
-        raise
-    except (ValueError, LookupError) as error:
-        raise document.fail(str(error)) from error
-    if not document.joints:
-        raise document.fail('it has no joints')
-    return document.joints
+    return joints_of(read_tree(path), str(path))
+
+
+def joints_of(tree: Element, source: str) -> dict[str, UrdfJoint]:
+    """Return the joints of a URDF, by name and in its order.
+
+    Raises:
+        UrdfError: there are none, or one is incomplete; the message names the source.
+
+    """
+    joints: dict[str, UrdfJoint] = {}
+    for element in tree:
+        if bare(element.tag) == 'joint':
+            joint = _joint(element, source)
+            if joint.name in joints:
+                raise _wrong(source, f"the joint '{joint.name}' appears twice")
+            joints[joint.name] = joint
+    if not joints:
+        raise _wrong(source, 'it has no joints')
+    return joints
+
+
+def _wrong(source: str, why: str) -> UrdfError:
+    return UrdfError(one_line(f'URDF {source}: {why}'))
+
+
+def _joint(element: Element, source: str) -> UrdfJoint:
+    name, kind = element.get('name', '').strip(), element.get('type', '').strip()
+    if not name:
+        raise _wrong(source, 'a joint has no name')
+    if not kind:
+        raise _wrong(source, f"the joint '{name}' has no type")
+    parts: dict[str, dict[str, str]] = {bare(part.tag): part.attrib for part in element}
+
+    def text(part: str, key: str, default: str = '') -> str:
+        return parts.get(part, {}).get(key, default)
+
+    def numbers(part: str, key: str, default: str, finite: bool = True) -> tuple[float, ...]:
+        given, count = text(part, key, default), len(default.split())
+        try:
+            values = tuple(float(word) for word in given.split())
+        except ValueError:
+            values = ()
+        if len(values) != count or any(
+                value != value or (finite and math.isinf(value)) for value in values):
+            what = 'a number' if count == 1 else f'{count} numbers'
+            raise _wrong(source, f"the joint '{name}': {part} {key}=\"{given[:40]}\" is not "
+                         f'{what}')
+        return values
+
+    lower, upper, velocity = (numbers('limit', key, '0', finite=False)[0]
+                              for key in ('lower', 'upper', 'velocity'))
+    bounded = kind in ('revolute', 'prismatic')
+    if bounded and 'limit' not in parts:
+        raise _wrong(source, f"the joint '{name}' is {kind}, but has no <limit>")
+    return UrdfJoint(
+        name, kind, lower if bounded else -math.inf, upper if bounded else math.inf,
+        abs(velocity) if velocity else math.inf, text('mimic', 'joint'), text('parent', 'link'),
+        text('child', 'link'), numbers('origin', 'xyz', '0 0 0'),
+        numbers('origin', 'rpy', '0 0 0'), numbers('axis', 'xyz', '1 0 0'))
 
 
 def root(joints: dict[str, UrdfJoint]) -> str:

@@ -17,9 +17,9 @@
 from dataclasses import dataclass
 import math
 from pathlib import Path
-from xml.parsers import expat
+from xml.etree.ElementTree import Element
 
-from cpg_ros.robots.urdf import chain, rotation, UrdfError, UrdfJoint
+from cpg_ros.robots.urdf import bare, chain, read_tree, rotation, UrdfJoint
 import numpy as np
 
 
@@ -39,32 +39,18 @@ class UrdfLink:
     centre: tuple[float, ...] = (0.0, 0.0, 0.0)
 
 
-class _Links:
-    """Collects links while the file is parsed; what is no number counts as not there."""
-
-    def __init__(self) -> None:
-        self.links: dict[str, UrdfLink] = {}
-        self._open: list[str] = []
-        self._link = UrdfLink()
-        self._origin: tuple[float, ...] = (0.0, 0.0, 0.0)
-
-    def start(self, tag: str, attributes: dict[str, str]) -> None:
-        self._open.append(tag.rpartition(':')[2])
-        place = self._open[1:]
-        if place == ['link']:
-            self._link = self.links[attributes.get('name', '').strip()] = UrdfLink()
-        elif place == ['link', 'inertial', 'mass']:
-            self._link.mass = sum(_numbers(attributes.get('value', '')))
-        elif place == ['link', 'collision']:
-            self._origin = (0.0, 0.0, 0.0)
-        elif place == ['link', 'collision', 'origin']:
-            self._origin = _numbers(attributes.get('xyz', '')) or self._origin
-        elif place == ['link', 'collision', 'geometry', 'sphere'] and not self._link.radius:
-            self._link.radius = sum(_numbers(attributes.get('radius', '')))
-            self._link.centre = self._origin
-
-    def end(self, _: str) -> None:
-        self._open.pop()
+def _link(element: Element) -> UrdfLink:
+    """Return a link; what is no number counts as not there."""
+    link = UrdfLink()
+    for mass in element.iterfind('inertial/mass'):
+        link.mass = sum(_numbers(mass.get('value', '')))
+    for collision in element.iterfind('collision'):
+        origin, sphere = collision.find('origin'), collision.find('geometry/sphere')
+        if sphere is not None and not link.radius:
+            link.radius = sum(_numbers(sphere.get('radius', '')))
+            centre = () if origin is None else _numbers(origin.get('xyz', ''))
+            link.centre = centre if len(centre) == 3 else link.centre
+    return link
 
 
 def _numbers(text: str) -> tuple[float, ...]:
@@ -82,17 +68,11 @@ def load_links(path: str | Path) -> dict[str, UrdfLink]:
         UrdfError: the file cannot be read.
 
     """
-    found = _Links()
-    parser = expat.ParserCreate()
-    parser.StartElementHandler, parser.EndElementHandler = found.start, found.end
-    try:
-        parser.Parse(Path(path).read_bytes(), True)
-    except OSError as error:
-        raise UrdfError(f'URDF {path}: {error.strerror}') from error
-    except expat.ExpatError as error:
-        raise UrdfError(f'URDF {path}: line {error.lineno}: '
-                        f'{expat.ErrorString(error.code)}') from error
-    return found.links
+    links: dict[str, UrdfLink] = {}
+    for element in read_tree(path):
+        if bare(element.tag) == 'link':
+            links[element.get('name', '').strip()] = _link(element)
+    return links
 
 
 def placed(joints: dict[str, UrdfJoint], name: str) -> tuple[np.ndarray, np.ndarray]:

@@ -25,7 +25,8 @@ import re
 from urllib.parse import unquote
 from xml.etree import ElementTree
 
-from cpg_ros.robots.urdf import UrdfError
+from cpg_ros.files import regular_file, xml_reader
+from cpg_ros.robots.urdf import bare, UrdfError
 import numpy as np
 
 #: What a reference may begin with, beside the name of a package.
@@ -76,7 +77,8 @@ def _name_of(folder: Path) -> str:
     manifest = folder / 'package.xml'
     if not manifest.is_file():
         return ''
-    found = re.search(r'<name>\s*([^<\s]+)\s*</name>', manifest.read_text(errors='replace'))
+    found = re.search(r'<name>\s*([^<\s]+)\s*</name>',
+                      regular_file.read_bytes(manifest, UrdfError).decode(errors='replace'))
     return found[1] if found else ''
 
 
@@ -106,7 +108,9 @@ def hull(path: Path) -> bytes:
     from scipy.spatial import ConvexHull, QhullError
     try:
         points = _collada(path) if path.suffix.lower() == '.dae' else _stl(path)
-    except (OSError, ValueError, AttributeError, ElementTree.ParseError) as error:
+    except UrdfError:
+        raise
+    except (ValueError, LookupError, AttributeError) as error:
         raise UrdfError(f'{path.name}: {error}') from error
     if len(points) < 4 or np.ptp(points, axis=0).min() < FLAT:
         raise UrdfError(f'{path.name}: {len(points)} points that enclose no volume')
@@ -127,23 +131,26 @@ def hull(path: Path) -> bytes:
 
 def _stl(path: Path) -> np.ndarray:
     """Return the vertices of an ASCII STL file, shape (vertices, 3)."""
-    found = re.findall(rb'vertex\s+(\S+)\s+(\S+)\s+(\S+)', path.read_bytes())
+    found = re.findall(rb'vertex\s+(\S+)\s+(\S+)\s+(\S+)',
+                       regular_file.read_bytes(path, UrdfError))
     return np.array(found, dtype=float).reshape(-1, 3)
 
 
 def _collada(path: Path) -> np.ndarray:
     """Return the points of a Collada file, z up and in metres, shape (points, 3)."""
-    root = ElementTree.parse(path).getroot()
-    space = root.tag.partition('}')[0] + '}' if '}' in root.tag else ''
-    unit = root.find(f'{space}asset/{space}unit')
-    up = root.findtext(f'{space}asset/{space}up_axis', 'Y_UP').strip()
+    root = xml_reader.parse(regular_file.read_bytes(path, UrdfError),
+                            lambda why: UrdfError(f'{path.name}: {why}'))
+    for element in root.iter():
+        element.tag = bare(element.tag)
+    unit = root.find('asset/unit')
+    up = root.findtext('asset/up_axis', 'Y_UP').strip()
     scale = float(unit.get('meter', 1.0)) if unit is not None else 1.0
-    meshes = {geometry.get('id', ''): _positions(geometry, space)
-              for geometry in root.iter(f'{space}geometry')}
+    meshes = {geometry.get('id', ''): _positions(geometry)
+              for geometry in root.iter('geometry')}
     found: list[np.ndarray] = []
-    for scene in root.iter(f'{space}visual_scene'):
-        for node in scene.findall(f'{space}node'):
-            _placed(node, np.eye(4), meshes, space, found)
+    for scene in root.iter('visual_scene'):
+        for node in scene.findall('node'):
+            _placed(node, np.eye(4), meshes, found)
     points = np.concatenate(found or list(meshes.values()) or [np.empty((0, 3))])
     if up == 'Y_UP':
         points = points[:, [0, 2, 1]] * [1.0, -1.0, 1.0]
@@ -152,31 +159,31 @@ def _collada(path: Path) -> np.ndarray:
     return scale * points
 
 
-def _positions(geometry: ElementTree.Element, space: str) -> np.ndarray:
+def _positions(geometry: ElementTree.Element) -> np.ndarray:
     found = [np.empty((0, 3))]
-    for vertices in geometry.iter(f'{space}vertices'):
-        for use in vertices.findall(f'{space}input[@semantic="POSITION"]'):
-            source = use.get('source', '').removeprefix('#')
-            array = geometry.find(f'.//{space}source[@id="{source}"]/{space}float_array')
-            if array is not None and array.text:
-                found.append(np.array(array.text.split(), dtype=float).reshape(-1, 3))
+    sources = {source.get('id', ''): source for source in geometry.iter('source')}
+    for vertices in geometry.iter('vertices'):
+        for use in vertices.findall('input[@semantic="POSITION"]'):
+            source = sources.get(use.get('source', '').removeprefix('#'))
+            numbers = '' if source is None else source.findtext('float_array', '')
+            found.append(np.array(numbers.split(), dtype=float).reshape(-1, 3))
     return np.concatenate(found)
 
 
 def _placed(node: ElementTree.Element, above: np.ndarray, meshes: dict[str, np.ndarray],
-            space: str, found: list[np.ndarray]) -> None:
+            found: list[np.ndarray]) -> None:
     """Collect the points of a node and all below it, in the frame of the scene."""
     place = above.copy()
     for step in node:
-        kind = step.tag.removeprefix(space)
+        kind = step.tag
         if kind in ('matrix', 'translate', 'rotate', 'scale'):
             place = place @ _step(kind, np.array((step.text or '').split(), dtype=float))
-    for use in node.findall(f'{space}instance_geometry'):
+    for use in node.findall('instance_geometry'):
         points = meshes.get(use.get('url', '').removeprefix('#'))
         if points is not None:
             found.append(points @ place[:3, :3].T + place[:3, 3])
-    for below in node.findall(f'{space}node'):
-        _placed(below, place, meshes, space, found)
+    for below in node.findall('node'):
+        _placed(below, place, meshes, found)
 
 
 def _step(kind: str, numbers: np.ndarray) -> np.ndarray:

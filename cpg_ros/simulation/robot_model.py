@@ -26,6 +26,7 @@ from types import ModuleType
 from typing import Any
 
 from cpg_ros.errors import CpgError
+from cpg_ros.files import regular_file
 from cpg_ros.files.shared_resources import share
 from cpg_ros.networks.registry import NETWORKS
 from cpg_ros.robots.robot import Robot
@@ -132,7 +133,8 @@ def load(name: str, robot: Robot, kp: float | None = None, kd: float | None = No
             spec = read_urdf(path, robot.order, visual, say)
             _free(spec, path)
         else:
-            spec = mujoco.MjSpec.from_file(str(path))
+            with regular_file.opened(path, SimulationError, 'model'):
+                spec = mujoco.MjSpec.from_file(str(path))
         joints = {joint.name: joint for joint in spec.joints}
         base = _base(spec, path)
         _check(robot, joints, path)
@@ -155,7 +157,8 @@ def load(name: str, robot: Robot, kp: float | None = None, kd: float | None = No
     except SimulationError:
         raise
     except (ValueError, UrdfError) as error:
-        raise SimulationError(f'model {path}: {_reason(error)}') from error
+        why = _reason(error).removeprefix(f'URDF {path}: ')
+        raise SimulationError(f'model {path}: {why}') from error
 
 
 def _reason(error: Exception) -> str:

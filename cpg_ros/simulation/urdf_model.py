@@ -23,9 +23,9 @@ from collections.abc import Callable, Collection, Mapping
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
-from xml.parsers import expat
 
-from cpg_ros.robots.urdf import UrdfError
+from cpg_ros.files import regular_file
+from cpg_ros.robots.urdf import read_tree, UrdfError
 from cpg_ros.simulation.inertia import ball, LEAST, LIGHTEST, possible
 from cpg_ros.simulation.mesh_files import find_mesh, hull, trouble
 import numpy as np
@@ -54,12 +54,12 @@ def read_urdf(path: Path, driven: Collection[str], visual: bool, say: Say) -> An
         say: takes what had to be changed, a line for each thing.
 
     Raises:
-        UrdfError: it is no XML.
+        UrdfError: it cannot be read, or is no URDF.
         ValueError: MuJoCo's reason why it cannot be used.
 
     """
     import mujoco
-    robot = _parsed(path)
+    robot = read_tree(path)
     extension = robot.find('mujoco/compiler')
     meshes = _Meshes(path, '' if extension is None else extension.get('meshdir', ''))
     for link in robot.findall('link'):
@@ -109,19 +109,6 @@ def part_touching(spec: Any, stand: Mapping[str, float]) -> None:
         spec.add_exclude(bodyname1=pair[0], bodyname2=pair[1])
 
 
-def _parsed(path: Path) -> ElementTree.Element:
-    """Parse without namespaces: prefixes that are declared nowhere are usual in URDF files."""
-    builder, parser = ElementTree.TreeBuilder(), expat.ParserCreate()
-    parser.StartElementHandler = builder.start
-    parser.EndElementHandler = builder.end
-    try:
-        parser.Parse(path.read_bytes(), True)
-        return builder.close()
-    except expat.ExpatError as error:
-        raise UrdfError(f'XML parse error: line {error.lineno}: '
-                        f'{expat.ErrorString(error.code)}') from error
-
-
 class _Meshes:
     """Looks for meshes, and does something about those that are of no use.
 
@@ -168,7 +155,11 @@ class _Meshes:
         lost = 'nothing can touch' if kind == 'collision' else 'pictures go without'
         if path is None:
             return '', f'meshes are not found, {lost} them'
-        why = trouble(path)
+        try:
+            with regular_file.opened(path, UrdfError):
+                why = trouble(path)
+        except UrdfError as error:
+            return '', f'{error}: {lost} meshes'
         if not why:
             return str(path.resolve()), ''
         if kind == 'collision':

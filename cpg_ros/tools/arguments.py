@@ -19,6 +19,8 @@ import os
 import sys
 from typing import NoReturn
 
+from cpg_ros.files.plain_text import printable
+
 
 class Parser(argparse.ArgumentParser):
     """Says what is wrong in one line, with code 2."""
@@ -76,7 +78,7 @@ def twice(names: list[str]) -> str:
 def say(text: str) -> None:
     """Print to a reader that may leave, as in ``... | head -1``."""
     try:
-        print(text, flush=True)
+        print(printable(text), flush=True)
     except BrokenPipeError:
         # Python flushes once more at its end: into nothing.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

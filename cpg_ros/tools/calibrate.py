@@ -27,6 +27,7 @@ from cpg_ros.calibration.recorded_efference import Calibrated, efference_from, w
 from cpg_ros.calibration.walk_recording import read_walk, TYPES
 from cpg_ros.errors import CpgError
 from cpg_ros.files.plain_text import table
+from cpg_ros.files.regular_file import read_bytes
 from cpg_ros.gaits.stride import NoSteadyGait
 from cpg_ros.motion.plan import Refused
 from cpg_ros.robots.robot import Robot
@@ -93,7 +94,7 @@ def _recorded(robot: Robot, chosen: argparse.Namespace) -> tuple[Robot, list[Cal
 
 def _comment(path: Path) -> str:
     """Return the comment that a file begins with."""
-    lines = path.read_text(encoding='utf-8').splitlines() if path.is_file() else []
+    lines = read_bytes(path, CpgError).decode().splitlines() if path.is_file() else []
     first = next((k for k, line in enumerate(lines) if not line.startswith('#')), len(lines))
     return '\n'.join(line[1:].removeprefix(' ') for line in lines[:first])
 

@@ -27,6 +27,7 @@ import time
 from typing import Any, TYPE_CHECKING
 
 from cpg_ros.errors import CpgError
+from cpg_ros.files.yaml_reader import parsed
 from cpg_ros.tools import completion
 from cpg_ros.tools.arguments import number, Parser, say
 from cpg_ros.tools.executables import PLACES, start
@@ -121,7 +122,7 @@ def parameter_value(text: str) -> Any:
     """
     from rclpy.parameter import Parameter
     try:
-        value = yaml.safe_load(text)
+        value = parsed(text)
         Parameter('one', value=value)
     except (yaml.YAMLError, TypeError):
         raise ArgumentTypeError(f"'{text}' is not a parameter value") from None
