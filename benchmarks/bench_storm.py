@@ -167,8 +167,8 @@ def storm(network: str, seconds: float, pipe: bool, seed: int) -> dict[str, obje
     from cpg_ros.networks.registry import PRESETS
     rng = random.Random(f'{network} {seed}')
     robot = ROBOTS.get(network, 'quadruped')
-    node = Piped(rate=RATE, network=network, robot=robot, ramp=0.2, feedback='false',
-                 cmd_vel=str(robot in STEERED).lower())
+    node = Piped(rate=RATE, network=network, robot=robot, ramp=0.2,
+                 cmd_vel=str(robot in STEERED).lower(), **{'feedback.enabled': 'false'})
     node.wait_for(b'publishing')
     checker, client = Checker(robot), ParameterClient()
     walk = client.node.create_publisher(Twist, 'cmd_vel', 10)

@@ -1,0 +1,97 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Every attack on what surrounds the loop, many times: nothing falls, no joint beyond its limits.
+
+The attacks are the live tests of them, which hold each message against the limits and end with the
+robot at its stand, sitting or damped; here each is repeated, on processes of its own every time.
+
+usage: bench_faults.py [--times 20] [--only NAME]
+"""
+
+import argparse
+from collections import Counter
+from pathlib import Path
+import subprocess
+import sys
+import tempfile
+from xml.etree import ElementTree
+
+from common import emit, log, ROOT
+from processes import enter_workspace
+
+#: Attack -> tests of it, as pytest selects them.
+FAULTS = {
+    'blocked log': ('test_blocked_log.py::test_a_generator_moves_on_and_ends_at_the_stand',
+                    'test_blocked_log.py::test_a_bridge_sits_down',
+                    'test_blocked_log.py::test_every_node_ends_though_its_terminal_is_paused'),
+    'ending signal': ('test_process.py::test_a_signal_ends_it_at_the_stand_with_code_0',
+                      'test_process.py::test_a_signal_while_it_imports_is_one_line'),
+    'stopped clock': ('test_clock.py::test_a_stop_does_not_wait_for_a_clock_that_stands_still',
+                      'test_clock.py::test_disabled_and_enabled_again_while_the_clock_stands_still'
+                      ),
+    'clock that jumps': ('test_clock.py::test_a_looped_clock',
+                         'test_clock.py::test_two_publishers_of_different_times',
+                         'test_clock.py::test_a_stop_between_two_clocks',
+                         'test_clock.py::test_jitter_of_the_clock_is_not_seen'),
+    'watchdog': ('test_unitree_live.py::'
+                 'test_bridge_and_watchdog_killed_together_leave_the_last_command',
+                 'test_unitree_live.py::test_another_users_watchdog_is_not_trusted',
+                 'test_unitree_live.py::test_what_happens_on_a_fault[fed_by_another_user]'),
+    'steering': ('test_panel_lease.py::test_two_pages_do_not_steer_at_once',
+                 'test_panel_lease.py::test_a_link_with_a_delay_does_not_steer',
+                 'test_panel_lease.py::test_a_page_that_was_frozen_does_not_steer',
+                 'test_panel_lease.py::test_a_panel_that_was_stopped_publishes_zero_first',
+                 'test_panel_lease.py::test_stop_works_from_any_page')}
+TARGETS = {'failed': 0, 'skipped': 0}
+
+
+def repeat(tests: tuple[str, ...], times: int) -> dict[str, object]:
+    """Run tests so often; return how many ended how, and the reasons of the first failures."""
+    with tempfile.TemporaryDirectory() as folder:
+        report = Path(folder) / 'report.xml'
+        subprocess.run(
+            [sys.executable, '-m', 'pytest', '--count', str(times), '-q', '--timeout', '600',
+             f'--junitxml={report}', *(f'test/{test}' for test in tests)],
+            cwd=ROOT, stdout=sys.stderr, check=False)
+        cases = list(ElementTree.parse(report).iter('testcase'))
+    outcomes: Counter[str] = Counter()
+    reasons = []
+    for case in cases:
+        bad = [one for one in case if one.tag in ('failure', 'error')]
+        skipped = case.find('skipped') is not None
+        outcomes['failed' if bad else 'skipped' if skipped else 'passed'] += 1
+        reasons += [f'{case.get("name")}: {one.get("message", "")[:200]}' for one in bad]
+    return {'runs': len(cases), **{key: outcomes[key] for key in ('passed', 'failed', 'skipped')},
+            'first failures': reasons[:3]}
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument('--times', type=int, default=20, help='repetitions of each test')
+    parser.add_argument('--only', default='', help='attacks with this in their names')
+    given = parser.parse_args()
+    enter_workspace()
+    found = {}
+    for fault, tests in FAULTS.items():
+        if given.only in fault:
+            log(f'{fault}: {len(tests)} tests, {given.times} times')
+            found[fault] = repeat(tests, given.times)
+    emit(benchmark='faults', times=given.times, **found, targets=TARGETS, passed=all(
+        one['runs'] and one[key] == target for one in found.values()
+        for key, target in TARGETS.items()))
+
+
+if __name__ == '__main__':
+    main()
