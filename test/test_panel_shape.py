@@ -150,6 +150,40 @@ def test_a_urdf_with_meshes_of_which_one_is_missing(tmp_path):
     assert shape.limits == {'shoulder': (-1.0, 2.0)}
 
 
+@pytest.fixture
+def installed(tmp_path, monkeypatch):
+    """Return the share folder of a package that is installed, and the package's sources."""
+    prefix, sources = tmp_path / 'prefix', tmp_path / 'src' / 'arm_description'
+    index = prefix / 'share' / 'ament_index' / 'resource_index' / 'packages'
+    shared = prefix / 'share' / 'arm_description'
+    for folder in (index, shared, sources):
+        folder.mkdir(parents=True)
+    (index / 'arm_description').touch()
+    (sources / 'package.xml').write_text('<package><name>arm_description</name></package>')
+    (sources / 'linked.stl').write_bytes(binary_stl(TETRAHEDRON))
+    (tmp_path / 'secret.stl').write_bytes(binary_stl(TETRAHEDRON))
+    (shared / 'own.stl').write_bytes(binary_stl(TETRAHEDRON))
+    # As colcon build --symlink-install does, and as it does not.
+    (shared / 'linked.stl').symlink_to(sources / 'linked.stl')
+    (shared / 'astray.stl').symlink_to(tmp_path / 'secret.stl')
+    monkeypatch.setenv('AMENT_PREFIX_PATH', str(prefix))
+    return shared
+
+
+@pytest.mark.parametrize(('name', 'drawn'), [
+    ('package://arm_description/own.stl', True), ('package://arm_description/linked.stl', True),
+    ('file://{shared}/own.stl', True), ('{shared}/own.stl', True), ('own.stl', False),
+    ('package://arm_description/astray.stl', False), ('file://{shared}/astray.stl', False),
+    ('package://arm_description/../../../secret.stl', False), ('package://../secret.stl', False),
+    ('package://arm_description/%2e%2e/%2e%2e/%2e%2e/secret.stl', False),
+    ('file://{shared}/../../../secret.stl', False), ('package://arm_description/%00', False)])
+def test_a_description_draws_meshes_of_installed_packages_only(installed, name, drawn):
+    said = []
+    text = URDF.format(mesh=name.format(shared=installed))
+    shape = urdf_shape.from_text(text, 'robot_description', said.append)
+    assert len(said) == 2 - drawn and bool(shape.links[0].vertices) is drawn
+
+
 def test_the_users_urdf_comes_first_and_what_is_wrong_with_it_is_said(tmp_path):
     (tmp_path / 'bad.urdf').write_text('<sdf/>')
     said = []
