@@ -18,6 +18,7 @@ from collections import deque
 
 from cpg_ros.feedback.kinematics import GRAVITY
 from cpg_ros.simulation.body import Body
+from cpg_ros.simulation.robot_model import engine
 from cpg_ros.simulation.scenario import SensorNoise
 import numpy as np
 
@@ -33,7 +34,7 @@ class InertialUnit:
         turned = np.array([1.0, half, half, 0.0])
         self._turned = turned / np.linalg.norm(turned)
         self._before = body.rates[:3].copy()
-        self._turn = np.zeros(9)
+        self._orientation = np.empty(4)
         self._late: deque[tuple[int, np.ndarray]] = deque()
 
     def measure(self, stamp: int) -> tuple[int, np.ndarray] | None:
@@ -45,8 +46,8 @@ class InertialUnit:
 
         """
         noise, body, found = self._noise, self._body, np.empty(10)
-        w, x, y, z = _product(body.quaternion, self._turned)
-        found[:4] = x, y, z, w
+        engine().mju_mulQuat(self._orientation, body.quaternion, self._turned)
+        found[:4] = np.roll(self._orientation, -1)
         rates = body.rates
         faster = (rates[:3] - self._before) / self._period
         faster[2] += GRAVITY
@@ -64,11 +65,3 @@ class InertialUnit:
         while self._late and self._late[0][0] <= stamp - 1e9 * noise.delay:
             arrived = self._late.popleft()
         return arrived
-
-
-def _product(one: np.ndarray, two: np.ndarray) -> tuple[float, float, float, float]:
-    """Product of quaternions, w x y z."""
-    a, b, c, d = one.tolist()
-    e, f, g, h = two.tolist()
-    return (a * e - b * f - c * g - d * h, a * f + b * e + c * h - d * g,
-            a * g - b * h + c * e + d * f, a * h + b * g - c * f + d * e)
