@@ -36,7 +36,7 @@ from cpg_ros.feedback.kinematics import GRAVITY
 from cpg_ros.files.progress_bar import progress_bar
 from cpg_ros.robots.robot import Robot
 from cpg_ros.robots.robot_file import load_robot
-from cpg_ros.simulation.scenario import Noise
+from cpg_ros.simulation.scenario import SensorNoise
 from feedback_figures import (
     flat,
     GAITS,
@@ -58,8 +58,8 @@ OTHERS, ENOUGH = ('quadruped', 'phase', 'hopf', 'matsuoka'), 28.0
 #: How many times its open-loop impulse a robot other than the Go2 is to survive.
 TWICE = 2.0
 #: Force sensors 10 % wrong with 5 % noise, 0.5 degrees of IMU bias, 0.02 rad/s on the gyro.
-DULL = {'delay': 0.01, 'force_bias': 0.1, 'force_noise': 0.05, 'lean_bias': 0.00873,
-        'turning_noise': 0.02}
+DULL = {'delay': 0.01, 'force_bias': 0.1, 'force_noise': 0.05, 'orientation_bias': 0.00873,
+        'gyroscope_noise': 0.02}
 
 
 class Job(NamedTuple):
@@ -100,7 +100,7 @@ def measure(job: Job, run: Run) -> Any:
                   job.network, others, run.model)
     if job.figure in ('pushes', 'noisy', 'networks'):
         if job.figure == 'noisy':
-            one.noise = Noise(**DULL, seed=run.seed)
+            one.noise = SensorNoise(**DULL, seed=run.seed)
         impulses = run.impulses or pushed_with(job, run, one.loop.geometry.weight / GRAVITY)
         found: Any = pushes(one, impulses[::2] if run.quick else impulses)
     else:

@@ -30,11 +30,15 @@ from cpg_ros.motion.plan import plan, Program
 from cpg_ros.motion.steering import Drive
 from cpg_ros.networks.registry import PRESETS
 from cpg_ros.robots.robot_file import load_robot
-from cpg_ros.simulation.batch import Batch, Scenario, targets
+from cpg_ros.simulation.batch import Batch, targets
 from cpg_ros.simulation.body import Body
-from cpg_ros.simulation.pattern_follower import Fallen, Follow, speed
 from cpg_ros.simulation.run_metrics import RunMetrics
+from cpg_ros.simulation.scenario import Scenario
 import numpy as np
+
+sys.path.append(str(ROOT / 'test'))
+
+from pattern_follower import Fallen, Follow, speed  # noqa: E402
 
 DT, DURATION = 0.002, 10.0
 GAITS = ('walk', 'trot', 'pace', 'bound', 'jump', 'pronk')

@@ -28,7 +28,7 @@ from cpg_ros.robots.robot import Robot
 from cpg_ros.robots.robot_file import load_robot
 from cpg_ros.simulation.closed_loop import ClosedLoop
 from cpg_ros.simulation.efference_measurement import measure_efference
-from cpg_ros.simulation.scenario import Noise, Outcome, Scenario
+from cpg_ros.simulation.scenario import impulse, Outcome, Scenario, SensorNoise
 from cpg_ros.simulation.terrain import Terrain
 import numpy as np
 
@@ -59,7 +59,7 @@ class Subject:
     gains: Gains | None
     rng: np.random.Generator
     quick: bool = False
-    noise: Noise | None = field(default=None)
+    noise: SensorNoise | None = field(default=None)
 
     def run(self, scenarios: Sequence[Scenario], duration: float, goal: float = math.inf
             ) -> Outcome:
@@ -99,23 +99,24 @@ def pushes(one: Subject, impulses: Sequence[float], friction: float = 1.0) -> di
     """
     directions, phases = (4, 2) if one.quick else (12, 8)
     shares: dict[float, float] = {}
-    for impulse in impulses:
+    for size in impulses:
         first = one.rng.uniform(0.0, 2.0 * math.pi)
         ways = first + np.arange(directions) * 2.0 * math.pi / directions
-        shares[impulse] = float(one.run(
-            [Scenario(friction, push=(impulse * math.cos(way), impulse * math.sin(way)),
-                      when=PUSHED, phase=k / phases) for way in ways for k in range(phases)],
+        shares[size] = float(one.run(
+            [Scenario(friction, phase=k / phases, pushes=(
+                impulse(PUSHED, size * math.cos(way), size * math.sin(way)),))
+             for way in ways for k in range(phases)],
             PUSHED + AFTER).upright.mean())
-        if shares[impulse] < 0.4:
+        if shares[size] < 0.4:
             break
     half = max(shares) if min(shares.values()) >= 0.5 else min(shares)
     for low, high in itertools.pairwise(shares):
         if shares[low] >= 0.5 > shares[high]:
             half = float(np.interp(0.5, [shares[high], shares[low]], [high, low]))
     count = directions * phases
-    return {'survived': {f'{impulse:g}': share for impulse, share in shares.items()},
-            'interval_95': {f'{impulse:g}': interval(share, count)
-                            for impulse, share in shares.items()},
+    return {'survived': {f'{size:g}': share for size, share in shares.items()},
+            'interval_95': {f'{size:g}': interval(share, count)
+                            for size, share in shares.items()},
             'half_survive_N_s': half}
 
 

@@ -19,13 +19,12 @@ model's meshes are pictures of another repository: they are left out.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 import math
 from pathlib import Path
 
 from cpg_ros.gaits.stride import find_stride, Stride
 from cpg_ros.networks.delayed import Delayed
-from cpg_ros.simulation.batch import PUSH
 from cpg_ros.simulation.body import FALLEN
 from cpg_ros.simulation.scenario import Scenario
 import mujoco
@@ -123,9 +122,10 @@ class Policy:
         action = np.zeros(model.nu, dtype=np.float32)
         wish = np.array([one.speed, 0.0, 0.0])
         angles, speed, upright = np.zeros((steps, model.nu)), np.zeros(steps), True
+        forces = replace(one, pushes=tuple(
+            (when + late, *force) for when, *force in one.pushes)).forces(steps, TIMESTEP)
         for k in range(steps):
-            pushed = one.when + late <= k * TIMESTEP < one.when + late + PUSH
-            data.xfrc_applied[self._base, :2] = np.array(one.push) / PUSH if pushed else 0.0
+            data.xfrc_applied[self._base, :2] = forces[k]
             mujoco.mj_step1(model, data)
             velocity = data.sensor('local_linvel').data
             if k % every == 0:

@@ -33,9 +33,9 @@ from cpg_ros.motion.plan import Refused
 from cpg_ros.motion.steering import Drive
 from cpg_ros.robots.robot_file import load_robot, RobotError, write_robot
 from cpg_ros.simulation.body import Body
-from cpg_ros.simulation.proprioception import Proprioception
 from cpg_ros.tools import calibrate
 from cpg_ros.tools.calibrate import main
+from pattern_follower import Proprioception
 
 CONTACTS, IMU = 'std_msgs/msg/Float64MultiArray', 'sensor_msgs/msg/Imu'
 TYPES = {'/joint_states': 'sensor_msgs/msg/JointState', '/imu': IMU, '/foot_contacts': CONTACTS,

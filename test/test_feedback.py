@@ -45,9 +45,9 @@ if any(importlib.util.find_spec(name) is None for name in ('mujoco', 'gym_quadru
 from cpg_ros.simulation.body import Body  # noqa: I100
 from cpg_ros.simulation.closed_loop import ClosedLoop
 from cpg_ros.simulation.efference_measurement import measure_efference
-from cpg_ros.simulation.proprioception import Proprioception
-from cpg_ros.simulation.scenario import Noise, Scenario
+from cpg_ros.simulation.scenario import impulse, Scenario, SensorNoise
 from cpg_ros.simulation.terrain import heights, Terrain
+from pattern_follower import Proprioception
 
 GAINS = Gains()
 #: No leg is stretched or folded to its end, nor the foot beside the hip, m.
@@ -136,7 +136,7 @@ def test_a_place_out_of_reach_stretches_the_leg_towards_it(loop):
 
 def test_the_estimate_is_the_bodys_own_velocity(loop, expected):
     """Also while it staggers from a push; 5 cm/s is what rolling feet alone would be off."""
-    ran = loop.run([Scenario(), Scenario(push=(0.0, 12.0), when=3.0)], 5.0, gains=GAINS,
+    ran = loop.run([Scenario(), Scenario(pushes=(impulse(3.0, 0.0, 12.0),))], 5.0, gains=GAINS,
                    expected=expected)
     assert ran.upright.all()
     off = np.sqrt(((ran.estimated - ran.velocity)[:, 500:, :2]**2).mean(axis=1))
@@ -250,7 +250,8 @@ def test_a_drive_taken_in_mid_walk_changes_no_bit():
 
 
 def test_the_closed_trot_survives_pushes_that_fell_the_open_one(loop, expected):
-    trials = [Scenario(push=(22.0 * math.cos(way), 22.0 * math.sin(way)), when=2.0, phase=phase)
+    trials = [Scenario(phase=phase, pushes=(
+        impulse(2.0, 22.0 * math.cos(way), 22.0 * math.sin(way)),))
               for way, phase in np.random.default_rng(7).uniform(0.0, [2.0 * math.pi, 1.0],
                                                                  (12, 2))]
     fell = ~loop.run(trials, 4.5).upright
@@ -287,7 +288,7 @@ def test_wishes_switches_and_dull_senses_reach_the_runs(loop, expected):
     wishes = [Scenario(speed=0.3, commands=((1.5, 0.3, 0.1, 0.0),)),
               Scenario(speed=0.3, commands=((1.5, 0.3, 0.0, 0.3),)),
               Scenario(speed=0.3, switches=((1.5, 'walk'),))]
-    for noise in (None, Noise(0.01, 0.1, 0.05, math.radians(0.5), 0.02)):
+    for noise in (None, SensorNoise(0.01, 0.1, 0.05, math.radians(0.5), 0.02)):
         ran = loop.run(wishes, 5.0, GAINS, noise=noise)
         assert ran.upright.all()
         late = slice(1500, None)

@@ -36,7 +36,8 @@ if any(importlib.util.find_spec(name) is None for name in ('mujoco', 'gym_quadru
     pytest.skip('the extra [sim] is not installed', allow_module_level=True)
 
 from cpg_ros.simulation.body import Body  # noqa: I100
-from cpg_ros.simulation.inertial_unit import Dullness, InertialUnit
+from cpg_ros.simulation.inertial_unit import InertialUnit
+from cpg_ros.simulation.scenario import SensorNoise
 
 TOPICS = {'imu': Imu, 'measured': JointState, 'foot_contacts': Float64MultiArray}
 #: A fault lasts from and to these times, s; a run takes to the last one.
@@ -88,7 +89,7 @@ class Robot:
         Wire.wires = {}
         made = program('trot')
         self.body = Body('go2', GO2)
-        self.unit = InertialUnit(self.body, DT, Dullness(**dull))
+        self.unit = InertialUnit(self.body, DT, SensorNoise(**dull))
         self.pattern = Pattern(made, 0.4, drive=Drive(4))
         geometry = geometry_of(GO2)
         self.loop = FeedbackLoop(self.pattern, geometry, lambda: (made.own_speed, 0.0, 0.0))

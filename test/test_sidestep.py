@@ -26,7 +26,7 @@ if any(importlib.util.find_spec(name) is None for name in ('mujoco', 'gym_quadru
     pytest.skip('the extra [sim] is not installed', allow_module_level=True)
 
 from cpg_ros.simulation.closed_loop import ClosedLoop  # noqa: I100
-from cpg_ros.simulation.scenario import Scenario
+from cpg_ros.simulation.scenario import impulse, Scenario
 
 GAINS = Gains()
 
@@ -57,7 +57,7 @@ def test_it_is_as_fast_on_the_spot_as_while_walking(loop):
 
 
 def test_without_a_command_to_the_side_nothing_changes_bit_for_bit(loop):
-    runs = [Scenario(), Scenario(push=(5.0, 20.0), when=1.5)]
+    runs = [Scenario(), Scenario(pushes=(impulse(1.5, 5.0, 20.0),))]
     one, other = (loop.run(runs, 3.0, gains)
                   for gains in (GAINS, GAINS._replace(sidestep_rate=0.0)))
     assert (one.place == other.place).all()

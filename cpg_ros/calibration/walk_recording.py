@@ -19,7 +19,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from cpg_ros.feedback.estimate import Senses
+from cpg_ros.feedback.estimate import rpy_of, Senses
 from cpg_ros.recordings.bag_storage import opened
 from cpg_ros.recordings.cdr import JOINT_STATE
 from cpg_ros.recordings.recording import RecordingError
@@ -147,7 +147,7 @@ def _joined(path: Path, robot: Robot, found: dict[str, list[tuple[int, Any]]]) -
                         one.orientation.z] for one in messages])
     senses = Senses(to_imu('joint_states.position', angles, own),
                     to_imu('joint_states.velocity', rates, own),
-                    to_imu('foot_contacts', loads, at), _lean(turned),
+                    to_imu('foot_contacts', loads, at), rpy_of(turned),
                     vectors('angular_velocity'), vectors('linear_acceleration'))
     return WalkRecording(str(path), joints, times, senses, phase)
 
@@ -155,11 +155,3 @@ def _joined(path: Path, robot: Robot, found: dict[str, list[tuple[int, Any]]]) -
 def _stamp(message: Any) -> float:
     """Time of a message's header, ns."""
     return 1e9 * message.header.stamp.sec + message.header.stamp.nanosec
-
-
-def _lean(quaternions: np.ndarray) -> np.ndarray:
-    """Roll, pitch and yaw of orientations (w x y z), rad."""
-    w, x, y, z = quaternions.T
-    return np.stack([np.arctan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y)),
-                     np.arcsin(np.clip(2.0 * (w * y - z * x), -1.0, 1.0)),
-                     np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))], axis=1)

@@ -55,6 +55,14 @@ class Senses:
         return cls(*(np.zeros((runs, size)) for size in (joints, joints, legs, 3, 3, 3)))
 
 
+def rpy_of(quaternions: np.ndarray) -> np.ndarray:
+    """Return roll, pitch and yaw of orientations (w x y z), rad, shape (..., 3)."""
+    w, x, y, z = np.moveaxis(quaternions, -1, 0)
+    return np.stack([np.arctan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y)),
+                     np.arcsin(np.clip(2.0 * (w * y - z * x), -1.0, 1.0)),
+                     np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))], axis=-1)
+
+
 def upward(lean: np.ndarray) -> np.ndarray:
     """Return the vertical in the base's frame, shape (..., 3)."""
     roll, pitch = lean[..., 0], lean[..., 1]

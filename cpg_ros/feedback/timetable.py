@@ -44,7 +44,7 @@ class Timetable:
         robot, theta = program.robot, np.arange(POINTS) / POINTS
         phases = theta[:, None] - program.readout.start + program.orbit.phases[robot.cells]
         self.angles, self.in_place = (
-            program.shift + np.stack([_periodic(row, phase) for row, phase
+            program.shift + np.stack([periodic(row, phase) for row, phase
                                       in zip(readout.angles, phases.T, strict=True)], axis=1)
             for readout in (program.readout, program.in_place))
         feet = forward(geometry, robot.column('offset') + self.angles)
@@ -66,7 +66,8 @@ def _paired(robot: Robot, one: str, other: str) -> bool:
             and {robot.sides.get(one), robot.sides.get(other)} == {'left', 'right'})
 
 
-def _periodic(values: np.ndarray, phase: np.ndarray) -> np.ndarray:
+def periodic(values: np.ndarray, phase: np.ndarray) -> np.ndarray:
+    """Look up what is given at even phases of a cycle, from 0 on, at phases in cycles."""
     grid = np.arange(values.size + 1) / values.size
     return np.interp(phase % 1.0, grid, np.append(values, values[0]))
 

@@ -143,7 +143,7 @@ def _differences(y: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return lags, found, variance
 
 
-def _runs(mask: np.ndarray) -> np.ndarray:
+def true_runs(mask: np.ndarray) -> np.ndarray:
     """Return first and last index of every run of true values, shape (runs, 2)."""
     edges = np.diff(np.concatenate([[0], mask.astype(np.int8), [0]]))
     return np.stack([np.flatnonzero(edges > 0), np.flatnonzero(edges < 0) - 1], axis=1)
@@ -151,7 +151,7 @@ def _runs(mask: np.ndarray) -> np.ndarray:
 
 def longest(mask: np.ndarray) -> tuple[int, int] | None:
     """Return first and last index of the longest run of true values, None without any."""
-    runs = _runs(mask)
+    runs = true_runs(mask)
     if not runs.size:
         return None
     first, last = runs[np.argmax(runs[:, 1] - runs[:, 0])]
@@ -194,7 +194,7 @@ def stretches(times: np.ndarray, y: np.ndarray) -> list[Stretch]:
         lags, differences, variance = _differences(y)
         for lag in lags[(lags >= FEWEST) & (lags < 2 * FEWEST)]:
             near = np.flatnonzero(np.abs(lags - lag) <= NEAR * lag)
-            for first, last in _runs(differences[near].min(axis=0) < REPEATS):
+            for first, last in true_runs(differences[near].min(axis=0) < REPEATS):
                 found_lag = _best_lag(lags, differences[:, first:last + 1], near)
                 half = 0.5 * min(2 * lag, len(y))
                 begin, end = max(first - half, 0.0), min(last + half, len(y) - 1.0)

@@ -31,9 +31,10 @@ from cpg_ros.robots.robot import Robot
 from cpg_ros.robots.robot_file import find_robot, RobotError
 from cpg_ros.simulation.body import Body
 from cpg_ros.simulation.camera import without_opengl
-from cpg_ros.simulation.inertial_unit import Dullness, InertialUnit
+from cpg_ros.simulation.inertial_unit import InertialUnit
 from cpg_ros.simulation.robot_model import SimulationError
 from cpg_ros.simulation.run_recorder import Diary, summary
+from cpg_ros.simulation.scenario import SensorNoise
 from cpg_ros.simulation.soft_start import Approach
 from cpg_ros.simulation.terrain import add_ground, lay, set_friction, Terrain
 from cpg_ros.simulation.terrain import KINDS as GROUNDS
@@ -150,9 +151,10 @@ class RobotSim(StartedNode):
         self._approach = Approach(round(APPROACH / timestep), self._body.stand,
                                   robot.leg_of_joint[robot.places])
         self._measurements = Measurements(self, self._body, InertialUnit(
-            self._body, 1.0 / self._rate, Dullness(
-                *map(self._value, ('gyroscope_noise', 'gyroscope_bias', 'accelerometer_noise',
-                                   'accelerometer_bias', 'orientation_bias', 'imu_delay')))))
+            self._body, 1.0 / self._rate, SensorNoise(self._value('imu_delay'), **{
+                name: self._value(name) for name in (
+                    'gyroscope_noise', 'gyroscope_bias', 'accelerometer_noise',
+                    'accelerometer_bias', 'orientation_bias')})))
         self._requests: deque = deque()
         self._last = round(self._value('duration') * self._rate)
         self._now, self._began, self._since = 0, 0.0, 0

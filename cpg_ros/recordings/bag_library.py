@@ -23,16 +23,13 @@ from cpg_ros.errors import needed
 
 if find_spec('rosbags') is not None or find_spec('rosbag2_py') is None:
     needed('rosbags')
-    from cpg_ros.recordings.rosbags_library import deserialize as deserialize
-    from cpg_ros.recordings.rosbags_library import Reader as Reader
-    from cpg_ros.recordings.rosbags_library import ReaderError as ReaderError
-    from cpg_ros.recordings.rosbags_library import SerdeError as SerdeError
+    from cpg_ros.recordings.rosbags_library import deserialize, Reader, ReaderError, SerdeError
 else:
-    from cpg_ros.recordings.rosbag2_library import deserialize as deserialize  # noqa: F401
-    from cpg_ros.recordings.rosbag2_library import Reader as Reader  # type: ignore # noqa: F401
-    from cpg_ros.recordings.rosbag2_library import (  # type: ignore[assignment] # noqa: F401
-        ReaderError as ReaderError,
+    from cpg_ros.recordings.rosbag2_library import (  # type: ignore[assignment]
+        deserialize,
+        Reader,
+        ReaderError,
+        SerdeError,
     )
-    from cpg_ros.recordings.rosbag2_library import (  # type: ignore[assignment] # noqa: F401
-        SerdeError as SerdeError,
-    )
+
+__all__ = ['Reader', 'ReaderError', 'SerdeError', 'deserialize']

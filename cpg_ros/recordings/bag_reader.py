@@ -56,20 +56,18 @@ def read_bag(path: str | Path, topics: Sequence[str] = (), joints: Sequence[str]
     path = Path(path)
     source = printable(f'{path}, ')
     with opened(path) as bag:
-        streams = {topic: Stream(topic, joints, servo) for topic in bag.choose(topics)}
+        streams = {topic: Stream(topic, joints, servo, source)
+                   for topic in bag.choose(topics)}
         expected = bag.expected()
         total = max(1, sum(expected[topic] for topic in streams))
         with progress_bar(f'reading {path.name}', total, enabled=progress) as bar:
-            done = 0
-            for topic, received, message in bag.messages(list(streams)):
-                stream = streams[topic]
-                stream.add(received, message)
-                if len(stream.messages) == BATCH:
-                    stream.decode(source)
-                    done += BATCH
+            messages = bag.messages(list(streams))
+            for done, (topic, received, message) in enumerate(messages, 1):
+                streams[topic].add(received, message)
+                if not done % BATCH:
                     bar(done)
         for stream in streams.values():
-            stream.decode(source)
+            stream.decode()
         notes = [*map(printable, bag.notes), *(
             f"{topic}: {stream.count} messages, where the bag's metadata counts {expected[topic]}"
             for topic, stream in streams.items() if stream.count != expected[topic]), *(

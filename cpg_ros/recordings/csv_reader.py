@@ -195,9 +195,14 @@ class _Table:
                    "no time column, such as 'time' or 'time [ms]'; the columns are "
                    + few(headers, 20)))
         k, header, unit = found[0]
-        if unit and option and TIMES[unit] != TIMES[option]:
+        return _Column(k, header, '', self._scale(header, unit, option, TIMES))
+
+    def _scale(self, header: str, unit: str | None, option: str | None,
+               units: dict[str, float]) -> float:
+        """Return the size of a column's unit: its header's, the option's, or the first."""
+        if unit and option and units[unit.lower()] != units[option]:
             raise RecordingError(f'{self.path}: column {header!r} is in {unit}, not {option}')
-        return _Column(k, header, '', TIMES[unit or option or 's'])
+        return units[(unit or option or next(iter(units))).lower()]
 
     def _joints(self, headers: list[str], option: str | None, wanted: Sequence[str]
                 ) -> list[_Column]:
@@ -208,11 +213,8 @@ class _Table:
             if k == self.time.index or not name:
                 continue
             if unit is None or unit.lower() in ANGLES:
-                angle = (unit or option or 'rad').lower()
-                if unit and option and ANGLES[angle] != ANGLES[option]:
-                    raise RecordingError(
-                        f'{self.path}: column {header!r} is in {unit}, not {option}')
-                columns.append(_Column(k, header, name, ANGLES[angle]))
+                columns.append(_Column(k, header, name,
+                                       self._scale(header, unit, option, ANGLES)))
             else:
                 others.append(header)
         positions = [replace(column, joint=match[match.lastindex or 0])

@@ -45,12 +45,14 @@ class Stream:
     Args:
         topic: its name.
         joints: that are wanted; all of them, if empty.
-        servo: of the joints, if what they were told is wanted instead of what they did.
+        servo: of the joints, if their commands are wanted instead of what they did.
+        source: what to put before the topic's name in messages.
 
     """
 
-    def __init__(self, topic: str, joints: Sequence[str], servo: Servo | None = None) -> None:
-        self.topic, self.servo = topic, servo
+    def __init__(self, topic: str, joints: Sequence[str], servo: Servo | None = None,
+                 source: str = '') -> None:
+        self.topic, self.servo, self.source = topic, servo, source
         self.wanted = set(joints)
         self.taken: set[str] = set()
         #: What is not decoded yet, and the times of receipt in ns.
@@ -83,11 +85,13 @@ class Stream:
         return self.unstamped < self.count - self.mute - self.odd - self.slack
 
     def add(self, received: int, message: bytes) -> None:
-        """Take a serialised message, received at a time in ns."""
+        """Take a serialised message, received at a time in ns; errors as of decode."""
         self.received.append(received)
         self.messages.append(message)
+        if len(self.messages) == BATCH:
+            self.decode()
 
-    def decode(self, source: str) -> None:
+    def decode(self) -> None:
         """Decode the messages at hand.
 
         Raises:
@@ -100,7 +104,7 @@ class Stream:
                 self._keep(block, received[block.rows])
         except UndecodableError as error:
             raise RecordingError(
-                f'{source}{self.topic}: message {self.count + error.index + 1} is not '
+                f'{self.source}{self.topic}: message {self.count + error.index + 1} is not '
                 f'a {JOINT_STATE}: {line(error)}') from error
         self.count += len(self.messages)
         self.messages, self.received = [], []

@@ -17,7 +17,7 @@
 from collections import deque
 from collections.abc import Sequence
 
-from cpg_ros.recordings.joint_streams import BATCH, recorded, Stream
+from cpg_ros.recordings.joint_streams import recorded, Stream
 from cpg_ros.recordings.recording import Recording, RecordingError
 from cpg_ros.recordings.servo import Servo
 
@@ -71,8 +71,6 @@ class Live:
             stream = Stream(topic, joints, servo)
             for received, message in kept:
                 stream.add(received, message)
-                if len(stream.messages) == BATCH:
-                    stream.decode('')
-            stream.decode('')
+            stream.decode()
             streams.append(stream)
         return recorded(streams, joints, '', some=some)

@@ -81,13 +81,8 @@ class RecordingFormat:
     lacks: Mapping[str, str] = field(default_factory=dict)
     files_in: Callable[[Path], list[Path]] | None = None
 
-    @property
-    def arguments(self) -> tuple[str, ...]:
-        """What its reader takes by name."""
-        return (*(option.name for option in self.options), *self.features)
-
     def refusal(self, argument: str) -> str:
         """Return why its reader does not take an argument, or ''."""
-        if argument in self.arguments:
+        if argument in (*(option.name for option in self.options), *self.features):
             return ''
         return self.lacks.get(argument, f'{self.name} recordings have none')

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What joints were told, from what they did and how hard they pulled."""
+"""The commands of joints, from their positions, velocities and efforts."""
 
 from dataclasses import dataclass
 

@@ -14,14 +14,12 @@
 
 """Many bodies at once with feedback, or without it: pushed, on rough ground, on slopes.
 
-All of them take a step of physics together, MuJoCo's own ``rollout`` of one step, and what they
-feel goes through one ``Feedback`` of as many runs. A run that has ended takes no more steps.
+All of them take a step of physics together, a ``rollout`` of one step, and what they feel goes
+through one ``Feedback`` of as many runs. A run that has ended takes no more steps.
 """
 
 from collections.abc import Mapping, Sequence
-import copy
 import math
-from typing import Any
 
 from cpg_ros.feedback.efference_copy import EfferenceCopy
 from cpg_ros.feedback.estimate import BodyState, Senses
@@ -30,28 +28,23 @@ from cpg_ros.feedback.gains import Gains
 from cpg_ros.feedback.kinematics import geometry_of
 from cpg_ros.feedback.timetable import Timetable
 from cpg_ros.motion.plan import Program
-from cpg_ros.simulation.batch import PUSH
+from cpg_ros.simulation.bodies import Bodies
 from cpg_ros.simulation.body import Body, FALLEN
 from cpg_ros.simulation.leg_geometry import read_geometry
-from cpg_ros.simulation.model_indices import Anatomy
 from cpg_ros.simulation.pattern_batch import PatternBatch
-from cpg_ros.simulation.proprioception import Dulled, felt
-from cpg_ros.simulation.robot_model import engine
-from cpg_ros.simulation.run_metrics import BEGINNING
-from cpg_ros.simulation.scenario import Noise, Outcome, Scenario
-from cpg_ros.simulation.terrain import add_ground, lay, Terrain
+from cpg_ros.simulation.proprioception import felt, NoisySenses
+from cpg_ros.simulation.run_metrics import BEGINNING, torques
+from cpg_ros.simulation.scenario import Outcome, Scenario, SensorNoise
+from cpg_ros.simulation.terrain import add_ground
 import numpy as np
 
 
-class ClosedLoop:
+class ClosedLoop(Bodies):
     """Bodies of one robot that feel what they do.
 
     Attributes:
         programs: the gaits that they know, by name; runs begin with the first.
-        body: one of them, for its model and its stand.
-        parts: where its parts are in the model.
-        geometry: of its legs.
-        timestep: of physics and feedback, s.
+        geometry: of the legs.
 
     """
 
@@ -63,23 +56,12 @@ class ClosedLoop:
             SimulationError: MuJoCo is missing, or the model cannot be used.
 
         """
-        mujoco = engine()
-        from mujoco import rollout
-        self.programs = {program.name: program for program in programs}
-        self.timestep = timestep
         self._robot = programs[0].robot
-        self.body = Body(name, self._robot, timestep=timestep, add=add_ground)
-        self.parts = Anatomy(self.body)
+        super().__init__(Body(name, self._robot, timestep=timestep, add=add_ground), threads)
+        self.programs = {program.name: program for program in programs}
         self.geometry = geometry_of(self._robot, self._robot.geometry
                                     or read_geometry(self.body, self.parts))
-        self.body.reset()
         self._tables = [Timetable(program, self.geometry) for program in programs]
-        self._models: dict[tuple[float, Terrain | None], Any] = {}
-        self._data = [mujoco.MjData(self.body.model) for _ in range(threads)]
-        self._pool = rollout.Rollout(nthread=threads)
-        full = mujoco.mjtState.mjSTATE_FULLPHYSICS
-        self._start = np.empty(mujoco.mj_stateSize(self.body.model, full))
-        mujoco.mj_getState(self.body.model, self.body.data, self._start, full)
 
     @property
     def program(self) -> Program:
@@ -88,7 +70,7 @@ class ClosedLoop:
 
     def run(self, scenarios: Sequence[Scenario], duration: float, gains: Gains | None = None,
             expected: EfferenceCopy | Mapping[str, EfferenceCopy] | None = None,
-            noise: Noise | None = None, goal: float = math.inf) -> Outcome:
+            noise: SensorNoise | None = None, goal: float = math.inf) -> Outcome:
         """Let bodies walk from the stand.
 
         Args:
@@ -97,7 +79,7 @@ class ClosedLoop:
             gains: of the feedback; None for none.
             expected: efference copy of the first gait, or of gaits by name; None for nothing
                 expected.
-            noise: what dulls the senses.
+            noise: of the sensors.
             goal: way forward at which a run ends, m.
 
         """
@@ -111,14 +93,11 @@ class ClosedLoop:
         memory, state_of = feedback.memory, BodyState(self.geometry, runs)
         estimated = memory.velocity if gains is not None else state_of.velocity
         pattern = PatternBatch(self.programs, self._tables, scenarios, dt)
-        models = [self._model(one) for one in scenarios]
-        spec = int(engine().mjtState.mjSTATE_CTRL | engine().mjtState.mjSTATE_XFRC_APPLIED)
-        control = np.zeros((runs, 1, model.nu + 6 * model.nbody))
-        force = control[:, 0, model.nu + 6 * parts.base:][:, :2]
-        impulse = np.array([one.push for one in scenarios]) / PUSH
-        begins = np.array([one.when for one in scenarios])
+        models = [self.model(one) for one in scenarios]
+        control, joints, force = self.controls(runs, 1)
+        forces = np.stack([one.forces(steps, dt) for one in scenarios], axis=1)
         order, places = np.argsort(self._robot.places), self._robot.places
-        state, sensors = np.tile(self._start, (runs, 1)), np.zeros((runs, model.nsensordata))
+        state, sensors = np.tile(self.start, (runs, 1)), np.zeros((runs, model.nsensordata))
         moving = slice(1 + model.nq, 1 + model.nq + model.nv)
         free = 1 + model.nq + int(model.jnt_dofadr[model.body_jntadr[parts.base]])
         base = slice(free, free + 6)
@@ -126,7 +105,7 @@ class ClosedLoop:
         earlier = state[:, base].copy()
         angle_at, rate_at = 1 + parts.angles[order], moving.start + parts.speeds[order]
         senses = Senses.blank(runs, legs, len(order))
-        dulled = None if noise is None else Dulled(noise, runs, legs, dt)
+        noisy = None if noise is None else NoisySenses(noise, runs, legs, dt)
         velocity, work = np.zeros((runs, 3)), np.zeros((steps, runs))
         fell, arrived = np.full((2, runs), np.inf)
         going, some, all_models = np.arange(runs), slice(None), models
@@ -139,7 +118,7 @@ class ClosedLoop:
             senses.angles[:], senses.rates[:] = state[:, angle_at], state[:, rate_at]
             np.negative(sensors[:, 2:3 * legs:3], out=senses.loads)
             felt(senses, state[:, 1 + parts.pose[3:]], state[:, base], earlier, dt, velocity)
-            noticed = senses if dulled is None else dulled(senses)
+            noticed = senses if noisy is None else noisy(senses)
             if gains is not None:
                 angles = feedback.advance(noticed, pattern.planned, pattern.phase, pattern.gaits,
                                           pattern.mix, pattern.wanted, pattern.course, dt,
@@ -148,17 +127,16 @@ class ClosedLoop:
                 angles = pattern.planned
                 state_of.update(noticed, dt)
             angles = pattern.confine(angles)
-            control[:, 0, :model.nu] = angles[:, places]
-            force[:] = np.where(((k * dt >= begins) & (k * dt < begins + PUSH))[:, None],
-                                impulse, 0.0)
+            joints[:, 0], force[:, 0] = angles[:, places], forces[k]
             for key, value in (('place', state[:, 1 + parts.pose[:2]]), ('lean', senses.lean),
                                ('velocity', velocity), ('estimated', estimated),
                                ('turning', senses.turning), ('phase', pattern.phase[:, None])):
                 record[key][k] = value
-            work[k] = self._work(control[:, 0], senses, order)
+            speeds = senses.rates[:, places]
+            _, applied = torques(model, joints[:, 0], senses.angles[:, places], speeds)
+            work[k] = np.maximum(applied * speeds, 0.0).sum(axis=1)
             earlier, before = state[:, base].copy(), state[some, moving]
-            after, sensed = self._pool.rollout(models, self._data, state[some], control[some],
-                                               control_spec=spec, initial_warmstart=warm[some])
+            after, sensed = self.rollout(models, state[some], control[some], warm[some])
             state[some], sensors[some] = after[:, 0], sensed[:, 0]
             warm[some] = (state[some, moving] - before) / dt
             height = np.cos(senses.lean[:, 0]) * np.cos(senses.lean[:, 1])
@@ -182,26 +160,3 @@ class ClosedLoop:
         found['phase'] = found['phase'][:, :, 0]
         return Outcome(fell=fell, arrived=arrived,
                        cost=done / (self.geometry.weight * np.maximum(way, 1e-3)), **found)
-
-    def _work(self, control: np.ndarray, senses: Senses, order: np.ndarray) -> np.ndarray:
-        """Power of the motors, none regained, W, shape (runs,)."""
-        model = self.body.model
-        stiffness, damping = model.actuator_gainprm[order, 0], -model.actuator_biasprm[order, 2]
-        limits = np.where(model.actuator_forcelimited.astype(bool)[:, None],
-                          model.actuator_forcerange, [-np.inf, np.inf])[order]
-        torque = np.clip(stiffness * (control[:, order] - senses.angles) - damping * senses.rates,
-                         *limits.T)
-        return np.maximum(torque * senses.rates, 0.0).sum(axis=1)
-
-    def _model(self, scenario: Scenario) -> Any:
-        key = (scenario.friction, scenario.terrain)
-        if key not in self._models:
-            model = copy.copy(self.body.model)
-            ground = model.geom_bodyid == 0
-            sliding = model.geom_friction[:, 0]
-            sliding[:] = np.where(ground, scenario.friction,
-                                  np.minimum(sliding, scenario.friction))
-            if scenario.terrain is not None:
-                lay(model, scenario.terrain)
-            self._models[key] = model
-        return self._models[key]

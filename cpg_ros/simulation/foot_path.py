@@ -24,12 +24,14 @@ from dataclasses import dataclass, replace
 import math
 
 from cpg_ros.dynamics.periodic import Orbit
+from cpg_ros.feedback.timetable import periodic
 from cpg_ros.motion.duty import Duty
 from cpg_ros.motion.joint_readout import joint_readout, standing
 from cpg_ros.robots.robot import Joint, JointMotion
 from cpg_ros.simulation.body import Body
+from cpg_ros.simulation.leg_geometry import at_zero, bend_of, chain_of, two_link_angles
 from cpg_ros.simulation.model_indices import Anatomy
-from cpg_ros.simulation.robot_model import engine, legs, SimulationError
+from cpg_ros.simulation.robot_model import legs, SimulationError
 from cpg_ros.simulation.sprawled_leg import SprawledLeg, sprawls
 import numpy as np
 
@@ -97,14 +99,11 @@ class Leg:
             SimulationError: its last two joints do not turn about parallel axes across the body.
 
         """
-        mujoco, model = engine(), body.model
-        data = mujoco.MjData(model)
-        mujoco.mj_kinematics(model, data)
-        chain = sorted(body.robot.legs[leg], key=lambda joint: model.joint(joint.name).bodyid[0])
+        data, (chain, ids) = at_zero(body), chain_of(body, leg)
         if len(chain) < 2:
             raise SimulationError(f'leg {leg} has fewer than two joints')
         self.thigh, self.calf = chain[-2:]
-        ids = [model.joint(joint.name).id for joint in chain[-2:]]
+        ids = ids[-2:]
         self._turns = data.xaxis[ids, 1]
         if np.abs(self._turns).min() < 0.99:
             raise SimulationError(f'leg {leg}: {self.thigh.name} and {self.calf.name} do not both '
@@ -114,8 +113,7 @@ class Leg:
         upper, lower = np.diff(corners, axis=0)
         # As complex numbers z + i x a positive turn about y multiplies by exp(i angle).
         self._upper, self._lower = complex(upper[1], upper[0]), complex(lower[1], lower[0])
-        bend = self._turns[1] * self.calf.offset + np.angle(self._lower / self._upper)
-        self._bend = math.copysign(1.0, math.remainder(bend, 2.0 * math.pi))
+        self._bend = bend_of(self._upper, self._lower, self._turns[1] * self.calf.offset)
         self.joints: tuple[Joint, ...] = (self.thigh, self.calf)
         self.length = float(np.hypot(*self.foot(np.array(self.thigh.offset),
                                                 np.array(self.calf.offset))))
@@ -131,12 +129,7 @@ class Leg:
 
         A place out of reach is taken to the nearest one along its line to the joint.
         """
-        place = z + 1j * x
-        a, b = abs(self._upper), abs(self._lower)
-        cosine = np.clip((np.abs(place)**2 - a * a - b * b) / (2.0 * a * b), -1.0, 1.0)
-        calf = self._bend * np.arccos(cosine) - np.angle(self._lower / self._upper)
-        reached = self._upper + self._lower * np.exp(1j * calf)
-        thigh = np.angle(place / reached)
+        thigh, calf = two_link_angles(self._upper, self._lower, self._bend, z + 1j * x)
         return self._turns[0] * thigh, self._wrapped(self._turns[1] * calf)
 
     @staticmethod
@@ -160,9 +153,8 @@ def basis(orbit: Orbit, cell: int, harmonics: int, path: Path) -> np.ndarray:
     duty = Duty(orbit, cells, peak - path.lead, np.array([OWN]), np.array([path.duty]))
     psi = joint_readout(orbit, np.full(6, cell), np.eye(6), cells, harmonics,
                         np.repeat(duty.of_cells(np.zeros(1, int), cells), 6, axis=0)).angles
-    grid = np.arange(psi.shape[1] + 1) / psi.shape[1]
-    phase = (peak + np.arange(POINTS) / POINTS) % 1.0
-    return np.array([np.interp(phase, grid, np.append(row, row[0])) for row in psi])
+    phase = peak + np.arange(POINTS) / POINTS
+    return np.array([periodic(row, phase) for row in psi])
 
 
 def fit(curves: np.ndarray, psi: np.ndarray) -> tuple[float, np.ndarray, np.ndarray]:

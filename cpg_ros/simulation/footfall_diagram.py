@@ -19,6 +19,7 @@ from io import BytesIO
 from pathlib import Path
 
 from cpg_ros.files.atomic_write import write_atomically
+from cpg_ros.gaits.steady_stretch import true_runs
 from matplotlib import rcParams
 from matplotlib.figure import Figure
 import numpy as np
@@ -41,10 +42,8 @@ def stances(time: np.ndarray, force: np.ndarray, least: float) -> list[tuple[flo
 
     """
     step = _spacing(time)
-    edges = np.diff(np.concatenate(([0], (force > least).astype(int), [0])))
-    begins, ends = np.flatnonzero(edges == 1), np.flatnonzero(edges == -1)
-    return [(float(time[begin]), float((end - begin) * step))
-            for begin, end in zip(begins, ends, strict=True)]
+    return [(float(time[first]), float((last + 1 - first) * step))
+            for first, last in true_runs(force > least)]
 
 
 def _spacing(time: np.ndarray) -> float:

@@ -12,51 +12,29 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What an inertial measurement unit on a simulated base shows, as dull as a real one."""
+"""What an inertial measurement unit on a simulated base shows, with the noise of a real one."""
 
 from collections import deque
-from dataclasses import dataclass
 
 from cpg_ros.feedback.kinematics import GRAVITY
 from cpg_ros.simulation.body import Body
+from cpg_ros.simulation.robot_model import engine
+from cpg_ros.simulation.scenario import SensorNoise
 import numpy as np
-
-
-@dataclass(frozen=True)
-class Dullness:
-    """How far a unit is from the truth.
-
-    Attributes:
-        gyroscope_noise, gyroscope_bias: rad/s; noise is a standard deviation, biases are those
-            of all axes.
-        accelerometer_noise, accelerometer_bias: m/s^2.
-        orientation_bias: of roll and of pitch, rad.
-        delay: between a measurement and its message, s.
-        seed: of the noise.
-
-    """
-
-    gyroscope_noise: float = 0.0
-    gyroscope_bias: float = 0.0
-    accelerometer_noise: float = 0.0
-    accelerometer_bias: float = 0.0
-    orientation_bias: float = 0.0
-    delay: float = 0.0
-    seed: int = 0
 
 
 class InertialUnit:
     """Measures a body period by period."""
 
-    def __init__(self, body: Body, period: float, dullness: Dullness) -> None:
+    def __init__(self, body: Body, period: float, noise: SensorNoise) -> None:
         """Be ready to measure a body at a period in s."""
-        self._body, self._period, self._dullness = body, period, dullness
-        self._rng = np.random.default_rng(dullness.seed)
-        half = 0.5 * dullness.orientation_bias
+        self._body, self._period, self._noise = body, period, noise
+        self._rng = np.random.default_rng(noise.seed)
+        half = 0.5 * noise.orientation_bias
         turned = np.array([1.0, half, half, 0.0])
         self._turned = turned / np.linalg.norm(turned)
         self._before = body.rates[:3].copy()
-        self._turn = np.zeros(9)
+        self._orientation = np.empty(4)
         self._late: deque[tuple[int, np.ndarray]] = deque()
 
     def measure(self, stamp: int) -> tuple[int, np.ndarray] | None:
@@ -67,31 +45,23 @@ class InertialUnit:
             velocity in rad/s and acceleration in m/s^2, shape (10,).
 
         """
-        dull, body, found = self._dullness, self._body, np.empty(10)
-        w, x, y, z = _product(body.quaternion, self._turned)
-        found[:4] = x, y, z, w
+        noise, body, found = self._noise, self._body, np.empty(10)
+        engine().mju_mulQuat(self._orientation, body.quaternion, self._turned)
+        found[:4] = np.roll(self._orientation, -1)
         rates = body.rates
         faster = (rates[:3] - self._before) / self._period
         faster[2] += GRAVITY
         self._before[:] = rates[:3]
-        found[4:7] = rates[3:] + dull.gyroscope_bias
-        found[7:] = faster @ body.axes + dull.accelerometer_bias
-        if dull.gyroscope_noise or dull.accelerometer_noise:
-            noise = self._rng.standard_normal(6)
-            found[4:7] += dull.gyroscope_noise * noise[:3]
-            found[7:] += dull.accelerometer_noise * noise[3:]
-        if not dull.delay:
+        found[4:7] = rates[3:] + noise.gyroscope_bias
+        found[7:] = faster @ body.axes + noise.accelerometer_bias
+        if noise.gyroscope_noise or noise.accelerometer_noise:
+            drawn = self._rng.standard_normal(6)
+            found[4:7] += noise.gyroscope_noise * drawn[:3]
+            found[7:] += noise.accelerometer_noise * drawn[3:]
+        if not noise.delay:
             return stamp, found
         self._late.append((stamp, found))
         arrived = None
-        while self._late and self._late[0][0] <= stamp - 1e9 * dull.delay:
+        while self._late and self._late[0][0] <= stamp - 1e9 * noise.delay:
             arrived = self._late.popleft()
         return arrived
-
-
-def _product(one: np.ndarray, two: np.ndarray) -> tuple[float, float, float, float]:
-    """Product of quaternions, w x y z."""
-    a, b, c, d = one.tolist()
-    e, f, g, h = two.tolist()
-    return (a * e - b * f - c * g - d * h, a * f + b * e + c * h - d * g,
-            a * g - b * h + c * e + d * f, a * h + b * g - c * f + d * e)

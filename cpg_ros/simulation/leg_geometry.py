@@ -12,12 +12,55 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The geometry of a robot's legs, read off its model."""
+"""The geometry of a robot's legs, read off its model, and the angles of two links."""
+
+import math
+from typing import Any
 
 from cpg_ros.robots.body_keys import BodyGeometry, leg_of
+from cpg_ros.robots.robot import Joint
 from cpg_ros.simulation.body import Body
 from cpg_ros.simulation.model_indices import Anatomy
 from cpg_ros.simulation.robot_model import engine, legs
+import numpy as np
+
+
+def at_zero(body: Body) -> Any:
+    """Return a ``mujoco.MjData`` with all joints at 0, kinematics done."""
+    data = engine().MjData(body.model)
+    engine().mj_kinematics(body.model, data)
+    return data
+
+
+def chain_of(body: Body, leg: str) -> tuple[list[Joint], list[int]]:
+    """Return a leg's joints from the base outwards, and their indices in the model."""
+    chain = sorted(body.robot.legs[leg],
+                   key=lambda joint: body.model.joint(joint.name).bodyid[0])
+    return chain, [body.model.joint(joint.name).id for joint in chain]
+
+
+def two_link_angles(upper: complex, lower: complex, bend: float, place: np.ndarray
+                    ) -> tuple[np.ndarray, np.ndarray]:
+    """Return by how much two links in a plane are turned, rad, to end at places of it.
+
+    A place out of reach is taken to the nearest one along its line to the first joint.
+
+    Args:
+        upper: from the first joint to the second where neither is turned, m.
+        lower: from there to the end, m.
+        bend: 1 or -1, the side to which the second joint is bent.
+        place: of the end, from the first joint, m, any shape.
+
+    """
+    a, b = abs(upper), abs(lower)
+    cosine = np.clip((np.abs(place)**2 - a * a - b * b) / (2.0 * a * b), -1.0, 1.0)
+    second = bend * np.arccos(cosine) - np.angle(lower / upper)
+    return np.angle(place / (upper + lower * np.exp(1j * second))), second
+
+
+def bend_of(upper: complex, lower: complex, second: float) -> float:
+    """Return to which side the second of two links is bent at an angle, rad: 1 or -1."""
+    return math.copysign(1.0, math.remainder(second + np.angle(lower / upper), 2.0 * math.pi))
 
 
 def read_geometry(body: Body, parts: Anatomy) -> BodyGeometry:
@@ -25,16 +68,12 @@ def read_geometry(body: Body, parts: Anatomy) -> BodyGeometry:
 
     Legs are left out that are not a hip about x, if any, then two joints about y.
     """
-    mujoco, model, robot = engine(), body.model, body.robot
-    data = mujoco.MjData(model)
-    mujoco.mj_kinematics(model, data)
+    model, data = body.model, at_zero(body)
     base, shapes = data.xpos[parts.base], {}
-    for foot, leg in zip(parts.feet, legs(robot), strict=True):
-        chain = sorted((joint.name for joint in robot.legs[leg]),
-                       key=lambda name: model.joint(name).bodyid[0])
-        ids = [model.joint(name).id for name in chain]
-        found = leg_of(chain, data.xaxis[ids], data.xanchor[ids] - base,
-                       data.geom_xpos[foot] - base)
+    for foot, leg in zip(parts.feet, legs(body.robot), strict=True):
+        chain, ids = chain_of(body, leg)
+        found = leg_of([joint.name for joint in chain], data.xaxis[ids],
+                       data.xanchor[ids] - base, data.geom_xpos[foot] - base)
         if found is not None:
             shapes[leg] = found
     return BodyGeometry(round(float(model.body_mass.sum()), 6),

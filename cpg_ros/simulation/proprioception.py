@@ -12,15 +12,14 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What bodies feel, from the true state of the physics, and what dulls it."""
+"""What bodies feel, from the true state of the physics, and with the noise of sensors."""
 
 import math
 
 from cpg_ros.feedback.estimate import Senses
 from cpg_ros.feedback.kinematics import GRAVITY
 from cpg_ros.integration.jit import entry
-from cpg_ros.simulation.body import Body
-from cpg_ros.simulation.scenario import Noise
+from cpg_ros.simulation.scenario import SensorNoise
 import numpy as np
 
 
@@ -62,15 +61,15 @@ def felt(senses: Senses, quaternions: np.ndarray, moving: np.ndarray, before: np
     _feel(quaternions, moving, before, dt, senses.lean, senses.turning, senses.push, velocity)
 
 
-class Dulled:
-    """Senses with noise, as some sensors have it, and delay."""
+class NoisySenses:
+    """What many bodies feel with the noise and the delay of sensors."""
 
-    def __init__(self, noise: Noise, runs: int, legs: int, dt: float) -> None:
+    def __init__(self, noise: SensorNoise, runs: int, legs: int, dt: float) -> None:
         self._noise, self._rng = noise, np.random.default_rng(noise.seed)
         self._later = round(noise.delay / dt)
         self._waiting: list[Senses] = []
         self._factor = 1.0 + noise.force_bias * self._rng.uniform(-1.0, 1.0, (runs, legs))
-        self._lean = noise.lean_bias * self._rng.choice([-1.0, 1.0], (runs, 2))
+        self._lean = noise.orientation_bias * self._rng.choice([-1.0, 1.0], (runs, 2))
 
     def __call__(self, true: Senses) -> Senses:
         """Return what is noticed now."""
@@ -79,27 +78,11 @@ class Dulled:
             size=true.loads.shape))
         lean = true.lean.copy()
         lean[:, :2] += self._lean
-        turning = true.turning + noise.turning_noise * rng.normal(size=true.turning.shape)
+        turning = (true.turning + noise.gyroscope_bias
+                   + noise.gyroscope_noise * rng.normal(size=true.turning.shape))
+        push = true.push + noise.accelerometer_bias
+        if noise.accelerometer_noise:
+            push += noise.accelerometer_noise * rng.normal(size=push.shape)
         self._waiting.append(Senses(true.angles.copy(), true.rates.copy(), loads, lean, turning,
-                                    true.push.copy()))
+                                    push))
         return self._waiting[0] if len(self._waiting) <= self._later else self._waiting.pop(0)
-
-
-class Proprioception:
-    """What one body feels, step by step; call it once after each."""
-
-    def __init__(self, body: Body) -> None:
-        self._body = body
-        self._order = np.argsort(body.robot.places)
-        self._senses = Senses.blank(1, len(body.robot.legs), len(self._order))
-        self._before, self._velocity = body.rates[None].copy(), np.zeros((1, 3))
-
-    def __call__(self) -> Senses:
-        """Return what is felt now, of one run; overwritten by the next call."""
-        body, senses = self._body, self._senses
-        senses.angles[0], senses.rates[0] = body.position[self._order], body.velocity[self._order]
-        senses.loads[0] = body.feet
-        felt(senses, body.quaternion[None], body.rates[None], self._before,
-             body.model.opt.timestep, self._velocity)
-        self._before[0] = body.rates
-        return senses

@@ -16,7 +16,10 @@
 
 from dataclasses import dataclass
 import math
+from typing import Any
 
+from cpg_ros.feedback.estimate import rpy_of
+from cpg_ros.gaits.steady_stretch import true_runs
 from cpg_ros.simulation.body import Body, FALLEN
 from cpg_ros.simulation.model_indices import Anatomy
 from cpg_ros.simulation.robot_model import engine
@@ -96,10 +99,9 @@ def judge(body: Body, parts: Anatomy, wanted: np.ndarray, mass: float, states: n
     place, angles, rates = states[:, 1:1 + model.nq], parts.angles, parts.speeds
     moving = states[:, 1 + model.nq:1 + model.nq + model.nv]
     pose = place[:, parts.pose]
-    w, x, y, z = pose[:, 3:].T
-    yaw = np.unwrap(np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z)))
-    roll = np.arctan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y))
-    pitch = np.arcsin(np.clip(2.0 * (w * y - z * x), -1.0, 1.0))
+    _, x, y, _ = pose[:, 3:].T
+    roll, pitch, yaw = rpy_of(pose[:, 3:]).T
+    yaw = np.unwrap(yaw)
     legs = len(body.robot.legs)
     force = -sensors[:, :3 * legs].reshape(len(sensors), legs, 3)[:, :, 2]
     touching: np.ndarray = force > 1.0
@@ -113,12 +115,8 @@ def judge(body: Body, parts: Anatomy, wanted: np.ndarray, mass: float, states: n
     middle = 0.5 * (yaw[later][1:] + yaw[later][:-1])
     way = float((path[:, 0] * np.cos(middle) + path[:, 1] * np.sin(middle)).sum())
     time = dt * len(path)
-    stiffness, damping = model.actuator_gainprm[:, 0], -model.actuator_biasprm[:, 2]
     speeds = moving[:, rates]
-    torque = stiffness * (wanted - place[:, angles]) - damping * speeds
-    limits = np.where(model.actuator_forcelimited.astype(bool)[:, None],
-                      model.actuator_forcerange, [-np.inf, np.inf])
-    applied = np.clip(torque, *limits.T)
+    torque, applied = torques(model, wanted, place[:, angles], speeds)
     work = float(np.maximum(applied * speeds, 0.0)[later].sum()) * dt
     weight = GRAVITY * mass * float(model.body_mass.sum())
     return RunMetrics(
@@ -136,10 +134,28 @@ def judge(body: Body, parts: Anatomy, wanted: np.ndarray, mass: float, states: n
         lift=float(np.subtract(*np.percentile(feet[:, :, 2], [90.0, 10.0], axis=0)).min()))
 
 
+def torques(model: Any, wanted: np.ndarray, angles: np.ndarray, speeds: np.ndarray
+            ) -> tuple[np.ndarray, np.ndarray]:
+    """Return the torques that servos would have, and those within their limits, N m.
+
+    Args:
+        model: of the body.
+        wanted: angles that the joints are driven to, rad, shape (n, joints), controllers' order.
+        angles: where they are, rad, the same shape.
+        speeds: rad/s, the same shape.
+
+    """
+    stiffness, damping = model.actuator_gainprm[:, 0], -model.actuator_biasprm[:, 2]
+    torque = stiffness * (wanted - angles) - damping * speeds
+    limits = np.where(model.actuator_forcelimited.astype(bool)[:, None],
+                      model.actuator_forcerange, [-np.inf, np.inf])
+    return torque, np.clip(torque, *limits.T)
+
+
 def _hops(touching: np.ndarray, dt: float) -> int:
     """Count the stretches without any foot on the floor that last AIRBORNE."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[True], touching, [True]])))
-    return int((np.diff(edges)[::2] * dt >= AIRBORNE).sum())
+    first, last = true_runs(~touching).T
+    return int(((last - first + 1) * dt >= AIRBORNE).sum())
 
 
 def _feet(body: Body, parts: Anatomy, places: np.ndarray) -> np.ndarray:

@@ -12,24 +12,27 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What robots meet in runs of a closed loop, what dulls their senses, and how the runs ended."""
+"""What robots meet in runs, how far their sensors are off, and how closed loops ended."""
 
 from dataclasses import dataclass
-import math
 
 from cpg_ros.simulation.terrain import Terrain
 import numpy as np
 
+#: A push lasts this long, s.
+PUSH = 0.1
+
 
 @dataclass(frozen=True)
 class Scenario:
-    """What a robot meets in a run, flat ground and nothing else if not told.
+    """What a robot meets in a run, flat ground and nothing else unless given.
 
     Attributes:
         friction: between feet and ground.
-        terrain: ground that is not flat.
-        push: impulse on the base forward and to the left, N s, within PUSH seconds.
-        when: the push begins, s.
+        mass: factor on the mass of every link.
+        pushes: each (s, N, N): when, and the force on the base forward and to the left for PUSH
+            seconds; see `impulse`.
+        terrain: ground that is not flat, of a closed loop only, as is what follows.
         phase: of the first leg at the start of the gait, cycles.
         speed: wanted, forward, m/s; ignored where the gait cannot be steered.
         commands: later wishes, each (s, m/s forward, m/s to the left, rad/s of turning).
@@ -38,24 +41,38 @@ class Scenario:
     """
 
     friction: float = 1.0
+    mass: float = 1.0
+    pushes: tuple[tuple[float, float, float], ...] = ()
     terrain: Terrain | None = None
-    push: tuple[float, float] = (0.0, 0.0)
-    when: float = math.inf
     phase: float = 0.0
     speed: float = 0.4
     commands: tuple[tuple[float, float, float, float], ...] = ()
     switches: tuple[tuple[float, str], ...] = ()
 
+    def forces(self, steps: int, timestep: float) -> np.ndarray:
+        """Return the forces of the pushes in each step of some s, N, shape (steps, 2)."""
+        found = np.zeros((steps, 2))
+        for when, *force in self.pushes:
+            begin = round(when / timestep)
+            found[begin:begin + round(PUSH / timestep)] += force
+        return found
+
+
+def impulse(when: float, forward: float, left: float) -> tuple[float, float, float]:
+    """Return the push that begins at a time, s, and has this impulse, N s."""
+    return when, forward / PUSH, left / PUSH
+
 
 @dataclass(frozen=True)
-class Noise:
-    """What dulls the senses of all runs of a batch.
+class SensorNoise:
+    """How far sensors are from the truth; noise is a standard deviation.
 
     Attributes:
-        delay: of everything that is felt, s.
+        delay: of everything that is measured, s.
         force_bias, force_noise: of each foot's force, as shares of it; the bias is drawn once.
-        lean_bias: of roll and pitch, rad, drawn once, either sign.
-        turning_noise: of the angular rates, rad/s.
+        orientation_bias: of roll and pitch, rad; of many runs each draws the signs once.
+        gyroscope_noise, gyroscope_bias: of the angular rates, rad/s, the bias on all axes.
+        accelerometer_noise, accelerometer_bias: the same, m/s^2.
         seed: of what is drawn.
 
     """
@@ -63,8 +80,11 @@ class Noise:
     delay: float = 0.0
     force_bias: float = 0.0
     force_noise: float = 0.0
-    lean_bias: float = 0.0
-    turning_noise: float = 0.0
+    orientation_bias: float = 0.0
+    gyroscope_noise: float = 0.0
+    gyroscope_bias: float = 0.0
+    accelerometer_noise: float = 0.0
+    accelerometer_bias: float = 0.0
     seed: int = 0
 
 

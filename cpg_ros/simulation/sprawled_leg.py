@@ -22,20 +22,18 @@ import math
 
 from cpg_ros.robots.robot import Joint
 from cpg_ros.simulation.body import Body
+from cpg_ros.simulation.leg_geometry import at_zero, bend_of, chain_of, two_link_angles
 from cpg_ros.simulation.model_indices import Anatomy
-from cpg_ros.simulation.robot_model import engine, legs, SimulationError
+from cpg_ros.simulation.robot_model import legs, SimulationError
 import numpy as np
 
 
 def sprawls(body: Body, leg: str) -> bool:
     """Tell whether a leg's last three joints turn about an upright and two level axes."""
-    mujoco, model = engine(), body.model
-    data = mujoco.MjData(model)
-    mujoco.mj_kinematics(model, data)
-    chain = sorted(body.robot.legs[leg], key=lambda joint: model.joint(joint.name).bodyid[0])
-    if len(chain) < 3:
+    _, ids = chain_of(body, leg)
+    if len(ids) < 3:
         return False
-    axes = data.xaxis[[model.joint(joint.name).id for joint in chain[-3:]]]
+    axes = at_zero(body).xaxis[ids[-3:]]
     return bool(abs(axes[0, 2]) > 0.99 and np.abs(axes[1:, 2]).max() < 0.01
                 and abs(axes[1] @ axes[2]) > 0.99)
 
@@ -56,12 +54,9 @@ class SprawledLeg:
             SimulationError: its foot is not in the plane that the coxa turns.
 
         """
-        mujoco, model = engine(), body.model
-        data = mujoco.MjData(model)
-        mujoco.mj_kinematics(model, data)
-        chain = sorted(body.robot.legs[leg], key=lambda joint: model.joint(joint.name).bodyid[0])
+        data, (chain, ids) = at_zero(body), chain_of(body, leg)
         self.joints: tuple[Joint, ...] = tuple(chain[-3:])
-        ids = [model.joint(joint.name).id for joint in self.joints]
+        ids = ids[-3:]
         foot = parts.places(data)[legs(body.robot).index(leg)]
         corners = np.stack([*data.xanchor[ids], foot]) - data.xanchor[ids[0]]
         # The plane's level direction, away from the body.
@@ -79,8 +74,7 @@ class SprawledLeg:
                                 *(np.cross(data.xaxis[one], across)[2] for one in ids[1:])])
         self._heading = math.atan2(out[1], out[0])
         stand = np.array([joint.offset for joint in self.joints])
-        bend = self._turns[2] * stand[2] + np.angle(self._lower / self._upper)
-        self._bend = math.copysign(1.0, math.remainder(bend, 2.0 * math.pi))
+        self._bend = bend_of(self._upper, self._lower, self._turns[2] * stand[2])
         self._x, self._y, height = (float(one[0]) for one in self._foot(*stand[:, None]))
         self.length = -height
 
@@ -105,9 +99,6 @@ class SprawledLeg:
         x = self._x + x
         way = np.arctan2(self._y, x)
         place = np.hypot(x, self._y) - self._coxa.real + 1j * z
-        a, b = abs(self._upper), abs(self._lower)
-        cosine = np.clip((np.abs(place)**2 - a * a - b * b) / (2.0 * a * b), -1.0, 1.0)
-        tibia = self._bend * np.arccos(cosine) - np.angle(self._lower / self._upper)
-        femur = np.angle(place / (self._upper + self._lower * np.exp(1j * tibia)))
+        femur, tibia = two_link_angles(self._upper, self._lower, self._bend, place)
         return tuple((turn * angle + math.pi) % (2.0 * math.pi) - math.pi for turn, angle in zip(
             self._turns, (way - self._heading, femur, tibia), strict=True))

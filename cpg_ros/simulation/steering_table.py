@@ -18,7 +18,8 @@ from collections.abc import Callable
 
 from cpg_ros.motion.plan import Program
 from cpg_ros.robots.robot import Steering
-from cpg_ros.simulation.batch import Batch, Scenario, targets
+from cpg_ros.simulation.batch import Batch, targets
+from cpg_ros.simulation.scenario import Scenario
 import numpy as np
 
 #: Strides that are tried, and how much slower the legs move at a stride of 0.

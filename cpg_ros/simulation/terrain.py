@@ -170,5 +170,6 @@ def lay(model: Any, terrain: Terrain) -> None:
 
 def set_friction(model: Any, friction: float) -> None:
     """Let nothing slide with more than this friction, and the ground with just as much."""
+    # Of two geoms in contact the larger friction counts.
     ground, sliding = model.geom_bodyid == 0, model.geom_friction[:, 0]
     sliding[:] = np.where(ground, friction, np.minimum(sliding, friction))

@@ -30,12 +30,13 @@ from cpg_ros.files.progress_bar import progress_bar
 from cpg_ros.motion.plan import gait_of, OutOfLimits, plan, Program, Refused
 from cpg_ros.networks.registry import NETWORKS
 from cpg_ros.robots.robot import Motion, Robot, Steering
-from cpg_ros.simulation.batch import Batch, Scenario, targets
+from cpg_ros.simulation.batch import Batch, targets
 from cpg_ros.simulation.efference_measurement import calibrated
 from cpg_ros.simulation.foot_path import Feet, OWN
 from cpg_ros.simulation.gait_design import AIMS, Design, LENGTH, price
 from cpg_ros.simulation.robot_model import SimulationError
 from cpg_ros.simulation.run_metrics import RunMetrics
+from cpg_ros.simulation.scenario import Scenario
 from cpg_ros.simulation.steering_table import measure, STRIDES
 import numpy as np
 

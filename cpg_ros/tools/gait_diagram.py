@@ -26,6 +26,7 @@ import sys
 
 from cpg_ros.dynamics.orbit import Orbit, solve_preset
 from cpg_ros.errors import CpgError, InputError
+from cpg_ros.gaits.steady_stretch import true_runs
 from cpg_ros.motion.phase_readout import evaluate, phase_map
 from cpg_ros.networks.leg_numbers import footfall_order
 from cpg_ros.networks.network import Network
@@ -84,10 +85,8 @@ def active(orbit: Orbit, cell: int, strides: float = STRIDES) -> list[tuple[floa
     else:
         # Not merely below 0: at a peak on the grid the sign of the slope is that of rounding.
         on = signal(orbit, cell, theta, 1) < -1e-9
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], on, [False]]).astype(int)))
-    last = theta.size - 1
-    return [(float(theta[a]), float(theta[min(b, last)] - theta[a]))
-            for a, b in edges.reshape(-1, 2)]
+    return [(float(theta[first]), float(theta[min(last + 1, theta.size - 1)] - theta[first]))
+            for first, last in true_runs(on)]
 
 
 def draw(axes: Axes, orbit: Orbit, title: str) -> None:

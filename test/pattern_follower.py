@@ -12,11 +12,13 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A body that follows a pattern, tick by tick, as a robot follows the generator."""
+"""A body that follows a pattern, tick by tick, as a robot follows the generator, and feels."""
 
 from cpg_ros.errors import CpgError
+from cpg_ros.feedback.estimate import Senses
 from cpg_ros.motion.pattern import Pattern
 from cpg_ros.simulation.body import Body
+from cpg_ros.simulation.proprioception import felt
 import numpy as np
 
 
@@ -65,3 +67,23 @@ def speed(track: np.ndarray, timestep: float) -> float:
     """Mean speed along the robot's own heading, m/s."""
     steps, yaw = np.diff(track[:, :2], axis=0), 0.5 * (track[1:, 2] + track[:-1, 2])
     return float((steps[:, 0] * np.cos(yaw) + steps[:, 1] * np.sin(yaw)).mean()) / timestep
+
+
+class Proprioception:
+    """What one body feels, step by step; call it once after each."""
+
+    def __init__(self, body: Body) -> None:
+        self._body = body
+        self._order = np.argsort(body.robot.places)
+        self._senses = Senses.blank(1, len(body.robot.legs), len(self._order))
+        self._before, self._velocity = body.rates[None].copy(), np.zeros((1, 3))
+
+    def __call__(self) -> Senses:
+        """Return what is felt now, of one run; overwritten by the next call."""
+        body, senses = self._body, self._senses
+        senses.angles[0], senses.rates[0] = body.position[self._order], body.velocity[self._order]
+        senses.loads[0] = body.feet
+        felt(senses, body.quaternion[None], body.rates[None], self._before,
+             body.model.opt.timestep, self._velocity)
+        self._before[0] = body.rates
+        return senses

@@ -1,0 +1,93 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Bodies of one robot that take steps of physics together, each on its own ground.
+
+Physics is MuJoCo's own ``rollout``, native threads.
+"""
+
+from collections.abc import Sequence
+import copy
+import os
+from typing import Any
+
+from cpg_ros.simulation.body import Body
+from cpg_ros.simulation.model_indices import Anatomy
+from cpg_ros.simulation.robot_model import engine
+from cpg_ros.simulation.scenario import Scenario
+from cpg_ros.simulation.terrain import lay, set_friction, Terrain
+import numpy as np
+
+
+class Bodies:
+    """As many bodies as are asked for, all of which begin in the stand.
+
+    Attributes:
+        body: one of them, for its model and its stand.
+        parts: where its parts are in the model.
+        timestep: s.
+        start: state in the stand, as of mjSTATE_FULLPHYSICS, shape (states,).
+
+    """
+
+    def __init__(self, body: Body, threads: int) -> None:
+        """Be ready to step bodies like this one on some threads, 0 for all cores."""
+        mujoco = engine()
+        from mujoco import rollout
+        self.body, self.parts, self.timestep = body, Anatomy(body), body.model.opt.timestep
+        threads = threads or (len(os.sched_getaffinity(0)) if hasattr(os, 'sched_getaffinity')
+                              else os.cpu_count() or 1)
+        self._data = [mujoco.MjData(body.model) for _ in range(threads)]
+        self._pool = rollout.Rollout(nthread=threads)
+        self._models: dict[tuple[float, float, Terrain | None], Any] = {}
+        self._spec = int(mujoco.mjtState.mjSTATE_CTRL | mujoco.mjtState.mjSTATE_XFRC_APPLIED)
+        full = mujoco.mjtState.mjSTATE_FULLPHYSICS
+        body.reset()
+        self.start = np.empty(mujoco.mj_stateSize(body.model, full))
+        mujoco.mj_getState(body.model, body.data, self.start, full)
+
+    def controls(self, runs: int, steps: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return what drives bodies, all zero, and views of two parts of it.
+
+        Returns:
+            For ``rollout``, shape (runs, steps, numbers); the joints' targets, rad, shape (runs,
+            steps, joints); the force on the base forward and to the left, N, shape (runs, steps,
+            2).
+
+        """
+        model = self.body.model
+        control = np.zeros((runs, steps, model.nu + 6 * model.nbody))
+        base = model.nu + 6 * self.parts.base
+        return control, control[:, :, :model.nu], control[:, :, base:base + 2]
+
+    def rollout(self, models: Sequence[Any], state: np.ndarray, control: np.ndarray,
+                warmstart: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
+        """Take steps from states, (runs, states); return states and sensors after each."""
+        return self._pool.rollout(models, self._data, state, control, control_spec=self._spec,
+                                  initial_warmstart=warmstart)
+
+    def model(self, scenario: Scenario) -> Any:
+        """Return the model of a body that meets a scenario."""
+        key = (scenario.friction, scenario.mass, scenario.terrain)
+        if key not in self._models:
+            mujoco, model = engine(), copy.copy(self.body.model)
+            set_friction(model, scenario.friction)
+            if scenario.mass != 1.0:
+                model.body_mass[:] *= scenario.mass
+                model.body_inertia[:] *= scenario.mass
+                mujoco.mj_setConst(model, mujoco.MjData(model))
+            if scenario.terrain is not None:
+                lay(model, scenario.terrain)
+            self._models[key] = model
+        return self._models[key]
