@@ -70,7 +70,7 @@ def dumped(watcher, node):
 NODES = {'/cpg_generator': ('generator', ('robot:=unitree_go2', 'gait:=walk',
                                           'feedback.step:=0.12')),
          '/robot_sim': ('robot_sim', ("film:=''", "footfalls:=''")),
-         '/cpg_inversion': ('inversion', ('window:=30.0',)), '/cpg_panel': ('panel', ()),
+         '/cpg_inversion': ('inversion', ('window:=30.0',)), '/cpg_panel': ('panel', ('port:=0',)),
          '/unitree_bridge': ('unitree_bridge', ('dry_run:=true',))}
 
 

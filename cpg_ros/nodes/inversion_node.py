@@ -36,7 +36,7 @@ from cpg_ros.recordings.live_buffer import Live
 from cpg_ros.recordings.servo import Servo
 from cpg_ros.robots.robot import Robot
 from cpg_ros.robots.robot_file import find_robot
-from rcl_interfaces.msg import ParameterDescriptor, SetParametersResult
+from rcl_interfaces.msg import SetParametersResult
 from rcl_interfaces.srv import SetParametersAtomically
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.exceptions import NameValidationException, ParameterException
@@ -67,6 +67,8 @@ SPECS = {
     'gait': Spec('', 'gait to fit; if empty, the recognised gait'),
     'preset': Spec('', 'shipped preset that supplies the parameters that are not free; if empty, '
                    "the gait's preset"),
+    # Never without a value: rclpy would answer nothing for all parameters it is read with.
+    'free': Spec([''], "parameters to fit; if empty, the network's default ones"),
     'order': Spec(3, 'order of the readout', 1, 3),
     'kp': Spec(0.0, 'proportional gain of the joint controllers [N m/rad], to fit the commands, '
                'position + (effort + kd velocity) / kp; 0 fits the measured positions', 0.0, 1e5),
@@ -84,9 +86,6 @@ class Inversion(StartedNode):
         super().__init__(NAME)
         for name, spec in SPECS.items():
             self._declare(name, spec)
-        # Not set is not the same as none.
-        self.declare_parameter('free', Parameter.Type.STRING_ARRAY, ParameterDescriptor(
-            description="parameters to fit; if not set, the network's default ones"))
         name = self._value('robot')
         self._robot: Robot | None = find_robot(name) if name else None
         if not self.get_parameter_or('topics').value:
@@ -183,13 +182,13 @@ class Inversion(StartedNode):
     def _work(self, heard: Live, work: Future) -> None:
         """Fit and write; the outcome is what to say, and what was found or None."""
         try:
-            free = self.get_parameter_or('free').value or ()
+            free = tuple(name for name in self._value('free') if name)
             robot = self._robot
             names = () if robot is None else [joint.name for joint in robot.joints]
             kp, kd = self._value('kp'), self._value('kd')
             recording = heard.recording(names, True, Servo(kp, kd) if kp else None)
             found = inverted(recording, robot, self._value('network'), self._value('gait'),
-                             tuple(free), self._value('order'), self._value('preset'))
+                             free, self._value('order'), self._value('preset'))
             work.set_result(('; '.join([_summary(found), *self._written(found)]), found))
         except (CpgError, OSError) as error:
             work.set_result((str(error), None))

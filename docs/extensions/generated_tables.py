@@ -92,9 +92,7 @@ def parameters(what: str) -> str:
     if what == 'feedback_gains':
         return table(HEAD, parameter_rows(feedback_parameters.GAINS))
     if what == 'inversion':
-        free = [code('free'), 'string[]', 'not set', '',
-                "parameters to fit; not set: the network's usual ones"]
-        return table(HEAD, [*parameter_rows(inversion_node.SPECS), free])
+        return table(HEAD, parameter_rows(inversion_node.SPECS))
     usual = SHIPPED['delayed' if what == 'generator' else what]
     planner = generator_parameters.Planner(usual, usual.presets(), find_robot(usual.usual_robot))
     own = planner.specs(usual.usual_gait)
