@@ -71,7 +71,8 @@ def leads(orbit, cells):
 
 
 def off(phases, wanted):
-    gap = np.array(phases) - np.array(wanted)
+    # Both against their first.
+    gap = np.array(phases) - np.array(wanted) - (phases[0] - wanted[0])
     return float(np.abs((gap + 0.5) % 1.0 - 0.5).max())
 
 
