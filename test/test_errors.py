@@ -48,6 +48,6 @@ def test_a_mistake_in_the_program_is_not_one_in_the_arguments(monkeypatch, tmp_p
     monkeypatch.setattr(analyze, 'verdicts', broken)
     with pytest.raises(ValueError, match='not aligned'):
         analyze.main(['--network', 'delayed'])
-    monkeypatch.setattr(inversion, 'read_csv', broken)
+    monkeypatch.setattr(inversion, 'read_recording', broken)
     with pytest.raises(ValueError, match='not aligned'):
         inversion.main(['--csv', str(tmp_path / 'walk.csv')])
