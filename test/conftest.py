@@ -13,9 +13,13 @@
 # limitations under the License.
 
 import os
+import signal
 
 # As nodes and tools run: before numpy loads.
 os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
+# Shells make what they start in the background ignore it, and its children would, too.
+if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 from graph import EXECUTABLE, Process, Watcher  # noqa: E402
 import pytest  # noqa: E402
