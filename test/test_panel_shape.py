@@ -158,13 +158,13 @@ def collada(kind, corners, counts=()):
     numbers = ' '.join(f'{100 * value:g}' for value in (0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1))
     words = ' '.join(f'{corner} 0' for corner in corners)
     number = f'<vcount>{" ".join(map(str, counts))}</vcount>' if counts else ''
-    return f'''<c:COLLADA xmlns:c="x"><c:asset><c:unit meter="0.01"/><c:up_axis>Z_UP</c:up_axis>
+    return f"""<c:COLLADA xmlns:c="x"><c:asset><c:unit meter="0.01"/><c:up_axis>Z_UP</c:up_axis>
       </c:asset><geometry id="g"><mesh><source id="p"><float_array>{numbers}</float_array></source>
       <vertices id="v"><input semantic="POSITION" source="#p"/></vertices><{kind}>
       <input semantic="VERTEX" source="#v" offset="0"/><input semantic="NORMAL" source="#n"
       offset="1"/>{number}<p>{words}</p></{kind}></mesh></geometry><visual_scene><node>
       <translate>0 0 3</translate><instance_geometry url="#g"/></node></visual_scene>
-      </c:COLLADA>'''
+      </c:COLLADA>"""
 
 
 @pytest.mark.parametrize('text', [
@@ -189,8 +189,8 @@ def test_collada_is_drawn(tmp_path, text):
                                    'ros/arm_pkg/meshes', 'urdf/geometry'])
 def test_the_panel_and_robot_sim_find_the_same_meshes(tmp_path, monkeypatch, place):
     pytest.importorskip('mujoco')
-    from four_legs import ROBOT, urdf
     from cpg_ros.simulation.robot_model import load
+    from four_legs import ROBOT, urdf
     folder = tmp_path / place
     folder.mkdir(parents=True)
     (folder / 'part.stl').write_bytes(binary_stl(TETRAHEDRON))

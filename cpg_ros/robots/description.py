@@ -89,6 +89,8 @@ class RobotDescription:
 
     Attributes:
         format: URDF or MJCF, for messages.
+        joints: by name.
+        links: by name; of URDF only.
 
     """
 

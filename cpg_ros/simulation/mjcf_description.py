@@ -60,7 +60,7 @@ def load_mjcf(name: str) -> RobotDescription:
 
 def _joints(mujoco: Any, model: Any) -> dict[str, JointDescription]:
     kinds, data = mujoco.mjtJoint, mujoco.MjData(model)
-    single = np.isin(model.jnt_type, (kinds.mjJNT_HINGE, kinds.mjJNT_SLIDE))
+    single = (model.jnt_type == kinds.mjJNT_HINGE) | (model.jnt_type == kinds.mjJNT_SLIDE)
     data.qpos[model.jnt_qposadr[single]] = 0.0
     mujoco.mj_kinematics(model, data)
     free = np.flatnonzero(model.jnt_type == kinds.mjJNT_FREE)
@@ -80,8 +80,8 @@ def _joints(mujoco: Any, model: Any) -> dict[str, JointDescription]:
             lower, upper, velocity = _limits(mujoco, model, k)
             found[name] = JointDescription(
                 name, _kind(mujoco, model, k), lower, upper, velocity, '', link, f'{name} link',
-                tuple((data.xanchor[k] - origins[link]) @ axes),
-                axis=tuple(data.xaxis[k] @ axes))
+                tuple(((data.xanchor[k] - origins[link]) @ axes).tolist()),
+                axis=tuple((data.xaxis[k] @ axes).tolist()))
             link = f'{name} link'
             origins[link] = data.xanchor[k]
         links[body] = link
@@ -105,10 +105,9 @@ def _limits(mujoco: Any, model: Any, k: int) -> tuple[float, float, float]:
     """Return the least and the largest angle, rad (m of a slide), and velocity of a joint."""
     lower, upper = model.jnt_range[k] if model.jnt_limited[k] else UNLIMITED
     velocity = math.inf
-    of_joints = (mujoco.mjtTrn.mjTRN_JOINT, mujoco.mjtTrn.mjTRN_JOINTINPARENT)
     for motor in range(model.nu):
-        if (model.actuator_trntype[motor] not in of_joints or not model.actuator_ctrllimited[motor]
-                or model.actuator_trnid[motor, 0] != k
+        if (model.actuator_trntype[motor] != mujoco.mjtTrn.mjTRN_JOINT
+                or model.actuator_trnid[motor, 0] != k or not model.actuator_ctrllimited[motor]
                 or model.actuator_biastype[motor] != mujoco.mjtBias.mjBIAS_AFFINE):
             continue
         low, high = sorted(model.actuator_ctrlrange[motor] / model.actuator_gear[motor, 0])
