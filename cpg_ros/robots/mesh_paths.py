@@ -84,7 +84,8 @@ def _packaged(package: str, rest: str, urdf: Path) -> Iterator[Path]:
 def _installed(reference: str, package: str, rest: str) -> Path:
     """Return a file of an installed package, or of its sources where these are linked to."""
     try:
-        for share in (prefix / 'share' for prefix in _folders('AMENT_PREFIX_PATH')):
+        for prefix in _folders('AMENT_PREFIX_PATH'):
+            share = Path(os.path.normpath(prefix / 'share'))
             path = Path(os.path.normpath(share / package / rest if package else Path('/', rest)))
             if not path.is_relative_to(share):
                 continue
