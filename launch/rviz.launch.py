@@ -22,7 +22,7 @@ from pathlib import Path
 
 from ament_index_python.packages import get_package_prefix, PackageNotFoundError
 from cpg_ros.nodes.launch_arguments import value
-from cpg_ros.robots.urdf import load_urdf, root
+from cpg_ros.robots.urdf import load_urdf
 from launch import LaunchDescription
 from launch.actions import (
     DeclareLaunchArgument,
@@ -70,7 +70,7 @@ def viewers(context):
     namespace, sim_time = LaunchConfiguration('namespace'), LaunchConfiguration('use_sim_time')
     clock = {'use_sim_time': ParameterValue(sim_time, value_type=bool)}
     urdf = Path(LaunchConfiguration('urdf').perform(context)).expanduser()
-    frame = root(load_urdf(urdf))
+    frame = load_urdf(urdf).root()
     nodes = [Node(package='robot_state_publisher', executable='robot_state_publisher',
                   namespace=namespace, output='screen', parameters=[{
                       'robot_description': ParameterValue(urdf.read_text(), value_type=str),

@@ -29,16 +29,15 @@ from cpg_ros.recordings.bag_reader import read_bag
 from cpg_ros.recordings.csv_reader import read_csv
 from cpg_ros.robots.robot_file import load_robot
 from cpg_ros.robots.urdf import load_urdf
-from cpg_ros.robots.urdf_links import load_links
-from cpg_ros.simulation.mesh_files import hull
+from cpg_ros.simulation.mesh_hull import hull
 from hypothesis import given, settings
 from hypothesis import strategies as st
 import pytest
 
 
 def panel_mesh(path):
-    from cpg_ros.panel.mesh_files import read
-    return read(path)
+    from cpg_ros.robots.mesh_files import read_mesh
+    return read_mesh(path)
 
 
 def panel_urdf(path):
@@ -59,7 +58,7 @@ def simulated(path):
 
 READERS = {'robot.yaml': load_robot, 'presets.yaml': lambda path: read_presets(
     path, NETWORKS['delayed']), 'network.py': lambda path: find_network(str(path)),
-    'robot.urdf': load_urdf, 'links.urdf': load_links, 'shape.urdf': panel_urdf,
+    'robot.urdf': load_urdf, 'shape.urdf': panel_urdf,
     'model.urdf': simulated, 'model.xml': simulated, 'mesh.stl': panel_mesh,
     'mesh.obj': panel_mesh, 'hull.stl': hull, 'hull.dae': hull, 'table.csv': read_csv,
     'table.mot': read_csv, 'bag.mcap': read_bag, 'bag.db3': read_bag}
@@ -154,7 +153,7 @@ LAUGHS = ('<?xml version="1.0"?><!DOCTYPE robot [<!ENTITY a0 "lol">' + ''.join(
     f'<!ENTITY a{k} "{f"&a{k - 1};" * 10}">' for k in range(1, 12)) + ']>')
 
 
-@pytest.mark.parametrize('name', ['robot.urdf', 'links.urdf', 'shape.urdf', 'model.urdf',
+@pytest.mark.parametrize('name', ['robot.urdf', 'shape.urdf', 'model.urdf',
                                   'hull.dae'])
 def test_xml_that_unfolds_or_is_nested_deep_is_one_line(tmp_path, name):
     root = 'COLLADA' if name == 'hull.dae' else 'robot'

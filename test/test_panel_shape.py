@@ -23,7 +23,8 @@ pytest.importorskip('websockets')
 
 from cpg_ros.files.shared_resources import share  # noqa: E402, I100
 from cpg_ros.panel import body_shape as solids  # noqa: E402
-from cpg_ros.panel import mesh_files, shape_source, stick_figure, urdf_shape  # noqa: E402
+from cpg_ros.panel import shape_source, stick_figure, urdf_shape  # noqa: E402
+from cpg_ros.robots.mesh_files import MeshError, read_mesh  # noqa: E402
 from cpg_ros.robots.robot_file import find_robot  # noqa: E402
 
 
@@ -110,25 +111,27 @@ OBJ = b'v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1/1 2/2 4/3\nf -4//1 -1//
     ('a.stl', binary_stl(TETRAHEDRON)), ('a.STL', text_stl(TETRAHEDRON)), ('a.obj', OBJ)])
 def test_mesh_files(tmp_path, name, data):
     (tmp_path / name).write_bytes(data)
-    found = mesh_files.read(tmp_path / name)
+    mesh = read_mesh(tmp_path / name)
+    found = mesh.points[mesh.triangles]
     np.testing.assert_allclose(found, TETRAHEDRON)
     assert volume(found) == pytest.approx(1 / 6)
 
 
 @pytest.mark.parametrize(('name', 'data', 'said'), [
-    ('a.dae', b'', 'neither .stl nor .obj'), ('a.obj', b'f 1 2 3', 'a.obj'),
+    ('a.ply', b'', 'none of .stl, .obj and .dae'), ('a.obj', b'f 1 2 3', 'a.obj'),
+    ('a.dae', b'', 'no element found'),
     ('a.obj', b'v 1 x 3', 'a.obj'), ('a.stl', text_stl(TETRAHEDRON * np.nan), 'not finite'),
     ('a.obj', None, 'No such file')])
 def test_meshes_that_cannot_be_read(tmp_path, name, data, said):
     if data is not None:
         (tmp_path / name).write_bytes(data)
-    with pytest.raises(mesh_files.MeshError, match=said):
-        mesh_files.read(tmp_path / name)
+    with pytest.raises(MeshError, match=said):
+        read_mesh(tmp_path / name)
 
 
 def test_vertices_that_lie_close_together_become_one():
     fine = np.concatenate([TETRAHEDRON, TETRAHEDRON * 1e-3])
-    left = mesh_files.coarse(fine, 0.01)
+    left = solids.coarse(fine, 0.01)
     assert len(left) == 4 and volume(left) == pytest.approx(1 / 6, rel=0.02)
 
 
@@ -144,10 +147,75 @@ def test_a_urdf_with_meshes_of_which_one_is_missing(tmp_path):
     path.write_text(URDF.format(mesh='part.stl'))
     said = []
     shape = urdf_shape.from_file(path, said.append)
-    assert len(said) == 1 and 'not installed here' in said[0]
+    assert len(said) == 1 and 'neither an installed package nor a folder above' in said[0]
     (drawn,) = shape.links[0].vertices
     assert volume(drawn) == pytest.approx(1 / 48)
     assert shape.limits == {'shoulder': (-1.0, 2.0)}
+
+
+def collada(kind, corners, counts=()):
+    """A tetrahedron in cm, its scene shifted by 3 cm along z, with normals between the corners."""
+    numbers = ' '.join(f'{100 * value:g}' for value in (0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1))
+    words = ' '.join(f'{corner} 0' for corner in corners)
+    number = f'<vcount>{" ".join(map(str, counts))}</vcount>' if counts else ''
+    return f"""<c:COLLADA xmlns:c="x"><c:asset><c:unit meter="0.01"/><c:up_axis>Z_UP</c:up_axis>
+      </c:asset><geometry id="g"><mesh><source id="p"><float_array>{numbers}</float_array></source>
+      <vertices id="v"><input semantic="POSITION" source="#p"/></vertices><{kind}>
+      <input semantic="VERTEX" source="#v" offset="0"/><input semantic="NORMAL" source="#n"
+      offset="1"/>{number}<p>{words}</p></{kind}></mesh></geometry><visual_scene><node>
+      <translate>0 0 3</translate><instance_geometry url="#g"/></node></visual_scene>
+      </c:COLLADA>"""
+
+
+@pytest.mark.parametrize('text', [
+    collada('triangles', [0, 2, 1, 0, 1, 3, 0, 3, 2, 1, 2, 3]),
+    collada('polylist', [0, 2, 1, 0, 1, 3, 0, 3, 2, 1, 2, 3], [3, 3, 3, 3]),
+    # Two triangles as one polygon that is bent.
+    collada('polylist', [1, 0, 2, 3, 0, 1, 3, 0, 3, 2], [4, 3, 3]),
+    collada('polygons', [0, 2, 1])])
+def test_collada_is_drawn(tmp_path, text):
+    (tmp_path / 'part.dae').write_text(text)
+    path = tmp_path / 'one.urdf'
+    path.write_text(URDF.format(mesh='part.dae'))
+    shape = urdf_shape.from_file(path, str)
+    (drawn,) = shape.links[0].vertices
+    np.testing.assert_allclose(drawn.min((0, 1)), [0, 0, 0.015])
+    if 'polygons' not in text:
+        assert len(drawn) == 4
+        np.testing.assert_allclose(drawn.max((0, 1)), [0.5, 0.5, 0.515])
+
+
+@pytest.mark.parametrize('place', ['arm_pkg/meshes', 'clone/meshes', 'prefix/share/arm_pkg/meshes',
+                                   'ros/arm_pkg/meshes', 'urdf/geometry'])
+def test_the_panel_and_robot_sim_find_the_same_meshes(tmp_path, monkeypatch, place):
+    pytest.importorskip('mujoco')
+    from cpg_ros.simulation.robot_model import load
+    from four_legs import ROBOT, urdf
+    folder = tmp_path / place
+    folder.mkdir(parents=True)
+    (folder / 'part.stl').write_bytes(binary_stl(TETRAHEDRON))
+    if place.startswith('clone'):
+        (tmp_path / 'clone' / 'package.xml').write_text('<package><name>arm_pkg</name></package>')
+    monkeypatch.setenv('AMENT_PREFIX_PATH', str(tmp_path / 'prefix'))
+    monkeypatch.setenv('ROS_PACKAGE_PATH', str(tmp_path / 'ros'))
+    at = tmp_path / place.partition('/')[0] / 'urdf'
+    if place.startswith('urdf'):
+        at = tmp_path / 'urdf'
+    at.mkdir(exist_ok=True)
+    path = at / 'own.urdf'
+    urdf(path)
+    mesh = 'part.stl' if place.startswith('urdf') else 'package://arm_pkg/meshes/part.stl'
+    compiler = '<mujoco><compiler meshdir="geometry"/></mujoco>' if mesh == 'part.stl' else ''
+    path.write_text(path.read_text().replace('</link>', (
+        f'<visual><geometry><mesh filename="{mesh}"/></geometry></visual></link>{compiler}'), 1))
+    said = []
+    model = load(str(path), ROBOT, visual=True, say=said.append)
+    assert model.nmesh == 1 and not said
+    shape = urdf_shape.from_file(path, said.append)
+    assert not said and any(len(part) == 4 for link in shape.links for part in link.vertices)
+    # Anybody on the graph may name files of installed packages only.
+    urdf_shape.from_text(path.read_text(), 'robot_description', said.append)
+    assert len(said) == 1 and 'installed packages only' in said[0]
 
 
 @pytest.fixture

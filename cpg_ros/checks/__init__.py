@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A robot file held against the robot's URDF, and a first one made from it.
+"""A robot file held against the robot's URDF or MJCF file, and a first one made from it.
 
 Imports ``motion``, ``gaits``, ``robots`` and what is below; knows nothing of ROS.
 """

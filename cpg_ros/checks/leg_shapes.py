@@ -12,42 +12,44 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The part ``geometry`` of a first robot file, from a URDF."""
-
-from collections.abc import Mapping
+"""The part ``geometry`` of a first robot file, from the robot's description."""
 
 from cpg_ros.robots.body_keys import BodyGeometry, leg_of
+from cpg_ros.robots.description import RobotDescription
 from cpg_ros.robots.robot import Robot
-from cpg_ros.robots.urdf import chain, direction, UrdfJoint
-from cpg_ros.robots.urdf_links import foot_below, placed, UrdfLink
 import numpy as np
 
 
-def geometry_from(robot: Robot, urdf: Mapping[str, UrdfJoint], links: dict[str, UrdfLink]
-                  ) -> tuple[BodyGeometry | None, str]:
-    """Work out a robot's geometry, and say which legs feedback cannot displace.
-
-    None where the URDF gives no mass, or none of the legs will do.
-    """
-    known, legs, radii, others = dict(urdf), {}, [], []
+def geometry_from(robot: Robot, known: RobotDescription) -> BodyGeometry:
+    """Work out a robot's geometry, with those of its legs that feedback can displace."""
+    legs, radii = {}, []
     for leg, joints in robot.legs.items():
-        names = sorted((joint.name for joint in joints), key=lambda one: len(chain(known, one)))
-        foot, radius = foot_below(known, links, names[-1])
-        found = None
-        if np.linalg.norm(foot - placed(known, names[-1])[0]) > 1e-3:
-            found = leg_of(names, np.array([direction(known, name) for name in names]),
-                           np.array([placed(known, name)[0] for name in names]), foot)
-        if found is None:
-            others.append(leg)
-        else:
+        names = sorted((joint.name for joint in joints), key=lambda one: len(known.chain(one)))
+        foot, radius = known.foot_below(names[-1])
+        places = np.array([known.frame(name)[0] for name in names])
+        if np.linalg.norm(foot - places[-1]) <= 1e-3:
+            continue
+        found = leg_of(names, np.array([known.direction(name) for name in names]), places, foot)
+        if found is not None:
             legs[leg] = found
             radii.append(radius)
-    mass = sum(link.mass for link in links.values())
-    if not legs or mass <= 0.0:
-        return None, ('feedback: the URDF gives no mass' if legs else
+    mass = sum(link.mass for link in known.links.values())
+    return BodyGeometry(round(mass, 6), round(float(np.mean(radii or 0.0)), 6), legs)
+
+
+def usable(robot: Robot, found: BodyGeometry, what: str) -> tuple[BodyGeometry | None, str]:
+    """Say which legs feedback cannot displace; return None where the geometry is of no use.
+
+    Args:
+        robot: with all its legs.
+        found: its geometry.
+        what: format of the file that this is from.
+
+    """
+    if not found.legs or found.mass <= 0.0:
+        return None, (f'feedback: the {what} gives no mass' if found.legs else
                       'feedback: no leg is a hip about x, if any, then two joints about y')
-    said = 'feedback can move all feet'
-    if others:
-        said = (f'feedback moves no foot of {", ".join(others)}: a leg must be a hip about x, if '
-                'any, then two joints about y')
-    return BodyGeometry(round(mass, 6), round(float(np.mean(radii)), 6), legs), said
+    others = [leg for leg in robot.legs if leg not in found.legs]
+    return found, 'feedback can move all feet' if not others else (
+        f'feedback moves no foot of {", ".join(others)}: a leg must be a hip about x, if any, '
+        'then two joints about y')

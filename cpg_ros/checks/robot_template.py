@@ -12,14 +12,13 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A first robot file from a URDF: legs by the joints' names, what each joint does by its axis.
+"""A first robot file from a description: legs by joints' names, what a joint does by its axis.
 
 x forward, y left, z up (REP 103). In each leg the joints that turn about y are, down the leg,
 the one that swings it, the knee and the ankle; others hold still. The stand has the knees bent
 and the end of the leg below its hip, if upper and lower leg are equally long.
 """
 
-from collections.abc import Mapping
 from dataclasses import replace
 from math import copysign, inf, pi
 
@@ -27,100 +26,101 @@ from cpg_ros.checks.urdf_match import unlimited
 from cpg_ros.gaits.leg_names import Legs, legs_of
 from cpg_ros.motion.plan import plan
 from cpg_ros.networks.registry import NETWORKS, numbered
+from cpg_ros.robots.description import DescriptionError, JointDescription, RobotDescription
 from cpg_ros.robots.robot import HARMONICS, Joint, Robot
 from cpg_ros.robots.robot_file import LARGEST, LIMITS
-from cpg_ros.robots.urdf import chain, direction, UrdfError, UrdfJoint
 import numpy as np
 
 #: How far the knees are bent at the stand, rad, on two legs and on more.
 UPRIGHT, CROUCHED = 0.5, 1.4
 #: How far legs swing and knees bend at first, rad.
 SWING, LIFT = 0.15, 0.15
-#: Angles and speeds where the URDF has no limits, rad and rad/s.
+#: Angles and speeds where the description has no limits, rad and rad/s.
 UNBOUNDED, SPEED = pi, 20.0
 #: Share of a joint's range that the stand keeps from either end, and of the room that gaits take.
 MARGIN, USED = 0.1, 0.8
 
 
-def robot_from(urdf: Mapping[str, UrdfJoint], name: str) -> tuple[Robot, str]:
-    """Make a robot file's content out of a URDF; also say how its joints were understood.
+def robot_from(known: RobotDescription, name: str) -> tuple[Robot, str]:
+    """Make a robot file's content out of a description; also say how its joints were understood.
 
     Raises:
         LegsError: the joints' names do not tell two or four legs.
-        UrdfError: the links make no tree, a leg has no joint that could swing it, or a joint
-            has no room to move.
+        DescriptionError: the links make no tree, a leg has no joint that could swing it, or a
+            joint has no room to move.
 
     """
-    legs = legs_of([joint.name for joint in urdf.values() if not joint.flaw], True)
+    legs = legs_of([joint.name for joint in known.joints.values() if not joint.flaw], True)
     usual = {kind.name: next(iter(kind.legs.items())) for kind in numbered(len(legs))}
     assignment, cells = next(one for one in usual.values() if set(one[1]) == set(legs))
     networks = tuple(name for name, one in usual.items() if one == (assignment, cells))
     joints, says = {}, []
     for leg in legs:
-        joints[leg], said = _leg(urdf, legs, leg, cells[leg][0])
+        joints[leg], said = _leg(known, legs, leg, cells[leg][0])
         says.append(said)
     driven = {joint.name for one in joints.values() for joint in one}
     robot = Robot(name, networks, assignment, HARMONICS, joints,
-                  tuple(joint for joint in urdf if joint in driven))
+                  tuple(joint for joint in known.joints if joint in driven))
     return _fitting(robot), '\n'.join(says)
 
 
-def _leg(urdf: Mapping[str, UrdfJoint], legs: Legs, leg: str, cell: int
+def _leg(known: RobotDescription, legs: Legs, leg: str, cell: int
          ) -> tuple[tuple[Joint, ...], str]:
-    known = dict(urdf)
-    names = sorted(legs[leg], key=lambda joint: len(chain(known, joint)))
+    described = known.joints
+    names = sorted(legs[leg], key=lambda joint: len(known.chain(joint)))
     # About y: positive angles of an axis along +y swing what is below backward.
-    turns = {joint: float(direction(known, joint)[1]) for joint in names}
+    turns = {joint: float(known.direction(joint)[1]) for joint in names}
     pitching = [joint for joint in names if abs(turns[joint]) > 0.7]
     if not pitching:
-        raise UrdfError(f"no joint of the leg {leg} turns about the y axis of the URDF's root, "
-                        'which points to the left (REP 103): nothing would swing it')
-    stand = {joint: _inside(urdf[joint], 0.0) for joint in names}
+        raise DescriptionError(f"no joint of the leg {leg} turns about the y axis of the "
+                               f"{known.format}'s root, which points to the left (REP 103): "
+                               'nothing would swing it')
+    stand = {joint: _inside(described[joint], 0.0) for joint in names}
     weights: dict[str, tuple[float, ...]] = dict.fromkeys(names, (0.0,))
     roles = dict.fromkeys(names, 'holds still')
     ways = {joint: copysign(1.0, turns[joint]) for joint in pitching}
     swings, knee, ankle = (*pitching[:3], '', '')[:3]
     if knee:
-        bend = _bend(urdf[knee], ways[knee], len(legs))
-        stand[knee] = _inside(urdf[knee], ways[knee] * bend)
+        bend = _bend(described[knee], ways[knee], len(legs))
+        stand[knee] = _inside(described[knee], ways[knee] * bend)
         # Half of the bend the other way: the end of the leg is below the hip.
-        stand[swings] = _inside(urdf[swings], -0.5 * ways[swings] * ways[knee] * stand[knee])
+        stand[swings] = _inside(described[swings], -0.5 * ways[swings] * ways[knee] * stand[knee])
         weights[knee] = (0.0, copysign(LIFT, ways[knee] * bend))
         roles[knee] = 'bends in swing'
     weights[swings] = (-SWING * ways[swings],)
     roles[swings] = 'swings'
     if ankle:
         tilt = ways[swings] * stand[swings] + ways[knee] * stand[knee]
-        stand[ankle] = _inside(urdf[ankle], -ways[ankle] * tilt)
+        stand[ankle] = _inside(described[ankle], -ways[ankle] * tilt)
         roles[ankle] = 'keeps the foot level'
-    speed = {joint: min(urdf[joint].velocity, LARGEST) if urdf[joint].velocity < inf else SPEED
-             for joint in names}
-    made = tuple(Joint(joint, leg, cell, stand[joint], weights[joint], *_range(urdf[joint]),
-                       speed[joint], _missing(urdf[joint])) for joint in legs[leg])
+    speed = {joint: min(described[joint].velocity, LARGEST)
+             if described[joint].velocity < inf else SPEED for joint in names}
+    made = tuple(Joint(joint, leg, cell, stand[joint], weights[joint], *_range(described[joint]),
+                       speed[joint], _missing(described[joint])) for joint in legs[leg])
     return made, f'{leg}: ' + ', '.join(f'{joint} {roles[joint]}' for joint in names)
 
 
-def _range(joint: UrdfJoint) -> tuple[float, float]:
+def _range(joint: JointDescription) -> tuple[float, float]:
     lower, upper = max(joint.lower, -UNBOUNDED), min(joint.upper, UNBOUNDED)
     if upper - lower < 0.01:
-        raise UrdfError(f"the joint '{joint.name}' has no room to move: its limits are "
+        raise DescriptionError(f"the joint '{joint.name}' has no room to move: its limits are "
                         f'{joint.lower:g} to {joint.upper:g} rad')
     return lower, upper
 
 
-def _missing(joint: UrdfJoint) -> tuple[str, ...]:
-    """Return which limits the URDF does not give."""
+def _missing(joint: JointDescription) -> tuple[str, ...]:
+    """Return which limits the description does not give."""
     return tuple(key for key in LIMITS if getattr(joint, key) in (-inf, inf))
 
 
-def _inside(joint: UrdfJoint, angle: float) -> float:
+def _inside(joint: JointDescription, angle: float) -> float:
     """Return the nearest angle that keeps a margin from the joint's limits."""
     lower, upper = _range(joint)
     margin = MARGIN * (upper - lower)
     return round(float(np.clip(angle, lower + margin, upper - margin)), 3)
 
 
-def _bend(knee: UrdfJoint, way: float, legs: int) -> float:
+def _bend(knee: JointDescription, way: float, legs: int) -> float:
     """Return how far about y a knee is bent at the stand: the way that its limits leave room."""
     middle = 0.5 * way * sum(_range(knee))
     # Where both ways do, the end of the leg goes backward on two legs and forward on more.

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A robot file held against a URDF: names, kinds, limits, and whether each gait fits."""
+"""A robot file held against the robot's description: names, kinds, limits, and gaits."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -25,8 +25,8 @@ from cpg_ros.files.plain_text import table
 from cpg_ros.gaits.leg_names import legs_of, LegsError, role_of
 from cpg_ros.motion.plan import plan, Refused
 from cpg_ros.networks.registry import NETWORKS
+from cpg_ros.robots.description import JointDescription, RobotDescription
 from cpg_ros.robots.robot import Joint, Motion, Robot
-from cpg_ros.robots.urdf import UrdfJoint
 
 #: Files have limits rounded: differences up to this many rad (rad/s) are none.
 ROUNDING = 1e-4
@@ -36,19 +36,20 @@ USUAL_FREQUENCY = 1.0
 
 @dataclass(frozen=True)
 class JointCheck:
-    """A joint of the robot file beside its namesake in the URDF, and what does not match."""
+    """A joint of the robot file beside its namesake in the description, and its faults."""
 
     joint: Joint
-    urdf: UrdfJoint | None
+    described: JointDescription | None
     faults: tuple[str, ...]
 
-    def as_dict(self) -> dict[str, Any]:
-        """Return it as plain types; limits in rad and rad/s."""
+    def as_dict(self, source: str) -> dict[str, Any]:
+        """Return it as plain types; limits in rad and rad/s, those described under a key."""
         keys = ('lower', 'upper', 'velocity')
         return {'name': self.joint.name, 'leg': self.joint.leg, 'matches': not self.faults,
-                'kind': self.urdf.kind if self.urdf else None,
+                'kind': self.described.kind if self.described else None,
                 'robot': {key: getattr(self.joint, key) for key in (*keys, 'offset')},
-                'urdf': {key: getattr(self.urdf, key) for key in keys} if self.urdf else None,
+                source: ({key: getattr(self.described, key) for key in keys}
+                         if self.described else None),
                 'faults': list(self.faults)}
 
 
@@ -88,7 +89,8 @@ class RobotCheck:
     """All that was compared; it matches if nothing has a fault."""
 
     robot: str
-    urdf: str
+    source: str
+    format: str
     joints: tuple[JointCheck, ...]
     gaits: tuple[GaitCheck, ...]
     lopsided: tuple[str, ...]
@@ -103,20 +105,22 @@ class RobotCheck:
 
     def as_dict(self) -> dict[str, Any]:
         """Return it as plain types."""
-        return {'robot': self.robot, 'urdf': self.urdf, 'matches': not self.faults,
-                'joints': [joint.as_dict() for joint in self.joints],
+        source = self.format.lower()
+        return {'robot': self.robot, source: self.source, 'matches': not self.faults,
+                'joints': [joint.as_dict(source) for joint in self.joints],
                 'gaits': [gait.as_dict() for gait in self.gaits],
                 'lopsided': list(self.lopsided), 'notes': list(self.notes)}
 
     def text(self) -> str:
         """Return it as tables, then what does not match, then notes."""
         rows: list[tuple[str, ...]] = [
-            ('joint', 'leg', 'kind', 'limits [rad]', 'URDF', 'speed [rad/s]', 'URDF', '')]
+            ('joint', 'leg', 'kind', 'limits [rad]', self.format, 'speed [rad/s]',
+             self.format, '')]
         for one in self.joints:
-            joint, urdf = one.joint, one.urdf
-            rows.append((joint.name, joint.leg, urdf.kind if urdf else '-', _span(joint),
-                         _span(urdf) if urdf else '-', f'{joint.velocity:.4g}',
-                         _limit(urdf.velocity) if urdf else '-',
+            joint, there = one.joint, one.described
+            rows.append((joint.name, joint.leg, there.kind if there else '-', _span(joint),
+                         _span(there) if there else '-', f'{joint.velocity:.4g}',
+                         _limit(there.velocity) if there else '-',
                          'does not match' if one.faults else 'ok'))
         said = table(rows, '<<<<<>><')
         rows = [('gait', 'network', 'stride [Hz]', 'nearest limit', 'fastest joint', '')]
@@ -129,20 +133,20 @@ class RobotCheck:
         said += ['', *table(rows, '<<><<<'), '']
         faults = self.faults
         said += [f'- {fault}' for fault in faults] + [f'note: {note}' for note in self.notes]
-        said.append(f'{self.robot} matches {self.urdf}' if not faults else
-                    f'{self.robot} does not match {self.urdf}: {len(faults)} '
+        said.append(f'{self.robot} matches {self.source}' if not faults else
+                    f'{self.robot} does not match {self.source}: {len(faults)} '
                     f'thing{"s" if len(faults) > 1 else ""}, see above')
         return '\n'.join(said)
 
 
-def checked(robot: Robot, urdf: Mapping[str, UrdfJoint], names: tuple[str, str],
+def checked(robot: Robot, known: RobotDescription, names: tuple[str, str],
             gaits: Sequence[str] = (), frequency: float | None = None, amplitude: float = 1.0
             ) -> RobotCheck:
-    """Hold a robot file against a URDF.
+    """Hold a robot file against the robot's description.
 
     Args:
         robot: what the file says.
-        urdf: joints by name.
+        known: what a URDF or an MJCF file says of it.
         names: of the two files, for messages.
         gaits: gaits or presets; by default all gaits of the robot's networks.
         frequency: strides per second (Hz), 0 for the model's own time; None takes what the
@@ -150,14 +154,14 @@ def checked(robot: Robot, urdf: Mapping[str, UrdfJoint], names: tuple[str, str],
         amplitude: factor on the readout weights.
 
     """
-    near = _nearest(robot, urdf)
-    joints = tuple(JointCheck(joint, urdf.get(joint.name), tuple(
-        _faults(joint, urdf.get(joint.name), near.get(joint.name, '')))) for joint in robot.joints)
+    near = _nearest(robot, known)
+    joints = tuple(JointCheck(joint, known.joints.get(joint.name), tuple(
+        _faults(joint, known, near.get(joint.name, '')))) for joint in robot.joints)
     chosen = [(network, name) for network in robot.networks for name in
               (gaits or NETWORKS[network].gaits()) if name in NETWORKS[network].presets()]
-    return RobotCheck(*names, joints, tuple(
-        _gait(robot, urdf, network, name, frequency, amplitude) for network, name in chosen),
-        tuple(_lopsided(robot)), tuple(_notes(robot, urdf)))
+    return RobotCheck(*names, known.format, joints, tuple(
+        _gait(robot, known, network, name, frequency, amplitude) for network, name in chosen),
+        tuple(_lopsided(robot)), tuple(_notes(robot, known)))
 
 
 def _lopsided(robot: Robot) -> Iterator[str]:
@@ -174,28 +178,29 @@ def _lopsided(robot: Robot) -> Iterator[str]:
                f'{len(robot.legs[more])}, none there like {", ".join(alone) or "the rest"}')
 
 
-def _faults(joint: Joint, urdf: UrdfJoint | None, near: str) -> Iterator[str]:
-    if urdf is None:
-        yield 'the URDF has no such joint' + (f", did you mean '{near}'?" if near else '')
+def _faults(joint: Joint, known: RobotDescription, near: str) -> Iterator[str]:
+    what, there = known.format, known.joints.get(joint.name)
+    if there is None:
+        yield f'the {what} has no such joint' + (f", did you mean '{near}'?" if near else '')
         return
-    if urdf.flaw:
-        yield f'cannot be driven, in the URDF it {urdf.flaw}'
+    if there.flaw:
+        yield f'cannot be driven, in the {what} it {there.flaw}'
         return
-    if joint.lower < urdf.lower - ROUNDING:
-        yield (f'lower limit {joint.lower:g} rad is {urdf.lower - joint.lower:.4g} rad below the '
-               f"URDF's {urdf.lower:g}")
-    if joint.upper > urdf.upper + ROUNDING:
-        yield (f'upper limit {joint.upper:g} rad is {joint.upper - urdf.upper:.4g} rad above the '
-               f"URDF's {urdf.upper:g}")
-    if not urdf.lower - ROUNDING <= joint.offset <= urdf.upper + ROUNDING:
-        yield (f"offset {joint.offset:g} rad is outside the URDF's limits {urdf.lower:g} to "
-               f'{urdf.upper:g}: the robot could not stand')
-    if joint.velocity > urdf.velocity + ROUNDING:
-        yield (f'velocity limit {joint.velocity:g} rad/s is {joint.velocity - urdf.velocity:.4g} '
-               f"rad/s above the URDF's {urdf.velocity:g}")
+    if joint.lower < there.lower - ROUNDING:
+        yield (f'lower limit {joint.lower:g} rad is {there.lower - joint.lower:.4g} rad below the '
+               f"{what}'s {there.lower:g}")
+    if joint.upper > there.upper + ROUNDING:
+        yield (f'upper limit {joint.upper:g} rad is {joint.upper - there.upper:.4g} rad above the '
+               f"{what}'s {there.upper:g}")
+    if not there.lower - ROUNDING <= joint.offset <= there.upper + ROUNDING:
+        yield (f"offset {joint.offset:g} rad is outside the {what}'s limits {there.lower:g} to "
+               f'{there.upper:g}: the robot could not stand')
+    if joint.velocity > there.velocity + ROUNDING:
+        yield (f'velocity limit {joint.velocity:g} rad/s is {joint.velocity - there.velocity:.4g} '
+               f"rad/s above the {what}'s {there.velocity:g}")
 
 
-def _gait(robot: Robot, urdf: Mapping[str, UrdfJoint], network: str, name: str,
+def _gait(robot: Robot, known: RobotDescription, network: str, name: str,
           frequency: float | None, amplitude: float) -> GaitCheck:
     preset = NETWORKS[network].presets()[name]
     if frequency is None:
@@ -206,8 +211,10 @@ def _gait(robot: Robot, urdf: Mapping[str, UrdfJoint], network: str, name: str,
         return GaitCheck(network, name, nan, nan, '', nan, '', (str(error),))
     faults, rooms, shares = [], [], []
     for joint, low, high, speed in zip(robot.joints, *program.span, program.speed, strict=True):
-        limits = [("the robot file's", joint), *(
-            ("the URDF's", known) for known in [urdf.get(joint.name)] if known and not known.flaw)]
+        limits: list[tuple[str, Joint | JointDescription]] = [("the robot file's", joint)]
+        there = known.joints.get(joint.name)
+        if there and not there.flaw:
+            limits.append((f"the {known.format}'s", there))
         lower, below = max((one.lower, whose) for whose, one in limits)
         upper, above = min((one.upper, whose) for whose, one in limits)
         fastest, slower = min((one.velocity, whose) for whose, one in limits)
@@ -236,10 +243,10 @@ def _fastest(motion: Motion) -> float:
     return max(motion.frequency or 0.0, *steered, 0.0) or USUAL_FREQUENCY
 
 
-def _nearest(robot: Robot, urdf: Mapping[str, UrdfJoint]) -> dict[str, str]:
-    """Return for joints that the URDF does not have the likeliest of those it has."""
+def _nearest(robot: Robot, described: RobotDescription) -> dict[str, str]:
+    """Return for joints that the description does not have the likeliest of those it has."""
     there = {joint.name for joint in robot.joints}
-    able = [name for name, joint in urdf.items() if not joint.flaw]
+    able = [name for name, joint in described.joints.items() if not joint.flaw]
     free = [name for name in able if name not in there]
     try:
         legs: Mapping[str, Sequence[str]] = legs_of(able, True).joints
@@ -257,23 +264,24 @@ def _nearest(robot: Robot, urdf: Mapping[str, UrdfJoint]) -> dict[str, str]:
     return near
 
 
-def _notes(robot: Robot, urdf: Mapping[str, UrdfJoint]) -> Iterator[str]:
-    driven = [joint.name for joint in robot.joints]
-    idle = [joint.name for joint in urdf.values()
+def _notes(robot: Robot, known: RobotDescription) -> Iterator[str]:
+    driven, what = [joint.name for joint in robot.joints], known.format
+    idle = [joint.name for joint in known.joints.values()
             if (not joint.flaw or joint.kind == 'prismatic') and joint.name not in driven]
     if idle:
-        yield 'moving joints of the URDF that no leg drives: ' + ', '.join(idle)
+        yield f'moving joints of the {what} that no leg drives: ' + ', '.join(idle)
     if any(joint.invented for joint in robot.joints):
-        yield 'limits that the URDF does not have are invented: ' + ', '.join(
+        yield f'limits that the {what} does not have are invented: ' + ', '.join(
             f'{joint.name} ({", ".join(joint.invented)})' for joint in robot.joints
             if joint.invented)
-    unbounded = [name for name in driven if name in urdf and urdf[name].velocity == inf]
+    unbounded = [name for name in driven
+                 if name in known.joints and known.joints[name].velocity == inf]
     if unbounded:
-        yield 'the URDF has no velocity limit of ' + (
+        yield f'the {what} has no velocity limit of ' + (
             'any joint' if len(unbounded) == len(driven) else ', '.join(unbounded))
 
 
-def _span(limits: Joint | UrdfJoint) -> str:
+def _span(limits: Joint | JointDescription) -> str:
     if limits.lower == -inf and limits.upper == inf:
         return 'none'
     return f'{limits.lower:.4g} to {limits.upper:.4g}'

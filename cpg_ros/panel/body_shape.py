@@ -19,12 +19,15 @@ from dataclasses import dataclass, field
 import math
 from typing import Any
 
+from cpg_ros.robots.mesh_files import merged, Mesh
 import numpy as np
 
 #: Corners of a circle.
 ROUND = 16
 #: Of what has no colour of its own.
 GREY = (0.62, 0.65, 0.70)
+#: Vertices closer than this are made one: a page draws a robot, not its screws, m.
+GRAIN = 0.008
 
 
 @dataclass
@@ -103,6 +106,15 @@ class Shape:
 
 def _base64(values: np.ndarray) -> str:
     return base64.b64encode(values.tobytes()).decode('ascii')
+
+
+def coarse(triangles: np.ndarray, grain: float = GRAIN) -> np.ndarray:
+    """Return the triangles left when vertices that lie close together, m, are made one."""
+    left = merged(Mesh(triangles.reshape(-1, 3), np.arange(3 * len(triangles)).reshape(-1, 3)),
+                  grain)
+    # Two that came to lie on one another are one, whichever way round.
+    _, kept = np.unique(np.sort(left.triangles, axis=1), axis=0, return_index=True)
+    return left.points[left.triangles[np.sort(kept)]]
 
 
 def box(half: np.ndarray) -> np.ndarray:

@@ -17,8 +17,7 @@
 from typing import Any
 
 from cpg_ros.panel import body_shape as solids
-from cpg_ros.panel.body_shape import Link, Shape
-from cpg_ros.panel.mesh_files import coarse
+from cpg_ros.panel.body_shape import coarse, Link, Shape
 from cpg_ros.robots.robot import Robot
 from cpg_ros.simulation.robot_model import engine, legs, load
 import numpy as np

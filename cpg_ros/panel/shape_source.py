@@ -165,7 +165,7 @@ def check(urdf: str) -> None:
     """See that a URDF that the user names can be read.
 
     Raises:
-        UrdfError: it cannot.
+        DescriptionError: it cannot.
 
     """
     if urdf:

@@ -22,26 +22,17 @@ from pathlib import Path
 from xml.etree import ElementTree as Xml
 
 from cpg_ros.panel import body_shape as solids
-from cpg_ros.panel import mesh_files
 from cpg_ros.panel.body_shape import Link, Shape
-from cpg_ros.panel.mesh_places import any_mesh, installed_mesh
-from cpg_ros.robots.urdf import (
-    joints_of,
-    parse_tree,
-    read_tree,
-    root,
-    rotation,
-    UrdfError,
-    UrdfJoint,
-)
+from cpg_ros.robots.description import DescriptionError, JointDescription, rotation
+from cpg_ros.robots.mesh_files import MeshError, read_mesh
+from cpg_ros.robots.mesh_paths import find_mesh
+from cpg_ros.robots.urdf import describe, mesh_folder, numbers, parse_tree, read_tree
 import numpy as np
 
 #: Largest text on ``robot_description``, bytes; triangles and bytes of meshes that are drawn.
 LARGEST, TRIANGLES, MESHES = 4_000_000, 1_000_000, 500_000_000
 #: Nothing that is drawn is longer or further away, m.
 FURTHEST = 1e4
-
-FindMesh = Callable[[str], Path]
 
 
 def from_text(text: str, source: str, said: Callable[[str], None]) -> Shape:
@@ -53,54 +44,56 @@ def from_text(text: str, source: str, said: Callable[[str], None]) -> Shape:
         said: is told of each part that cannot be drawn.
 
     Raises:
-        UrdfError: it is no URDF, is too large, or its links are not one tree.
+        DescriptionError: it is no URDF, is too large, or its links are not one tree.
 
     """
     data = text.encode(errors='replace')
     if len(data) > LARGEST:
-        raise UrdfError(f'URDF {source}: has {len(data) / 1e6:.4g} MB, more than the '
+        raise DescriptionError(f'URDF {source}: has {len(data) / 1e6:.4g} MB, more than the '
                         f'{LARGEST / 1e6:g} MB that are read')
-    return _shape(parse_tree(data, source), source, installed_mesh, said)
+    return _shape(parse_tree(data, source), source, None, said)
 
 
 def from_file(path: Path, said: Callable[[str], None]) -> Shape:
     """Return the shape that a user's URDF file describes.
 
     Args:
-        path: of the file; meshes are found from its folder, or as ``package://`` says.
+        path: of the file; meshes are found as ``find_mesh`` says.
         said: is told of each part that cannot be drawn.
 
     Raises:
-        UrdfError: it is no URDF, or its links are not one tree.
+        DescriptionError: it is no URDF, or its links are not one tree.
 
     """
-    return _shape(read_tree(path), path.name, lambda name: any_mesh(name, path.parent), said)
+    return _shape(read_tree(path), path.name, path, said)
 
 
-def _shape(tree: Xml.Element, source: str, find: FindMesh, said: Callable[[str], None]) -> Shape:
-    joints = joints_of(tree, source)
-    drawing = _Drawing(tree, find)
+def _shape(tree: Xml.Element, source: str, path: Path | None, said: Callable[[str], None]
+           ) -> Shape:
+    description = describe(tree, source)
+    joints = description.joints
+    drawing = _Drawing(tree, path)
     visuals = {link.get('name', ''): link.findall('visual') for link in tree.findall('link')}
-    shape = Shape(source, [Link(root(joints), -1)])
+    shape = Shape(source, [Link(description.root(), -1)])
     shape.limits = {joint.name: (joint.lower, joint.upper) for joint in joints.values()
                     if joint.kind != 'fixed'}
-    below: dict[str, list[UrdfJoint]] = {}
+    below: dict[str, list[JointDescription]] = {}
     for joint in joints.values():
         below.setdefault(joint.parent, []).append(joint)
     for index, link in enumerate(shape.links):  # which grows
         if len(shape.links) > len(joints) + 1:
-            raise UrdfError(f'URDF {source}: the links form a loop')
+            raise DescriptionError(f'URDF {source}: the links form a loop')
         for joint in below.get(link.name, ()):
             shape.links.append(_held(joint, index))
         for visual in visuals.get(link.name, ()):
             try:
                 drawing.add(link, visual)
-            except mesh_files.MeshError as error:
+            except MeshError as error:
                 said(f'not drawn: {error}')
     return shape
 
 
-def _held(joint: UrdfJoint, parent: int) -> Link:
+def _held(joint: JointDescription, parent: int) -> Link:
     fixed = joint.kind == 'fixed' or bool(joint.mimic)
     axis = np.array(joint.axis)
     return Link(joint.child, parent, '' if fixed else joint.name, joint.kind == 'prismatic',
@@ -110,22 +103,18 @@ def _held(joint: UrdfJoint, parent: int) -> Link:
 
 def _numbers(text: str | None, default: str) -> np.ndarray:
     """Return as many numbers as the default has."""
-    words = (text or default).split()
-    try:
-        found = np.array([float(word) for word in words])
-    except ValueError:
-        found = np.empty(0)
-    if len(found) != len(default.split()) or not (np.abs(found) < FURTHEST).all():
-        raise mesh_files.MeshError(f"'{(text or '')[:40]}' is not {len(default.split())} numbers "
-                                   f'below {FURTHEST:g}')
+    count = len(default.split())
+    found = np.array(numbers(text or default, count))
+    if not len(found) or not (np.abs(found) < FURTHEST).all():
+        raise MeshError(f"'{(text or '')[:40]}' is not {count} numbers below {FURTHEST:g}")
     return found
 
 
 class _Drawing:
     """Draws visuals as triangles, as many as a page can show."""
 
-    def __init__(self, tree: Xml.Element, find: FindMesh) -> None:
-        self._find = find
+    def __init__(self, tree: Xml.Element, path: Path | None) -> None:
+        self._path, self._folder = path, mesh_folder(tree)
         self._colours = {one.get('name', ''): one for one in tree.findall('material')}
         self._meshes: dict[Path, np.ndarray] = {}
         self._bytes = self._triangles = 0
@@ -145,7 +134,7 @@ class _Drawing:
             found = self._solid(one)
             self._triangles += len(found)
             if self._triangles > TRIANGLES:
-                raise mesh_files.MeshError(f'the robot has more than {TRIANGLES} triangles')
+                raise MeshError(f'the robot has more than {TRIANGLES} triangles')
             link.add(found, colour, place, pose)
 
     def _colour(self, material: Xml.Element) -> tuple[float, ...]:
@@ -166,20 +155,22 @@ class _Drawing:
         if solid.tag == 'capsule':
             return solids.capsule(radius, 0.5 * length)
         if solid.tag != 'mesh':
-            raise mesh_files.MeshError(f'<{solid.tag}> is not a URDF shape')
+            raise MeshError(f'<{solid.tag}> is not a URDF shape')
         name = solid.get('filename', '')
         found = self._mesh(name) * _numbers(solid.get('scale'), '1 1 1')
         if not (np.abs(found) < FURTHEST).all():
-            raise mesh_files.MeshError(f'{name}: a vertex is further than {FURTHEST:g} m away')
-        return mesh_files.coarse(found)
+            raise MeshError(f'{name}: a vertex is further than {FURTHEST:g} m away')
+        return solids.coarse(found)
 
     def _mesh(self, name: str) -> np.ndarray:
-        path = self._find(name)
+        path = find_mesh(name, self._path, self._folder)
         if path not in self._meshes:
-            found = mesh_files.read(path)
+            mesh = read_mesh(path)
+            if not len(mesh.triangles):
+                raise MeshError(f'{path}: it has no triangles')
+            found = mesh.points[mesh.triangles]
             self._bytes += found.nbytes
             if self._bytes > MESHES:
-                raise mesh_files.MeshError(f'{name}: the meshes have more than '
-                                           f'{MESHES / 1e6:g} MB')
+                raise MeshError(f'{name}: the meshes have more than {MESHES / 1e6:g} MB')
             self._meshes[path] = found
         return self._meshes[path]

