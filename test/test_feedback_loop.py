@@ -17,8 +17,8 @@
 import importlib.util
 import math
 
+from cpg_ros.feedback.input_monitor import FADE, GOOD, STALE
 from cpg_ros.feedback.kinematics import geometry_of
-from cpg_ros.feedback.watch import FADE, GOOD, STALE
 from cpg_ros.motion.pattern import Pattern
 from cpg_ros.motion.steering import Drive
 from cpg_ros.nodes import senses_input

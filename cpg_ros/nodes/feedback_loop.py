@@ -21,10 +21,11 @@ from cpg_ros.feedback.estimate import TOUCH
 from cpg_ros.feedback.feedback import Feedback
 from cpg_ros.feedback.gains import Gains
 from cpg_ros.feedback.gait_tables import SLOTS
+from cpg_ros.feedback.input_monitor import Fade
 from cpg_ros.feedback.kinematics import Geometry
 from cpg_ros.feedback.plausibility import agreement
+from cpg_ros.feedback.tick import PlannedMotion
 from cpg_ros.feedback.timetable import POINTS, Timetable
-from cpg_ros.feedback.watch import Fade
 from cpg_ros.motion.pattern import Pattern
 from cpg_ros.motion.plan import Program
 from cpg_ros.nodes.senses_input import SensesInput
@@ -111,7 +112,7 @@ class FeedbackLoop:
     def ages(self, now: float) -> dict[str, float]:
         """Return name -> time since the last message that could be believed, s; inf for none."""
         return {} if self._inputs is None else {
-            watch.name: now - watch.believed for watch in self._inputs.watches}
+            monitor.name: now - monitor.believed for monitor in self._inputs.monitors}
 
     def sense(self, dt: float, now: float) -> None:
         """Take what has arrived, and have the coming tick of dt corrected by it; s both."""
@@ -136,10 +137,10 @@ class FeedbackLoop:
     def _judge(self, inputs: SensesInput, now: float) -> None:
         """Find out what keeps the feedback out."""
         found, self.waiting = [], False
-        for watch in inputs.watches:
-            if fault := watch.fault(now):
-                found.append(f'{watch.name}: {fault} for {now - watch.since:.1f} s')
-                self.waiting = self.waiting or watch.believed == -math.inf
+        for monitor in inputs.monitors:
+            if fault := monitor.fault(now):
+                found.append(f'{monitor.name}: {fault} for {now - monitor.since:.1f} s')
+                self.waiting = self.waiting or monitor.believed == -math.inf
         pattern = self._pattern
         program = pattern.program
         if program.motion.efference is None:
@@ -149,7 +150,8 @@ class FeedbackLoop:
             self._agrees = 1.0
         else:
             row = int(pattern.phases[0] * POINTS) % POINTS
-            self._agrees = agreement(inputs.senses.loads[0], self._least, times.swinging[row],
+            self._agrees = agreement(inputs.senses.foot_forces[0], self._least,
+                                     times.swinging[row],
                                      min(self._dt * program.frequency, 1.0), self._agrees)
             if self._agrees < AGREES:
                 found.append(f'{inputs.feet}: the contacts do not go with the gait')
@@ -163,7 +165,7 @@ class FeedbackLoop:
         self._phase[0] = pattern.phases[0]
         forward, left, turn = self._motion()
         self._speeds[0] = forward, left
-        yaw = float(inputs.senses.lean[0, 2])
+        yaw = float(inputs.senses.rpy[0, 2])
         if self.share and pattern.level:
             # The heading is kept where no turn is asked for, and otherwise turns on.
             ahead = (self._course[0] + turn * self._dt - yaw + math.pi) % (2.0 * math.pi) - math.pi
@@ -171,10 +173,11 @@ class FeedbackLoop:
         else:
             self._course[0] = yaw
         memory = feedback.memory
-        found = feedback.advance(inputs.senses, planned[None], self._phase, self._gaits,
-                                 self._mix, self._speeds, self._course, self._dt,
-                                 self.share, pattern.level)
-        pattern.hurry = float(memory.hurry[0])
+        found = feedback.advance(
+            inputs.senses, PlannedMotion(planned[None], self._phase, self._gaits, self._mix,
+                                         self._speeds, self._course),
+            self._dt, self.share, pattern.level)
+        pattern.hurry = float(memory.frequency_scale[0])
         if pattern.drive is not None:
             self._trim[:] = memory.stride[0]
             pattern.drive.trim = self._trim
