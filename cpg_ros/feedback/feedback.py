@@ -22,7 +22,7 @@ from cpg_ros.feedback.gains import Gains
 from cpg_ros.feedback.gait_tables import GaitTables, SLOTS
 from cpg_ros.feedback.kinematics import Geometry
 from cpg_ros.feedback.memory import Memory
-from cpg_ros.feedback.tick import PlannedMotion, Step, tick
+from cpg_ros.feedback.tick import PlannedMotion, tick
 from cpg_ros.feedback.timetable import Timetable
 from cpg_ros.integration.jit import bound
 from cpg_ros.motion.pattern import Pattern
@@ -47,7 +47,7 @@ class Feedback:
         legs = len(geometry.hips)
         self.geometry, self.gains = geometry, gains or Gains()
         self.memory = Memory.empty(runs, legs)
-        self._tables = GaitTables.empty(legs)
+        self._legs, self._tables = geometry.arrays, GaitTables.empty(legs)
         self._programs: list[Program | None] = [None] * SLOTS
         self._learnt = 0
         self.angles = np.zeros((runs, joints or int(geometry.columns.max()) + 1))
@@ -94,8 +94,9 @@ class Feedback:
             level: of the pattern: 0 at the stand, 1 in the full gait.
 
         """
-        arguments = (self.geometry.arrays, self._tables, self.gains, self.memory, sensors,
-                     planned, Step(dt, share * level, level), self.angles)
+        # A plain tuple, which is made faster than a named one.
+        arguments = (self._legs, self._tables, self.gains, self.memory, sensors, planned,
+                     (dt, share * level, level), self.angles)
         if self._tick is None or self._bound is not self.gains:
             self._tick, self._bound = bound(tick, *arguments), self.gains
         self._tick(*arguments)

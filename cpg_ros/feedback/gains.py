@@ -14,7 +14,6 @@
 
 """The list of the feedback laws, and the switches and gains of all of them."""
 
-from collections import namedtuple
 from collections.abc import Sequence
 from typing import Any
 
@@ -30,7 +29,7 @@ from cpg_ros.feedback import (
     tegotae,
     touchdown,
 )
-from cpg_ros.feedback.law import Gain, Law
+from cpg_ros.feedback.law import Gain, Law, named_tuple
 
 #: In the order in which parameters and the reference list them.
 LAWS: Sequence[Law] = [module.LAW for module in (
@@ -43,8 +42,7 @@ GAINS: dict[str, Gain] = {name: gain for gains in (*(law.gains for law in LAWS),
                           for name, gain in gains.items()}
 _DEFAULTS = {**{law.name: law.on for law in LAWS},
              **{name: gain.default for name, gain in GAINS.items()}}
-# The laws name the fields, which no static checker can know.
-_Fields: Any = namedtuple('Gains', _DEFAULTS, defaults=_DEFAULTS.values())
+_Fields: Any = named_tuple('Gains', _DEFAULTS, _DEFAULTS.values())
 
 
 class Gains(_Fields):  # type: ignore[misc]

@@ -14,8 +14,10 @@
 
 """What a feedback law declares beside its kernel: its switch, its gains and its state."""
 
-from collections.abc import Mapping
+from collections import namedtuple
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
+from typing import Any
 
 
 @dataclass(frozen=True)
@@ -70,3 +72,8 @@ class Law:
     on: bool
     gains: Mapping[str, Gain]
     memory: Mapping[str, Variable] = field(default_factory=dict)
+
+
+def named_tuple(name: str, fields: Iterable[str], defaults: Iterable[Any] = ()) -> Any:
+    """Return a class of named tuples; the laws name its fields, which mypy cannot know."""
+    return namedtuple(name, tuple(fields), defaults=tuple(defaults))

@@ -14,12 +14,11 @@
 
 """What the feedback keeps from tick to tick: the estimate, the laws' state, its output."""
 
-from collections import namedtuple
 from typing import Any
 
 from cpg_ros.feedback.efference_copy import SIGNALS
 from cpg_ros.feedback.gains import LAWS
-from cpg_ros.feedback.law import Variable
+from cpg_ros.feedback.law import named_tuple, Variable
 import numpy as np
 
 #: State that is no single law's.
@@ -41,7 +40,7 @@ SCRATCH = {
                                ('legs', 4)),
     'scratch': Variable('see estimate.update', (5, 3)),
     'expected': Variable('signals of the efference copy', (SIGNALS,))}
-_Fields: Any = namedtuple('Memory', [*VARIABLES, *SCRATCH])
+_Fields: Any = named_tuple('Memory', [*VARIABLES, *SCRATCH])
 
 
 class Memory(_Fields):  # type: ignore[misc]

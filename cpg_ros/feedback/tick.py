@@ -64,14 +64,6 @@ class PlannedMotion(NamedTuple):
     heading: np.ndarray
 
 
-class Step(NamedTuple):
-    """Of a tick: its length in s, the share of all corrections and the pattern's level, 0 to 1."""
-
-    dt: float
-    share: float
-    level: float
-
-
 class Deviation(NamedTuple):
     """By how much the body's motion differs from the expected one: m/s, rad/s, rad."""
 
@@ -105,14 +97,14 @@ def _deviation(tables, memory, sensors, planned, run, level):
 @jit
 def _change_strides(tables, gains, memory, run, slot, missing, headings, step):
     """Fill what is added to strides; missing speed in m/s, wanted and measured heading in rad."""
-    stride, share = memory.stride[run], step.share
+    stride, (dt, share, _) = memory.stride[run], step
     stride[:] = 0.0
     if not tables.steered[slot]:
         return
     longer = uneven = 0.0
     if gains.speed:
         memory.speed_integral[run] = speed.integrate(memory.speed_integral[run], missing, gains,
-                                                     share * step.dt)
+                                                     share * dt)
         longer = share * speed.stride_change(missing, memory.speed_integral[run], gains)
     if gains.heading:
         rate = heading.response(tables.at[slot], tables.turn[slot],
@@ -133,11 +125,11 @@ def tick(legs, tables, gains, memory, sensors, planned, step, out):
         memory: Memory of all runs, changed in place.
         sensors: SensorData.
         planned: PlannedMotion.
-        step: Step.
+        step: its length dt in s, the share of all corrections, the pattern's level, 0 to 1 both.
         out: filled.
 
     """
-    rows, columns, dt, share = legs.rows, legs.columns, step.dt, step.share
+    rows, columns, (dt, share, level) = legs.rows, legs.columns, step
     quick = 1.0 - math.exp(-dt / gains.smooth)
     foot, feet = memory.scratch[0], memory.leg_velocities
     for run in range(out.shape[0]):
@@ -149,7 +141,7 @@ def tick(legs, tables, gains, memory, sensors, planned, step, out):
         approach(velocity, velocity[:0], dt, wanted[0], wanted[1])
         old, new, mix = planned.gaits[run, 0], planned.gaits[run, 1], planned.mix[run]
         slot, phase, left = new if mix > 0.5 else old, planned.phase[run], wanted[0, 1]
-        off = _deviation(tables, memory, sensors, planned, run, step.level)
+        off = _deviation(tables, memory, sensors, planned, run, level)
 
         # Feet that land together pitch and roll the body wherever they are put: of the laws
         # that move feet or change the frequency, only posture helps a hop.

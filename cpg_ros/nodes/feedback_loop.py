@@ -69,8 +69,9 @@ class FeedbackLoop:
         self._known: list[tuple[Program, Timetable]] = []
         self._inputs: SensesInput | None = None
         self._least = TOUCH * geometry.weight
-        self._gaits, self._mix = np.zeros((1, 2), dtype=np.int64), np.zeros(1)
-        self._phase, self._speeds, self._course = np.zeros(1), np.zeros((1, 2)), np.zeros(1)
+        self._planned = PlannedMotion(np.zeros((1, len(pattern.robot.joints))), np.zeros(1),
+                                      np.zeros((1, 2), dtype=np.int64), np.zeros(1),
+                                      np.zeros((1, 2)), np.zeros(1))
         self.wanted, self.waiting, self.faults = False, True, ''
         self._trim = np.zeros(len(pattern.robot.legs))
         self.restart()
@@ -157,26 +158,25 @@ class FeedbackLoop:
                 found.append(f'{inputs.feet}: the contacts do not go with the gait')
         self.faults = '; '.join(found)
 
-    def _correct(self, planned: np.ndarray) -> np.ndarray:
+    def _correct(self, angles: np.ndarray) -> np.ndarray:
         pattern, feedback, inputs = self._pattern, self._feedback, self._inputs
         assert inputs is not None
-        old, new, self._mix[0] = pattern.fading
-        self._gaits[0] = feedback.slot(old), feedback.slot(new)
-        self._phase[0] = pattern.phases[0]
+        planned, heading = self._planned, self._planned.heading
+        planned.angles[0] = angles
+        old, new, planned.mix[0] = pattern.fading
+        planned.gaits[0] = feedback.slot(old), feedback.slot(new)
+        planned.phase[0] = pattern.phases[0]
         forward, left, turn = self._motion()
-        self._speeds[0] = forward, left
+        planned.velocity[0] = forward, left
         yaw = float(inputs.senses.rpy[0, 2])
         if self.share and pattern.level:
             # The heading is kept where no turn is asked for, and otherwise turns on.
-            ahead = (self._course[0] + turn * self._dt - yaw + math.pi) % (2.0 * math.pi) - math.pi
-            self._course[0] = yaw + min(max(ahead, -FURTHEST), FURTHEST)
+            ahead = (heading[0] + turn * self._dt - yaw + math.pi) % (2.0 * math.pi) - math.pi
+            heading[0] = yaw + min(max(ahead, -FURTHEST), FURTHEST)
         else:
-            self._course[0] = yaw
+            heading[0] = yaw
         memory = feedback.memory
-        found = feedback.advance(
-            inputs.senses, PlannedMotion(planned[None], self._phase, self._gaits, self._mix,
-                                         self._speeds, self._course),
-            self._dt, self.share, pattern.level)
+        found = feedback.advance(inputs.senses, planned, self._dt, self.share, pattern.level)
         pattern.hurry = float(memory.frequency_scale[0])
         if pattern.drive is not None:
             self._trim[:] = memory.stride[0]
