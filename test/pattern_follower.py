@@ -15,7 +15,7 @@
 """A body that follows a pattern, tick by tick, as a robot follows the generator, and feels."""
 
 from cpg_ros.errors import CpgError
-from cpg_ros.feedback.estimate import Senses
+from cpg_ros.feedback.estimate import SensorData
 from cpg_ros.motion.pattern import Pattern
 from cpg_ros.simulation.body import Body
 from cpg_ros.simulation.proprioception import felt
@@ -75,14 +75,15 @@ class Proprioception:
     def __init__(self, body: Body) -> None:
         self._body = body
         self._order = np.argsort(body.robot.places)
-        self._senses = Senses.blank(1, len(body.robot.legs), len(self._order))
+        self._senses = SensorData.zeros(1, len(body.robot.legs), len(self._order))
         self._before, self._velocity = body.rates[None].copy(), np.zeros((1, 3))
 
-    def __call__(self) -> Senses:
+    def __call__(self) -> SensorData:
         """Return what is felt now, of one run; overwritten by the next call."""
         body, senses = self._body, self._senses
-        senses.angles[0], senses.rates[0] = body.position[self._order], body.velocity[self._order]
-        senses.loads[0] = body.feet
+        senses.joint_positions[0] = body.position[self._order]
+        senses.joint_velocities[0] = body.velocity[self._order]
+        senses.foot_forces[0] = body.feet
         felt(senses, body.quaternion[None], body.rates[None], self._before,
              body.model.opt.timestep, self._velocity)
         self._before[0] = body.rates

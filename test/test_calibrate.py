@@ -66,12 +66,12 @@ def messages():
         header = kinds['std_msgs/msg/Header'](kinds['builtin_interfaces/msg/Time'](
             stamp // 10**9, stamp % 10**9), 'imu')
         found += [
-            ('/joint_states', stamp, joint_state(stamp, names, senses.angles[0],
-                                                 senses.rates[0])),
+            ('/joint_states', stamp, joint_state(stamp, names, senses.joint_positions[0],
+                                                 senses.joint_velocities[0])),
             ('/imu', stamp, packed(IMU, header, quaternion(x, y, z, w), unknown,
-                                   vector(*senses.turning[0]), unknown, vector(*senses.push[0]),
-                                   unknown)),
-            ('/foot_contacts', stamp, packed(CONTACTS, layout, senses.loads[0].copy())),
+                                   vector(*senses.angular_velocity[0]), unknown,
+                                   vector(*senses.acceleration[0]), unknown)),
+            ('/foot_contacts', stamp, packed(CONTACTS, layout, senses.foot_forces[0].copy())),
             ('/cpg_generator/phase', stamp, packed(CONTACTS, layout, pattern.phases.copy()))]
     return found
 

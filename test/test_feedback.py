@@ -20,7 +20,7 @@ import math
 
 from cpg_ros.errors import InputError
 from cpg_ros.feedback.efference_copy import BINS, EfferenceCopy, fold, SIGNALS
-from cpg_ros.feedback.estimate import BodyState, Senses
+from cpg_ros.feedback.estimate import BodyState, SensorData
 from cpg_ros.feedback.feedback import close, Feedback
 from cpg_ros.feedback.gains import Gains
 from cpg_ros.feedback.kinematics import (
@@ -146,7 +146,7 @@ def test_the_estimate_is_the_bodys_own_velocity(loop, expected):
 
 
 def standing(loads, rates=None, push=(0.0, 0.0, GRAVITY)):
-    return Senses(GO2.column('offset')[None], np.zeros((1, 12)) if rates is None else rates,
+    return SensorData(GO2.column('offset')[None], np.zeros((1, 12)) if rates is None else rates,
                   np.array([loads]), np.zeros((1, 3)), np.zeros((1, 3)), np.array([push]))
 
 

@@ -61,8 +61,8 @@ def test_a_body_that_goes_too_fast_steps_further():
 def test_feet_in_the_air_go_to_their_steps_and_those_on_the_ground_yield():
     swung = stood = 0.0
     for _ in range(100):
-        swung = placement.swing(swung, 0.05, GAINS, DT)
-        stood = placement.stand(stood, 0.1, GAINS, DT)
+        swung = placement.in_swing(swung, 0.05, GAINS, DT)
+        stood = placement.in_stance(stood, 0.1, GAINS, DT)
     assert swung == pytest.approx(0.05, abs=1e-3)
     assert -0.1 * 0.2 < stood < 0.0
 
@@ -75,7 +75,7 @@ def test_a_sidestep_begins_as_far_on_one_side_as_it_ends_on_the_other():
 
 
 def test_pace_quickens_both_ways_up_to_its_most():
-    found = [pace.hurry(v, 0.0, GAINS) for v in (-5.0, -0.2, 0.0, 0.1, 0.2, 5.0)]
+    found = [pace.frequency_change(v, 0.0, GAINS) for v in (-5.0, -0.2, 0.0, 0.1, 0.2, 5.0)]
     assert found[0] == found[-1] == GAINS.pace_most
     assert found[1] == found[4]
     assert found[2] == found[3] == 0.0 < found[4] < GAINS.pace_most
@@ -85,17 +85,17 @@ def test_pace_tires_of_what_lasts():
     """A velocity that stays, hurried or not, is no push: a share 1 / (1 + fatigue) is left."""
     fatigue = 0.0
     for k in range(round(8.0 * GAINS.pace_memory / DT)):
-        added = pace.hurry(5.0, fatigue, GAINS)
+        added = pace.frequency_change(5.0, fatigue, GAINS)
         if k * DT < 0.1:
             assert added > 0.9 * GAINS.pace_most
-        fatigue = pace.tire(fatigue, added, GAINS, DT)
+        fatigue = pace.update_fatigue(fatigue, added, GAINS, DT)
     assert added == pytest.approx(GAINS.pace_most / (1.0 + GAINS.pace_fatigue), rel=0.01)
 
 
 def test_feet_stand_under_the_body_on_a_slope():
     ground = 0.0
     for _ in range(2000):
-        ground = slope.follow(ground, -0.2, GAINS, DT)
+        ground = slope.update_ground(ground, -0.2, GAINS, DT)
     assert ground == pytest.approx(-0.2, abs=1e-3)
     assert slope.shift(ground, GAINS) == pytest.approx(
         -GAINS.slope_share * GAINS.slope_height * math.tan(0.2), abs=1e-3)
@@ -103,7 +103,7 @@ def test_feet_stand_under_the_body_on_a_slope():
 
 
 def test_heading_turns_back_by_the_shorter_way():
-    found = [heading.turn(wanted, yaw, GAINS) for wanted, yaw in
+    found = [heading.yaw_rate(wanted, yaw, GAINS) for wanted, yaw in
              ((0.0, 0.1), (3.1, -3.1), (0.0, -2.0))]
     assert found == pytest.approx(
         [-0.1 * GAINS.turn, -GAINS.turn * (2 * math.pi - 6.2), GAINS.turn_most])
@@ -112,13 +112,13 @@ def test_heading_turns_back_by_the_shorter_way():
 def test_strides_lengthen_while_speed_is_missing():
     way = 0.0
     for _ in range(100):
-        way = speed.gather(way, 0.1, GAINS, DT)
-    assert speed.longer(0.1, way, GAINS) == pytest.approx(
+        way = speed.integrate(way, 0.1, GAINS, DT)
+    assert speed.stride_change(0.1, way, GAINS) == pytest.approx(
         0.1 * GAINS.speed_share + 0.02 * GAINS.speed_rate)
-    assert speed.longer(9.0, way, GAINS) == GAINS.speed_most
+    assert speed.stride_change(9.0, way, GAINS) == GAINS.speed_most
     for _ in range(100):
-        way = speed.gather(way, 1e3, GAINS, DT)
-    assert speed.longer(0.0, way, GAINS) <= GAINS.speed_most
+        way = speed.integrate(way, 1e3, GAINS, DT)
+    assert speed.stride_change(0.0, way, GAINS) <= GAINS.speed_most
 
 
 def reflex(built, contact, swinging, progress, height=-0.3, steps=100, lifted=0.0):

@@ -17,8 +17,8 @@
 import importlib.util
 import math
 
+from cpg_ros.feedback.input_monitor import FADE, GOOD, STALE
 from cpg_ros.feedback.kinematics import geometry_of
-from cpg_ros.feedback.watch import FADE, GOOD, STALE
 from cpg_ros.motion.pattern import Pattern
 from cpg_ros.motion.steering import Drive
 from cpg_ros.nodes import senses_input
@@ -202,7 +202,7 @@ def test_feet_are_felt_by_their_own_sensors_or_by_the_motors(monkeypatch, contac
     felt, true = [], []
     for _ in range(round(2.0 / DT)):
         robot.tick()
-        felt.append(robot.loop._inputs.senses.loads[0].copy())
+        felt.append(robot.loop._inputs.senses.foot_forces[0].copy())
         true.append(robot.body.feet.copy())
     assert not robot.loop.faults and robot.loop.share == 1.0 and not robot.body.fallen
     felt, true = np.array(felt[500:]), np.array(true[500:])

@@ -39,10 +39,10 @@ def loop():
 def test_what_is_missing_is_asked_for_up_to_a_share_of_what_is_wanted():
     added = 0.0
     for _ in range(round(10.0 / DT)):
-        added = sidestep.gather(added, 0.05, 0.1, GAINS, DT)
+        added = sidestep.correct_speed(added, 0.05, 0.1, GAINS, DT)
     assert added == pytest.approx(0.1 * GAINS.sidestep_more)
-    assert sidestep.gather(added, -0.05, 0.1, GAINS, DT) < added
-    assert sidestep.gather(added, 0.05, 0.0, GAINS, DT) == 0.0
+    assert sidestep.correct_speed(added, -0.05, 0.1, GAINS, DT) < added
+    assert sidestep.correct_speed(added, 0.05, 0.0, GAINS, DT) == 0.0
 
 
 def test_it_is_as_fast_on_the_spot_as_while_walking(loop):

@@ -20,7 +20,7 @@ from dataclasses import dataclass, replace
 from cpg_ros.calibration.walk_recording import WalkRecording
 from cpg_ros.errors import InputError
 from cpg_ros.feedback.efference_copy import BINS, EfferenceCopy, fold, SIGNALS, SPEEDS
-from cpg_ros.feedback.estimate import BodyState, Senses
+from cpg_ros.feedback.estimate import BodyState, SensorData
 from cpg_ros.feedback.kinematics import geometry_of
 from cpg_ros.feedback.timetable import POINTS, Timetable
 from cpg_ros.gaits.stride import find_stride
@@ -86,7 +86,7 @@ def efference_from(recording: WalkRecording, robot: Robot, gait: str | None = No
     times, felt, estimate = recording.times, recording.senses, BodyState(geometry)
     velocity = np.empty((len(times), 2))
     for k, row in enumerate(velocity):
-        now = Senses(*(getattr(felt, key)[k:k + 1] for key in Senses.__dataclass_fields__))
+        now = SensorData(*(rows[k:k + 1] for rows in felt))
         estimate.update(now, times[k] - times[k - 1] if k else 1e-3)
         row[:] = estimate.velocity[0, :2]
     inside = (times >= stride.begin) & (times <= stride.end)
@@ -95,7 +95,8 @@ def efference_from(recording: WalkRecording, robot: Robot, gait: str | None = No
     else:
         phases = stride.warp(times[inside]) + LAG * stride.frequency + _shift(
             stride.theta, stride.mean.T, Timetable(program, geometry), columns)
-    signals = np.concatenate([velocity, felt.turning[:, :2], felt.lean[:, :2]], axis=1)[inside]
+    signals = np.concatenate([velocity, felt.angular_velocity[:, :2], felt.rpy[:, :2]],
+                             axis=1)[inside]
     table = fold(phases, signals)
     speed = float(table[:, 0].mean()) if speed is None else speed
     return Calibrated(recording.source, gait, speed, stride.cycles,

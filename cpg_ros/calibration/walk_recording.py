@@ -19,7 +19,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from cpg_ros.feedback.estimate import rpy_of, Senses
+from cpg_ros.feedback.estimate import rpy_of, SensorData
 from cpg_ros.recordings.bag_storage import opened
 from cpg_ros.recordings.cdr import JOINT_STATE
 from cpg_ros.recordings.recording import RecordingError
@@ -51,13 +51,13 @@ class WalkRecording:
     source: str
     joints: tuple[str, ...]
     times: np.ndarray
-    senses: Senses
+    senses: SensorData
     phase: np.ndarray | None = None
 
     @property
     def positions(self) -> np.ndarray:
         """Angles in rad, shape (n, joints)."""
-        return self.senses.angles
+        return self.senses.joint_positions
 
 
 def read_walk(path: str | Path, robot: Robot, topics: Mapping[str, str]) -> WalkRecording:
@@ -145,7 +145,7 @@ def _joined(path: Path, robot: Robot, found: dict[str, list[tuple[int, Any]]]) -
 
     turned = np.array([[one.orientation.w, one.orientation.x, one.orientation.y,
                         one.orientation.z] for one in messages])
-    senses = Senses(to_imu('joint_states.position', angles, own),
+    senses = SensorData(to_imu('joint_states.position', angles, own),
                     to_imu('joint_states.velocity', rates, own),
                     to_imu('foot_contacts', loads, at), rpy_of(turned),
                     vectors('angular_velocity'), vectors('linear_acceleration'))

@@ -12,10 +12,10 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What a robot feels, and what it makes of it: contact, lean, and its velocity over ground."""
+"""Sensor data, and the state estimated from it: contacts and velocity over ground."""
 
-from dataclasses import dataclass
 import math
+from typing import NamedTuple
 
 from cpg_ros.feedback.kinematics import foot_of, Geometry, GRAVITY, slopes_of
 from cpg_ros.integration.jit import entry, jit
@@ -29,29 +29,29 @@ PULL = 0.02
 SLIP = 0.25
 
 
-@dataclass
-class Senses:
-    """What a robot feels at an instant, of each run.
+class SensorData(NamedTuple):
+    """What a robot measures at an instant, of each run.
 
     Attributes:
-        angles, rates: of the joints leg by leg, rad and rad/s, shape (runs, joints).
-        loads: of the feet, N, shape (runs, legs).
-        lean: roll, pitch and yaw, rad, shape (runs, 3).
-        turning: of the base in its own frame, rad/s, shape (runs, 3).
-        push: what an accelerometer shows, its own frame, m/s^2, shape (runs, 3).
+        joint_positions: leg by leg, rad, shape (runs, joints).
+        joint_velocities: the same, rad/s.
+        foot_forces: upward on each foot, N, shape (runs, legs).
+        rpy: roll, pitch and yaw, rad, shape (runs, 3).
+        angular_velocity: of the base in its own frame, rad/s, shape (runs, 3).
+        acceleration: as an accelerometer measures it, base's frame, m/s^2, shape (runs, 3).
 
     """
 
-    angles: np.ndarray
-    rates: np.ndarray
-    loads: np.ndarray
-    lean: np.ndarray
-    turning: np.ndarray
-    push: np.ndarray
+    joint_positions: np.ndarray
+    joint_velocities: np.ndarray
+    foot_forces: np.ndarray
+    rpy: np.ndarray
+    angular_velocity: np.ndarray
+    acceleration: np.ndarray
 
     @classmethod
-    def blank(cls, runs: int, legs: int, joints: int) -> 'Senses':
-        """Nothing felt yet, to be filled in place."""
+    def zeros(cls, runs: int, legs: int, joints: int) -> 'SensorData':
+        """Return zeros, to be filled in place."""
         return cls(*(np.zeros((runs, size)) for size in (joints, joints, legs, 3, 3, 3)))
 
 
@@ -63,24 +63,24 @@ def rpy_of(quaternions: np.ndarray) -> np.ndarray:
                      np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))], axis=-1)
 
 
-def upward(lean: np.ndarray) -> np.ndarray:
+def upward(rpy: np.ndarray) -> np.ndarray:
     """Return the vertical in the base's frame, shape (..., 3)."""
-    roll, pitch = lean[..., 0], lean[..., 1]
+    roll, pitch = rpy[..., 0], rpy[..., 1]
     return np.stack([-np.sin(pitch), np.sin(roll) * np.cos(pitch),
                      np.cos(roll) * np.cos(pitch)], axis=-1)
 
 
 @jit
-def seen_by(leg, joints, rates, slopes, turning, up, radius, out):
-    """Fill the base's velocity as one leg has it whose foot rolls on the ground, m/s.
+def velocity_by_leg(leg, joints, rates, slopes, turning, up, radius, out):
+    """Fill the base's velocity according to one leg whose foot rolls on the ground, m/s.
 
     Args:
         leg: a row of the geometry.
         joints: hip, thigh and calf, rad.
         rates: of these, rad/s.
         slopes: scratch, shape (3, 3).
-        turning: of the base, rad/s, shape (3,).
-        up: the vertical in the base's frame.
+        turning: angular velocity of the base, rad/s, shape (3,).
+        up: the vertical in the base's frame, shape (3,).
         radius: of the foot, m.
         out: shape (3,).
 
@@ -104,52 +104,54 @@ def seen_by(leg, joints, rates, slopes, turning, up, radius, out):
 
 
 @jit
-def update(rows, columns, radius, weight, angles, rates, loads, lean, turning, push, dt,
-           velocity, contact, seen, scratch):
-    """Take note of what one run feels: velocity (3,) and contact (legs,) are changed in place.
+def update(legs, sensors, run, dt, velocity, contact, leg_velocities, scratch):
+    """Update the estimate of one run: velocity (3,) and contact (legs,), in place.
 
-    Scratch are seen, shape (legs, 4), and scratch, shape (5, 3).
+    Scratch are leg_velocities, shape (legs, 4), each leg's estimate and its weight, and scratch,
+    shape (5, 3).
     """
-    legs = rows.shape[0]
+    rows, columns = legs.rows, legs.columns
+    angles, rates = sensors.joint_positions[run], sensors.joint_velocities[run]
+    forces, rpy = sensors.foot_forces[run], sensors.rpy[run]
+    turning, acceleration = sensors.angular_velocity[run], sensors.acceleration[run]
     up, slopes, now = scratch[4], scratch[:3], scratch[3]
-    up[0], up[1] = -math.sin(lean[1]), math.sin(lean[0]) * math.cos(lean[1])
-    up[2] = math.cos(lean[0]) * math.cos(lean[1])
+    up[0], up[1] = -math.sin(rpy[1]), math.sin(rpy[0]) * math.cos(rpy[1])
+    up[2] = math.cos(rpy[0]) * math.cos(rpy[1])
     vx, vy, vz = velocity[0], velocity[1], velocity[2]
-    velocity[0] += dt * (push[0] - GRAVITY * up[0] - (turning[1] * vz - turning[2] * vy))
-    velocity[1] += dt * (push[1] - GRAVITY * up[1] - (turning[2] * vx - turning[0] * vz))
-    velocity[2] += dt * (push[2] - GRAVITY * up[2] - (turning[0] * vy - turning[1] * vx))
+    velocity[0] += dt * (acceleration[0] - GRAVITY * up[0] - (turning[1] * vz - turning[2] * vy))
+    velocity[1] += dt * (acceleration[1] - GRAVITY * up[1] - (turning[2] * vx - turning[0] * vz))
+    velocity[2] += dt * (acceleration[2] - GRAVITY * up[2] - (turning[0] * vy - turning[1] * vx))
     total = 0.0
-    for leg in range(legs):
-        share = max(loads[leg], 0.0) / weight
+    for leg in range(rows.shape[0]):
+        share, seen = max(forces[leg], 0.0) / legs.weight, leg_velocities[leg]
         contact[leg] = share > (LEAVE if contact[leg] else TOUCH)
-        seen[leg, 3] = 0.0
+        seen[3] = 0.0
         if not contact[leg] or rows[leg, 1] == 0.0:
             continue
         one, two, three = columns[leg, 0], columns[leg, 1], columns[leg, 2]
         now[0], now[1], now[2] = angles[one], angles[two], angles[three]
-        seen_by(rows[leg], now, (rates[one], rates[two], rates[three]), slopes, turning, up,
-                radius, seen[leg])
+        velocity_by_leg(rows[leg], now, (rates[one], rates[two], rates[three]), slopes, turning,
+                        up, legs.radius, seen)
         off = 0.0
         for k in range(3):
-            off += (seen[leg, k] - velocity[k])**2
-        # Even where all legs slip, they are believed a little: integrated pushes drift.
-        seen[leg, 3] = min(dt / PULL * share / (1.0 + off / SLIP**2), 0.5)
-        total += seen[leg, 3]
+            off += (seen[k] - velocity[k])**2
+        # Even where all legs slip, they count a little: integrated accelerations drift.
+        seen[3] = min(dt / PULL * share / (1.0 + off / SLIP**2), 0.5)
+        total += seen[3]
     scale = min(total, 0.9) / max(total, 1e-9)
     vx, vy, vz = velocity[0], velocity[1], velocity[2]
-    for leg in range(legs):
-        pull = scale * seen[leg, 3]
-        velocity[0] += pull * (seen[leg, 0] - vx)
-        velocity[1] += pull * (seen[leg, 1] - vy)
-        velocity[2] += pull * (seen[leg, 2] - vz)
+    for leg in range(rows.shape[0]):
+        seen = leg_velocities[leg]
+        pull = scale * seen[3]
+        velocity[0] += pull * (seen[0] - vx)
+        velocity[1] += pull * (seen[1] - vy)
+        velocity[2] += pull * (seen[2] - vz)
 
 
 @entry
-def _update_all(rows, columns, radius, weight, angles, rates, loads, lean, turning, push, dt,
-                velocity, contact, seen, scratch):
-    for run in range(angles.shape[0]):
-        update(rows, columns, radius, weight, angles[run], rates[run], loads[run], lean[run],
-               turning[run], push[run], dt, velocity[run], contact[run], seen, scratch)
+def _update_all(legs, sensors, dt, velocity, contact, leg_velocities, scratch):
+    for run in range(velocity.shape[0]):
+        update(legs, sensors, run, dt, velocity[run], contact[run], leg_velocities, scratch)
 
 
 class BodyState:
@@ -168,9 +170,7 @@ class BodyState:
         self.contact = np.zeros((runs, legs), dtype=bool)
         self.scratch = np.zeros((legs, 4)), np.zeros((5, 3))
 
-    def update(self, senses: Senses, dt: float) -> None:
-        """Take note of what is felt, dt in s after the last time."""
-        geometry = self.geometry
-        _update_all(geometry.rows, geometry.columns, geometry.radius, geometry.weight,
-                    senses.angles, senses.rates, senses.loads, senses.lean, senses.turning,
-                    senses.push, dt, self.velocity, self.contact, *self.scratch)
+    def update(self, sensors: SensorData, dt: float) -> None:
+        """Update the estimate with what is measured, dt in s after the last time."""
+        _update_all(self.geometry.arrays, sensors, dt, self.velocity, self.contact,
+                    *self.scratch)

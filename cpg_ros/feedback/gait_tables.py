@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What the feedback knows of each gait it may meet, in arrays that are filled once."""
+"""Tables of the gaits that the feedback corrects, in arrays that are filled once."""
 
 from typing import NamedTuple
 
@@ -39,6 +39,8 @@ class GaitTables(NamedTuple):
         steered: whether strides can be changed, shape (SLOTS,).
         at: speeds of the steering tables, m/s, shape (SLOTS, ROWS).
         turn: rad/s of yaw for each unit by which right strides exceed left ones, the same.
+        sides: -1/2 of left legs and 1/2 of right ones, shape (legs,); 0 before a gait that can
+            be steered is known.
 
     """
 
@@ -51,6 +53,7 @@ class GaitTables(NamedTuple):
     steered: np.ndarray
     at: np.ndarray
     turn: np.ndarray
+    sides: np.ndarray
 
     @classmethod
     def empty(cls, legs: int) -> 'GaitTables':
@@ -58,7 +61,7 @@ class GaitTables(NamedTuple):
         return cls(np.zeros((SLOTS, POINTS, legs), dtype=bool), np.zeros((SLOTS, POINTS, legs)),
                    np.ones((SLOTS, legs)), np.ones(SLOTS), np.zeros((SLOTS, SPEEDS)),
                    np.zeros((SLOTS, SPEEDS, BINS, SIGNALS)), np.zeros(SLOTS, dtype=bool),
-                   np.zeros((SLOTS, ROWS)), np.ones((SLOTS, ROWS)))
+                   np.zeros((SLOTS, ROWS)), np.ones((SLOTS, ROWS)), np.zeros(legs))
 
     def fill(self, slot: int, timetable: Timetable, expected: EfferenceCopy, program: Program
              ) -> None:
@@ -78,6 +81,7 @@ class GaitTables(NamedTuple):
         if steering is not None:
             self.at[slot] = _filled(np.array(steering.speed), ROWS, 'a steering table')
             self.turn[slot] = _filled(np.array(steering.turn), ROWS, 'a steering table')
+            self.sides[:] = np.where(program.robot.left, -0.5, 0.5)
 
 
 def _filled(rows: np.ndarray, size: int, what: str) -> np.ndarray:

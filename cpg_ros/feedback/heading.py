@@ -12,15 +12,40 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Heading: a robot that is turned away turns back."""
+"""Heading: a robot that has been turned away from its heading turns back."""
 
 import math
 
+from cpg_ros.feedback.law import Gain, Law
 from cpg_ros.integration.jit import jit
+
+LAW = Law(
+    'heading', 'hold the heading, by strides that differ between left and right', True,
+    gains={
+        'turn': Gain(1.0, 10.0, '1/s', 'yaw rate asked for per rad of heading error'),
+        'turn_most': Gain(0.6, 6.0, 'rad/s', 'the largest yaw rate asked for')})
 
 
 @jit
-def turn(wanted, yaw, gains):
-    """Return the yaw rate to ask of the legs, rad/s; headings in rad."""
+def yaw_rate(wanted, yaw, gains):
+    """Return the yaw rate that corrects the heading, rad/s; headings in rad."""
     error = (wanted - yaw + math.pi) % (2.0 * math.pi) - math.pi
     return min(max(gains.turn * error, -gains.turn_most), gains.turn_most)
+
+
+@jit
+def response(speeds, yaw_rates, speed):
+    """Return the yaw rate for each unit by which right strides exceed left ones, rad/s.
+
+    Args:
+        speeds: of the steering table, m/s, rising, shape (rows,).
+        yaw_rates: at these, rad/s, shape (rows,).
+        speed: forward, m/s.
+
+    """
+    k = 0
+    while k + 2 < speeds.shape[0] and speed > speeds[k + 1]:
+        k += 1
+    gap = speeds[k + 1] - speeds[k]
+    up = min(max((speed - speeds[k]) / gap, 0.0), 1.0) if gap > 0.0 else 0.0
+    return yaw_rates[k] + up * (yaw_rates[k + 1] - yaw_rates[k])

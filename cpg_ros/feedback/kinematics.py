@@ -20,6 +20,7 @@ Frames are the base's: x forward, y left, z up. A leg of two joints has no way s
 from dataclasses import dataclass
 from functools import cached_property
 import math
+from typing import NamedTuple
 
 from cpg_ros.errors import InputError
 from cpg_ros.integration.jit import entry, jit
@@ -29,6 +30,23 @@ import numpy as np
 
 #: Of free fall, m/s^2.
 GRAVITY = 9.81
+
+
+class LegArrays(NamedTuple):
+    """A geometry as compiled code takes it.
+
+    Attributes:
+        rows: of Geometry, shape (legs, 14).
+        columns: of Geometry, shape (legs, 3).
+        radius: of the feet, m.
+        weight: of the robot, N.
+
+    """
+
+    rows: np.ndarray
+    columns: np.ndarray
+    radius: float
+    weight: float
 
 
 @dataclass(frozen=True)
@@ -65,6 +83,11 @@ class Geometry:
         """A row for each leg as the kernels take it, shape (legs, 14)."""
         return np.column_stack([self.turns, self.hips, self.thighs, self.uppers.real,
                                 self.uppers.imag, self.lowers.real, self.lowers.imag, self.bends])
+
+    @cached_property
+    def arrays(self) -> LegArrays:
+        """What the kernels need of it."""
+        return LegArrays(self.rows, self.columns, self.radius, self.weight)
 
 
 def geometry_of(robot: Robot, body: BodyGeometry | None = None) -> Geometry:

@@ -14,23 +14,39 @@
 
 """Pace: a body that is pushed sideways steps faster, for a while.
 
-A gait that is hurried sways less and goes faster than its efference copy says, which would pass
-for a push: so the law tires, and speed forward, which follows from the pace itself, is no matter
-of it.
+A gait at a higher frequency sways less and is faster than its efference copy says, which would
+pass for a push. The law therefore fatigues, and it disregards the forward speed, which follows
+from the frequency itself.
 """
 
 import math
 
+from cpg_ros.feedback.law import Gain, Law, Variable
 from cpg_ros.integration.jit import jit
+
+LAW = Law(
+    'pace', 'take faster strides for a while when the body is pushed sideways', True,
+    gains={
+        'pace_from': Gain(0.12, 1.2, 'm/s',
+                          'sideways velocity error above which strides become faster'),
+        'pace_gain': Gain(4.0, 40.0, 's/m',
+                          'relative increase of the stride frequency per m/s above pace_from'),
+        'pace_most': Gain(0.8, 8.0, '', 'largest relative increase of the stride frequency'),
+        'pace_fatigue': Gain(2.0, 20.0, '',
+                             'how many times the mean of recent increases is subtracted from '
+                             'a new one'),
+        'pace_memory': Gain(2.0, 20.0, 's', 'time constant of the mean of recent increases')},
+    memory={
+        'fatigue': Variable('low-passed relative increase of the stride frequency')})
 
 
 @jit
-def hurry(left, fatigue, gains):
-    """Return what to add to the factor of the stride frequency.
+def frequency_change(left, fatigue, gains):
+    """Return the relative increase of the stride frequency.
 
     Args:
         left: velocity to the left beyond what is expected, m/s.
-        fatigue: mean of what was added of late, see tire.
+        fatigue: mean of the recent increases, see update_fatigue.
         gains: of the law.
 
     """
@@ -39,6 +55,6 @@ def hurry(left, fatigue, gains):
 
 
 @jit
-def tire(fatigue, added, gains, dt):
-    """Return the mean of what has been added to the factor of late, dt in s later."""
+def update_fatigue(fatigue, added, gains, dt):
+    """Return the low-passed increase of the stride frequency, dt in s later."""
     return fatigue + (1.0 - math.exp(-dt / gains.pace_memory)) * (added - fatigue)

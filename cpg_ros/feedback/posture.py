@@ -14,7 +14,25 @@
 
 """Posture: legs of the low side push, and a foot in the air stays level to gravity."""
 
+from cpg_ros.feedback.law import Gain, Law
 from cpg_ros.integration.jit import jit
+
+LAW = Law(
+    'posture', 'keep the body level, through the legs in stance and the height of feet '
+    'in swing', True,
+    gains={
+        'roll': Gain(1.6, 16.0, '1/rad',
+                     'how far posture draws a foot in, per metre to the left and rad of roll'),
+        'roll_rate': Gain(0.14, 1.4, 's/rad',
+                          'how far posture draws a foot in, per metre to the left and rad/s '
+                          'of roll rate'),
+        'pitch': Gain(1.1, 11.0, '1/rad',
+                      'how far posture lets a foot out, per metre to the front and rad of '
+                      'pitch'),
+        'pitch_rate': Gain(0.062, 0.62, 's/rad',
+                           'how far posture lets a foot out, per metre to the front and rad/s '
+                           'of pitch rate'),
+        'posture_most': Gain(0.08, 0.8, 'm', 'the most that posture moves a foot in stance')})
 
 
 @jit

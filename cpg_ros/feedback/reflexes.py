@@ -12,11 +12,28 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Reflexes: over what a foot hits, down to what it misses, and no further where it has landed."""
+"""Reflexes: lift a foot over obstacles, reach for missing ground, stop where it lands early."""
 
 import math
 
+from cpg_ros.feedback.law import Gain, Law, Variable
 from cpg_ros.integration.jit import jit
+
+LAW = Law(
+    'reflexes', 'lift feet over obstacles, and reach for ground that is missing', True,
+    gains={
+        'lift': Gain(0.06, 0.6, 'm',
+                     'how far a foot is lifted when it hits something in swing'),
+        'reach_rate': Gain(0.3, 3.0, 'm/s',
+                           'speed at which a foot that finds no ground in stance reaches for '
+                           'it'),
+        'reach_most': Gain(0.05, 0.5, 'm',
+                           'the most that a foot without ground reaches for it'),
+        'reflex_rate': Gain(8.0, 80.0, '1/s',
+                            'rate at which the lift, the reach and the height held after an '
+                            'early landing decay')},
+    memory={
+        'reflex_state': Variable('of each leg, see LIFT to LANDED', ('legs', 5))})
 
 #: Shares of the swing in which a foot may stumble, and from which on it may land early; before,
 #: it may still be on its way off the ground.
@@ -27,17 +44,17 @@ MISSED = 0.1
 LEANS = 0.005
 #: Time in which a foot is lifted over what it hits, s.
 LIFTING = 0.01
-#: What a foot's reflexes have built up: the lift over an obstacle, the reach for the ground and
-#: the height held after an early landing, m; the height at which it landed, m; whether it has.
+#: State of a foot's reflexes: the lift over an obstacle, the reach for the ground and the height
+#: held after an early landing, m; the height at which it landed early, m; whether it has.
 LIFT, REACH, HELD, HEIGHT, LANDED = range(5)
 
 
 @jit
-def advance(built, contact, swinging, progress, height, lifted, gains, dt):
+def advance(state, contact, swinging, progress, height, lifted, gains, dt):
     """Return how far to draw a foot in, m.
 
     Args:
-        built: by its reflexes, shape (5,), changed in place.
+        state: of its reflexes, shape (5,), changed in place.
         contact: whether the foot is on the ground.
         swinging: whether it is meant to be in the air.
         progress: share of that swing, or else of its stance, that is over.
@@ -50,22 +67,22 @@ def advance(built, contact, swinging, progress, height, lifted, gains, dt):
     fade = math.exp(-gains.reflex_rate * dt)
     late = swinging and progress >= EARLY
     if swinging and contact and STUMBLE < progress < EARLY:
-        built[LIFT] = min(built[LIFT] + gains.lift * dt / LIFTING, gains.lift)
+        state[LIFT] = min(state[LIFT] + gains.lift * dt / LIFTING, gains.lift)
     elif late:
         # Back to where the gait lands, or the leg were too short for the body's weight.
-        built[LIFT] = min(built[LIFT], gains.lift * (1.0 - progress) / (1.0 - EARLY))
+        state[LIFT] = min(state[LIFT], gains.lift * (1.0 - progress) / (1.0 - EARLY))
     elif not swinging:
-        built[LIFT] *= fade
+        state[LIFT] *= fade
     if not (swinging or contact) and progress > MISSED and lifted < LEANS:
-        built[REACH] = min(built[REACH] + gains.reach_rate * dt, gains.reach_most)
+        state[REACH] = min(state[REACH] + gains.reach_rate * dt, gains.reach_most)
     elif swinging:
-        built[REACH] *= fade
-    if late and contact and not built[LANDED]:
-        built[HEIGHT], built[LANDED] = height + max(built[LIFT], built[HELD]), 1.0
+        state[REACH] *= fade
+    if late and contact and not state[LANDED]:
+        state[HEIGHT], state[LANDED] = height + max(state[LIFT], state[HELD]), 1.0
     elif not late:
-        built[LANDED] = 0.0
-    if built[LANDED]:
-        built[HELD] = min(max(built[HEIGHT] - height, 0.0), gains.lift)
+        state[LANDED] = 0.0
+    if state[LANDED]:
+        state[HELD] = min(max(state[HEIGHT] - height, 0.0), gains.lift)
     else:
-        built[HELD] *= fade
-    return max(built[LIFT], built[HELD]) - built[REACH]
+        state[HELD] *= fade
+    return max(state[LIFT], state[HELD]) - state[REACH]

@@ -14,17 +14,35 @@
 
 """Sidestep: feet carry the body sideways while they stand, and step back while they swing.
 
-How far they get depends on how the gait rocks the body: what is missing is added up and asked for.
+How fast that is depends on how the gait rocks the body, so the speed is corrected by an integral.
 """
 
+from cpg_ros.feedback import placement
+from cpg_ros.feedback.law import Gain, Law, Variable
 from cpg_ros.integration.jit import jit
+
+LAW = Law(
+    'sidestep', 'follow the sideways speed of cmd_vel', True,
+    gains={
+        'sidestep_share': Gain(1.1, 11.0, '',
+                               'share of the commanded sideways motion that feet carry out'),
+        'sidestep_most': Gain(0.08, 0.8, 'm', 'the most that a foot is carried sideways'),
+        'sidestep_rate': Gain(0.5, 5.0, '1/s',
+                              'how fast the sideways speed that feet are asked for is '
+                              'corrected by what is missing of it'),
+        'sidestep_more': Gain(1.0, 10.0, '',
+                              'largest such correction, as a share of the commanded sideways '
+                              'speed')},
+    memory={
+        'sidestep_displacement': Variable('of each foot to the left [m]', ('legs',)),
+        'sidestep_correction': Variable('added to the commanded sideways speed [m/s]')})
 
 
 @jit
 def landing(wanted, stance, gains):
     """Return where a foot is to land, m to the left of where the gait has it.
 
-    Half of the way that the body is to go over the foot.
+    That is half of the distance that the body moves over the foot.
 
     Args:
         wanted: speed to the left, m/s.
@@ -37,25 +55,43 @@ def landing(wanted, stance, gains):
 
 
 @jit
-def carry(way, wanted, gains, dt):
-    """Return how far to the left a foot on the ground is of where the gait has it, m, dt later."""
-    way -= dt * gains.sidestep_share * wanted
-    return min(max(way, -gains.sidestep_most), gains.sidestep_most)
+def carry(displacement, wanted, gains, dt):
+    """Return the displacement to the left of a foot on the ground, m, dt in s later."""
+    displacement -= dt * gains.sidestep_share * wanted
+    return min(max(displacement, -gains.sidestep_most), gains.sidestep_most)
 
 
 @jit
-def gather(added, missing, wanted, gains, dt):
-    """Return what is asked of the feet beyond what is wanted, m/s, dt in s later.
-
-    Nothing where nothing is wanted.
+def advance(displacement, swinging, wanted, stance, gains, dt):
+    """Return the displacement of a foot to the left, m, dt in s later.
 
     Args:
-        added: so far, m/s.
-        missing: speed to the left, m/s.
+        displacement: now, m.
+        swinging: whether the foot is meant to be in the air.
         wanted: speed to the left, m/s.
+        stance: how long the foot will stand, s.
+        gains: of the law.
+        dt: s.
+
+    """
+    if swinging:
+        return placement.in_swing(displacement, landing(wanted, stance, gains), gains, dt)
+    return carry(displacement, wanted, gains, dt)
+
+
+@jit
+def correct_speed(correction, missing, wanted, gains, dt):
+    """Return what to add to the commanded speed to the left, m/s, dt in s later.
+
+    0 where none is commanded.
+
+    Args:
+        correction: so far, m/s.
+        missing: speed to the left, m/s.
+        wanted: commanded speed to the left, m/s.
         gains: of the law.
         dt: s.
 
     """
     most = gains.sidestep_more * abs(wanted)
-    return min(max(added + dt * gains.sidestep_rate * missing, -most), most)
+    return min(max(correction + dt * gains.sidestep_rate * missing, -most), most)

@@ -12,21 +12,35 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Slope: feet under the body along gravity, not along the body."""
+"""Slope: feet stay under the body along gravity, not along the body's own vertical."""
 
 import math
 
+from cpg_ros.feedback.law import Gain, Law, Variable
 from cpg_ros.integration.jit import jit
+
+LAW = Law(
+    'slope', 'move the feet under the centre of mass on slopes', True,
+    gains={
+        'slope_share': Gain(0.7, 7.0, '',
+                            'share of the way to the vertical through the body by which feet '
+                            'are moved'),
+        'slope_height': Gain(0.3, 3.0, 'm', 'height of the body above its feet'),
+        'slope_filter': Gain(0.5, 5.0, 's',
+                             'time constant of the filter on the angles of the ground'),
+        'slope_most': Gain(0.1, 1.0, 'm', 'the most that slope moves the feet')},
+    memory={
+        'ground_angles': Variable('low-passed roll and pitch [rad]', (2,))})
 
 
 @jit
-def follow(ground, lean, gains, dt):
-    """Return the low-passed angle of the ground, rad, dt in s later."""
-    return ground + (1.0 - math.exp(-dt / gains.slope_filter)) * (lean - ground)
+def update_ground(ground, angle, gains, dt):
+    """Return the angle of the ground, rad, dt in s later: the body's low-passed roll or pitch."""
+    return ground + (1.0 - math.exp(-dt / gains.slope_filter)) * (angle - ground)
 
 
 @jit
 def shift(ground, gains):
-    """Return how far to move all feet uphill of an angle in rad, m."""
+    """Return how far to move all feet uphill, m, on ground at an angle in rad."""
     far = gains.slope_share * gains.slope_height * math.tan(ground)
     return min(max(far, -gains.slope_most), gains.slope_most)

@@ -14,18 +14,31 @@
 
 """Speed: a robot that is too slow takes longer strides."""
 
+from cpg_ros.feedback.law import Gain, Law, Variable
 from cpg_ros.integration.jit import jit
+
+LAW = Law(
+    'speed', 'hold the speed, through the length of the strides', True,
+    gains={
+        'speed_share': Gain(0.5, 5.0, 's/m',
+                            'how much longer strides become per m/s of missing speed'),
+        'speed_rate': Gain(0.3, 3.0, '1/m',
+                           'how much longer strides become per metre of missing distance'),
+        'speed_most': Gain(0.3, 3.0, '',
+                           'the most by which speed changes the length of strides')},
+    memory={
+        'speed_integral': Variable('of the missing forward speed [m]')})
 
 
 @jit
-def longer(missing, way, gains):
-    """Return what to add to strides; missing speed in m/s, its integral in m."""
-    return min(max(gains.speed_share * missing + gains.speed_rate * way, -gains.speed_most),
+def stride_change(missing, integral, gains):
+    """Return what to add to the strides; the missing speed in m/s, its integral in m."""
+    return min(max(gains.speed_share * missing + gains.speed_rate * integral, -gains.speed_most),
                gains.speed_most)
 
 
 @jit
-def gather(way, missing, gains, dt):
+def integrate(integral, missing, gains, dt):
     """Return the integral of the missing speed, m, no larger than the law can use."""
     most = gains.speed_most / max(gains.speed_rate, 1e-9)
-    return min(max(way + dt * missing, -most), most)
+    return min(max(integral + dt * missing, -most), most)

@@ -22,7 +22,15 @@ their mean.
 
 import math
 
+from cpg_ros.feedback.law import Gain, Law
 from cpg_ros.integration.jit import jit
+
+LAW = Law(
+    'tegotae', 'keep a leg that bears load in its stance', False,
+    gains={
+        'tegotae_gain': Gain(4.0, 40.0, 'rad/s',
+                             "largest change of the phase's rate when a leg bears the whole "
+                             'weight')})
 
 
 @jit

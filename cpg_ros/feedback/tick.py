@@ -37,207 +37,191 @@ from cpg_ros.integration.jit import entry, jit
 from cpg_ros.motion.strides import approach
 import numpy as np
 
-#: Joints are where they are told to be a little later: corrections come ahead by this, cycles.
+#: Joints lag behind their commands, so corrections lead the pattern by this, cycles.
 LEAD = 0.04
+#: The stride frequency is never scaled to less than this.
+SLOWEST = 0.2
 
 
-class Memory(NamedTuple):
-    """What the feedback keeps from tick to tick, of each run.
+class PlannedMotion(NamedTuple):
+    """What the pattern plans and what is commanded, of each run.
 
     Attributes:
-        velocity: of the base in its own frame, m/s, shape (runs, 3).
-        contact: whether each foot is on the ground, shape (runs, legs).
-        way: by which each foot is moved now, m, shape (runs, legs, 3).
-        stepped: of that, by placement, shape (runs, legs, 2).
-        carried: of that, by the sidestep, shape (runs, legs).
-        built: by reflexes, see reflexes, shape (runs, legs, 5).
-        ground: low-passed roll and pitch, rad, shape (runs, 2).
-        missed: integral of the missing speed, m, shape (runs,).
-        aside: asked of the feet beyond the sideways speed that is wanted, m/s, shape (runs,).
-        stride: to be added to each leg's stride, shape (runs, legs).
-        hurry: factor of the stride frequency, shape (runs,).
-        fatigue: low-passed share by which it was above 1 for pushes, shape (runs,).
-        phase: of the first leg at the last tick, cycles, shape (runs,).
-        owed: by the touchdown reset to the phase, cycles, shape (runs,).
-        asked: wanted speed forward and to the left as it is approached, m/s, and in a second row
-            its rates, m/s^2, shape (runs, 2, 2).
-        landed, seen, scratch, own: for passing on within a tick.
+        angles: of the joints, rad, shape (runs, joints).
+        phase: of the first leg, cycles, shape (runs,).
+        gaits: slots of the gait that is left and of that which is entered, shape (runs, 2).
+        mix: share of the one that is entered, shape (runs,).
+        velocity: wanted forward and to the left, m/s, shape (runs, 2).
+        heading: wanted, rad, shape (runs,).
 
     """
 
-    velocity: np.ndarray
-    contact: np.ndarray
-    way: np.ndarray
-    stepped: np.ndarray
-    carried: np.ndarray
-    built: np.ndarray
-    ground: np.ndarray
-    missed: np.ndarray
-    aside: np.ndarray
-    stride: np.ndarray
-    hurry: np.ndarray
-    fatigue: np.ndarray
+    angles: np.ndarray
     phase: np.ndarray
-    owed: np.ndarray
-    asked: np.ndarray
-    landed: np.ndarray
-    seen: np.ndarray
-    scratch: np.ndarray
-    own: np.ndarray
+    gaits: np.ndarray
+    mix: np.ndarray
+    velocity: np.ndarray
+    heading: np.ndarray
 
-    @classmethod
-    def empty(cls, runs: int, legs: int) -> 'Memory':
-        """Remember nothing."""
-        return cls(np.zeros((runs, 3)), np.zeros((runs, legs), dtype=bool),
-                   np.zeros((runs, legs, 3)), np.zeros((runs, legs, 2)), np.zeros((runs, legs)),
-                   np.zeros((runs, legs, 5)), np.zeros((runs, 2)), np.zeros(runs),
-                   np.zeros(runs), np.zeros((runs, legs)), np.ones(runs), np.zeros(runs),
-                   np.zeros(runs), np.zeros(runs), np.zeros((runs, 2, 2)),
-                   np.zeros(legs, dtype=bool), np.zeros((legs, 4)), np.zeros((5, 3)),
-                   np.zeros(SIGNALS))
+
+class Deviation(NamedTuple):
+    """By how much the body's motion differs from the expected one: m/s, rad/s, rad."""
+
+    vx: float
+    vy: float
+    wx: float
+    wy: float
+    roll: float
+    pitch: float
 
 
 @jit
-def _steer(tables, slot, sides, gains, memory, run, missing, wanted, course, yaw, dt, share):
-    """Work out what is added to strides."""
-    stride = memory.stride[run]
+def _deviation(tables, memory, sensors, planned, run, level):
+    """Return what differs from the gaits' efference copies and the wanted sideways speed."""
+    old, new, mix = planned.gaits[run, 0], planned.gaits[run, 1], planned.mix[run]
+    phase, forward = planned.phase[run], memory.wanted_velocity[run, 0, 0]
+    expected, turning, rpy = memory.expected, sensors.angular_velocity[run], sensors.rpy[run]
+    expected[:] = 0.0
+    expect(tables.speeds[old], tables.expected[old], phase, forward, 1.0 - mix, expected)
+    if mix > 0.0:
+        expect(tables.speeds[new], tables.expected[new], phase, forward, mix, expected)
+    for k in range(SIGNALS):
+        expected[k] *= level
+    left = memory.wanted_velocity[run, 0, 1]
+    return Deviation(memory.velocity[run, 0] - expected[0],
+                     memory.velocity[run, 1] - expected[1] - left,
+                     turning[0] - expected[2], turning[1] - expected[3],
+                     rpy[0] - expected[4], rpy[1] - expected[5])
+
+
+@jit
+def _change_strides(tables, gains, memory, run, slot, missing, headings, step):
+    """Fill what is added to strides; missing speed in m/s, wanted and measured heading in rad."""
+    stride, (dt, share, _) = memory.stride[run], step
     stride[:] = 0.0
     if not tables.steered[slot]:
         return
     longer = uneven = 0.0
     if gains.speed:
-        memory.missed[run] = speed.gather(memory.missed[run], missing, gains, share * dt)
-        longer = share * speed.longer(missing, memory.missed[run], gains)
+        memory.speed_integral[run] = speed.integrate(memory.speed_integral[run], missing, gains,
+                                                     share * dt)
+        longer = share * speed.stride_change(missing, memory.speed_integral[run], gains)
     if gains.heading:
-        at, turn, k = tables.at[slot], tables.turn[slot], 0
-        while k + 2 < at.shape[0] and wanted > at[k + 1]:
-            k += 1
-        gap = at[k + 1] - at[k]
-        up = min(max((wanted - at[k]) / gap, 0.0), 1.0) if gap > 0.0 else 0.0
-        rate = turn[k] + up * (turn[k + 1] - turn[k])
-        uneven = share * heading.turn(course, yaw, gains) / rate
+        rate = heading.response(tables.at[slot], tables.turn[slot],
+                                memory.wanted_velocity[run, 0, 0])
+        uneven = share * heading.yaw_rate(headings[0], headings[1], gains) / rate
     for leg in range(stride.shape[0]):
-        stride[leg] = longer + uneven * sides[leg]
+        stride[leg] = longer + uneven * tables.sides[leg]
 
 
 @entry
-def tick(rows, columns, radius, weight, gains, tables, sides, memory, angles, rates, loads,
-         lean, turning, push, planned, phases, gaits, mix, wanted, course, dt, share, level,
-         out):
-    """Correct planned angles; arguments as of Feedback.advance, out is filled."""
+def tick(legs, tables, gains, memory, sensors, planned, step, out):
+    """Correct planned angles: fill out, rad, shape (runs, joints), and memory's outputs.
+
+    Args:
+        legs: LegArrays of the robot.
+        tables: GaitTables of its gaits.
+        gains: Gains of the laws.
+        memory: Memory of all runs, changed in place.
+        sensors: SensorData.
+        planned: PlannedMotion.
+        step: its length dt in s, the share of all corrections, the pattern's level, 0 to 1 both.
+        out: filled.
+
+    """
+    rows, columns, (dt, share, level) = legs.rows, legs.columns, step
     quick = 1.0 - math.exp(-dt / gains.smooth)
-    own, foot, feet = memory.own, memory.scratch[0], memory.seen
-    for run in range(planned.shape[0]):
-        memory.landed[:] = memory.contact[run]
-        update(rows, columns, radius, weight, angles[run], rates[run], loads[run], lean[run],
-               turning[run], push[run], dt, memory.velocity[run], memory.contact[run],
-               memory.seen, memory.scratch)
-        old, new = gaits[run, 0], gaits[run, 1]
-        slot = new if mix[run] > 0.5 else old
-        # What is wished for is approached as strides are.
-        approach(wanted[run], wanted[run, :0], dt, memory.asked[run, 0], memory.asked[run, 1])
-        phase = phases[run]
-        forward, left = memory.asked[run, 0, 0], memory.asked[run, 0, 1]
-        own[:] = 0.0
-        expect(tables.speeds[old], tables.expected[old], phase, forward, 1.0 - mix[run], own)
-        if mix[run] > 0.0:
-            expect(tables.speeds[new], tables.expected[new], phase, forward, mix[run], own)
-        for k in range(SIGNALS):
-            own[k] *= level
-        vx = memory.velocity[run, 0] - own[0]
-        vy = memory.velocity[run, 1] - own[1] - left
-        wx, wy = turning[run, 0] - own[2], turning[run, 1] - own[3]
-        roll, pitch = lean[run, 0] - own[4], lean[run, 1] - own[5]
+    foot, feet = memory.scratch[0], memory.leg_velocities
+    for run in range(out.shape[0]):
+        memory.previous_contact[:] = memory.contact[run]
+        update(legs, sensors, run, dt, memory.velocity[run], memory.contact[run],
+               memory.leg_velocities, memory.scratch)
+        wanted, velocity = memory.wanted_velocity[run], planned.velocity[run]
+        # The wanted velocity is approached as strides are.
+        approach(velocity, velocity[:0], dt, wanted[0], wanted[1])
+        old, new, mix = planned.gaits[run, 0], planned.gaits[run, 1], planned.mix[run]
+        slot, phase, left = new if mix > 0.5 else old, planned.phase[run], wanted[0, 1]
+        off = _deviation(tables, memory, sensors, planned, run, level)
 
         # Feet that land together pitch and roll the body wherever they are put: of the laws
-        # that move feet or change the pace, only posture helps a hop.
-        turns = tables.turns[old] + mix[run] * (tables.turns[new] - tables.turns[old])
-        ground = memory.ground[run]
-        ground[0] = slope.follow(ground[0], roll, gains, dt)
-        ground[1] = slope.follow(ground[1], pitch, gains, dt)
+        # that move feet or change the frequency, only posture helps a hop.
+        turns = tables.turns[old] + mix * (tables.turns[new] - tables.turns[old])
+        ground = memory.ground_angles[run]
+        ground[0] = slope.update_ground(ground[0], off.roll, gains, dt)
+        ground[1] = slope.update_ground(ground[1], off.pitch, gains, dt)
+        roll, pitch = off.roll - ground[0], off.pitch - ground[1]
         uphill_x = uphill_y = 0.0
         if gains.slope:
             uphill_x = turns * slope.shift(ground[1], gains)
             uphill_y = -turns * slope.shift(ground[0], gains)
-        step_x = placement.step(vx, wy, gains.step, gains.step_pitch_rate, gains)
-        step_y = placement.step(vy, wx, gains.step_left, gains.step_roll_rate, gains)
-        memory.aside[run] = sidestep.gather(memory.aside[run], -vy, left, gains, share * dt)
-        sideways = left + memory.aside[run]
-        strode = (phase - memory.phase[run] + 0.5) % 1.0 - 0.5
-        memory.phase[run] = phase
+        step_x = placement.step(off.vx, off.wy, gains.step, gains.step_pitch_rate, gains)
+        step_y = placement.step(off.vy, off.wx, gains.step_left, gains.step_roll_rate, gains)
+        memory.sidestep_correction[run] = sidestep.correct_speed(
+            memory.sidestep_correction[run], -off.vy, left, gains, share * dt)
+        sideways = left + memory.sidestep_correction[run]
+        strode = (phase - memory.last_phase[run] + 0.5) % 1.0 - 0.5
+        memory.last_phase[run] = phase
         row = int((phase + LEAD) % 1.0 * POINTS) % POINTS
         now = int(phase % 1.0 * POINTS) % POINTS
-        out[run] = planned[run]
-        leaning, standing, mean_x, mean_y = 0.0, 0, 0.0, 0.0
+        out[run] = planned.angles[run]
+        phase_rate, standing, mean_x, mean_y = 0.0, 0, 0.0, 0.0
         for leg in range(rows.shape[0]):
             hip, thigh, calf = columns[leg, 0], columns[leg, 1], columns[leg, 2]
             feet[leg, 0], feet[leg, 1], feet[leg, 2] = foot_of(
-                rows[leg], planned[run, hip], planned[run, thigh], planned[run, calf])
+                rows[leg], out[run, hip], out[run, thigh], out[run, calf])
             if not tables.swinging[slot, row, leg]:
                 standing, mean_x, mean_y = (standing + 1, mean_x + feet[leg, 0],
                                             mean_y + feet[leg, 1])
         mean_x, mean_y = mean_x / max(standing, 1), mean_y / max(standing, 1)
         for leg in range(rows.shape[0]):
             foot[0], foot[1], foot[2] = feet[leg, 0], feet[leg, 1], feet[leg, 2]
-            swinging = tables.swinging[slot, row, leg]
+            swinging, contact = tables.swinging[slot, row, leg], memory.contact[run, leg]
+            swings_now, progress = tables.swinging[slot, now, leg], tables.progress[slot, now, leg]
             x, y, z = uphill_x, uphill_y, 0.0
             if gains.posture:
                 if swinging:
                     # A hop lands on legs that a falling nose would draw in.
-                    z = turns * posture.in_swing(foot[0], foot[1], roll - ground[0],
-                                                 pitch - ground[1], gains)
+                    z = turns * posture.in_swing(foot[0], foot[1], roll, pitch, gains)
                 else:
                     # About the middle of the feet that stand: the body is tilted, not raised.
-                    z = posture.in_stance(foot[0] - mean_x, foot[1] - mean_y, roll, pitch, wx,
-                                          wy, gains)
+                    z = posture.in_stance(foot[0] - mean_x, foot[1] - mean_y, off.roll,
+                                          off.pitch, off.wx, off.wy, gains)
             if gains.placement:
-                stepped = memory.stepped[run, leg]
-                if swinging:
-                    stepped[0] = placement.swing(stepped[0], step_x, gains, dt)
-                    stepped[1] = placement.swing(stepped[1], step_y, gains, dt)
-                else:
-                    stepped[0] = placement.stand(stepped[0], gains.give * vx, gains, dt)
-                    stepped[1] = placement.stand(stepped[1], gains.give_left * vy, gains, dt)
-                x, y = x + turns * stepped[0], y + turns * stepped[1]
+                placed = memory.placement_displacement[run, leg]
+                placement.advance(placed, swinging, step_x, step_y, off.vx, off.vy, gains, dt)
+                x, y = x + turns * placed[0], y + turns * placed[1]
             if gains.sidestep:
-                carried = memory.carried[run, leg]
-                if swinging:
-                    stance = tables.duty[slot, leg] * dt / max(strode, 0.1 * dt)
-                    landing = sidestep.landing(sideways, stance, gains)
-                    carried = placement.swing(carried, landing, gains, dt)
-                else:
-                    carried = sidestep.carry(carried, sideways, gains, dt)
-                memory.carried[run, leg] = carried
-                y += carried
+                carried = memory.sidestep_displacement[run]
+                carried[leg] = sidestep.advance(
+                    carried[leg], swinging, sideways,
+                    tables.duty[slot, leg] * dt / max(strode, 0.1 * dt), gains, dt)
+                y += carried[leg]
             if gains.reflexes:
                 z += turns * reflexes.advance(
-                    memory.built[run, leg], memory.contact[run, leg],
-                    tables.swinging[slot, now, leg], tables.progress[slot, now, leg], foot[2],
-                    (roll - ground[0]) * foot[1] - (pitch - ground[1]) * foot[0], gains, dt)
+                    memory.reflex_state[run, leg], contact, swings_now, progress, foot[2],
+                    roll * foot[1] - pitch * foot[0], gains, dt)
             if gains.tegotae:
-                leaning += tegotae.rate(max(loads[run, leg], 0.0) / weight,
-                                        tables.swinging[slot, now, leg],
-                                        tables.progress[slot, now, leg], gains)
-            if gains.touchdown and memory.contact[run, leg] and not memory.landed[leg]:
-                memory.owed[run] += touchdown.change(
-                    tables.swinging[slot, now, leg], tables.progress[slot, now, leg],
-                    tables.duty[slot, leg], gains) / rows.shape[0]
-            way = memory.way[run, leg]
-            way[0] += quick * (share * x - way[0])
-            way[1] += quick * (share * y - way[1])
-            way[2] += quick * (share * z - way[2])
-            move_foot(rows[leg], columns[leg], out[run], foot, way)
-        memory.hurry[run] = 1.0
+                phase_rate += tegotae.rate(max(sensors.foot_forces[run, leg], 0.0) / legs.weight,
+                                           swings_now, progress, gains)
+            if gains.touchdown and contact and not memory.previous_contact[leg]:
+                memory.phase_correction[run] += touchdown.phase_change(
+                    swings_now, progress, tables.duty[slot, leg], gains) / rows.shape[0]
+            displacement = memory.displacement[run, leg]
+            displacement[0] += quick * (share * x - displacement[0])
+            displacement[1] += quick * (share * y - displacement[1])
+            displacement[2] += quick * (share * z - displacement[2])
+            move_foot(rows[leg], columns[leg], out[run], foot, displacement)
+
+        scale, frequency = 1.0, max(strode / dt, 0.1)
         if gains.pace:
-            memory.hurry[run] += share * turns * pace.hurry(vy, memory.fatigue[run], gains)
-        memory.fatigue[run] = pace.tire(memory.fatigue[run], memory.hurry[run] - 1.0, gains,
-                                        dt)
-        frequency = max(strode / dt, 0.1)
-        memory.hurry[run] += share * leaning / (2.0 * math.pi * frequency * rows.shape[0])
+            scale += share * turns * pace.frequency_change(off.vy, memory.fatigue[run], gains)
+        memory.fatigue[run] = pace.update_fatigue(memory.fatigue[run], scale - 1.0, gains, dt)
+        scale += share * phase_rate / (2.0 * math.pi * frequency * rows.shape[0])
         if gains.touchdown:
-            more = share * touchdown.hurry(memory.owed[run], frequency)
-            memory.owed[run] -= more * strode
-            memory.hurry[run] += more
-        memory.hurry[run] = max(memory.hurry[run], 0.2)
-        _steer(tables, slot, sides, gains, memory, run, -vx, forward, course[run],
-               lean[run, 2], dt, share)
+            change = share * touchdown.frequency_change(memory.phase_correction[run], frequency)
+            memory.phase_correction[run] -= change * strode
+            scale += change
+        memory.frequency_scale[run] = max(scale, SLOWEST)
+
+        _change_strides(tables, gains, memory, run, slot, -off.vx,
+                        (planned.heading[run], sensors.rpy[run, 2]), step)

@@ -16,19 +16,29 @@
 
 Aoi and Tsuchiya, "Locomotion control of a biped robot using nonlinear oscillators", Autonomous
 Robots 19 (2005) 219-232, set the phase to that of touchdown. Here legs whose phases are locked
-share the change, and the clock makes up for it in a while: joints do not jump.
+share the change, and the stride frequency makes it gradually, so that joints do not jump.
 """
 
+from cpg_ros.feedback.law import Gain, Law, Variable
 from cpg_ros.integration.jit import jit
 
-#: In this time the clock makes up for most of a change, s; by this much it is faster at most.
-WHILE, MOST = 0.05, 0.5
+LAW = Law(
+    'touchdown', "begin a leg's stance when its foot lands", False,
+    gains={
+        'touchdown_gain': Gain(0.5, 5.0, '',
+                               "share of a landing's phase error that is corrected")},
+    memory={
+        'phase_correction': Variable('still to be made after landings [cycles]')})
+
+#: Time constant with which a change of the phase is made, s; largest relative change of the
+#: stride frequency.
+SETTLING, MOST = 0.05, 0.5
 #: A foot that lands earlier than this share of its swing has met something else.
 EARLIEST = 0.5
 
 
 @jit
-def change(swinging, progress, duty, gains):
+def phase_change(swinging, progress, duty, gains):
     """Return by how much a leg's phase is to be changed when its foot lands, cycles.
 
     Args:
@@ -46,6 +56,9 @@ def change(swinging, progress, duty, gains):
 
 
 @jit
-def hurry(owed, frequency):
-    """Return what is added to the clock's factor; what is owed in cycles, the frequency in Hz."""
-    return min(max(owed / (WHILE * frequency), -MOST), MOST)
+def frequency_change(correction, frequency):
+    """Return the relative change of the stride frequency.
+
+    The correction of the phase that is still to be made in cycles, the frequency in Hz.
+    """
+    return min(max(correction / (SETTLING * frequency), -MOST), MOST)

@@ -21,10 +21,11 @@ from cpg_ros.feedback.estimate import TOUCH
 from cpg_ros.feedback.feedback import Feedback
 from cpg_ros.feedback.gains import Gains
 from cpg_ros.feedback.gait_tables import SLOTS
+from cpg_ros.feedback.input_monitor import Fade
 from cpg_ros.feedback.kinematics import Geometry
 from cpg_ros.feedback.plausibility import agreement
+from cpg_ros.feedback.tick import PlannedMotion
 from cpg_ros.feedback.timetable import POINTS, Timetable
-from cpg_ros.feedback.watch import Fade
 from cpg_ros.motion.pattern import Pattern
 from cpg_ros.motion.plan import Program
 from cpg_ros.nodes.senses_input import SensesInput
@@ -68,8 +69,9 @@ class FeedbackLoop:
         self._known: list[tuple[Program, Timetable]] = []
         self._inputs: SensesInput | None = None
         self._least = TOUCH * geometry.weight
-        self._gaits, self._mix = np.zeros((1, 2), dtype=np.int64), np.zeros(1)
-        self._phase, self._speeds, self._course = np.zeros(1), np.zeros((1, 2)), np.zeros(1)
+        self._planned = PlannedMotion(np.zeros((1, len(pattern.robot.joints))), np.zeros(1),
+                                      np.zeros((1, 2), dtype=np.int64), np.zeros(1),
+                                      np.zeros((1, 2)), np.zeros(1))
         self.wanted, self.waiting, self.faults = False, True, ''
         self._trim = np.zeros(len(pattern.robot.legs))
         self.restart()
@@ -111,7 +113,7 @@ class FeedbackLoop:
     def ages(self, now: float) -> dict[str, float]:
         """Return name -> time since the last message that could be believed, s; inf for none."""
         return {} if self._inputs is None else {
-            watch.name: now - watch.believed for watch in self._inputs.watches}
+            monitor.name: now - monitor.believed for monitor in self._inputs.monitors}
 
     def sense(self, dt: float, now: float) -> None:
         """Take what has arrived, and have the coming tick of dt corrected by it; s both."""
@@ -136,10 +138,10 @@ class FeedbackLoop:
     def _judge(self, inputs: SensesInput, now: float) -> None:
         """Find out what keeps the feedback out."""
         found, self.waiting = [], False
-        for watch in inputs.watches:
-            if fault := watch.fault(now):
-                found.append(f'{watch.name}: {fault} for {now - watch.since:.1f} s')
-                self.waiting = self.waiting or watch.believed == -math.inf
+        for monitor in inputs.monitors:
+            if fault := monitor.fault(now):
+                found.append(f'{monitor.name}: {fault} for {now - monitor.since:.1f} s')
+                self.waiting = self.waiting or monitor.believed == -math.inf
         pattern = self._pattern
         program = pattern.program
         if program.motion.efference is None:
@@ -149,32 +151,33 @@ class FeedbackLoop:
             self._agrees = 1.0
         else:
             row = int(pattern.phases[0] * POINTS) % POINTS
-            self._agrees = agreement(inputs.senses.loads[0], self._least, times.swinging[row],
+            self._agrees = agreement(inputs.senses.foot_forces[0], self._least,
+                                     times.swinging[row],
                                      min(self._dt * program.frequency, 1.0), self._agrees)
             if self._agrees < AGREES:
                 found.append(f'{inputs.feet}: the contacts do not go with the gait')
         self.faults = '; '.join(found)
 
-    def _correct(self, planned: np.ndarray) -> np.ndarray:
+    def _correct(self, angles: np.ndarray) -> np.ndarray:
         pattern, feedback, inputs = self._pattern, self._feedback, self._inputs
         assert inputs is not None
-        old, new, self._mix[0] = pattern.fading
-        self._gaits[0] = feedback.slot(old), feedback.slot(new)
-        self._phase[0] = pattern.phases[0]
+        planned, heading = self._planned, self._planned.heading
+        planned.angles[0] = angles
+        old, new, planned.mix[0] = pattern.fading
+        planned.gaits[0] = feedback.slot(old), feedback.slot(new)
+        planned.phase[0] = pattern.phases[0]
         forward, left, turn = self._motion()
-        self._speeds[0] = forward, left
-        yaw = float(inputs.senses.lean[0, 2])
+        planned.velocity[0] = forward, left
+        yaw = float(inputs.senses.rpy[0, 2])
         if self.share and pattern.level:
             # The heading is kept where no turn is asked for, and otherwise turns on.
-            ahead = (self._course[0] + turn * self._dt - yaw + math.pi) % (2.0 * math.pi) - math.pi
-            self._course[0] = yaw + min(max(ahead, -FURTHEST), FURTHEST)
+            ahead = (heading[0] + turn * self._dt - yaw + math.pi) % (2.0 * math.pi) - math.pi
+            heading[0] = yaw + min(max(ahead, -FURTHEST), FURTHEST)
         else:
-            self._course[0] = yaw
+            heading[0] = yaw
         memory = feedback.memory
-        found = feedback.advance(inputs.senses, planned[None], self._phase, self._gaits,
-                                 self._mix, self._speeds, self._course, self._dt,
-                                 self.share, pattern.level)
-        pattern.hurry = float(memory.hurry[0])
+        found = feedback.advance(inputs.senses, planned, self._dt, self.share, pattern.level)
+        pattern.hurry = float(memory.frequency_scale[0])
         if pattern.drive is not None:
             self._trim[:] = memory.stride[0]
             pattern.drive.trim = self._trim

@@ -15,18 +15,14 @@
 """The parameters of the feedback: its laws, their gains, and the topics that it listens to."""
 
 from collections.abc import Callable
-import re
 from typing import Any
 
-from cpg_ros.feedback.gains import Gains
+from cpg_ros.feedback.gains import GAINS as GAIN_OF
+from cpg_ros.feedback.gains import Gains, LAWS
 from cpg_ros.nodes.parameter_spec import Spec
 from cpg_ros.nodes.senses_input import CONTACTS
 
 PREFIX = 'feedback.'
-#: A gain may be this many times the default, and up to 1 where that is 0.
-RANGE = 10.0
-
-
 #: The switch, which has been PREFIX without its dot: no name is the beginning of another, or
 #: ``ros2 param dump`` could not nest them.
 ENABLED, FORMER = f'{PREFIX}enabled', PREFIX.rstrip('.')
@@ -51,26 +47,11 @@ TOPICS = {
                                     'with the loads on the feet in N; with wrenches, the name of '
                                     "each leg's own topic, as in lh/foot_contacts",
                                     read_only=True)}
-
-
-def _texts() -> dict[str, str]:
-    """Return what each gain is, as its class says."""
-    _, _, listed = (Gains.__doc__ or '').partition('Attributes:')
-    texts = {}
-    for names, text in re.findall(r'^ {8}([a-z_, ]+?): (.+?)(?=\n {8}\w|\Z)', listed, re.S | re.M):
-        for name in names.split(', '):
-            texts[name] = ' '.join(text.split()).rstrip('.')
-    return texts
-
-
-def _gain(default: float, text: str) -> Spec:
-    return Spec(default, text, 0.0, round(RANGE * default, 6) or 1.0)
-
-
-#: Laws and gains, all of which can be set at any time.
-GAINS = {f'{PREFIX}{name}': Spec(default, _texts()[name]) if isinstance(default, bool)
-         else _gain(default, _texts()[name])
-         for name, default in Gains._field_defaults.items()}
+#: Switches of the laws and gains, all of which can be set at any time.
+GAINS = {**{f'{PREFIX}{law.name}': Spec(law.on, law.text) for law in LAWS},
+         **{f'{PREFIX}{name}': Spec(gain.default, f'{gain.text} [{gain.unit}]' if gain.unit
+                                    else gain.text, 0.0, gain.high)
+            for name, gain in GAIN_OF.items()}}
 SPECS = {**TOPICS, **GAINS}
 
 

@@ -18,8 +18,9 @@ from collections.abc import Callable, Sequence
 from functools import partial
 import math
 
-from cpg_ros.feedback.estimate import Senses
+from cpg_ros.feedback.estimate import SensorData
 from cpg_ros.feedback.foot_force import loads_of
+from cpg_ros.feedback.input_monitor import InputMonitor
 from cpg_ros.feedback.kinematics import Geometry
 from cpg_ros.feedback.plausibility import (
     IMU,
@@ -29,7 +30,6 @@ from cpg_ros.feedback.plausibility import (
     judge_loads,
     VERDICTS,
 )
-from cpg_ros.feedback.watch import Watch
 from cpg_ros.integration.jit import bound
 from cpg_ros.nodes.raw_messages import (
     JointLayout,
@@ -58,10 +58,10 @@ Reader = Callable[[bytes, float], tuple[str, bytes, bool]]
 
 
 class _Input:
-    """One topic: its newest message, and the watch over it."""
+    """One topic: its newest message and its monitor."""
 
     def __init__(self, node: Node, kind: type, topic: str) -> None:
-        self.newest, self.watch = Newest(node, kind, topic), Watch(topic)
+        self.newest, self.monitor = Newest(node, kind, topic), InputMonitor(topic)
         self.stamped = hasattr(kind, 'header')
 
 
@@ -70,7 +70,7 @@ class SensesInput:
 
     Attributes:
         senses: of one run, filled in place with what could be believed last.
-        watches: over the inputs.
+        monitors: of the inputs.
         topics: of the inputs, resolved.
         feet: what tells of contacts.
 
@@ -95,13 +95,15 @@ class SensesInput:
         self._names = [joint.name for joint in robot.joints]
         self._limits = robot.column('lower'), robot.column('upper'), robot.column('velocity')
         count = len(self._names)
-        self.senses = Senses.blank(1, len(self._legs), count)
-        self.senses.angles[0], self.senses.push[0, 2] = robot.column('offset'), 9.81
+        self.senses = SensorData.zeros(1, len(self._legs), count)
+        self.senses.joint_positions[0] = robot.column('offset')
+        self.senses.acceleration[0, 2] = 9.81
         self._efforts = np.zeros(count)
         # Of the one run: rows, so that a tick need not look for them.
         senses = self.senses
-        self._angles, self._rates, self._felt = senses.angles[0], senses.rates[0], senses.loads[0]
-        self._lean, self._turning, self._push = senses.lean[0], senses.turning[0], senses.push[0]
+        self._angles, self._rates = senses.joint_positions[0], senses.joint_velocities[0]
+        self._felt, self._lean = senses.foot_forces[0], senses.rpy[0]
+        self._turning, self._push = senses.angular_velocity[0], senses.acceleration[0]
         self._loads = np.zeros(len(self._legs))
         self._contacts, self.feet = contacts, joints if contacts == 'efforts' else feet
         self._imu, self._joints = _Input(node, Imu, imu), _Input(node, JointState, joints)
@@ -125,13 +127,13 @@ class SensesInput:
         self._judge_loads = bound(judge_loads, told, self._order, 0.1, 0.1, self._heavy[0],
                                   self._felt)
         inputs = [self._imu, self._joints, *self._feet]
-        self.watches: Sequence[Watch] = [one.watch for one in inputs]
+        self.monitors: Sequence[InputMonitor] = [one.monitor for one in inputs]
         self.topics: Sequence[str] = [one.newest.topic for one in inputs]
 
     def restart(self) -> None:
         """Forget when messages came, as where simulated time jumps back."""
-        for watch in self.watches:
-            watch.restart()
+        for monitor in self.monitors:
+            monitor.restart()
 
     def take(self, now: float, moving: bool) -> None:
         """Take what has arrived.
@@ -151,14 +153,14 @@ class SensesInput:
         data = one.newest.take()
         if data is None:
             return
-        watch = one.watch
+        monitor = one.monitor
         try:
-            wrong, content, at_rest = read(data, watch.gap(now))
+            wrong, content, at_rest = read(data, monitor.gap(now))
         except ValueError as error:
             wrong, content, at_rest = str(error), b'', False
         if at_rest and patience < FLIGHT:
             patience = FLIGHT
-        watch.note(now, stamp_of(data) if one.stamped else None, content, wrong, patience)
+        monitor.note(now, stamp_of(data) if one.stamped else None, content, wrong, patience)
 
     def _read_imu(self, data: bytes, gap: float) -> tuple[str, bytes, bool]:
         verdict = self._judge_imu(last_numbers(data, IMU), gap, self._memory, self._lean,

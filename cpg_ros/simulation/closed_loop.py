@@ -22,10 +22,11 @@ from collections.abc import Mapping, Sequence
 import math
 
 from cpg_ros.feedback.efference_copy import EfferenceCopy
-from cpg_ros.feedback.estimate import BodyState, Senses
+from cpg_ros.feedback.estimate import BodyState, SensorData
 from cpg_ros.feedback.feedback import Feedback
 from cpg_ros.feedback.gains import Gains
 from cpg_ros.feedback.kinematics import geometry_of
+from cpg_ros.feedback.tick import PlannedMotion
 from cpg_ros.feedback.timetable import Timetable
 from cpg_ros.motion.plan import Program
 from cpg_ros.simulation.bodies import Bodies
@@ -104,7 +105,7 @@ class ClosedLoop(Bodies):
         before, warm = state[:, moving].copy(), np.zeros((runs, model.nv))
         earlier = state[:, base].copy()
         angle_at, rate_at = 1 + parts.angles[order], moving.start + parts.speeds[order]
-        senses = Senses.blank(runs, legs, len(order))
+        senses = SensorData.zeros(runs, legs, len(order))
         noisy = None if noise is None else NoisySenses(noise, runs, legs, dt)
         velocity, work = np.zeros((runs, 3)), np.zeros((steps, runs))
         fell, arrived = np.full((2, runs), np.inf)
@@ -114,32 +115,35 @@ class ClosedLoop(Bodies):
                    ('phase', 1))}
         none, calm = np.zeros((runs, legs)), np.ones(runs)
         for k in range(steps):
-            pattern.advance(*(none, calm) if gains is None else (memory.stride, memory.hurry))
-            senses.angles[:], senses.rates[:] = state[:, angle_at], state[:, rate_at]
-            np.negative(sensors[:, 2:3 * legs:3], out=senses.loads)
+            pattern.advance(*(none, calm) if gains is None
+                            else (memory.stride, memory.frequency_scale))
+            senses.joint_positions[:] = state[:, angle_at]
+            senses.joint_velocities[:] = state[:, rate_at]
+            np.negative(sensors[:, 2:3 * legs:3], out=senses.foot_forces)
             felt(senses, state[:, 1 + parts.pose[3:]], state[:, base], earlier, dt, velocity)
             noticed = senses if noisy is None else noisy(senses)
             if gains is not None:
-                angles = feedback.advance(noticed, pattern.planned, pattern.phase, pattern.gaits,
-                                          pattern.mix, pattern.wanted, pattern.course, dt,
-                                          1.0, pattern.level)
+                planned = PlannedMotion(pattern.planned, pattern.phase, pattern.gaits, pattern.mix,
+                                        pattern.wanted, pattern.course)
+                angles = feedback.advance(noticed, planned, dt, 1.0, pattern.level)
             else:
                 angles = pattern.planned
                 state_of.update(noticed, dt)
             angles = pattern.confine(angles)
             joints[:, 0], force[:, 0] = angles[:, places], forces[k]
-            for key, value in (('place', state[:, 1 + parts.pose[:2]]), ('lean', senses.lean),
+            for key, value in (('place', state[:, 1 + parts.pose[:2]]), ('lean', senses.rpy),
                                ('velocity', velocity), ('estimated', estimated),
-                               ('turning', senses.turning), ('phase', pattern.phase[:, None])):
+                               ('turning', senses.angular_velocity),
+                               ('phase', pattern.phase[:, None])):
                 record[key][k] = value
-            speeds = senses.rates[:, places]
-            _, applied = torques(model, joints[:, 0], senses.angles[:, places], speeds)
+            speeds = senses.joint_velocities[:, places]
+            _, applied = torques(model, joints[:, 0], senses.joint_positions[:, places], speeds)
             work[k] = np.maximum(applied * speeds, 0.0).sum(axis=1)
             earlier, before = state[:, base].copy(), state[some, moving]
             after, sensed = self.rollout(models, state[some], control[some], warm[some])
             state[some], sensors[some] = after[:, 0], sensed[:, 0]
             warm[some] = (state[some, moving] - before) / dt
-            height = np.cos(senses.lean[:, 0]) * np.cos(senses.lean[:, 1])
+            height = np.cos(senses.rpy[:, 0]) * np.cos(senses.rpy[:, 1])
             down = (height < math.cos(FALLEN)) | (sensors[:, 3 * legs] > 0.0)
             far = state[:, 1 + parts.pose[0]] > goal
             ends = (down | far)[going]

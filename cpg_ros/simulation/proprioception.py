@@ -16,7 +16,7 @@
 
 import math
 
-from cpg_ros.feedback.estimate import Senses
+from cpg_ros.feedback.estimate import SensorData
 from cpg_ros.feedback.kinematics import GRAVITY
 from cpg_ros.integration.jit import entry
 from cpg_ros.simulation.scenario import SensorNoise
@@ -44,12 +44,12 @@ def _feel(quaternions, moving, before, dt, lean, turning, push, velocity):
                 velocity[k, axis] += axes[axis][world] * moving[k, world]
 
 
-def felt(senses: Senses, quaternions: np.ndarray, moving: np.ndarray, before: np.ndarray,
+def felt(senses: SensorData, quaternions: np.ndarray, moving: np.ndarray, before: np.ndarray,
          dt: float, velocity: np.ndarray) -> None:
     """Fill in what the base feels, and its true velocity in its own frame, m/s, (runs, 3).
 
     Args:
-        senses: lean, turning and push are filled.
+        senses: rpy, angular_velocity and acceleration are filled.
         quaternions: of the bases, w x y z, shape (runs, 4).
         moving: velocity in the world's frame, m/s, then angular velocity in the base's, rad/s,
             shape (runs, 6).
@@ -58,7 +58,8 @@ def felt(senses: Senses, quaternions: np.ndarray, moving: np.ndarray, before: np
         velocity: filled.
 
     """
-    _feel(quaternions, moving, before, dt, senses.lean, senses.turning, senses.push, velocity)
+    _feel(quaternions, moving, before, dt, senses.rpy, senses.angular_velocity,
+          senses.acceleration, velocity)
 
 
 class NoisySenses:
@@ -67,22 +68,22 @@ class NoisySenses:
     def __init__(self, noise: SensorNoise, runs: int, legs: int, dt: float) -> None:
         self._noise, self._rng = noise, np.random.default_rng(noise.seed)
         self._later = round(noise.delay / dt)
-        self._waiting: list[Senses] = []
+        self._waiting: list[SensorData] = []
         self._factor = 1.0 + noise.force_bias * self._rng.uniform(-1.0, 1.0, (runs, legs))
         self._lean = noise.orientation_bias * self._rng.choice([-1.0, 1.0], (runs, 2))
 
-    def __call__(self, true: Senses) -> Senses:
+    def __call__(self, true: SensorData) -> SensorData:
         """Return what is noticed now."""
         rng, noise = self._rng, self._noise
-        loads = true.loads * (self._factor + noise.force_noise * rng.normal(
-            size=true.loads.shape))
-        lean = true.lean.copy()
+        loads = true.foot_forces * (self._factor + noise.force_noise * rng.normal(
+            size=true.foot_forces.shape))
+        lean = true.rpy.copy()
         lean[:, :2] += self._lean
-        turning = (true.turning + noise.gyroscope_bias
-                   + noise.gyroscope_noise * rng.normal(size=true.turning.shape))
-        push = true.push + noise.accelerometer_bias
+        turning = (true.angular_velocity + noise.gyroscope_bias
+                   + noise.gyroscope_noise * rng.normal(size=true.angular_velocity.shape))
+        push = true.acceleration + noise.accelerometer_bias
         if noise.accelerometer_noise:
             push += noise.accelerometer_noise * rng.normal(size=push.shape)
-        self._waiting.append(Senses(true.angles.copy(), true.rates.copy(), loads, lean, turning,
-                                    push))
+        self._waiting.append(SensorData(true.joint_positions.copy(), true.joint_velocities.copy(),
+                                        loads, lean, turning, push))
         return self._waiting[0] if len(self._waiting) <= self._later else self._waiting.pop(0)

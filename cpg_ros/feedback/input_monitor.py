@@ -12,13 +12,13 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Whether an input of the feedback can be believed, and since when it cannot."""
+"""Whether an input of the feedback is valid, and since when it is not."""
 
 import math
 
 from cpg_ros.motion.smoothstep import smoothstep
 
-#: An input is out when no message could be believed for this time, s.
+#: An input is out after this time without a valid message, s.
 STALE = 0.05
 #: A stamp that is older, or further ahead, than this, s.
 DELAYED = 0.1
@@ -26,12 +26,12 @@ DELAYED = 0.1
 FADE, GOOD = 0.15, 0.3
 
 
-class Watch:
-    """The age of one input, and what is wrong with its messages.
+class InputMonitor:
+    """Monitors the age of one input and the faults of its messages.
 
     Attributes:
         name: of the input.
-        believed: when its last good message came, s; -inf before the first one.
+        believed: when its last valid message came, s; -inf before the first one.
         since: when it went out, s; NaN while it is in.
 
     """
@@ -46,12 +46,12 @@ class Watch:
         self._changed, self._content, self._wrong = -math.inf, b'', ''
 
     def gap(self, now: float) -> float:
-        """Time since the last message that could be believed, s, at most 1."""
+        """Time since the last valid message, s, at most 1."""
         return min(now - self.believed, 1.0)
 
     def note(self, now: float, stamp: float | None, content: bytes, wrong: str = '',
              patience: float = 0.0) -> None:
-        """Take note of a new message.
+        """Record a new message.
 
         Args:
             now: s.

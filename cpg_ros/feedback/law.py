@@ -1,0 +1,79 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What a feedback law declares beside its kernel: its switch, its gains and its state."""
+
+from collections import namedtuple
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+
+@dataclass(frozen=True)
+class Gain:
+    """A gain of a law, which may be set from 0 to its upper limit.
+
+    Attributes:
+        default: found on a simulated Go2.
+        high: upper limit.
+        unit: '' for a pure number.
+        text: what it does, without the unit.
+
+    """
+
+    default: float
+    high: float
+    unit: str
+    text: str
+
+
+@dataclass(frozen=True)
+class Variable:
+    """An array that is kept from tick to tick; its first axis is that of the runs.
+
+    Attributes:
+        text: what it is, with its unit.
+        shape: for one run; 'legs' stands for their number.
+        initial: value at the start; its type is the array's.
+
+    """
+
+    text: str
+    shape: tuple[int | str, ...] = ()
+    initial: float | bool = 0.0
+
+
+@dataclass(frozen=True)
+class Law:
+    """A feedback law.
+
+    Attributes:
+        name: of its switch.
+        text: what it does.
+        on: whether it is on by default.
+        gains: by name; the names of all laws differ.
+        memory: its state variables by name; these differ, too.
+
+    """
+
+    name: str
+    text: str
+    on: bool
+    gains: Mapping[str, Gain]
+    memory: Mapping[str, Variable] = field(default_factory=dict)
+
+
+def named_tuple(name: str, fields: Iterable[str], defaults: Iterable[Any] = ()) -> Any:
+    """Return a class of named tuples; the laws name its fields, which mypy cannot know."""
+    return namedtuple(name, tuple(fields), defaults=tuple(defaults))
