@@ -17,7 +17,7 @@
 import json
 import math
 
-from cpg_ros.robots.robot_file import load_robot
+from cpg_ros.robots.robot_file import read_robot
 from cpg_ros.robots.urdf import load_urdf
 from cpg_ros.tools.check_robot import main
 from go2 import GO2
@@ -62,7 +62,7 @@ def test_a_robot_file_of_gym_quadrupeds_go2(tmp_path, capsys):
     text = capsys.readouterr().err
     assert 'FL_calf_joint bends in swing' in text and 'feedback can move all feet' in text
     assert 'made from go2.xml: limits are those of the MJCF' in out.read_text()
-    robot = load_robot(out)
+    robot = read_robot(out)
     assert robot.networks == ('delayed', 'quadruped') and set(robot.legs) == set(GO2.legs)
     # What tune and calibrate read off the same model.
     assert robot.geometry == GO2.geometry
@@ -147,4 +147,4 @@ def test_a_model_without_a_free_joint_is_made_without_geometry(tmp_path, capsys)
     assert main(['--mjcf', str(tmp_path / 'held.xml'), '--make', str(tmp_path / 'a.yaml')]) in (
         0, 1)
     assert 'feedback: ' in capsys.readouterr().err
-    assert load_robot(tmp_path / 'a.yaml').geometry is None
+    assert read_robot(tmp_path / 'a.yaml').geometry is None

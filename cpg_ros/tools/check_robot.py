@@ -35,7 +35,7 @@ from cpg_ros.networks.registry import NETWORKS
 from cpg_ros.robots.body_keys import BodyGeometry
 from cpg_ros.robots.description import RobotDescription
 from cpg_ros.robots.robot import Robot
-from cpg_ros.robots.robot_file import find_robot, write_robot
+from cpg_ros.robots.robot_file import load_robot, write_robot
 from cpg_ros.robots.urdf import load_urdf
 from cpg_ros.simulation.body import Body
 from cpg_ros.simulation.leg_geometry import read_geometry
@@ -94,7 +94,7 @@ def _checked(chosen: Namespace) -> RobotCheck:
             raise InputError(f'--{option}: {value:g} is not from 0 to {highest:g}')
     known = load_mjcf(chosen.mjcf) if chosen.urdf is None else load_urdf(chosen.urdf)
     source = chosen.mjcf if chosen.urdf is None else str(chosen.urdf)
-    robot = find_robot(chosen.robot) if chosen.make is None else _made(chosen, known)
+    robot = load_robot(chosen.robot) if chosen.make is None else _made(chosen, known)
     presets = [name for network in robot.networks for name in NETWORKS[network].presets()]
     for name in chosen.gaits:
         if name not in presets:
@@ -120,7 +120,7 @@ def _made(chosen: Namespace, known: RobotDescription) -> Robot:
                                                    says=says))
     print(f'check_robot: wrote {chosen.make}, check what it takes each joint for:\n{says}',
           file=sys.stderr)
-    return find_robot(str(chosen.make.absolute()))
+    return load_robot(str(chosen.make.absolute()))
 
 
 def _geometry(chosen: Namespace, robot: Robot, known: RobotDescription) -> BodyGeometry:
