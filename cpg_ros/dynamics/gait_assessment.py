@@ -22,7 +22,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
-from cpg_ros.dynamics.continuation import from_hopf
+from cpg_ros.dynamics.continuation import continue_from_hopf
 from cpg_ros.dynamics.equilibrium import NoEquilibrium
 from cpg_ros.dynamics.floquet import attracts_with, Multipliers, multipliers, smallest_gain
 from cpg_ros.dynamics.hopf import first_hopf
@@ -31,14 +31,15 @@ from cpg_ros.dynamics.orbit import NoOrbit, Orbit, solve_orbit
 from cpg_ros.dynamics.stability import stability
 from cpg_ros.networks.network import Network
 from cpg_ros.networks.parameter_line import ParameterLine
+from cpg_ros.short_repr import ShortRepr
 
 #: Hopf points are looked at up to this many times the delay, and so many turns more than the
 #: first of their kind.
 FURTHEST, TURNS = 4.0, 1
 
 
-@dataclass(frozen=True)
-class GaitAssessment:
+@dataclass(frozen=True, eq=False, repr=False)
+class GaitAssessment(ShortRepr):
     """One gait of one parameter set.
 
     Attributes:
@@ -67,10 +68,9 @@ class GaitAssessment:
     def phases(self) -> dict[str, float]:
         """Phase of each leg's first cell, or of each muscle, in cycles."""
         orbit = self._orbit
-        network = type(orbit.network)
-        legs = next(iter(network.legs.values()))
-        told = network.muscles or {leg: cells[0] for leg, cells in legs.items()}
-        return {name: float(orbit.phases[cell - 1]) for name, cell in told.items()}
+        muscles = orbit.network.muscles
+        return ({name: float(orbit.phases[cell - 1]) for name, cell in muscles.items()}
+                or orbit.leg_phases)
 
     @cached_property
     def multipliers(self) -> Multipliers:
@@ -155,8 +155,9 @@ def _beyond(network: Network, gait: str, why: str) -> GaitAssessment:
         low, high = sorted((0.9 * point.value, delay)) if point.normal_form.side > 0 else (
             0.5 * delay, 1.1 * point.value)
         try:
-            branch = from_hopf(point.network, point.block.symmetry, point.omega, line, low, high,
-                               rest=point.state, vector=point.eigenvector, most=80)
+            branch = continue_from_hopf(point.network, point.block.symmetry, point.omega, line,
+                                        low, high, rest=point.state, vector=point.eigenvector,
+                                        most=80)
             orbits = branch.at(delay)
         except NoOrbit:
             continue

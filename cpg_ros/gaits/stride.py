@@ -39,6 +39,7 @@ from cpg_ros.gaits.phase_estimation import between, followed, grown, Rough, Warp
 from cpg_ros.gaits.phase_scatter import phase_scatter, PhaseScatter
 from cpg_ros.gaits.steady_stretch import best, CYCLES, even, FASTEST, FEWEST, FINER, stretches
 from cpg_ros.networks.network import Network
+from cpg_ros.short_repr import ShortRepr
 import numpy as np
 
 #: Points of a mean cycle.
@@ -87,8 +88,8 @@ class Recorded(Protocol):
         """What to call it."""
 
 
-@dataclass(frozen=True)
-class Stride:
+@dataclass(frozen=True, eq=False, repr=False)
+class Stride(ShortRepr):
     """The mean stride of a steady stretch.
 
     Phase 0 is where the joint of the first leg with the largest first harmonic has the maximum
@@ -142,6 +143,11 @@ class Stride:
     doubts: tuple[str, ...]
     notes: tuple[str, ...]
     warp: Warp
+
+    def _summary(self) -> str:
+        return (f'{self.gait or f"no gait, nearest {self.nearest}"}: {self.cycles} cycles of '
+                f'{self.frequency:.6g} +- {self.frequency_error:.2g} Hz, {self.begin:.6g} to '
+                f'{self.end:.6g} s, {len(self.joints)} joints')
 
 
 def find_stride(recording: Recorded, legs: Legs | Mapping[str, Sequence[str]],
