@@ -54,7 +54,7 @@ class BranchPoint(ShortRepr):
     place: Place
 
     def _summary(self) -> str:
-        return f'{self.place.curve.along} {self.value:.6g}, {self.orbit!r}'
+        return f'{self.value:.6g}, {self.orbit!r}'
 
     @property
     def amplitude(self) -> float:
