@@ -83,7 +83,7 @@ class Branch(ShortRepr):
         orbit, values = self.points[0].orbit, self.values
         return (f'{orbit.gait} of {orbit.network.name} along {self.along} '
                 f'{values.min():.6g} to {values.max():.6g}: {len(self.points)} points, '
-                f'{len(self.turns)} folds, ends: {self.ends[0]}; {self.ends[1]}')
+                f'folds: {len(self.turns)}, ends: {self.ends[0]}; {self.ends[1]}')
 
     @property
     def folds(self) -> tuple[BranchPoint, ...]:

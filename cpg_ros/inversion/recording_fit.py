@@ -74,7 +74,7 @@ class RecordingFit(ShortRepr):
         fit = self.fit
         return (f'{fit.gait} of {fit.network.name} to {self.recording.source}: '
                 f'{self.stride.frequency:.6g} Hz, confidence {self.confidence:.3g}, RMS error '
-                f'{100.0 * fit.mean_rms_share:.3g} % of range, {len(self.warnings)} warnings')
+                f'{100.0 * fit.mean_rms_share:.3g} % of range, warnings: {len(self.warnings)}')
 
     @property
     def confidence(self) -> float:
