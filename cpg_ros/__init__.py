@@ -14,7 +14,7 @@
 
 """Central pattern generators of legged locomotion, true to the theory and running on ROS 2.
 
-What is used most is here by name, and loaded when it is first asked for; the rest is in the rooms.
+What is used most is here by name and loaded on first use; the rest is in the subpackages.
 """
 
 import os
@@ -26,35 +26,47 @@ os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
 # As in typing, which would take longer to load than all of this.
 TYPE_CHECKING = False
 if TYPE_CHECKING:
-    from cpg_ros.dynamics.continuation import follow  # noqa: I300
+    from cpg_ros.dynamics.continuation import continue_orbit  # noqa: I300
     from cpg_ros.dynamics.floquet import multipliers
     from cpg_ros.dynamics.hopf_search import hopf_points
     from cpg_ros.dynamics.orbit import NoOrbit, solve_orbit
+    from cpg_ros.dynamics.stability import stability
     from cpg_ros.errors import CpgError
     from cpg_ros.integration.simulate import simulate
     from cpg_ros.integration.stepper import Stepper
-    from cpg_ros.inversion.recording_fit import inverted
+    from cpg_ros.inversion.parameter_files import write_fitted
+    from cpg_ros.inversion.recording_fit import fit_recording
     from cpg_ros.motion.pattern import Pattern
     from cpg_ros.motion.plan import plan
+    from cpg_ros.networks.network import Network
+    from cpg_ros.networks.network_definition import Range
+    from cpg_ros.networks.parameter_line import ParameterLine
+    from cpg_ros.networks.preset_files import Preset
     from cpg_ros.networks.registry import NETWORKS, PRESETS
+    from cpg_ros.networks.symmetry import Symmetry
     from cpg_ros.recordings.bag_reader import read_bag
     from cpg_ros.recordings.csv_reader import read_csv
     from cpg_ros.recordings.formats import read_recording
-    from cpg_ros.robots.robot_file import find_robot
+    from cpg_ros.robots.robot_file import load_robot
 
 __version__ = '0.1.0'
-__all__ = ['NETWORKS', 'PRESETS', 'CpgError', 'NoOrbit', 'Pattern', 'Stepper', 'find_robot',
-           'follow', 'hopf_points', 'inverted', 'multipliers', 'plan', 'read_bag', 'read_csv',
-           'read_recording', 'simulate', 'solve_orbit']
+__all__ = ['NETWORKS', 'PRESETS', 'CpgError', 'Network', 'NoOrbit', 'ParameterLine', 'Pattern',
+           'Preset', 'Range', 'Stepper', 'Symmetry', 'continue_orbit', 'fit_recording',
+           'hopf_points', 'load_robot', 'multipliers', 'plan', 'read_bag', 'read_csv',
+           'read_recording', 'simulate', 'solve_orbit', 'stability', 'write_fitted']
 
 _PLACES = {
     'NETWORKS': 'networks.registry', 'PRESETS': 'networks.registry', 'CpgError': 'errors',
-    'NoOrbit': 'dynamics.orbit', 'Pattern': 'motion.pattern', 'Stepper': 'integration.stepper',
-    'find_robot': 'robots.robot_file', 'follow': 'dynamics.continuation',
-    'hopf_points': 'dynamics.hopf_search', 'inverted': 'inversion.recording_fit',
+    'Network': 'networks.network', 'NoOrbit': 'dynamics.orbit',
+    'ParameterLine': 'networks.parameter_line', 'Pattern': 'motion.pattern',
+    'Preset': 'networks.preset_files', 'Range': 'networks.network_definition',
+    'Stepper': 'integration.stepper', 'Symmetry': 'networks.symmetry',
+    'continue_orbit': 'dynamics.continuation', 'fit_recording': 'inversion.recording_fit',
+    'hopf_points': 'dynamics.hopf_search', 'load_robot': 'robots.robot_file',
     'multipliers': 'dynamics.floquet', 'plan': 'motion.plan', 'read_bag': 'recordings.bag_reader',
     'read_csv': 'recordings.csv_reader', 'read_recording': 'recordings.formats',
-    'simulate': 'integration.simulate', 'solve_orbit': 'dynamics.orbit'}
+    'simulate': 'integration.simulate', 'solve_orbit': 'dynamics.orbit',
+    'stability': 'dynamics.stability', 'write_fitted': 'inversion.parameter_files'}
 
 
 def __getattr__(name: str) -> object:

@@ -27,6 +27,7 @@ from cpg_ros.dynamics.equilibrium import equilibrium
 from cpg_ros.dynamics.hopf_search import hopf_points
 from cpg_ros.dynamics.isotypic import blocks
 from cpg_ros.errors import CpgError
+from cpg_ros.short_repr import ShortRepr
 import numpy as np
 
 #: Lines on which curves begin, steps in shares of the ranges, and points of a curve at most.
@@ -37,8 +38,8 @@ NEWTON, EXACT, DIFFERENCE = 12, 1e-12, 1e-6
 SAME = 5e-3
 
 
-@dataclass(frozen=True, eq=False)
-class Curve:
+@dataclass(frozen=True, eq=False, repr=False)
+class Curve(ShortRepr):
     """A boundary in the plane of an atlas.
 
     Attributes:

@@ -26,6 +26,7 @@ from typing import Any
 from cpg_ros.atlas.chart import Chart, COARSE
 from cpg_ros.atlas.hopf_curves import Curve
 from cpg_ros.atlas.row_job import NONE, Row
+from cpg_ros.short_repr import ShortRepr
 import numpy as np
 
 #: Known orbits that a point is reached from, and numbers that are filled in between points that
@@ -34,8 +35,8 @@ CLOSE = 2
 NUMBERS = ('period', 'amplitude', 'leading', 'leading_within', 'unstable', 'lock', 'basin')
 
 
-@dataclass
-class Sheet:
+@dataclass(eq=False, repr=False)
+class Sheet(ShortRepr):
     """What is known of one gait on the grid.
 
     Attributes:

@@ -25,6 +25,7 @@ from cpg_ros.recordings.cdr import JOINT_STATE
 from cpg_ros.recordings.recording import RecordingError
 from cpg_ros.recordings.rosbags_library import SerdeError, STORE
 from cpg_ros.robots.robot import Robot
+from cpg_ros.short_repr import ShortRepr
 import numpy as np
 
 #: What is read: key -> type of its topic.
@@ -35,8 +36,8 @@ TYPES = {'joint_states': JOINT_STATE, 'imu': 'sensor_msgs/msg/Imu',
 OPTIONAL = ('phase',)
 
 
-@dataclass(frozen=True)
-class WalkRecording:
+@dataclass(frozen=True, eq=False, repr=False)
+class WalkRecording(ShortRepr):
     """What a robot felt.
 
     Attributes:

@@ -27,6 +27,7 @@ import math
 from typing import Any, Protocol
 
 from cpg_ros.errors import CpgError
+from cpg_ros.short_repr import ShortRepr
 import numpy as np
 from scipy.optimize import brentq
 
@@ -84,8 +85,8 @@ class Curve(Protocol):
         """
 
 
-@dataclass(frozen=True, eq=False)
-class Place:
+@dataclass(frozen=True, eq=False, repr=False)
+class Place(ShortRepr):
     """A point of a curve and the unit tangent there.
 
     Attributes:

@@ -29,6 +29,7 @@ from cpg_ros.dynamics.arclength import Place
 from cpg_ros.dynamics.continuation import Branch, BranchPoint
 from cpg_ros.dynamics.floquet import Multipliers, multipliers
 from cpg_ros.dynamics.periodic import NoOrbit
+from cpg_ros.short_repr import ShortRepr
 import numpy as np
 from scipy.optimize import brentq
 
@@ -40,8 +41,8 @@ NEUTRAL = 1e-6
 REAL = 1e-3
 
 
-@dataclass(frozen=True, eq=False)
-class Bifurcation:
+@dataclass(frozen=True, eq=False, repr=False)
+class Bifurcation(ShortRepr):
     """A point of a branch where a multiplier crosses the unit circle.
 
     Attributes:

@@ -20,7 +20,7 @@ more symmetry, near a homoclinic orbit, where its period has no bound, or at the
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 from cpg_ros.dynamics import arclength
 from cpg_ros.dynamics.arclength import Place
@@ -31,14 +31,15 @@ from cpg_ros.errors import InputError
 from cpg_ros.networks.network import Network
 from cpg_ros.networks.parameter_line import ParameterLine
 from cpg_ros.networks.symmetry import Symmetry
+from cpg_ros.short_repr import ShortRepr
 import numpy as np
 
 #: Below this amplitude an orbit is as good as its Hopf point.
 REST = 2e-3
 
 
-@dataclass(frozen=True, eq=False)
-class BranchPoint:
+@dataclass(frozen=True, eq=False, repr=False)
+class BranchPoint(ShortRepr):
     """A point of a branch.
 
     Attributes:
@@ -50,7 +51,10 @@ class BranchPoint:
 
     value: float
     orbit: Orbit
-    place: Place = field(repr=False)
+    place: Place
+
+    def _summary(self) -> str:
+        return f'{self.value:.6g}, {self.orbit!r}'
 
     @property
     def amplitude(self) -> float:
@@ -58,8 +62,8 @@ class BranchPoint:
         return float(self.orbit.levels[0, 0, 1])
 
 
-@dataclass(frozen=True, eq=False)
-class Branch:
+@dataclass(frozen=True, eq=False, repr=False)
+class Branch(ShortRepr):
     """Periodic orbits of one gait along a line of parameters.
 
     Attributes:
@@ -74,6 +78,12 @@ class Branch:
     points: tuple[BranchPoint, ...]
     turns: tuple[int, ...]
     ends: tuple[End, End]
+
+    def _summary(self) -> str:
+        orbit, values = self.points[0].orbit, self.values
+        return (f'{orbit.gait} of {orbit.network.name} along {self.along} '
+                f'{values.min():.6g} to {values.max():.6g}: {len(self.points)} points, '
+                f'folds: {len(self.turns)}, ends: {self.ends[0]}; {self.ends[1]}')
 
     @property
     def folds(self) -> tuple[BranchPoint, ...]:
@@ -119,29 +129,30 @@ class Branch:
         return tuple(found)
 
 
-def continue_orbit(orbit: Orbit, along: ParameterLine, low: float, high: float, *,
+def continue_orbit(orbit: Orbit, along: ParameterLine | str, low: float, high: float, *,
                    first_step: float = arclength.FIRST, longest_step: float = arclength.LONGEST,
                    most: int = 200, both: bool = True, longest: float = 20.0) -> Branch:
     """Follow a gait's orbit along a line of parameters, past folds.
 
     Args:
         orbit: of a network on the line; its gait's symmetry is kept.
-        along: the line.
-        low: least value.
-        high: greatest value.
+        along: the line, or its text: 'tau', 'alpha=-beta', or a group of the network.
+        low: least value, in the parameter's unit.
+        high: greatest value, in the parameter's unit.
         first_step: arclength of the first step. States count as they are, the period against
             the first one's, the value against high - low.
         longest_step: arclength of any step.
-        most: points in each direction, at most.
+        most: number of points in each direction, at most.
         both: also in the direction in which the value falls at first; its points come first.
-        longest: period, over the first one's, at which the branch ends.
+        longest: period at which the branch ends, as a ratio to the first one's.
 
     Raises:
-        ValueError: the orbit's network is not on the line or not in the range, or the line
-            breaks the gait's symmetry.
+        InputError: no such parameter, the orbit's network is not on the line or not in the
+            range, or the line breaks the gait's symmetry.
         NoOrbit: Newton's method fails at the given orbit.
 
     """
+    along = ParameterLine.of(along, type(orbit.network))
     _check(orbit.network, orbit.symmetry, along, low, high)
     value, scales = along.value(orbit.network), (orbit.period, high - low)
     curve, z = curve_through(orbit, along, scales)
@@ -172,8 +183,7 @@ def continue_from_hopf(network: Network, symmetry: Symmetry, omega: float,
                        rest: np.ndarray | None = None, vector: np.ndarray | None = None,
                        amplitude: float = 0.02, first_step: float = arclength.FIRST,
                        longest_step: float = arclength.LONGEST, most: int = 200,
-                       longest: float = 20.0
-                       ) -> Branch:
+                       longest: float = 20.0) -> Branch:
     """Follow the orbits that bifurcate at a Hopf point, whichever side of it they are on.
 
     The first orbit has a given amplitude and the value that goes with it, which near the Hopf
@@ -190,7 +200,7 @@ def continue_from_hopf(network: Network, symmetry: Symmetry, omega: float,
         vector: critical eigenvector, complex, shape (components,); by default that of cells with
             one variable, which their phases give.
         amplitude: of the first orbit.
-        first_step: arclength of the first step, as in follow.
+        first_step: arclength of the first step, as in continue_orbit.
         longest_step: arclength of any step.
         most: points, at most.
         longest: period, over that of the Hopf point, at which the branch ends.
@@ -238,7 +248,7 @@ def continue_from_disturbance(network: Network, symmetry: Symmetry, along: Param
         disturbance: the direction in which they leave it, the same.
         period: at the place, model time.
         amplitude: share of the disturbance in the first orbit.
-        first_step: arclength of the first step, as in follow.
+        first_step: arclength of the first step, as in continue_orbit.
         longest_step: arclength of any step.
         most: points, at most.
         longest: period, over that at the place, at which the branch ends.

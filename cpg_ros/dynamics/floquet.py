@@ -21,6 +21,7 @@ which the symmetry lock -g (I - P) x shrinks and nothing else does.
 from dataclasses import dataclass
 
 from cpg_ros.dynamics.orbit import Orbit, way
+from cpg_ros.short_repr import ShortRepr
 import numpy as np
 from scipy.optimize import brentq
 
@@ -34,8 +35,8 @@ ROUGHLY = 1e-4
 MOST_GAINS = 40
 
 
-@dataclass(frozen=True)
-class Multipliers:
+@dataclass(frozen=True, eq=False, repr=False)
+class Multipliers(ShortRepr):
     """Floquet multipliers of an orbit over a period, largest first.
 
     With a delay there are infinitely many; those that decay to nothing are rounding.
@@ -56,6 +57,10 @@ class Multipliers:
     transverse: np.ndarray
     trivial: complex
     parts: tuple[np.ndarray, ...] = ()
+
+    def _summary(self) -> str:
+        return (f'leading within {self.leading_within:.6g}, transverse '
+                f'{self.leading_transverse:.6g}, gain {self.gain:.6g}, error {self.error:.0e}')
 
     @property
     def leading_within(self) -> float:

@@ -31,14 +31,15 @@ from cpg_ros.dynamics.orbit import NoOrbit, Orbit, solve_orbit
 from cpg_ros.dynamics.stability import stability
 from cpg_ros.networks.network import Network
 from cpg_ros.networks.parameter_line import ParameterLine
+from cpg_ros.short_repr import ShortRepr
 
 #: Hopf points are looked at up to this many times the delay, and so many turns more than the
 #: first of their kind.
 FURTHEST, TURNS = 4.0, 1
 
 
-@dataclass(frozen=True)
-class GaitAssessment:
+@dataclass(frozen=True, eq=False, repr=False)
+class GaitAssessment(ShortRepr):
     """One gait of one parameter set.
 
     Attributes:
@@ -67,10 +68,9 @@ class GaitAssessment:
     def phases(self) -> dict[str, float]:
         """Phase of each leg's first cell, or of each muscle, in cycles."""
         orbit = self._orbit
-        network = type(orbit.network)
-        legs = next(iter(network.legs.values()))
-        told = network.muscles or {leg: cells[0] for leg, cells in legs.items()}
-        return {name: float(orbit.phases[cell - 1]) for name, cell in told.items()}
+        muscles = orbit.network.muscles
+        return ({name: float(orbit.phases[cell - 1]) for name, cell in muscles.items()}
+                or orbit.leg_phases)
 
     @cached_property
     def multipliers(self) -> Multipliers:
@@ -156,8 +156,8 @@ def _beyond(network: Network, gait: str, why: str) -> GaitAssessment:
             0.5 * delay, 1.1 * point.value)
         try:
             branch = continue_from_hopf(point.network, point.block.symmetry, point.omega, line,
-                                        low, high,
-                                        rest=point.state, vector=point.eigenvector, most=80)
+                                        low, high, rest=point.state, vector=point.eigenvector,
+                                        most=80)
             orbits = branch.at(delay)
         except NoOrbit:
             continue

@@ -37,14 +37,15 @@ from cpg_ros.dynamics.isotypic import Block, block_of, blocks, character, power
 from cpg_ros.dynamics.normal_form import NormalForm
 from cpg_ros.networks.network import Network
 from cpg_ros.networks.parameter_line import ParameterLine
+from cpg_ros.short_repr import ShortRepr
 import numpy as np
 
 #: Roots this close to the imaginary axis lie on it, 1/model time or against omega.
 ON_AXIS = 1e-8
 
 
-@dataclass(frozen=True, eq=False)
-class HopfPoint:
+@dataclass(frozen=True, eq=False, repr=False)
+class HopfPoint(ShortRepr):
     """A crossing of the imaginary axis by a pair of roots.
 
     Attributes:
@@ -65,6 +66,10 @@ class HopfPoint:
     omega: float
     rest: np.ndarray
     n: int = 0
+
+    def _summary(self) -> str:
+        return (f'{self.gait} of {self.network.name} at {self.line} {self.value:.7g}, '
+                f'omega {self.omega:.7g}')
 
     @property
     def gait(self) -> str:

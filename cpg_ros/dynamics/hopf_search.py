@@ -40,7 +40,7 @@ GRID = 241
 SPARE = 2
 
 
-def hopf_points(network: Network, line: ParameterLine, low: float, high: float
+def hopf_points(network: Network, line: ParameterLine | str, low: float, high: float
                 ) -> list[HopfPoint]:
     """Find all Hopf points of the equilibrium between two values of parameters, by rising value.
 
@@ -50,18 +50,19 @@ def hopf_points(network: Network, line: ParameterLine, low: float, high: float
 
     Args:
         network: the other parameters.
-        line: the parameters that move.
-        low: least value.
-        high: largest value.
+        line: the parameters that move, or their text: 'tau', 'alpha=-beta', or a group.
+        low: least value, in the parameter's unit.
+        high: greatest value, in the parameter's unit.
 
     Raises:
         NoEquilibrium: it exists nowhere on the way.
-        InputError: low is not below high, a parameter is not finite, the delay would be
+        InputError: low is not below high, no such parameter, one is not finite, the delay would be
             negative, or the weights have not the symmetry of the network.
 
     """
     if not (np.isfinite(low) and np.isfinite(high) and low < high):
         raise InputError(f'low {low} must be less than high {high}')
+    line = ParameterLine.of(line, type(network))
     if not network.rests:
         equilibrium(network)
     delay = network.delay_parameter

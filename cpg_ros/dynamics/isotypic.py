@@ -31,11 +31,12 @@ from cpg_ros.dynamics.expansion import Expansion
 from cpg_ros.errors import InputError
 from cpg_ros.networks.network import Network
 from cpg_ros.networks.symmetry import Group, Symmetry
+from cpg_ros.short_repr import ShortRepr
 import numpy as np
 
 
-@dataclass(frozen=True, eq=False)
-class Block:
+@dataclass(frozen=True, eq=False, repr=False)
+class Block(ShortRepr):
     """The linearisation in a symmetry class.
 
     Attributes:

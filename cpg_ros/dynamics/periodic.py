@@ -22,8 +22,9 @@ import math
 from cpg_ros.dynamics.arclength import NoOrbit
 from cpg_ros.errors import InputError
 from cpg_ros.networks.network import Network
-from cpg_ros.networks.stated_gait import other_gait
+from cpg_ros.networks.stated_gait import other_gait, stated_gait
 from cpg_ros.networks.symmetry import Symmetry
+from cpg_ros.short_repr import ShortRepr
 import numpy as np
 
 __all__ = ['NoOrbit', 'Orbit', 'added_symmetry', 'check_values', 'richer']
@@ -37,8 +38,8 @@ COMPARED, PARTS = 60, (2, 3, 5)
 SAME = 1e-4
 
 
-@dataclass(frozen=True, eq=False)
-class Orbit(ABC):
+@dataclass(frozen=True, eq=False, repr=False)
+class Orbit(ShortRepr, ABC):
     """A gait of a network: its waveforms, its period, and where each cell is in them.
 
     Called with times it gives the states, so it serves as a history for the simulation. Cell i's
@@ -46,7 +47,7 @@ class Orbit(ABC):
     first variable of cell 1 peaks.
 
     Attributes:
-        network: the parameters it solves.
+        network: the parameters for which it solves the equations.
         symmetry: of the gait; gives waves and phases of the cells.
         period: T in model time.
         residual: largest residual of the equations, between the nodes where they are solved.
@@ -72,15 +73,33 @@ class Orbit(ABC):
     def d_waveform(self, theta: np.ndarray, wave: int = 0, variable: int = 0) -> np.ndarray:
         """Return the derivatives by the parameters, shape theta.shape + (parameters,)."""
 
+    def _summary(self) -> str:
+        return (f'{self.gait} of {self.network.name}: period {self.period:.7g}, '
+                f'residual {self.residual:.0e}')
+
     @property
     @abstractmethod
     def samples(self) -> int:
         """Even points of a cycle that tell all there is to a waveform."""
 
     @property
+    def gait(self) -> str:
+        """Name of the gait: the one that the parameters state, or that has this symmetry."""
+        network = self.network
+        return stated_gait(network) or next(
+            (gait for gait in network.gaits() if network.symmetry(gait) == self.symmetry),
+            'unnamed orbit')
+
+    @property
     def phases(self) -> np.ndarray:
         """Phase of each cell in cycles, shape (cells,)."""
         return self.symmetry.phases
+
+    @property
+    def leg_phases(self) -> dict[str, float]:
+        """Leg -> cycles by which its first cell is ahead of cell 1, from 0 to 1."""
+        legs = next(iter(self.network.legs.values()))
+        return {leg: float(self.phases[cells[0] - 1]) for leg, cells in legs.items()}
 
     @property
     def waves(self) -> np.ndarray:

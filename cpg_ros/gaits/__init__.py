@@ -19,4 +19,4 @@ Imports ``networks`` and ``files``; knows nothing of ROS.
 
 __all__ = ['doubts', 'insect_legs', 'leg_motion', 'leg_names', 'leg_phases', 'mean_cycle',
            'period', 'phase_average', 'phase_estimation', 'phase_scatter', 'recognition',
-           'steady_stretch', 'stride', 'waveform_comparison']
+           'recorded', 'steady_stretch', 'stride', 'waveform_comparison']

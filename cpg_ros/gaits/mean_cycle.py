@@ -20,6 +20,7 @@ Being a fit, it takes times as they come, and averages noise.
 from dataclasses import dataclass
 
 from cpg_ros.errors import InputError
+from cpg_ros.short_repr import ShortRepr
 import numpy as np
 from scipy.linalg import solve_toeplitz, toeplitz
 
@@ -31,8 +32,8 @@ DETERMINED = 0.1
 BINS = 4096
 
 
-@dataclass(frozen=True)
-class Cycle:
+@dataclass(frozen=True, eq=False, repr=False)
+class Cycle(ShortRepr):
     """The mean cycle of a recording.
 
     Attributes:

@@ -25,6 +25,7 @@ from itertools import pairwise
 
 from cpg_ros.errors import InputError
 from cpg_ros.gaits.mean_cycle import determined, rows_of, series, weights_for
+from cpg_ros.short_repr import ShortRepr
 import numpy as np
 
 #: Most harmonics of a mean cycle.
@@ -39,8 +40,8 @@ BLOCK, CYCLES = 1 << 15, 20.0
 ENOUGH, POOLED = 4, 4
 
 
-@dataclass(frozen=True)
-class Warped:
+@dataclass(frozen=True, eq=False, repr=False)
+class Warped(ShortRepr):
     """Mean cycles.
 
     Attributes:

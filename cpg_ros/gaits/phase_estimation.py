@@ -25,6 +25,7 @@ from dataclasses import dataclass
 from cpg_ros.gaits.mean_cycle import rows_of, series, weights_for
 from cpg_ros.gaits.phase_average import blocks, mean_weights
 from cpg_ros.gaits.steady_stretch import even, longest, Stretch
+from cpg_ros.short_repr import ShortRepr
 import numpy as np
 from scipy.linalg import solveh_banded
 
@@ -56,8 +57,8 @@ STEPS, FARTHEST = 6, 0.1
 STIFFNESS = 1e-3
 
 
-@dataclass(frozen=True)
-class Warp:
+@dataclass(frozen=True, eq=False, repr=False)
+class Warp(ShortRepr):
     """The phase of a motion, linear between knots.
 
     Attributes:
@@ -83,8 +84,8 @@ class Warp:
         return float(self.phases[-1] - self.phases[0])
 
 
-@dataclass(frozen=True)
-class Rough:
+@dataclass(frozen=True, eq=False, repr=False)
+class Rough(ShortRepr):
     """The rough phase of a stretch: at times (c,), s, in cycles (c,)."""
 
     begin: float

@@ -28,6 +28,7 @@ from cpg_ros.gaits.mean_cycle import Cycle, mean_cycle
 from cpg_ros.gaits.period import find_period, holds_two
 from cpg_ros.networks.hk_theorem import symmetries
 from cpg_ros.networks.symmetry import Group, Permutation, Symmetry
+from cpg_ros.short_repr import ShortRepr
 import numpy as np
 
 #: Grid for the best shift, per cycle; a mean cycle has far fewer harmonics.
@@ -40,8 +41,8 @@ FEWEST = 8
 MOST, NONE, LARGER = 0.3, 3.0, 1.25
 
 
-@dataclass(frozen=True)
-class Recognised:
+@dataclass(frozen=True, eq=False, repr=False)
+class Recognised(ShortRepr):
     """What a rhythm is.
 
     Distances are the RMS violation of a symmetry over cells and cycle, in units of the

@@ -20,7 +20,6 @@ real stride is quite as long as the last (warp), and averaged over that phase (w
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Protocol
 
 from cpg_ros.errors import CpgError, InputError
 from cpg_ros.gaits.doubts import (
@@ -37,8 +36,10 @@ from cpg_ros.gaits.leg_phases import leg_phases, named, named_by_cells, told_apa
 from cpg_ros.gaits.phase_average import Warped, warped
 from cpg_ros.gaits.phase_estimation import between, followed, grown, Rough, Warp
 from cpg_ros.gaits.phase_scatter import phase_scatter, PhaseScatter
+from cpg_ros.gaits.recorded import Recorded
 from cpg_ros.gaits.steady_stretch import best, CYCLES, even, FASTEST, FEWEST, FINER, stretches
 from cpg_ros.networks.network import Network
+from cpg_ros.short_repr import ShortRepr
 import numpy as np
 
 #: Points of a mean cycle.
@@ -67,28 +68,8 @@ class NoSteadyGait(CpgError):
     """A recording has no steady gait; the message says what it has instead."""
 
 
-class Recorded(Protocol):
-    """What is needed of a recording; see Recording."""
-
-    @property
-    def joints(self) -> tuple[str, ...]:
-        """Names."""
-
-    @property
-    def times(self) -> np.ndarray:
-        """Rising, s, shape (n,)."""
-
-    @property
-    def positions(self) -> np.ndarray:
-        """Angles in rad, nan where missing, shape (n, joints)."""
-
-    @property
-    def source(self) -> str:
-        """What to call it."""
-
-
-@dataclass(frozen=True)
-class Stride:
+@dataclass(frozen=True, eq=False, repr=False)
+class Stride(ShortRepr):
     """The mean stride of a steady stretch.
 
     Phase 0 is where the joint of the first leg with the largest first harmonic has the maximum
@@ -142,6 +123,11 @@ class Stride:
     doubts: tuple[str, ...]
     notes: tuple[str, ...]
     warp: Warp
+
+    def _summary(self) -> str:
+        return (f'{self.gait or f"no gait, nearest {self.nearest}"}: {self.cycles} cycles of '
+                f'{self.frequency:.6g} +- {self.frequency_error:.2g} Hz, {self.begin:.6g} to '
+                f'{self.end:.6g} s, {len(self.joints)} joints')
 
 
 def find_stride(recording: Recorded, legs: Legs | Mapping[str, Sequence[str]],

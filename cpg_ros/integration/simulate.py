@@ -22,6 +22,7 @@ from cpg_ros.files.progress_bar import progress_bar
 from cpg_ros.integration import kernel
 from cpg_ros.networks.network import Network
 from cpg_ros.networks.symmetry import Symmetry
+from cpg_ros.short_repr import ShortRepr
 import numpy as np
 
 #: A constant state, shape (components,), or a function of times t <= 0, shape (m,), that
@@ -35,8 +36,8 @@ LANES = 8
 CHUNK = 20_000_000
 
 
-@dataclass(frozen=True)
-class Trajectory:
+@dataclass(frozen=True, eq=False, repr=False)
+class Trajectory(ShortRepr):
     """Dense solution on a fixed grid.
 
     Attributes:
@@ -50,6 +51,11 @@ class Trajectory:
     t: np.ndarray
     x: np.ndarray
     slopes: np.ndarray
+
+    def _summary(self) -> str:
+        batch = f'{self.x.shape[0]} runs, ' if self.x.ndim == 3 else ''
+        return (f'{batch}{self.t.size} nodes from 0 to {self.t[-1]:.6g}, '
+                f'{self.x.shape[-1]} components')
 
     def __call__(self, times: np.ndarray | float) -> np.ndarray:
         """Return the states at the times given, cubic Hermite, shape (..., times, components).
@@ -110,7 +116,8 @@ def sample_history(history: History, nodes: int, step: float, components: int
 
 
 def simulate(network: Network | Sequence[Network], history: History | Sequence[History],
-             t_end: float, step: float, *, lock: tuple[float, Symmetry] | None = None,
+             t_end: float, step: float | None = None, *,
+             lock: tuple[float, Symmetry] | None = None,
              noise: float = 0.0, seed: int = 0, every: int = 1, progress: bool = True
              ) -> Trajectory:
     """Integrate a network from a history, RK4 with cubic Hermite delayed values.
@@ -123,7 +130,9 @@ def simulate(network: Network | Sequence[Network], history: History | Sequence[H
         network: parameters, one set or a sequence of them.
         history: constant state, function of times t <= 0, or orbit (see History); or many.
         t_end: model time to reach; rounded up to whole steps.
-        step: model time per step; every delay must be at least one step.
+        step: model time per step; every delay must be at least one step. By default half the
+            network's own, or the shortest delay if that is less: without noise, each shipped
+            gait stays within 1e-6 of its range of the exact orbit over a cycle.
         lock: symmetry lock (gain in 1/model time, the gait's symmetry), or none.
         noise: standard deviation of white noise per square root of model time.
         seed: seeds the noise of the whole batch.
@@ -131,8 +140,9 @@ def simulate(network: Network | Sequence[Network], history: History | Sequence[H
         progress: show a progress bar on work of more than about two seconds.
 
     Raises:
-        ValueError: step or t_end not positive and finite, a parameter not finite, a delay
-            shorter than a step, or shapes that do not fit.
+        InputError: step or t_end not positive and finite, a parameter not finite, a delay
+            shorter than a step.
+        ValueError: shapes or numbers of networks and histories that do not fit.
 
     """
     networks = [network] if isinstance(network, Network) else list(network)
@@ -143,6 +153,8 @@ def simulate(network: Network | Sequence[Network], history: History | Sequence[H
     batch = max(len(networks), len(histories))
     if {len(networks), len(histories)} - {1, batch}:
         raise ValueError(f'{len(networks)} networks do not go with {len(histories)} histories')
+    if step is None:
+        step = min((0.5 * networks[0].step, *(one.delay for one in networks if one.delay > 0.0)))
     if not (np.isfinite(t_end) and t_end > 0.0 and np.isfinite(step) and step > 0.0):
         raise InputError(f't_end {t_end} and step {step} must be positive and finite')
     for one in networks:

@@ -28,14 +28,15 @@ from cpg_ros.errors import InputError
 from cpg_ros.inversion.free_parameters import free_numbers, with_values
 from cpg_ros.inversion.trust_region import descend, Trial
 from cpg_ros.networks.delayed import Delayed
+from cpg_ros.short_repr import ShortRepr
 import numpy as np
 
 #: Relative change of parameters and objective at which the method stops.
 TOLERANCE = 1e-12
 
 
-@dataclass(frozen=True)
-class CycleFit:
+@dataclass(frozen=True, eq=False, repr=False)
+class CycleFit(ShortRepr):
     """A fit to a cycle.
 
     Attributes:

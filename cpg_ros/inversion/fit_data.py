@@ -21,6 +21,7 @@ from typing import Protocol
 from cpg_ros.errors import InputError
 from cpg_ros.networks.network import Network
 from cpg_ros.robots.robot import Robot
+from cpg_ros.short_repr import ShortRepr
 import numpy as np
 
 #: A mean cycle is never known better than to this share of the joint's range.
@@ -55,8 +56,8 @@ class MeanCycle(Protocol):
         """Its standard error, Hz."""
 
 
-@dataclass(frozen=True)
-class Joints:
+@dataclass(frozen=True, eq=False, repr=False)
+class Joints(ShortRepr):
     """Joints over one cycle.
 
     Attributes:

@@ -25,6 +25,7 @@ from cpg_ros.inversion.trust_region import Trial
 from cpg_ros.inversion.variable_projection import basis
 from cpg_ros.inversion.waveform_harmonics import signals
 from cpg_ros.networks.network import Network
+from cpg_ros.short_repr import ShortRepr, shown
 import numpy as np
 
 #: Phases between recording and orbit that are tried.
@@ -33,8 +34,8 @@ SHIFTS = 120
 STANDS = 0.01
 
 
-@dataclass(frozen=True)
-class Fit:
+@dataclass(frozen=True, eq=False, repr=False)
+class Fit(ShortRepr):
     """A gait fitted to a mean cycle.
 
     Attributes:
@@ -81,6 +82,11 @@ class Fit:
     sharing: float
     starts: tuple[Trial, ...]
     warnings: tuple[str, ...]
+
+    def _summary(self) -> str:
+        return (f'{self.gait} of {self.network.name} to {len(self.joints)} joints: RMS error '
+                f'{100.0 * self.mean_rms_share:.3g} % of range, '
+                f'{shown({name: one.value for name, one in self.parameters.items()})}')
 
     @property
     def joints(self) -> tuple[str, ...]:

@@ -27,6 +27,7 @@ from dataclasses import dataclass
 from cpg_ros.dynamics.periodic import NoOrbit
 from cpg_ros.inversion.free_parameters import Free
 from cpg_ros.inversion.trust_region import Evaluate, Trial
+from cpg_ros.short_repr import ShortRepr
 import numpy as np
 
 #: Half the width of a 95 % interval, in standard errors.
@@ -86,8 +87,8 @@ def correlation_length(residual: np.ndarray) -> float:
     return float(1.0 + 2.0 * together[1:end].sum())
 
 
-@dataclass(frozen=True)
-class Spread:
+@dataclass(frozen=True, eq=False, repr=False)
+class Spread(ShortRepr):
     """Covariance of the numbers of a fit.
 
     Attributes:
@@ -137,8 +138,8 @@ def spread(jacobian: np.ndarray, inflation: float) -> Spread:
     return Spread(inflation * (half.T @ half) * np.outer(scale, scale), rows[~seen], scale)
 
 
-@dataclass(frozen=True)
-class Optimum:
+@dataclass(frozen=True, eq=False, repr=False)
+class Optimum(ShortRepr):
     """A least cost, and what intervals about it are made from.
 
     Attributes:

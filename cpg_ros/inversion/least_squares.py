@@ -25,6 +25,7 @@ from cpg_ros.inversion.free_parameters import Free, with_values
 from cpg_ros.inversion.variable_projection import basis, basis_moved, project, WEIGHTS
 from cpg_ros.inversion.waveform_harmonics import Signals, signals
 from cpg_ros.networks.network import Network
+from cpg_ros.short_repr import ShortRepr
 import numpy as np
 
 #: Phases among which the first guess of the one between recording and orbit is chosen.
@@ -41,8 +42,8 @@ class Period:
     error: float
 
 
-@dataclass(frozen=True)
-class Placed:
+@dataclass(frozen=True, eq=False, repr=False)
+class Placed(ShortRepr):
     """The best readouts for some values.
 
     Attributes:

@@ -28,6 +28,7 @@ from cpg_ros.inversion.fit_data import MeanCycle
 from cpg_ros.networks.delayed import CELLS, Delayed
 from cpg_ros.networks.network import Network
 from cpg_ros.robots.robot import Robot
+from cpg_ros.short_repr import ShortRepr
 import numpy as np
 from scipy.optimize import minimize_scalar
 
@@ -35,8 +36,8 @@ from scipy.optimize import minimize_scalar
 POINTS, SHIFTS = 20, 60
 
 
-@dataclass(frozen=True)
-class PaperFit:
+@dataclass(frozen=True, eq=False, repr=False)
+class PaperFit(ShortRepr):
     """A fit from one start.
 
     Attributes:

@@ -42,7 +42,7 @@ def fitted_robot(found: RecordingFit, robot: Robot | None) -> Robot:
     """Return a robot whose joints move as the recorded ones.
 
     Args:
-        found: the inverted recording.
+        found: the fit, as fit_recording returns it.
         robot: whose limits, cells and joint order are kept; joints that were not recorded stay
             as they are. Without one, limits are taken from the recording.
 
@@ -116,15 +116,15 @@ def _planned(parameters: Path, robot: Path) -> None:
          tree['frequency'], tree['amplitude'])
 
 
-def write_fitted(path: Path, found: RecordingFit, robot: Robot | None = None,
+def write_fitted(path: str | Path, found: RecordingFit, robot: Robot | None = None,
                  named: Path | None = None) -> list[Path]:
     """Write the parameter file, and beside it the robot file that it names.
 
     Nothing gets their names that the generator would refuse.
 
     Args:
-        path: of the parameter file.
-        found: the inverted recording.
+        path: of the parameter file; frequencies in it are in Hz, angles in rad.
+        found: the fit, as fit_recording returns it.
         robot: as of fitted_robot.
         named: where the robot file will be moved to; it stays beside by default.
 
@@ -137,6 +137,7 @@ def write_fitted(path: Path, found: RecordingFit, robot: Robot | None = None,
         OSError: a file cannot be written.
 
     """
+    path = Path(path)
     beside = robot_file_of(path)
     said = (f'{found.fit.gait} at {found.stride.frequency:.4f} Hz, fitted to '
             f'{found.recording.source}\nmean RMS error {100 * found.fit.mean_rms_share:.1f} % of '

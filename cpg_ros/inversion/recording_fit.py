@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A recording inverted: its steady stride, the gait fitted to it, and how well that does."""
+"""A fit to a recording: its steady stride, the gait fitted to it, and how well that does."""
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -37,6 +37,7 @@ from cpg_ros.networks.registry import (
 from cpg_ros.networks.stated_gait import other_gait
 from cpg_ros.recordings.recording import Recording
 from cpg_ros.robots.robot import Robot
+from cpg_ros.short_repr import ShortRepr
 import numpy as np
 
 #: Mean RMS error over range above which a fit is poor, by the order of the readout: real trots
@@ -46,12 +47,12 @@ POOR, LEFT = {1: 0.25, 2: 0.15, 3: 0.1}, 0.5
 ORDERS = (1, 2, 3)
 
 
-@dataclass(frozen=True, eq=False)
-class RecordingFit:
-    """What came of a recording.
+@dataclass(frozen=True, eq=False, repr=False)
+class RecordingFit(ShortRepr):
+    """A network's gait fitted to a recording.
 
     Attributes:
-        recording: what was recorded.
+        recording: joint angles, rad, over times in s.
         read: how its joints were given to legs.
         legs: leg -> its joints.
         stride: its steady gait.
@@ -68,6 +69,12 @@ class RecordingFit:
     fit: Fit
     shares: dict[int, float]
     warnings: tuple[str, ...]
+
+    def _summary(self) -> str:
+        fit = self.fit
+        return (f'{fit.gait} of {fit.network.name} to {self.recording.source}: '
+                f'{self.stride.frequency:.6g} Hz, confidence {self.confidence:.3g}, RMS error '
+                f'{100.0 * fit.mean_rms_share:.3g} % of range, warnings: {len(self.warnings)}')
 
     @property
     def confidence(self) -> float:

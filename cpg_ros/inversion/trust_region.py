@@ -21,6 +21,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from cpg_ros.dynamics.periodic import NoOrbit
+from cpg_ros.short_repr import ShortRepr
 import numpy as np
 from scipy.optimize import least_squares
 
@@ -28,8 +29,8 @@ from scipy.optimize import least_squares
 Evaluate = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
 
 
-@dataclass(frozen=True)
-class Trial:
+@dataclass(frozen=True, eq=False, repr=False)
+class Trial(ShortRepr):
     """What came of one start.
 
     Attributes:

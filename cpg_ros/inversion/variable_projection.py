@@ -23,6 +23,7 @@ alone. Its exact derivative is Golub & Pereyra's (1973).
 from dataclasses import dataclass
 
 from cpg_ros.motion.readout import monomials
+from cpg_ros.short_repr import ShortRepr
 import numpy as np
 
 #: Weights of each readout order.
@@ -67,8 +68,8 @@ def basis_moved(order: int, x: np.ndarray, y: np.ndarray, slopes: np.ndarray) ->
             + by_y[:, :count, None] * slopes[1][:, None])
 
 
-@dataclass(frozen=True)
-class Projection:
+@dataclass(frozen=True, eq=False, repr=False)
+class Projection(ShortRepr):
     """What the best linear readout of some joints leaves.
 
     Attributes:

@@ -25,6 +25,7 @@ from functools import lru_cache
 
 from cpg_ros.dynamics.periodic import Orbit
 from cpg_ros.motion.phase_readout import evaluate, POINTS, smooth_terms
+from cpg_ros.short_repr import ShortRepr
 import numpy as np
 
 TURN = 2.0 * np.pi
@@ -32,8 +33,8 @@ TURN = 2.0 * np.pi
 SAMPLES = 2048
 
 
-@dataclass(frozen=True)
-class Signals:
+@dataclass(frozen=True, eq=False, repr=False)
+class Signals(ShortRepr):
     """x of every waveform of a gait.
 
     Attributes:

@@ -64,7 +64,7 @@ class Pattern:
 
     def __init__(self, program: Program, ramp: float = 1.0, enabled: bool = True,
                  drive: Drive | None = None) -> None:
-        """Stand, then ramp into the program if enabled; a drive steers it."""
+        """Stand, then go into the gait within ``ramp`` s if enabled; a drive steers it."""
         robot = program.robot
         self.robot, self.drive = robot, drive
         self._leg = robot.leg_of_joint

@@ -29,6 +29,7 @@ from cpg_ros.motion.readout import extremes, WaveReadout
 from cpg_ros.motion.runnable import obstacle
 from cpg_ros.networks.network import Network, Preset
 from cpg_ros.robots.robot import Joint, Motion, Robot, Steering
+from cpg_ros.short_repr import ShortRepr
 import numpy as np
 
 #: Strides per second below which a robot would seem to stand (Hz).
@@ -55,8 +56,8 @@ class OutOfLimits(Refused):
         self.said, self.excess = said, excess
 
 
-@dataclass(frozen=True)
-class Program:
+@dataclass(frozen=True, eq=False, repr=False)
+class Program(ShortRepr):
     """One gait on one robot, ready to run.
 
     Attributes:
@@ -91,6 +92,10 @@ class Program:
     span: np.ndarray
     speed: np.ndarray
     duty: np.ndarray
+
+    def _summary(self) -> str:
+        return (f'{self.name} on {self.robot.name}: {self.frequency:.6g} Hz, symmetry gain '
+                f'{self.gain:.6g}, {self.orbit!r}')
 
     @cached_property
     def seed(self) -> Stepper:

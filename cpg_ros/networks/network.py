@@ -19,7 +19,7 @@ What it states of its parameters, cells and equations is in network_definition.
 
 from abc import abstractmethod
 from collections.abc import Mapping
-from dataclasses import replace
+import dataclasses
 from typing import Any, NamedTuple, TypeAlias, TypeVar
 
 from cpg_ros.errors import InputError
@@ -68,6 +68,22 @@ class Network(NetworkDefinition):
         """Return the rates' derivative by the parameters, (..., components, parameters)."""
         return Field(self).by_parameter(x, past)
 
+    def replace(self: AnyNetwork, **values: float) -> AnyNetwork:
+        """Return the network with other values of some parameters, or groups of them, by name.
+
+        Raises:
+            InputError: a name that is neither a parameter nor a group of the network.
+
+        """
+        found: dict[str, float] = {}
+        for name, value in values.items():
+            members = self.groups.get(name, (name,))
+            if not set(members) <= set(self.parameters()):
+                known = ', '.join((*self.groups, *self.parameters()))
+                raise InputError(f"'{name}' is not one of {known}")
+            found |= dict.fromkeys(members, value)
+        return dataclasses.replace(self, **found)  # type: ignore[type-var]
+
     @property
     def coefficients(self) -> np.ndarray:
         """The parameters as the kernel takes them, a value for each cell, shape (rows, cells)."""
@@ -107,7 +123,7 @@ class Network(NetworkDefinition):
         """Return the network with the phases of these legs, cycles; itself if it states none."""
         wanted = {self.offsets[leg]: float((phase + 0.5) % 1.0 - 0.5)
                   for leg, phase in phases.items() if leg in self.offsets}
-        return replace(self, **wanted) if wanted else self  # type: ignore[type-var]
+        return self.replace(**wanted) if wanted else self
 
     def on_orbit(self, gait: str) -> tuple[np.ndarray, float] | None:
         """Return a state near the gait's orbit and its period, where they are known beforehand.

@@ -33,7 +33,14 @@ AnyDefinition = TypeVar('AnyDefinition', bound='NetworkDefinition')
 
 @dataclass(frozen=True)
 class Range:
-    """A parameter's range and meaning."""
+    """A parameter's range and meaning.
+
+    Attributes:
+        low: least value that may be set, in the parameter's own unit.
+        high: greatest value, in the same unit.
+        text: what it is, with its unit in brackets if it has one.
+
+    """
 
     low: float
     high: float

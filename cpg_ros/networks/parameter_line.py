@@ -42,7 +42,7 @@ class ParameterLine:
         """Read ``tau``, ``alpha=beta``, ``alpha=-beta`` or a group of the network, ``w_a``.
 
         Raises:
-            ValueError: a name that is not a parameter of the network, or given twice.
+            InputError: a name that is not a parameter of the network, or given twice.
 
         """
         names: list[str] = []
@@ -62,6 +62,11 @@ class ParameterLine:
             names.extend(members)
             signs.extend([sign] * len(members))
         return cls(tuple(names), tuple(signs))
+
+    @classmethod
+    def of(cls, line: 'ParameterLine | str', network: type[Network]) -> 'ParameterLine':
+        """Return the line itself, or the one that a text such as ``tau`` names; see parse."""
+        return cls.parse(line, network) if isinstance(line, str) else line
 
     def __str__(self) -> str:
         return '='.join(('' if sign > 0.0 else '-') + name

@@ -25,14 +25,15 @@ from cpg_ros.files.atomic_write import write_atomically
 from cpg_ros.files.shared_resources import share
 from cpg_ros.files.yaml_reader import Reader
 from cpg_ros.networks.network_definition import AnyDefinition
+from cpg_ros.short_repr import ShortRepr
 import yaml
 
 #: No number in a preset is larger.
 LARGEST = 1e3
 
 
-@dataclass(frozen=True)
-class Preset(Generic[AnyDefinition]):
+@dataclass(frozen=True, repr=False)
+class Preset(ShortRepr, Generic[AnyDefinition]):
     """A named parameter set and the gait it runs.
 
     Attributes:
@@ -48,6 +49,10 @@ class Preset(Generic[AnyDefinition]):
     network: AnyDefinition
     start: tuple[float, ...] | None = None
     period: float = 0.0
+
+    def _summary(self) -> str:
+        return f'{self.gait} of {self.network.name}: ' + ', '.join(
+            f'{name} {value:.6g}' for name, value in self.network.as_dict().items())
 
 
 class PresetError(CpgError):

@@ -54,7 +54,7 @@ class NetworkError(CpgError):
 
 
 class _Networks(Mapping[str, type[Network]]):
-    """All networks by name; those of other packages are loaded when they are asked for."""
+    """All networks by name; those of other packages are loaded on first use."""
 
     def __init__(self) -> None:
         #: Network of a file -> the file.
@@ -64,6 +64,9 @@ class _Networks(Mapping[str, type[Network]]):
     def _offered(self) -> dict[str, EntryPoint]:
         return {point.name: point for point in entry_points(group=GROUP)
                 if point.name not in SHIPPED}
+
+    def __repr__(self) -> str:
+        return f'NETWORKS({", ".join(self)})'
 
     def __iter__(self) -> Iterator[str]:
         return iter((*SHIPPED, *self._offered, *(network.name for network in self.files)))
@@ -90,7 +93,10 @@ class _Networks(Mapping[str, type[Network]]):
 
 
 class _Presets(Mapping[str, dict[str, Preset]]):
-    """Network -> name -> preset."""
+    """Name of a network -> name of a preset -> preset."""
+
+    def __repr__(self) -> str:
+        return f'PRESETS({", ".join(f"{name}: {len(self[name])}" for name in self)})'
 
     def __iter__(self) -> Iterator[str]:
         return iter(NETWORKS)

@@ -28,6 +28,7 @@ from itertools import product
 import math
 
 from cpg_ros.errors import InputError
+from cpg_ros.short_repr import ShortRepr
 import numpy as np
 
 #: g as a permutation: cell i (from 0) goes to cell g[i].
@@ -122,8 +123,8 @@ GAITS = {'pronk': (0, 0), 'pace': (0, 1), 'bound': (2, 0), 'trot': (2, 1),
 D2 = Group(4, (('rho', (1, 0, 3, 2)), ('tau', (2, 3, 0, 1))))
 
 
-@dataclass(frozen=True)
-class Symmetry:
+@dataclass(frozen=True, repr=False)
+class Symmetry(ShortRepr):
     """The spatio-temporal symmetry of a gait: a shift for every element of H.
 
     Attributes:
@@ -142,6 +143,10 @@ class Symmetry:
     variables: int = 2
     odd: bool = False
     leads: tuple[float, ...] = field(default=(), compare=False)
+
+    def _summary(self) -> str:
+        return f'{self.group.cells} cells: ' + ', '.join(
+            f'{name} by {shift}' for name, shift in self.shifts if name != '1')
 
     @classmethod
     def of(cls, group: Group, shifts: Mapping[str, Fraction | float], variables: int = 2,

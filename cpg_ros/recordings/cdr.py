@@ -27,6 +27,7 @@ from typing import Any
 
 from cpg_ros.errors import CpgError
 from cpg_ros.recordings.bag_library import deserialize, SerdeError
+from cpg_ros.short_repr import ShortRepr
 import numpy as np
 
 JOINT_STATE = 'sensor_msgs/msg/JointState'
@@ -46,8 +47,8 @@ class UndecodableError(CpgError):
         self.index = index
 
 
-@dataclass(frozen=True)
-class MessageBlock:
+@dataclass(frozen=True, eq=False, repr=False)
+class MessageBlock(ShortRepr):
     """Messages that have the same names.
 
     Attributes:

@@ -29,6 +29,7 @@ from cpg_ros.recordings.stray_samples import (
     without_far,
 )
 from cpg_ros.recordings.thinned import Thinned
+from cpg_ros.short_repr import ShortRepr
 import numpy as np
 
 #: Stamps, shape (n,), int64, ns; the joints' names; positions, shape (n, names), rad.
@@ -45,8 +46,8 @@ class RecordingError(CpgError):
     """A recording cannot be used; the message is one line with the file, topic and place."""
 
 
-@dataclass(frozen=True, eq=False)
-class Recording:
+@dataclass(frozen=True, eq=False, repr=False)
+class Recording(ShortRepr):
     """Joint angles over time.
 
     Attributes:
@@ -69,6 +70,10 @@ class Recording:
     source: str
     start: float = 0.0
     notes: tuple[str, ...] = ()
+
+    def _summary(self) -> str:
+        return (f'{self.source}: {len(self.joints)} joints, {len(self.times)} samples '
+                f'in {self.times[-1]:.6g} s')
 
     def __post_init__(self) -> None:
         if self.positions.shape != (len(self.times), len(self.joints)):

@@ -23,6 +23,7 @@ from dataclasses import asdict, dataclass, field
 from typing import Any
 
 from cpg_ros.files.yaml_reader import Reader, shown
+from cpg_ros.short_repr import ShortRepr
 import numpy as np
 
 #: Bins of the stride in an efference table, and most speeds that it has.
@@ -53,8 +54,8 @@ class LegGeometry:
     foot: tuple[float, ...]
 
 
-@dataclass(frozen=True)
-class BodyGeometry:
+@dataclass(frozen=True, repr=False)
+class BodyGeometry(ShortRepr):
     """What feedback needs to know of a body.
 
     Attributes:
@@ -69,8 +70,8 @@ class BodyGeometry:
     legs: dict[str, LegGeometry] = field(default_factory=dict)
 
 
-@dataclass(frozen=True)
-class EfferenceTable:
+@dataclass(frozen=True, repr=False)
+class EfferenceTable(ShortRepr):
     """What the base does by itself in a gait, by speed and by the phase of the first leg.
 
     Attributes:

@@ -27,6 +27,7 @@ from dataclasses import dataclass, field
 from cpg_ros.errors import InputError
 from cpg_ros.networks.registry import NETWORKS
 from cpg_ros.robots.body_keys import BodyGeometry, EfferenceTable
+from cpg_ros.short_repr import ShortRepr, shown
 import numpy as np
 
 #: Harmonics of a Morris-Lecar cell that joints follow, if the file does not say.
@@ -98,8 +99,8 @@ class JointMotion:
     in_place: tuple[float, ...] = ()
 
 
-@dataclass(frozen=True)
-class Motion:
+@dataclass(frozen=True, repr=False)
+class Motion(ShortRepr):
     """What a gait makes of a robot, where that differs from what its joints say.
 
     Attributes:
@@ -121,8 +122,8 @@ class Motion:
     stance: tuple[float, float] | None = None
 
 
-@dataclass(frozen=True)
-class Robot:
+@dataclass(frozen=True, repr=False)
+class Robot(ShortRepr):
     """Legs and joints of a robot, joints grouped by leg in the order of the file.
 
     Attributes:
@@ -155,6 +156,10 @@ class Robot:
             stated = {leg: word for name in self.networks
                       for leg, word in getattr(NETWORKS[name], key).items()}
             object.__setattr__(self, key, {**stated, **getattr(self, key)})
+
+    def _summary(self) -> str:
+        return (f'{self.name}: {len(self.legs)} legs, {len(self.order)} joints, driven by '
+                f'{shown(self.networks)}')
 
     @property
     def left(self) -> np.ndarray:

@@ -288,14 +288,14 @@ def _alike(cells: Mapping[str, tuple[int, ...]], others: Mapping[str, tuple[int,
     return set(cells) == set(others) and all(cells[leg][0] == others[leg][0] for leg in cells)
 
 
-def load_robot(name: str) -> Robot:
-    """Load a robot file, or a shipped one by its bare name.
+def load_robot(name: str | Path) -> Robot:
+    """Load a robot file, or a shipped one by its bare name; angles in rad, speeds in rad/s.
 
     Raises:
         RobotError: there is no such file, or it cannot be used.
 
     """
-    if name.endswith(('.yaml', '.yml')) or '/' in name:
+    if isinstance(name, Path) or name.endswith(('.yaml', '.yml')) or '/' in name:
         return read_robot(Path(name).expanduser())
     path = share() / 'config' / f'{name}.yaml'
     if not path.is_file():

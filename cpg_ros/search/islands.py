@@ -26,6 +26,7 @@ from cpg_ros.errors import CpgError
 from cpg_ros.networks.network import Network
 from cpg_ros.search.objectives import evaluate, pairs, Score
 from cpg_ros.search.search_space import search_space, Space
+from cpg_ros.short_repr import ShortRepr
 import numpy as np
 
 #: Generations between two migrations, and the share of a population that goes.
@@ -51,8 +52,8 @@ class Ground:
         return search_space(self.network, self.gait, self.bounds, self.fixed)
 
 
-@dataclass(frozen=True)
-class Stay:
+@dataclass(frozen=True, eq=False, repr=False)
+class Stay(ShortRepr):
     """An island for some generations.
 
     Attributes:
@@ -75,8 +76,8 @@ class Stay:
     known: tuple[Score, ...] = ()
 
 
-@dataclass(frozen=True)
-class Evolved:
+@dataclass(frozen=True, eq=False, repr=False)
+class Evolved(ShortRepr):
     """What came of a stay: the last generation, best first, and all sets that were judged."""
 
     values: np.ndarray

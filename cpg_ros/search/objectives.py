@@ -38,6 +38,7 @@ from cpg_ros.search.settled_cycle import (
     SPAN,
     start_states,
 )
+from cpg_ros.short_repr import ShortRepr
 import numpy as np
 
 #: Sets that are simulated at once, which limits memory: a usual generation is one batch.
@@ -58,8 +59,8 @@ LEAST_RANGE, LEAST_STEADINESS, LEAST_DIFFERENCE, MARGIN = 0.15, 0.1, 0.15, 1.2
 WORST, DEAD, APERIODIC = 180.0, 2.0, 1.5
 
 
-@dataclass(frozen=True)
-class Score:
+@dataclass(frozen=True, eq=False, repr=False)
+class Score(ShortRepr):
     """A parameter set, what it is worth, and where its gait can be found.
 
     Attributes:

@@ -19,6 +19,7 @@ from dataclasses import dataclass
 
 from cpg_ros.integration.simulate import simulate, Trajectory
 from cpg_ros.networks.network import Network
+from cpg_ros.short_repr import ShortRepr
 import numpy as np
 
 #: Model time that every set is simulated for, and between the states that are kept.
@@ -36,8 +37,8 @@ ALIVE = 0.05
 RETURNED = 0.1
 
 
-@dataclass(frozen=True)
-class SettledCycle:
+@dataclass(frozen=True, eq=False, repr=False)
+class SettledCycle(ShortRepr):
     """What a network does in the end, from a simulation.
 
     Attributes:

@@ -26,6 +26,7 @@ from cpg_ros.networks.network import Preset
 from cpg_ros.networks.symmetry import Symmetry
 from cpg_ros.search.objectives import phase_errors, Score, waveform_shortfall
 from cpg_ros.search.settled_cycle import ALIVE, COARSER, KEPT, last_cycle
+from cpg_ros.short_repr import ShortRepr
 import numpy as np
 
 #: Noise that a gait has to survive (per square root of model time), for how long (model time),
@@ -44,8 +45,8 @@ class NotGood(CpgError):
     """A parameter set does not stand up to scrutiny; the message says why."""
 
 
-@dataclass(frozen=True)
-class Chosen:
+@dataclass(frozen=True, eq=False, repr=False)
+class Chosen(ShortRepr):
     """A parameter set with its exact orbit.
 
     Attributes:

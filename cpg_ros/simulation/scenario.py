@@ -16,6 +16,7 @@
 
 from dataclasses import dataclass
 
+from cpg_ros.short_repr import ShortRepr
 from cpg_ros.simulation.terrain import Terrain
 import numpy as np
 
@@ -88,8 +89,8 @@ class SensorNoise:
     seed: int = 0
 
 
-@dataclass(frozen=True)
-class Outcome:
+@dataclass(frozen=True, eq=False, repr=False)
+class Outcome(ShortRepr):
     """How runs ended, and their signals after each step; the first axis is the run's.
 
     What follows a run's end repeats its last value.

@@ -120,9 +120,9 @@ def _born(point: HopfPoint, analysis: Analysis) -> list[Branch]:
     low, high = analysis.span
     try:
         return [continue_from_hopf(point.network, point.block.symmetry, point.omega,
-                                   analysis.along, low,
-                                   high, rest=point.state, vector=point.eigenvector, most=POINTS,
-                                   longest=SLOWEST, longest_step=LONGEST)]
+                                   analysis.along, low, high, rest=point.state,
+                                   vector=point.eigenvector, most=POINTS, longest=SLOWEST,
+                                   longest_step=LONGEST)]
     except NoOrbit:
         return []
 

@@ -30,6 +30,7 @@ from cpg_ros.files.plain_text import table
 from cpg_ros.networks.network import Network
 from cpg_ros.networks.parameter_line import ParameterLine
 from cpg_ros.papers.commentary import COMMENTARIES, Commentary
+from cpg_ros.short_repr import ShortRepr
 import numpy as np
 
 #: From this error of the multiplier along the orbit on, it is said.
@@ -72,8 +73,8 @@ def _degenerate(network: Network) -> list[str]:
             'with the size at which they reach a kink, not with size 0.']
 
 
-@dataclass(frozen=True, eq=False)
-class Analysis:
+@dataclass(frozen=True, eq=False, repr=False)
+class Analysis(ShortRepr):
     """A parameter set with its gaits.
 
     Where the network has a delay, its Hopf points are those at which the delay is critical.

@@ -36,14 +36,15 @@ from cpg_ros.dynamics.periodic import NoOrbit
 from cpg_ros.networks.network import Network
 from cpg_ros.networks.parameter_line import ParameterLine
 from cpg_ros.networks.symmetry import Symmetry
+from cpg_ros.short_repr import ShortRepr
 import numpy as np
 
 #: States, shape (m, components), as a function of times in cycles, shape (m,).
 States = Callable[[np.ndarray], np.ndarray]
 
 
-@dataclass(frozen=True, eq=False)
-class FourierCurve:
+@dataclass(frozen=True, eq=False, repr=False)
+class FourierCurve(ShortRepr):
     """Orbits by waveforms: unknowns u at n nodes of each row, T, and the value on the line.
 
     Attributes:

@@ -14,14 +14,14 @@
 
 """Orbits as trigonometric polynomials: the gaits of networks with a delay."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 from cpg_ros.dynamics.fourier import collocation
 from cpg_ros.dynamics.periodic import Orbit
 import numpy as np
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class FourierOrbit(Orbit):
     """An orbit by its waveforms on evenly spaced nodes.
 
@@ -33,8 +33,11 @@ class FourierOrbit(Orbit):
 
     """
 
-    values: np.ndarray = field(repr=False)
-    derivatives: np.ndarray = field(repr=False)
+    values: np.ndarray
+    derivatives: np.ndarray
+
+    def _summary(self) -> str:
+        return f'{super()._summary()}, {self.samples} nodes'
 
     @property
     def d_period(self) -> np.ndarray:

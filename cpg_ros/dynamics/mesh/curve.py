@@ -39,14 +39,15 @@ from cpg_ros.dynamics.mesh.refinement import completed
 from cpg_ros.networks.network import Network
 from cpg_ros.networks.parameter_line import ParameterLine
 from cpg_ros.networks.symmetry import Symmetry
+from cpg_ros.short_repr import ShortRepr
 import numpy as np
 
 #: States, shape (m, components), as a function of times in cycles, shape (m,).
 States = Callable[[np.ndarray], np.ndarray]
 
 
-@dataclass(frozen=True, eq=False)
-class MeshCurve:
+@dataclass(frozen=True, eq=False, repr=False)
+class MeshCurve(ShortRepr):
     """Orbits of a network without delay on a mesh: points, nodes, L = T/m, and the value.
 
     Attributes:

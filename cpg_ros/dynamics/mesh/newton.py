@@ -30,6 +30,7 @@ from cpg_ros.dynamics.periodic import NoOrbit
 from cpg_ros.networks.field import Field
 from cpg_ros.networks.network import Network
 from cpg_ros.networks.symmetry import Symmetry
+from cpg_ros.short_repr import ShortRepr
 import numpy as np
 from numpy.polynomial import polynomial
 
@@ -59,8 +60,8 @@ class Reduced(Field):
         self.turn = (symmetry.classes[symmetry.turn[first]] + blocks * self.size).ravel()
 
 
-@dataclass
-class Solution:
+@dataclass(eq=False, repr=False)
+class Solution(ShortRepr):
     """What Newton's method works on: values at mesh points, at nodes, and L = T/m."""
 
     mesh: np.ndarray

@@ -18,7 +18,7 @@ A gait with m = order of H/K is known from the cells of one class each, over one
 ``x_i(t + T/m) = x_turn(i)(t)``.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 
 from cpg_ros.dynamics.mesh.newton import derivatives, Reduced, Solution
@@ -29,7 +29,7 @@ import numpy as np
 SAMPLES = 8192
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class MeshOrbit(Orbit):
     """An orbit as polynomials on a mesh.
 
@@ -40,9 +40,12 @@ class MeshOrbit(Orbit):
 
     """
 
-    mesh: np.ndarray = field(repr=False)
-    stages: np.ndarray = field(repr=False)
-    coefficients: np.ndarray = field(repr=False)
+    mesh: np.ndarray
+    stages: np.ndarray
+    coefficients: np.ndarray
+
+    def _summary(self) -> str:
+        return f'{super()._summary()}, {self.mesh.size - 1} intervals'
 
     @property
     def solution(self) -> Solution:
