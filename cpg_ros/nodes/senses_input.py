@@ -31,14 +31,8 @@ from cpg_ros.feedback.plausibility import (
 )
 from cpg_ros.feedback.watch import Watch
 from cpg_ros.integration.jit import bound
-from cpg_ros.nodes.raw_messages import (
-    JointLayout,
-    last_numbers,
-    legs_of,
-    Newest,
-    numbers_at,
-    stamp_of,
-)
+from cpg_ros.nodes.polled_group import PolledSubscription
+from cpg_ros.nodes.raw_messages import JointLayout, last_numbers, legs_of, numbers_at, stamp_of
 from cpg_ros.robots.robot import Robot
 from geometry_msgs.msg import WrenchStamped
 import numpy as np
@@ -61,7 +55,7 @@ class _Input:
     """One topic: its newest message, and the watch over it."""
 
     def __init__(self, node: Node, kind: type, topic: str) -> None:
-        self.newest, self.watch = Newest(node, kind, topic), Watch(topic)
+        self.messages, self.watch = PolledSubscription(node, kind, topic, raw=True), Watch(topic)
         self.stamped = hasattr(kind, 'header')
 
 
@@ -126,7 +120,7 @@ class SensesInput:
                                   self._felt)
         inputs = [self._imu, self._joints, *self._feet]
         self.watches: Sequence[Watch] = [one.watch for one in inputs]
-        self.topics: Sequence[str] = [one.newest.topic for one in inputs]
+        self.topics: Sequence[str] = [one.messages.topic for one in inputs]
 
     def restart(self) -> None:
         """Forget when messages came, as where simulated time jumps back."""
@@ -148,7 +142,7 @@ class SensesInput:
             self._take(one, now, patience, read)
 
     def _take(self, one: _Input, now: float, patience: float, read: Reader) -> None:
-        data = one.newest.take()
+        data = one.messages.newest()
         if data is None:
             return
         watch = one.watch

@@ -25,5 +25,5 @@ needed('websockets', part='websockets.asyncio')
 
 __all__ = ['body_shape', 'controls', 'door', 'graph', 'lease', 'mesh_files', 'mesh_places',
            'model_shape', 'orders', 'pages', 'panel_node', 'recorder', 'requests', 'robot_view',
-           'service_calls', 'shape_facts', 'shape_source', 'steering', 'stick_figure', 'teleop',
-           'topics', 'urdf_shape', 'web_server']
+           'shape_facts', 'shape_source', 'steering', 'stick_figure', 'teleop', 'urdf_shape',
+           'web_server']
