@@ -27,7 +27,7 @@ from types import SimpleNamespace
 
 from cpg_ros.nodes.deadline_thread import Ticker
 from cpg_ros.nodes.diagnostics import Diagnostics
-from cpg_ros.nodes.rivals import Rivals
+from cpg_ros.nodes.other_publishers import OtherPublishers
 from cpg_ros.nodes.shutdown import ended
 from cpg_ros.robots.robot import Robot
 from cpg_ros.robots.robot_file import load_robot
@@ -109,7 +109,7 @@ def main() -> int:
     still = SimpleNamespace(program=program, robot=robot, faults=0, held=0, recovering=False,
                             standing=True)
     deaf = SimpleNamespace(out='', active=False, state=lambda now: {})
-    diagnostics = Diagnostics(node, still, ticker, Rivals(node, ()), None, deaf)
+    diagnostics = Diagnostics(node, still, ticker, OtherPublishers(node, ()), None, deaf)
     node.create_service(SetBool, '~/enable', lambda request, response: response)
     executor = SingleThreadedExecutor()
     executor.add_node(node)

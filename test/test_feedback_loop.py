@@ -51,11 +51,12 @@ class Wire:
 
     wires: dict = {}
 
-    def __init__(self, _node, _kind, topic):
+    def __init__(self, _node, _kind, topic, raw):
+        assert raw
         self.topic, self.data = topic, None
         self.wires[topic] = self
 
-    def take(self):
+    def newest(self):
         data, self.data = self.data, None
         return data
 
@@ -85,7 +86,7 @@ class Robot:
     """A body whose topics may lie."""
 
     def __init__(self, monkeypatch, contacts='foot_contacts', lag=0, **dull):
-        monkeypatch.setattr(senses_input, 'Newest', Wire)
+        monkeypatch.setattr(senses_input, 'PolledSubscription', Wire)
         Wire.wires = {}
         made = program('trot')
         self.body = Body('go2', GO2)

@@ -33,6 +33,8 @@ pytest.importorskip('websockets')
 
 from graph import free_domain, Process, until  # noqa: E402, I100
 from panel_client import Client, PANEL, start_panel, steered_robot  # noqa: E402
+from rclpy.qos import qos_profile_sensor_data  # noqa: E402
+from std_msgs.msg import String  # noqa: E402
 
 
 @pytest.fixture(scope='module')
@@ -183,9 +185,14 @@ def test_stop_and_enable(rig, page):
 
 def test_a_recording_can_be_fetched_and_read(rig, page):
     address = rig[2]
+    # As sensors are published.
+    felt = rig[3].node.create_publisher(String, '/felt', qos_profile_sensor_data)
+    time.sleep(1.5)
     page.send(do='record', on=True)
     until(lambda: page.last['state']['recording'], 'recording')
-    time.sleep(1.0)
+    for _ in range(20):
+        time.sleep(0.1)
+        felt.publish(String(data='touch'))
     page.send(do='record', on=False)
     until(lambda: not page.last['state']['recording'], 'the end')
     bag = page.last['state']['bag']
@@ -198,6 +205,7 @@ def test_a_recording_can_be_fetched_and_read(rig, page):
               told['rosbag2_bagfile_information']['topics_with_message_count']}
     # Every message of 200 a second, not thirty.
     assert counts['/joint_states'] > 100 and counts['/cpg_generator/gait'] == 1
+    assert counts['/felt'] > 0
 
 
 HOSTILE = ['', '{', '[' * 4000, 'null', '{"do":"set","name":"gait","value":NaN}',

@@ -21,7 +21,8 @@ import pytest
 pytest.importorskip('websockets')
 
 from cpg_ros.files.loopback import is_loopback  # noqa: E402, I100
-from cpg_ros.panel.controls import choices, unit  # noqa: E402
+from cpg_ros.nodes.parameter_spec import choices  # noqa: E402
+from cpg_ros.panel.controls import unit  # noqa: E402
 from cpg_ros.panel.door import Delays, Door, DoorError, PEERS, token_for  # noqa: E402
 from cpg_ros.panel.requests import LONGEST, read, RequestError  # noqa: E402
 

@@ -20,7 +20,7 @@ from typing import Any
 
 from cpg_ros.errors import CpgError
 from cpg_ros.nodes.joint_publishers import COMMAND_TOPICS
-from cpg_ros.nodes.unserved import subscribe, taken
+from cpg_ros.nodes.polled_group import PolledSubscription
 from cpg_ros.robots.robot import Robot
 from cpg_ros.robots.robot_file import LARGEST
 import numpy as np
@@ -68,7 +68,7 @@ class Commands:
         self.angles = np.array(angles, dtype=float)
         self._index = {name: k for k, name in enumerate(robot.order)}
         # One for each topic: the subscription, what reads a message, and names -> places.
-        self._sources: list[tuple[Any, Any]] = []
+        self._sources: list[tuple[PolledSubscription, Any]] = []
         self._known: dict[str, tuple[list[str], np.ndarray]] = {}
         self._fresh: list[bool] = []
         self._since = 0
@@ -84,10 +84,11 @@ class Commands:
         else:
             self._listen(Float64MultiArray, COMMAND_TOPICS[kind],
                          partial(self._array, COMMAND_TOPICS[kind]))
-        self.topics = [subscription.topic_name for subscription, _ in self._sources]
+        self.topics = [subscription.topic for subscription, _ in self._sources]
 
     def _listen(self, kind: type, topic: str, read: Any) -> None:
-        self._sources.append((subscribe(self._node, kind, topic, QoSProfile(depth=10)), read))
+        self._sources.append((
+            PolledSubscription(self._node, kind, topic, QoSProfile(depth=10)), read))
         self._fresh.append(False)
 
     @property
@@ -105,7 +106,7 @@ class Commands:
         self.refused = ''
         for k, (subscription, read) in enumerate(self._sources):
             # Every one: what cannot be used is told even if a better one has followed.
-            for message, _ in taken(subscription):
+            for message, _ in subscription.take():
                 try:
                     self._fresh[k] |= read(message)
                 except _Bad as error:

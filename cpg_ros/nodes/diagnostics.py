@@ -21,7 +21,7 @@ from cpg_ros.nodes.cmd_vel import CmdVel
 from cpg_ros.nodes.deadline_thread import Ticker
 from cpg_ros.nodes.feedback_switch import FeedbackSwitch
 from cpg_ros.nodes.log_queue import QUEUE
-from cpg_ros.nodes.rivals import Rivals
+from cpg_ros.nodes.other_publishers import OtherPublishers
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.clock import Clock
 from rclpy.clock_type import ClockType
@@ -37,11 +37,11 @@ class Diagnostics:
     A warning is for lateness, and for silence: what is not published is not OK.
     """
 
-    def __init__(self, node: Node, pattern: Pattern, ticker: Ticker, rivals: Rivals,
+    def __init__(self, node: Node, pattern: Pattern, ticker: Ticker, others: OtherPublishers,
                  cmd_vel: CmdVel | None, feedback: FeedbackSwitch) -> None:
         self._feedback = feedback
         self._node, self._pattern, self._ticker = node, pattern, ticker
-        self._rivals, self._cmd_vel = rivals, cmd_vel
+        self._others, self._cmd_vel = others, cmd_vel
         self._publisher = node.create_publisher(DiagnosticArray, '/diagnostics', 10)
         self._before = self._counts()
         self._silent = 0
@@ -66,8 +66,8 @@ class Diagnostics:
             level, text = DiagnosticStatus.ERROR, 'the network left its orbit and was re-seeded'
             if program.gain == 0.0:
                 text += ' (symmetry_gain is 0: no gait is stable)'
-        elif self._rivals.text:
-            level, text = DiagnosticStatus.ERROR, self._rivals.text
+        elif self._others.text:
+            level, text = DiagnosticStatus.ERROR, self._others.text
         elif new['jumps back of simulated time']:
             level = DiagnosticStatus.WARN
             text = self._why_anew(new['jumps back of simulated time'])

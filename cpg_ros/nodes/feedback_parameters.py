@@ -19,7 +19,7 @@ from typing import Any
 
 from cpg_ros.feedback.gains import GAINS as GAIN_OF
 from cpg_ros.feedback.gains import Gains, LAWS
-from cpg_ros.nodes.parameter_spec import Spec
+from cpg_ros.nodes.parameter_spec import one_of, Spec
 from cpg_ros.nodes.senses_input import CONTACTS
 
 PREFIX = 'feedback.'
@@ -42,7 +42,7 @@ TOPICS = {
     f'{PREFIX}contacts': Spec('foot_contacts', 'source of the loads on the feet: one message '
                               'with all of them, a geometry_msgs/WrenchStamped for each leg, or '
                               'the efforts of the measured joints', read_only=True,
-                              constraints='one of: ' + ', '.join(CONTACTS)),
+                              constraints=one_of(CONTACTS)),
     f'{PREFIX}contacts_topic': Spec('foot_contacts', 'topic of the std_msgs/Float64MultiArray '
                                     'with the loads on the feet in N; with wrenches, the name of '
                                     "each leg's own topic, as in lh/foot_contacts",

@@ -14,15 +14,14 @@
 
 """The generator node: a central pattern generator that publishes joint states in real time."""
 
-from pathlib import Path
+from functools import partial
 import sys
 import time
 
 from cpg_ros.motion.pattern import Pattern
 from cpg_ros.motion.plan import Refused
 from cpg_ros.motion.steering import Drive
-from cpg_ros.networks.network import Network, Preset
-from cpg_ros.networks.preset_files import PresetError, read_presets
+from cpg_ros.networks.preset_files import PresetError
 from cpg_ros.networks.registry import find_network, NetworkError
 from cpg_ros.nodes import feedback_parameters
 from cpg_ros.nodes.cells_publisher import Cells
@@ -38,21 +37,21 @@ from cpg_ros.nodes.generator_parameters import (
     NETWORK,
     network_for,
     Planner,
+    presets_of,
     specs,
 )
 from cpg_ros.nodes.joint_publishers import Outputs
 from cpg_ros.nodes.kernels import compile_kernels
 from cpg_ros.nodes.measured_pose import MeasuredPose
 from cpg_ros.nodes.node_base import asked_for_help, run, StartedNode, StartError
-from cpg_ros.nodes.parameter_spec import as_doubles
+from cpg_ros.nodes.other_publishers import OtherPublishers
+from cpg_ros.nodes.qos_profiles import latched
 from cpg_ros.nodes.real_time import NoSuchCore, RealTime, SPECS
-from cpg_ros.nodes.rivals import Rivals
 from cpg_ros.nodes.senses_input import CONTACTS
 from cpg_ros.robots.robot import Robot
 from cpg_ros.robots.robot_file import load_robot, RobotError
 from rcl_interfaces.msg import ParameterType, SetParametersResult
 from rclpy.parameter import Parameter
-from rclpy.qos import DurabilityPolicy, QoSProfile
 from rclpy.qos_overriding_options import QoSOverridingOptions
 from std_msgs.msg import String
 from std_srvs.srv import SetBool
@@ -89,9 +88,15 @@ class Generator(StartedNode):
         for name, spec in specs(network).items():
             self._declare(name, spec)
         self._declare('exclusive', exclusive(self._value('command')))
-        presets = network.presets() | self._further_presets(network)
+        try:
+            presets = presets_of(network, self._value('presets'))
+        except PresetError as error:
+            raise StartError(str(error)) from error
         self._one_of('gait', tuple(presets))
-        self._list_gaits(network, presets)
+        # Its descriptor lists those of the file, too.
+        descriptor = gait_spec(network, presets).descriptor()
+        descriptor.type = ParameterType.PARAMETER_STRING
+        self.set_descriptor('gait', descriptor)
         self._one_of('command', COMMANDS)
         try:
             robot = load_robot(self._value('robot'))
@@ -107,7 +112,8 @@ class Generator(StartedNode):
             raise StartError(f"there is no parameter '{FORMER}': it is '{ENABLED}'")
         self._declare(ENABLED, usual(self, robot, self._value('combined_topic')))
         self._one_of('feedback.contacts', CONTACTS)
-        self._given_groups()
+        for parameter in self._planner.given(self._value('gait'), self._parameter_overrides):
+            self._parameter_overrides[parameter.name] = parameter
         for name, spec in self._planner.specs(self._value('gait')).items():
             self._declare(name, spec)
         try:
@@ -132,50 +138,26 @@ class Generator(StartedNode):
         self._cells = Cells(self, network)
         self._measured = self._measured_pose(robot)
         self._gait = self.create_publisher(
-            String, '~/gait',
-            QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL),
+            String, '~/gait', latched(),
             qos_overriding_options=QoSOverridingOptions.with_default_policies())
         self.create_service(SetBool, '~/enable', self._enable)
         try:
-            self._real_time = RealTime.of(*map(self._value, SPECS))
+            real_time = RealTime.of(*map(self._value, SPECS))
         except NoSuchCore as error:
             raise StartError(str(error)) from error
         self.ticker = Ticker(self, self._value('rate'), self._tick, self._restart, self._fail,
-                             self.pattern.resume, self._claim_real_time)
-        self._rivals = Rivals(self, self._outputs.topics)
-        self._diagnostics = Diagnostics(self, self.pattern, self.ticker, self._rivals,
+                             self.pattern.resume, partial(real_time.request, self.get_logger()))
+        self._others = OtherPublishers(self, self._outputs.topics)
+        self._diagnostics = Diagnostics(self, self.pattern, self.ticker, self._others,
                                         self._cmd_vel, self._feedback)
         self.add_on_set_parameters_callback(self._judge)
         self.add_post_set_parameters_callback(self._apply)
         self._warn_of_unknown()
-        if self._value('exclusive') and self._rivals.seek(joined + DISCOVERY - time.monotonic()):
-            raise StartError(f'{self._rivals.text}: stop that publisher, rename the topic, '
+        if self._value('exclusive') and self._others.seek(joined + DISCOVERY - time.monotonic()):
+            raise StartError(f'{self._others.text}: stop that publisher, rename the topic, '
                              'or set exclusive to false')
 
     # -- parameters -----------------------------------------------------------------------
-
-    def _further_presets(self, network: type[Network]) -> dict[str, Preset]:
-        path = self._value('presets')
-        try:
-            return read_presets(Path(path).expanduser(), network) if path else {}
-        except PresetError as error:
-            raise StartError(str(error)) from error
-
-    def _list_gaits(self, network: type[Network], presets: dict[str, Preset]) -> None:
-        """Let the descriptor of ``gait`` list those of the further presets, too."""
-        descriptor = gait_spec(network, presets).descriptor()
-        descriptor.type = ParameterType.PARAMETER_STRING
-        self.set_descriptor('gait', descriptor)
-
-    def _given_groups(self) -> None:
-        """Let what is given for a group at start stand for each of its members."""
-        preset = self._planner.presets[self._value('gait')]
-        names = set(self._planner.specs(self._value('gait')))
-        given = [p for p in self._parameter_overrides.values() if p.name in names]
-        current = {f'{preset.network.name}.{key}': value
-                   for key, value in preset.network.as_dict().items()}
-        for parameter in self._planner.complete(as_doubles(given, names), current):
-            self._parameter_overrides[parameter.name] = parameter
 
     def _values(self, changes: list[Parameter] | None = None) -> dict:
         values = {name: self._value(name) for name in self._planner.names}
@@ -270,8 +252,8 @@ class Generator(StartedNode):
             if not request.data:
                 response.message = 'nothing is published yet'
                 return response
-            if self._value('exclusive') and self._rivals.look():
-                response.success, response.message = False, self._rivals.text
+            if self._value('exclusive') and self._others.look():
+                response.success, response.message = False, self._others.text
                 return response
             response.message += f' from {self._lead_to_the_stand()}'
             self.ticker.start()
@@ -287,14 +269,6 @@ class Generator(StartedNode):
             self.ticker.stop_moving()
         self.get_logger().info(response.message)
         return response
-
-    def _claim_real_time(self) -> None:
-        """Ask for what the publishing thread is to have; it goes on without what is refused."""
-        granted, refused = self._real_time.claim()
-        for line in refused:
-            self.get_logger().warning(line)
-        if granted:
-            self.get_logger().info(f'real time: {", ".join(granted)}')
 
     def _tick(self, dt: float, stamp: int) -> None:
         self._feedback.sense(dt, stamp)

@@ -14,29 +14,31 @@
 
 """The generator's parameters: descriptors, presets, and what a batch of changes asks for."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 import contextlib
 from dataclasses import dataclass
 import functools
 import math
+from pathlib import Path
 from typing import Any
 
 from cpg_ros.errors import CpgError
 from cpg_ros.motion.plan import gait_of, plan, Program, Refused
 from cpg_ros.networks.network import Network, Preset
+from cpg_ros.networks.preset_files import read_presets
 from cpg_ros.networks.registry import find_network, NETWORKS, with_legs_of
 from cpg_ros.nodes import real_time
-from cpg_ros.nodes.parameter_spec import Spec
+from cpg_ros.nodes.parameter_spec import as_doubles, one_of, Spec
 from cpg_ros.robots.robot import Robot
 from cpg_ros.robots.robot_file import load_robot
 from rclpy.parameter import Parameter
 
 COMMANDS = ('none', 'joint_trajectory', 'forward_position')
 NETWORK = Spec('delayed', 'network of cells that generates the rhythm', read_only=True,
-               constraints='one of: ' + ', '.join(NETWORKS)
-               + ', or the path of a Python file that defines one; append a number of legs, as in '
-               "delayed6, for a variant; without one, the robot file's number of legs is used "
-               'where the file asks for that variant')
+               constraints=one_of(NETWORKS, ', or the path of a Python file that defines one; '
+                                  'append a number of legs, as in delayed6, for a variant; '
+                                  "without one, the robot file's number of legs is used where the "
+                                  'file asks for that variant'))
 
 
 def specs(network: type[Network]) -> dict[str, Spec]:
@@ -59,7 +61,7 @@ def specs(network: type[Network]) -> dict[str, Spec]:
         'combined_topic': Spec('joint_states', 'topic with all joints in one message; empty for '
                                'none', read_only=True),
         'command': Spec('none', 'command topic for ros2_control', read_only=True,
-                        constraints='one of: ' + ', '.join(COMMANDS)),
+                        constraints=one_of(COMMANDS)),
         'measured_topic': Spec('joint_states', "topic of the robot's measured joint states, from "
                                'which the generator moves it to the stand if autostart is false; '
                                'empty for none', read_only=True),
@@ -87,10 +89,20 @@ def network_for(network: Any, robot: Any) -> Any:
     return network
 
 
+def presets_of(network: type[Network], path: str) -> dict[str, Preset]:
+    """Return a network's presets and those of a file, '' for none.
+
+    Raises:
+        PresetError: the file cannot be used.
+
+    """
+    return network.presets() | (read_presets(Path(path).expanduser(), network) if path else {})
+
+
 def gait_spec(network: type[Network], presets: Iterable[str], further: str = '') -> Spec:
     """Return the parameter that is one of these presets, or of some further ones."""
     return Spec(network.usual_gait, 'gait; setting it loads its preset of network parameters',
-                constraints='one of: ' + ', '.join(presets) + further)
+                constraints=one_of(presets, further))
 
 
 def exclusive(command: str) -> Spec:
@@ -154,6 +166,13 @@ class Planner:
                 values[group], f'mean of {", ".join(members)}; setting it sets all of them',
                 allowed.low, allowed.high)
         return found
+
+    def given(self, gait: str, overrides: Mapping[str, Parameter]) -> list[Parameter]:
+        """Return what is given at start for a gait's specs, a group's value for each member."""
+        names, network = set(self.specs(gait)), self.presets[gait].network
+        current = {f'{network.name}.{key}': value for key, value in network.as_dict().items()}
+        return self.complete(as_doubles([one for one in overrides.values() if one.name in names],
+                                        names), current)
 
     def _frequency(self, preset: str) -> float | None:
         """Frequency for which the robot file has this gait, Hz."""

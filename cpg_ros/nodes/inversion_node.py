@@ -17,6 +17,7 @@
 One thread listens and answers; a fit runs in a thread of its own, while more comes in.
 """
 
+import asyncio
 from functools import partial
 import json
 from pathlib import Path
@@ -31,17 +32,17 @@ from cpg_ros.inversion.recording_fit import fit_recording, RecordingFit
 from cpg_ros.networks.registry import is_path
 from cpg_ros.nodes import node_base as starting
 from cpg_ros.nodes.node_base import StartedNode, StartError
+from cpg_ros.nodes.node_client import CallError, NodeClient, ServiceClients
 from cpg_ros.nodes.parameter_spec import Spec
+from cpg_ros.nodes.qos_profiles import best_effort, latched
 from cpg_ros.recordings.live_buffer import Live
 from cpg_ros.recordings.servo import Servo
 from cpg_ros.robots.robot import Robot
 from cpg_ros.robots.robot_file import load_robot
 from rcl_interfaces.msg import SetParametersResult
-from rcl_interfaces.srv import SetParametersAtomically
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.exceptions import NameValidationException, ParameterException
 from rclpy.parameter import Parameter
-from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.qos_overriding_options import QoSOverridingOptions
 from rclpy.task import Future
 from rclpy.timer import Timer
@@ -94,15 +95,13 @@ class Inversion(StartedNode):
             validate_topic_name(topic)
         topics = tuple(self.resolve_topic_name(topic) for topic in self._value('topics'))
         self._live = Live(topics, self._value('window'))
-        # Best effort goes with every publisher; a reader may fall behind while it fits.
-        quality = QoSProfile(depth=2000, reliability=ReliabilityPolicy.BEST_EFFORT)
         for topic in topics:
+            # A reader may fall behind while it fits.
             self.create_subscription(
-                JointState, topic, partial(self._hear, topic), quality, raw=True,
+                JointState, topic, partial(self._hear, topic), best_effort(2000), raw=True,
                 qos_overriding_options=QoSOverridingOptions.with_default_policies())
-        self._result = self.create_publisher(String, '~/result', QoSProfile(
-            depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL))
-        # Answers of others come in while a request waits for its fit.
+        self._result = self.create_publisher(String, '~/result', latched())
+        # Another request is answered while one waits for its fit.
         self._group = ReentrantCallbackGroup()
         self.create_service(Trigger, '~/fit', self._fit, callback_group=self._group)
         self._timer: Timer | None = None
@@ -152,7 +151,7 @@ class Inversion(StartedNode):
         return response
 
     async def _done(self) -> tuple[bool, str]:
-        """Fit in a thread, publish and apply; tell whether it went well, and what."""
+        """Fit in a thread; tell whether it went well, and what."""
         self._busy = True
         try:
             heard, work = self._live.copy(), Future(executor=self.executor)
@@ -161,26 +160,18 @@ class Inversion(StartedNode):
             work.add_done_callback(lambda _: None)
             self.thread = threading.Thread(target=self._work, args=(heard, work), daemon=True)
             self.thread.start()
-            said, found = await work
-            if found is not None:
-                self._result.publish(String(data=json.dumps(finite(found.as_dict()))))
-                target = self._value('apply_to')
-                why = await self._applied(target, found) if target else ''
-                if why:
-                    said, found = f'{said}; not applied to {target}: {why}', None
-                elif target:
-                    said = f'{said}; applied to {target}'
+            well, said = await work
         finally:
             self._busy = False
         # The logger tells its callers by their lines, and wants one severity of each.
-        if found is None:
-            self.get_logger().warning(said)
-        else:
+        if well:
             self.get_logger().info(said)
-        return found is not None, said
+        else:
+            self.get_logger().warning(said)
+        return well, said
 
     def _work(self, heard: Live, work: Future) -> None:
-        """Fit and write; the outcome is what to say, and what was found or None."""
+        """Fit, write, publish and apply; the outcome is whether it went well, and what to say."""
         try:
             free = tuple(name for name in self._value('free') if name)
             robot = self._robot
@@ -189,13 +180,16 @@ class Inversion(StartedNode):
             recording = heard.recording(names, True, Servo(kp, kd) if kp else None)
             found = fit_recording(recording, robot, self._value('network'), self._value('gait'),
                                   free, self._value('order'), self._value('preset'))
-            work.set_result(('; '.join([_summary(found), *self._written(found)]), found))
+            said = '; '.join([_summary(found), *self._written(found)])
+            self._result.publish(String(data=json.dumps(finite(found.as_dict()))))
+            well, applied = self._applied(self._value('apply_to'), found)
+            work.set_result((well, said + applied))
         except (CpgError, OSError) as error:
-            work.set_result((str(error), None))
+            work.set_result((False, str(error)))
         except Exception as error:
             # One fit must not end a node that listens.
             self.get_logger().error('a fit failed:\n' + traceback.format_exc())
-            work.set_result((f'{type(error).__name__}: {error}', None))
+            work.set_result((False, f'{type(error).__name__}: {error}'))
 
     def _written(self, found: RecordingFit) -> list[str]:
         written = []
@@ -209,31 +203,20 @@ class Inversion(StartedNode):
             written.append(path)
         return [f'written: {", ".join(map(str, written))}'] if written else []
 
-    async def _applied(self, target: str, found: RecordingFit) -> str:
-        """Set a running generator; return why that failed, or ''."""
-        name = f'{target}/set_parameters_atomically'
+    def _applied(self, target: str, found: RecordingFit) -> tuple[bool, str]:
+        """Set a running generator, if there is a target; return whether it is set, and so."""
+        if not target:
+            return True, ''
+        network, services = found.fit.network, ServiceClients(self)
+        values = {'gait': found.fit.gait, 'frequency': found.stride.frequency,
+                  **{f'{network.name}.{key}': value for key, value in network.as_dict().items()}}
         try:
-            client = self.create_client(SetParametersAtomically, name,
-                                        callback_group=self._group)
-        except NameValidationException as error:
-            return ' '.join(str(error).split())
-        try:
-            network = found.fit.network
-            values = {'gait': found.fit.gait, 'frequency': found.stride.frequency,
-                      **{f'{network.name}.{key}': value
-                         for key, value in network.as_dict().items()}}
-            if not client.wait_for_service(PATIENCE):
-                return f'there is no service {name}'
-            answer = client.call_async(SetParametersAtomically.Request(parameters=[
-                Parameter(key, value=value).to_parameter_msg() for key, value in values.items()]))
-            late = self.create_timer(PATIENCE, answer.cancel, callback_group=self._group)
-            result = await answer
-            self.destroy_timer(late)
-            if result is None:
-                return f'{name} does not answer'
-            return '' if result.result.successful else result.result.reason
+            asyncio.run(NodeClient(services, target).set_parameters(values, PATIENCE))
+        except (CallError, NameValidationException) as error:
+            return False, f'; not applied to {target}: {" ".join(str(error).split())}'
         finally:
-            self.destroy_client(client)
+            services.forget(target)
+        return True, f'; applied to {target}'
 
 
 def _summary(found: RecordingFit) -> str:

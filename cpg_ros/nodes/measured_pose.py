@@ -17,11 +17,11 @@
 import math
 import time
 
-from cpg_ros.nodes.unserved import subscribe, taken
+from cpg_ros.nodes.polled_group import PolledSubscription
+from cpg_ros.nodes.qos_profiles import best_effort
 from cpg_ros.robots.robot import Robot
 import numpy as np
 from rclpy.node import Node
-from rclpy.qos import QoSProfile, ReliabilityPolicy
 from sensor_msgs.msg import JointState
 
 #: Joint states older than this tell nothing of where the joints are now, s.
@@ -33,9 +33,8 @@ class MeasuredPose:
 
     def __init__(self, node: Node, robot: Robot, topic: str) -> None:
         self._names = [joint.name for joint in robot.joints]
-        # Best effort goes with every publisher; several may share the topic.
-        self._subscription = subscribe(node, JointState, topic, QoSProfile(
-            depth=50, reliability=ReliabilityPolicy.BEST_EFFORT))
+        # Several publishers may share the topic.
+        self._subscription = PolledSubscription(node, JointState, topic, best_effort(50))
 
     def take(self) -> np.ndarray | None:
         """Return the angle of each joint, rad, leg by leg; None where nothing is published.
@@ -45,10 +44,10 @@ class MeasuredPose:
 
         """
         found: dict[str, float] = {}
-        for message, arrived in taken(self._subscription):
+        for message, arrived in self._subscription.take():
             if time.time_ns() - arrived < FRESH * 1e9:
                 found.update(zip(message.name, message.position, strict=False))
         missing = [name for name in self._names if not math.isfinite(found.get(name, math.nan))]
         if found and missing:
-            raise ValueError(f'{self._subscription.topic_name} has no angle of {missing[0]}')
+            raise ValueError(f'{self._subscription.topic} has no angle of {missing[0]}')
         return np.array([found[name] for name in self._names]) if found else None

@@ -22,7 +22,7 @@ from typing import Any
 import weakref
 
 from cpg_ros.nodes.bounded_request import bounded
-from cpg_ros.nodes.unserved import Unserved
+from cpg_ros.nodes.polled_group import PolledGroup
 from rcl_interfaces import srv
 from rcl_interfaces.msg import Parameter as ParameterMessage
 from rcl_interfaces.msg import SetParametersResult
@@ -86,7 +86,7 @@ class StrictParameterService(ParameterService):
                 (srv.GetParameterTypes, self._get_parameter_types_callback),
                 (srv.ListParameters, self._list_parameters_callback)):
             self._serve(kind, partial(self._counted, answer), group)
-        own = Unserved()
+        own = PolledGroup()
         self._each = self._serve(srv.SetParameters, _untaken, own)
         self._together = self._serve(srv.SetParametersAtomically, _untaken, own)
         self._ending = False

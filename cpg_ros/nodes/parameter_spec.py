@@ -14,7 +14,9 @@
 
 """What a node's parameters are, and the numbers that they are given."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
+import re
 from typing import Any
 
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
@@ -22,6 +24,18 @@ from rclpy.parameter import Parameter
 
 #: What a value of a type is called.
 KINDS = {bool: 'a bool', int: 'an integer', float: 'a double', str: 'a string'}
+
+
+def one_of(words: Iterable[str], further: str = '') -> str:
+    """Return the constraints of a text that is one of some words, and what else it may be."""
+    return 'one of: ' + ', '.join(words) + further
+
+
+def choices(constraints: str) -> list[str]:
+    """Return the words that a descriptor's constraints list, if they are those of one_of."""
+    found = re.search(r'one of: (.*)', constraints)
+    words = found[1].split(', ') if found else []
+    return [word for word in words if re.fullmatch(r'[\w.-]+', word)]
 
 
 @dataclass(frozen=True)

@@ -12,47 +12,21 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Messages taken as bytes, and where their numbers are: decoding whole ones costs far more.
+"""Where the numbers of messages are that were taken as bytes.
 
 The bytes are CDR: four of encapsulation, then the fields, each aligned to its size.
 """
 
 from collections.abc import Sequence
 import struct
-from typing import Any
 
-from cpg_ros.nodes.unserved import subscribe
 import numpy as np
-from rclpy.node import Node
-from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray
 
 #: Bytes of the encapsulation, from behind which everything is aligned.
 HEADER = 4
-
-
-class Newest:
-    """The newest message of a topic, as bytes, once.
-
-    Attributes:
-        topic: resolved.
-
-    """
-
-    def __init__(self, node: Node, kind: type, topic: str) -> None:
-        # Sensor data: best effort goes with every publisher, and only the newest one counts.
-        self._subscription = subscribe(node, kind, topic, QoSProfile(
-            depth=1, reliability=ReliabilityPolicy.BEST_EFFORT))
-        self.topic: str = self._subscription.topic_name
-
-    def take(self) -> bytes | None:
-        """Return it, or None if there is none that is new."""
-        handle: Any = self._subscription.handle
-        with handle:
-            found = handle.take_message(self._subscription.msg_type, True)
-        return None if found is None else found[0]
 
 
 def stamp_of(data: bytes) -> float | None:

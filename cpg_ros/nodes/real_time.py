@@ -23,6 +23,7 @@ import threading
 
 from cpg_ros.errors import CpgError
 from cpg_ros.nodes.parameter_spec import Spec
+from rclpy.impl.rcutils_logger import RcutilsLogger
 
 #: With which transport a participant of Fast DDS speaks; the user's own choice goes first.
 TRANSPORT = 'FASTDDS_BUILTIN_TRANSPORTS', 'UDPv4'
@@ -98,6 +99,14 @@ class RealTime:
                                f'the limit rtprio (@realtime - rtprio {max(98, self.priority)}) '
                                f'{LIMITS}')
         return granted, refused
+
+    def request(self, logger: RcutilsLogger) -> None:
+        """Request it for the calling thread; log what is granted, and go on without the rest."""
+        granted, refused = self.claim()
+        for line in refused:
+            logger.warning(line)
+        if granted:
+            logger.info(f'real time: {", ".join(granted)}')
 
 
 def leave_shared_memory() -> None:

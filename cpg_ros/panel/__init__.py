@@ -23,7 +23,6 @@ from cpg_ros.errors import needed
 # Before any of its modules: one line where the extra is missing, not a traceback.
 needed('websockets', part='websockets.asyncio')
 
-__all__ = ['body_shape', 'controls', 'door', 'graph', 'lease', 'model_shape',
-           'orders', 'pages', 'panel_node', 'recorder', 'requests', 'robot_view',
-           'service_calls', 'shape_facts', 'shape_source', 'steering', 'stick_figure', 'teleop',
-           'topics', 'urdf_shape', 'web_server']
+__all__ = ['body_shape', 'controls', 'door', 'graph', 'lease', 'model_shape', 'orders', 'pages',
+           'panel_node', 'recorder', 'requests', 'robot_view', 'shape_facts', 'shape_source',
+           'steering', 'stick_figure', 'teleop', 'urdf_shape', 'web_server']

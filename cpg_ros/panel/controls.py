@@ -19,30 +19,17 @@ from collections.abc import Callable
 import re
 from typing import Any
 
+from cpg_ros.nodes.node_client import CallError, NodeClient, RequestRefused
+from cpg_ros.nodes.parameter_spec import choices
 from cpg_ros.panel.requests import RequestError
-from cpg_ros.panel.service_calls import CallError, Services
-from rcl_interfaces.msg import Parameter as ParameterMessage
 from rcl_interfaces.msg import ParameterEvent, ParameterType
-from rcl_interfaces.srv import (
-    DescribeParameters,
-    GetParameters,
-    ListParameters,
-    SetParametersAtomically,
-)
-from rclpy.parameter import Parameter, parameter_value_to_python
+from rclpy.parameter import parameter_value_to_python
 
 #: Types that a page has a control for.
 KINDS = {ParameterType.PARAMETER_BOOL: 'bool', ParameterType.PARAMETER_INTEGER: 'integer',
          ParameterType.PARAMETER_DOUBLE: 'double', ParameterType.PARAMETER_STRING: 'text'}
 #: What every node of ROS has, which says nothing of this one.
 COMMON = ('qos_overrides.', 'start_type_description_service')
-
-
-def choices(constraints: str) -> list[str]:
-    """Return the words that a descriptor's constraints list as ``one of: a, b, c``, if they do."""
-    found = re.search(r'one of: (.*)', constraints)
-    words = found[1].split(', ') if found else []
-    return [word for word in words if re.fullmatch(r'[\w.-]+', word)]
 
 
 def unit(text: str) -> str:
@@ -59,15 +46,12 @@ class Controls:
 
     """
 
-    def __init__(self, services: Services, node: str, told: Callable[[str], None]) -> None:
+    def __init__(self, node: NodeClient, told: Callable[[str], None]) -> None:
         """Be those of a node; what it refuses is told."""
-        self._services, self._node, self._told = services, node, told
+        self._node, self._told = node, told
         self.known: dict[str, dict[str, Any]] = {}
         self._waiting: dict[str, Any] = {}
         self._work: asyncio.Task | None = None
-
-    async def _ask(self, kind: Any, service: str, **request: Any) -> Any:
-        return await self._services.call(kind, f'{self._node}/{service}', kind.Request(**request))
 
     async def read(self) -> None:
         """Ask the node for everything.
@@ -76,12 +60,10 @@ class Controls:
             CallError: it does not answer.
 
         """
-        names = [name for name in (await self._ask(ListParameters, 'list_parameters')).result.names
-                 if not name.startswith(COMMON)]
-        described = await self._ask(DescribeParameters, 'describe_parameters', names=names)
-        values = await self._ask(GetParameters, 'get_parameters', names=names)
+        names = [name for name in await self._node.parameters() if not name.startswith(COMMON)]
+        described, values = await self._node.descriptors(names), await self._node.values(names)
         known = {}
-        for name, about, value in zip(names, described.descriptors, values.values, strict=True):
+        for name, about, value in zip(names, described, values, strict=True):
             if about.type not in KINDS:
                 continue
             (span,) = (*about.floating_point_range, *about.integer_range)[:1] or (None,)
@@ -89,13 +71,13 @@ class Controls:
                 'name': name, 'kind': KINDS[about.type], 'text': about.description,
                 'unit': unit(about.description), 'fixed': about.read_only,
                 'choices': choices(about.additional_constraints),
-                'value': parameter_value_to_python(value),
+                'value': value,
                 'low': span.from_value if span else None, 'high': span.to_value if span else None}
         self.known = known
 
     def hear(self, event: ParameterEvent) -> dict[str, Any]:
         """Take note of what has changed; return name -> value if it is this node's."""
-        if event.node != self._node:
+        if event.node != self._node.name:
             return {}
         values = {one.name: parameter_value_to_python(one.value)
                   for one in event.changed_parameters if one.name in self.known}
@@ -116,7 +98,7 @@ class Controls:
         """
         about = self.known.get(name)
         if about is None:
-            raise RequestError(f"{self._node} has no parameter '{name}'")
+            raise RequestError(f"{self._node.name} has no parameter '{name}'")
         if about['fixed']:
             raise RequestError(f'{name} cannot be changed while the node runs')
         self._waiting[name] = _fitting(about, value)
@@ -127,12 +109,10 @@ class Controls:
         while self._waiting:
             name = next(iter(self._waiting))
             value = self._waiting.pop(name)
-            message: ParameterMessage = Parameter(name, value=value).to_parameter_msg()
             try:
-                answer = await self._ask(SetParametersAtomically, 'set_parameters_atomically',
-                                         parameters=[message])
-                if not answer.result.successful:
-                    self._told(f'{name} {value}: {answer.result.reason}')
+                await self._node.set_parameters({name: value})
+            except RequestRefused as error:
+                self._told(f'{name} {value}: {error}')
             except CallError as error:
                 self._told(str(error))
 

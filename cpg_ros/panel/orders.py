@@ -19,13 +19,13 @@ from collections.abc import Callable
 from typing import Any
 
 from cpg_ros.errors import CpgError
+from cpg_ros.nodes.node_client import NodeClient, PATIENCE, ServiceClients
 from cpg_ros.panel.graph import namespace
 from cpg_ros.panel.lease import LeaseError
 from cpg_ros.panel.pages import MOST, Page, Pages
 from cpg_ros.panel.recorder import Recorder
 from cpg_ros.panel.requests import Request
 from cpg_ros.panel.robot_view import RobotView
-from cpg_ros.panel.service_calls import PATIENCE, Services
 from cpg_ros.panel.steering import push
 from std_srvs.srv import SetBool, Trigger
 
@@ -46,7 +46,7 @@ class OrderError(CpgError):
 class Orders:
     """Does to the robot of a page, or to the recording, what that page asks for."""
 
-    def __init__(self, pages: Pages, services: Services, recorder: Recorder,
+    def __init__(self, pages: Pages, services: ServiceClients, recorder: Recorder,
                  recorded: Callable[[], None]) -> None:
         """Work with these; recorded is called when a recording has begun or ended."""
         self._pages, self._services, self._recorder = pages, services, recorder
@@ -68,7 +68,7 @@ class Orders:
         teleop.lease.renew(page, now)
         if action == 'stop' or (action == 'enable' and not values['on']):
             teleop.steering.stop()
-            await self._call(page, SetBool, f'{view.name}/enable', SetBool.Request(data=False))
+            await self._command(page, view.name, SetBool, 'enable', data=False)
             return
         if page.stop_only and action != 'alive':
             raise OrderError(f'{MOST} pages are open already: this one can only stop the robot')
@@ -81,7 +81,7 @@ class Orders:
         elif action == 'release':
             teleop.release(page)
         elif action == 'enable':
-            await self._call(page, SetBool, f'{view.name}/enable', SetBool.Request(data=True))
+            await self._command(page, view.name, SetBool, 'enable', data=True)
         elif action == 'push':
             await asyncio.to_thread(view.push, push(values['force'], values['direction']))
         elif action == 'record':
@@ -92,7 +92,7 @@ class Orders:
             node = view.graph.beside(view.name, nodes)
             if not node:
                 raise OrderError(f'there is no {what} for {view.name}')
-            await self._call(page, Trigger, f'{node}/{action}', Trigger.Request(), FIT)
+            await self._command(page, node, Trigger, action, FIT)
 
     def _acquire(self, page: Page, view: RobotView, request: Request, now: float) -> None:
         """Let a page do what moves the robot, if it is fresh and no other page may."""
@@ -117,12 +117,10 @@ class Orders:
                 page.refused = str(error)
                 raise
 
-    async def _call(self, page: Page, kind: Any, service: str, request: Any,
-                    patience: float = PATIENCE) -> None:
-        answer = await self._services.call(kind, service, request, patience)
-        if not answer.success:
-            raise OrderError(answer.message or f'{service} refused')
-        self._pages.say([page], answer.message, 'told')
+    async def _command(self, page: Page, node: str, kind: Any, service: str,
+                       patience: float = PATIENCE, **fields: Any) -> None:
+        other = NodeClient(self._services, node)
+        self._pages.say([page], await other.command(kind, service, patience, **fields), 'told')
 
     async def _record(self, view: RobotView, on: bool) -> None:
         if on:

@@ -26,6 +26,7 @@ from typing import Any
 from cpg_ros.errors import CpgError
 from cpg_ros.files.loopback import is_loopback
 from cpg_ros.nodes.node_base import asked_for_help, run, StartedNode, StartError
+from cpg_ros.nodes.node_client import ServiceClients
 from cpg_ros.nodes.parameter_spec import Spec
 from cpg_ros.panel import requests, shape_source
 from cpg_ros.panel.door import Door, DoorError, token_for
@@ -35,7 +36,6 @@ from cpg_ros.panel.pages import Page, Pages, SLOW
 from cpg_ros.panel.recorder import Recorder
 from cpg_ros.panel.requests import RequestError
 from cpg_ros.panel.robot_view import RobotView
-from cpg_ros.panel.service_calls import Services
 from cpg_ros.panel.web_server import WebServer
 import rclpy
 from rclpy.node import Node
@@ -84,7 +84,7 @@ class Panel(StartedNode):
             f'{self.get_name()}_watch', namespace=self.get_namespace(), enable_rosout=False,
             start_parameter_services=False, use_global_arguments=False)
         self._pages = Pages()
-        self._calls = Services(self)
+        self._calls = ServiceClients(self)
         self._views: dict[str, RobotView] = {}
         self._graph = Graph()
         self._recorder = Recorder(

@@ -12,32 +12,18 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What is on the topics, into a bag: every message, by a thread of its own."""
+"""Bags of the topics of a robot, one after the other, recorded by a thread of its own."""
 
 from collections.abc import Callable, Iterable
-import contextlib
 from pathlib import Path
 import shutil
 import threading
 import time
 import zipfile
 
-from cpg_ros.errors import CpgError
-from cpg_ros.nodes.message_types import message_class, message_fields, UnknownType
-from cpg_ros.panel.topics import latched, Topic
-from cpg_ros.recordings.bag_writer import BagError, BagWriter
+from cpg_ros.nodes.bag_recorder import BagRecorder, EVERY
+from cpg_ros.recordings.bag_writer import BagError
 from rclpy.node import Node
-from rclpy.qos import QoSProfile
-from rosbags.interfaces import Connection
-
-#: How often messages are fetched, s, and how many a topic may have had by then.
-EVERY, DEPTH = 0.02, 1000
-#: Topics whose last message waits for who comes later.
-LATCHED = ('/gait', '/robot_description', '/tf_static')
-
-
-class RecordingError(CpgError):
-    """A recording cannot be made; one line for whoever asked."""
 
 
 class Recorder:
@@ -58,13 +44,7 @@ class Recorder:
         self._node, self._folder, self._largest, self._ended = node, folder, largest, ended
         self._stop = threading.Event()
         self._thread: threading.Thread | None = None
-        self._writer: BagWriter | None = None
         self.bag = ''
-
-    @property
-    def size(self) -> int:
-        """What the newest bag holds, bytes."""
-        return 0 if self._writer is None else self._writer.size
 
     @property
     def running(self) -> bool:
@@ -75,54 +55,42 @@ class Recorder:
         """Record topics, (name, type), to a new bag; return its name.
 
         Raises:
-            RecordingError: one is being recorded, nothing can be recorded, or not there.
+            BagError: one is being recorded, nothing can be recorded, or not there.
 
         """
         if self.running:
-            raise RecordingError(f'{self.bag} is being recorded already')
-        known = []
-        for name, kind in sorted(topics):
-            with contextlib.suppress(UnknownType):  # of a package that is not installed here
-                known.append((name, kind, message_class(kind), message_fields(kind)))
-        if not known:
-            raise RecordingError('there are no topics to record')
+            raise BagError(f'{self.bag} is being recorded already')
         bag = time.strftime('panel_%Y%m%d_%H%M%S')
         try:
             self._folder.mkdir(parents=True, exist_ok=True)
-            writer = BagWriter(self._folder / bag)
+            recorder = BagRecorder(self._node, self._folder / bag)
         except OSError as error:
-            raise RecordingError(f'{self._folder}: {error.strerror}') from error
-        except BagError as error:
-            raise RecordingError(str(error)) from error
-        readers = []
-        for name, kind, message, _ in known:
-            quality = latched() if name.endswith(LATCHED) else QoSProfile(depth=DEPTH)
-            readers.append((Topic(self._node, message, name, quality, raw=True),
-                            writer.connect(name, kind, message_fields)))
+            raise BagError(f'{self._folder}: {error.strerror}') from error
+        for name, kind in sorted(topics):
+            recorder.subscribe(name, kind)
+        if not recorder.counts:
+            recorder.close()
+            raise BagError('there are no topics to record')
         self._stop.clear()
-        self.bag, self._writer = bag, writer
-        self._thread = threading.Thread(target=self._record, args=(writer, readers),
-                                        name='recorder', daemon=True)
+        self.bag = bag
+        self._thread = threading.Thread(target=self._record, args=(recorder,), name='recorder',
+                                        daemon=True)
         self._thread.start()
         return bag
 
-    def _record(self, writer: BagWriter, readers: list[tuple[Topic, Connection]]) -> None:
+    def _record(self, recorder: BagRecorder) -> None:
         why = ''
         try:
             while not self._stop.wait(EVERY):
-                for reader, connection in readers:
-                    for data, when in reader.take():
-                        writer.write(connection, when, data)
-                if writer.size > self._largest:
-                    why = f'{self.bag} is full ({writer.size / 1e6:.0f} MB)'
+                recorder.take()
+                if recorder.size > self._largest:
+                    why = f'{self.bag} is full ({recorder.size / 1e6:.0f} MB)'
                     break
         except BagError as error:
             why = str(error)
         finally:
-            for reader, _ in readers:
-                reader.close()
             try:
-                writer.close()
+                recorder.close()
             except BagError as error:
                 why = why or str(error)
         if why:
@@ -138,17 +106,17 @@ class Recorder:
         """Return a recording that has ended as a zip archive.
 
         Raises:
-            RecordingError: there is no such recording, or it has not ended.
+            BagError: there is no such recording, or it has not ended.
 
         """
         path = self._folder / bag
         # Only what this recorder makes: no name leads out of the folder.
         if not bag.startswith('panel_') or not bag[6:].replace('_', '').isdigit():
-            raise RecordingError('this is not a recording')
+            raise BagError('this is not a recording')
         if self.running and bag == self.bag:
-            raise RecordingError(f'{bag} is still being recorded')
+            raise BagError(f'{bag} is still being recorded')
         if not path.is_dir():
-            raise RecordingError(f'there is no recording {bag}')
+            raise BagError(f'there is no recording {bag}')
         archive = self._folder / f'{bag}.zip'
         if not archive.is_file():
             part = archive.with_suffix('.part')

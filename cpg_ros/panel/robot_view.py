@@ -20,12 +20,13 @@ import math
 import time
 from typing import Any
 
+from cpg_ros.nodes.node_client import CallError, NodeClient, ServiceClients
+from cpg_ros.nodes.polled_group import PolledSubscription
+from cpg_ros.nodes.qos_profiles import best_effort, latched
 from cpg_ros.panel import shape_facts, shape_source
 from cpg_ros.panel.controls import Controls
 from cpg_ros.panel.graph import Graph, namespace
-from cpg_ros.panel.service_calls import CallError, Services
 from cpg_ros.panel.teleop import Teleop
-from cpg_ros.panel.topics import latched, Topic
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import Wrench
 from nav_msgs.msg import Odometry
@@ -48,7 +49,7 @@ class RobotView:
 
     """
 
-    def __init__(self, node: Node, watch: Node, services: Services, name: str,
+    def __init__(self, node: Node, watch: Node, services: ServiceClients, name: str,
                  fastest: tuple[float, float], said: Callable[[str], None],
                  tell: Callable[[dict[str, Any]], None]) -> None:
         """View a generator.
@@ -66,11 +67,11 @@ class RobotView:
         self.name, self._space = name, namespace(name)
         self._node, self._watch, self._services = node, watch, services
         self._said, self._tell = said, tell
-        self.controls = Controls(services, name, said)
+        self.controls = Controls(NodeClient(services, name), said)
         self._pushes: Any = None
         self.teleop = Teleop(node, f'{self._space}/cmd_vel', fastest)
         self.graph = Graph()
-        self._topics: dict[str, Topic] = {}
+        self._topics: dict[str, PolledSubscription] = {}
         self._kept: dict[str, dict[str, Any]] = {}
         self._joints: dict[str, float] = {}
         self._names: dict[str, list[str]] = {}
@@ -129,22 +130,23 @@ class RobotView:
         joints = joints or [name for name, kind in graph.topics if kind.endswith('/JointState')
                             and name.startswith(f'{space}/') and name.endswith('/joint_states')
                             and name.removeprefix(f'{space}/').count('/') == 1]
-        topics = {**{name: (JointState, None, 1) for name in joints},
-                  f'{self.name}/gait': (String, latched(), 1),
-                  '/diagnostics': (DiagnosticArray, None, 20),
-                  '/parameter_events': (ParameterEvent, None, 100)}
+        topics = {**{name: (JointState, best_effort()) for name in joints},
+                  f'{self.name}/gait': (String, latched()),
+                  '/diagnostics': (DiagnosticArray, best_effort(20)),
+                  '/parameter_events': (ParameterEvent, best_effort(100))}
         optional = {f'{self.name}/phase': Float64MultiArray, f'{self.name}/cells':
                     Float64MultiArray, f'{space}/foot_contacts': Float64MultiArray}
-        topics.update({name: (kind, None, 1) for name, kind in optional.items()
+        topics.update({name: (kind, best_effort()) for name, kind in optional.items()
                        if (name, floats) in graph.topics})
         if (f'{space}/odom', 'nav_msgs/msg/Odometry') in graph.topics:
-            topics[f'{space}/odom'] = (Odometry, None, 1)
+            topics[f'{space}/odom'] = Odometry, best_effort()
         topics = topics if wanted else {}
         for name in set(self._topics) - set(topics):
             self._topics.pop(name).close()
-        for name, (kind, quality, depth) in topics.items():
+        for name, (kind, quality) in topics.items():
             if name not in self._topics:
-                self._topics[name] = Topic(self._watch, kind, name, quality, depth)
+                self._topics[name] = PolledSubscription(self._watch, kind, name, quality,
+                                                        overridable=False)
 
     def _newest(self, name: str) -> Any:
         topic = self._topics.get(name)

@@ -17,13 +17,12 @@
 import asyncio
 from typing import Any
 
+from cpg_ros.nodes.node_client import NodeClient, ServiceClients
+from cpg_ros.nodes.polled_group import PolledSubscription
+from cpg_ros.nodes.qos_profiles import latched
 from cpg_ros.panel.graph import Graph, namespace
-from cpg_ros.panel.service_calls import Services
 from cpg_ros.panel.shape_source import Known, shipped_robot
-from cpg_ros.panel.topics import latched, Topic
-from rcl_interfaces.srv import GetParameters
 from rclpy.node import Node
-from rclpy.parameter import parameter_value_to_python
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 
@@ -36,7 +35,7 @@ def descriptions(space: str) -> tuple[str, str]:
     return f'{space}/robot_description', '/robot_description'
 
 
-async def ask(watch: Node, services: Services, graph: Graph, generator: str, robot: str,
+async def ask(watch: Node, services: ServiceClients, graph: Graph, generator: str, robot: str,
               urdf: str) -> Known:
     """Ask the graph.
 
@@ -58,9 +57,7 @@ async def ask(watch: Node, services: Services, graph: Graph, generator: str, rob
             description = getattr(await _once(watch, String, topic), 'data', '')
     simulation = graph.beside(generator, graph.simulations)
     if simulation:
-        answer = await services.call(GetParameters, f'{simulation}/get_parameters',
-                                     GetParameters.Request(names=['model']))
-        model = parameter_value_to_python(answer.values[0]) if answer.values else ''
+        model, = await NodeClient(services, simulation).values(['model'])
     legs = {}
     for topic, kind in () if shipped_robot(robot) is not None else sorted(graph.topics):
         leg = topic.removeprefix(f'{space}/').removesuffix('/joint_states')
@@ -72,7 +69,8 @@ async def ask(watch: Node, services: Services, graph: Graph, generator: str, rob
 
 async def _once(watch: Node, kind: type, name: str) -> Any:
     """Return a topic's next or latched message, None if it is silent."""
-    topic = Topic(watch, kind, name, latched() if kind is String else None)
+    topic = PolledSubscription(watch, kind, name, latched() if kind is String else None,
+                               overridable=False)
     try:
         for _ in range(round(PATIENCE / 0.02)):
             if (message := topic.newest()) is not None:

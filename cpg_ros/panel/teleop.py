@@ -21,7 +21,7 @@ publisher that has appeared since the holder took over ends his steering until h
 
 from typing import Any
 
-from cpg_ros.nodes.rivals import NAMELESS, UNKNOWN
+from cpg_ros.nodes.other_publishers import node_of
 from cpg_ros.panel.lease import Lease, LeaseError
 from cpg_ros.panel.pages import Page
 from cpg_ros.panel.steering import HOLD, Steering
@@ -131,9 +131,7 @@ class Teleop:
         if self._publisher is not None and not self._own:
             self._own = self._named() - self._before
         self.others = {
-            gid: NAMELESS if one.node_name == UNKNOWN
-            else f'{one.node_namespace.rstrip("/")}/{one.node_name}'
-            for one in self._node.get_publishers_info_by_topic(self._topic)
+            gid: node_of(one) for one in self._node.get_publishers_info_by_topic(self._topic)
             if (gid := bytes(one.endpoint_gid)) not in self._own}
 
     def _open(self) -> None:

@@ -21,4 +21,4 @@ __all__ = ['analysis_plot', 'analysis_report', 'analyze', 'arguments', 'atlas', 
            'bag_recording', 'calibrate', 'check_robot', 'completion', 'cpg', 'demo', 'demo_course',
            'executables', 'gait_diagram', 'graph_topics', 'inversion', 'inversion_many',
            'network_options', 'optimize', 'reading_options', 'reproduce', 'reproduction_report',
-           'running_node', 'tune']
+           'tune']

@@ -14,91 +14,52 @@
 
 """What is published on a graph, recorded into a bag as ``ros2 bag record`` does it."""
 
-from collections import Counter
 from collections.abc import Sequence
-from functools import partial
 from pathlib import Path
+import sys
+import time
 
-from cpg_ros.nodes.message_types import message_class, message_fields, UnknownType
-from cpg_ros.recordings.bag_writer import BagWriter
+from cpg_ros.nodes.bag_recorder import BagRecorder, EVERY
 from rclpy.node import Node
-from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
-from rosbags.interfaces import Connection
 
-#: Messages that may wait for the disk.
-DEPTH = 5000
-#: Topics that come with every node and that nobody asked for.
+#: How often the graph is searched for new topics, s.
+LOOK = 0.5
+#: Topics that come with every node and that nobody wants.
 USUAL = ('/rosout', '/parameter_events')
 
 
-class Recorder:
-    """Writes what is published into a bag, raw.
+def record(node: Node, path: Path, wanted: Sequence[str]) -> BagRecorder:
+    """Record until Ctrl-C.
 
-    Attributes:
-        counts: topic -> messages written.
-        passed_over: topic -> why it is not recorded.
+    Args:
+        node: ours.
+        path: of the bag, a folder that is not there yet.
+        wanted: topics; all that there are and that appear, if empty.
+
+    Raises:
+        BagError: something is there already, or the folder cannot be written to.
 
     """
+    recorder, looked = BagRecorder(node, path), 0.0
+    names = [node.resolve_topic_name(one) for one in wanted]
+    try:
+        while True:
+            if time.monotonic() > looked + LOOK:
+                looked = time.monotonic()
+                for topic in _subscribed(node, recorder, names):
+                    print(f'recording {topic}', file=sys.stderr, flush=True)
+            recorder.take()
+            time.sleep(EVERY)
+    except KeyboardInterrupt:
+        pass
+    finally:
+        recorder.close()
+    return recorder
 
-    def __init__(self, node: Node, path: Path, wanted: Sequence[str]) -> None:
-        """Open the bag; it has its name only when it is whole.
 
-        Args:
-            node: ours.
-            path: of the bag, a folder that is not there yet.
-            wanted: topics; all that there are and that appear, if empty.
-
-        Raises:
-            BagError: something is there already, or the folder cannot be written to.
-
-        """
-        self._node = node
-        self._wanted = [node.resolve_topic_name(one) for one in wanted]
-        self.counts: Counter[str] = Counter()
-        self.passed_over: dict[str, str] = {}
-        self._writer = BagWriter(path)
-
-    def look(self) -> list[str]:
-        """Listen to what is new on the graph; return the topics."""
-        new = []
-        for topic, kinds in self._node.get_topic_names_and_types():
-            if topic in self.counts or topic in self.passed_over or (
-                    topic not in self._wanted if self._wanted else topic in USUAL):
-                continue
-            offered = self._node.get_publishers_info_by_topic(topic)
-            if not offered:
-                continue
-            try:
-                self._listen(topic, kinds[0], [one.qos_profile for one in offered])
-            except UnknownType as error:
-                self.passed_over[topic] = str(error)
-                continue
-            new.append(topic)
-        return new
-
-    def _listen(self, topic: str, kind: str, offered: Sequence[QoSProfile]) -> None:
-        message = message_class(kind)
-        connection = self._writer.connect(topic, kind, message_fields)
-        self.counts[topic] = 0
-        # What every publisher offers: a reliable listener hears no best-effort one.
-        kept = all(one.durability == DurabilityPolicy.TRANSIENT_LOCAL for one in offered)
-        sure = all(one.reliability == ReliabilityPolicy.RELIABLE for one in offered)
-        profile = QoSProfile(
-            depth=DEPTH,
-            durability=DurabilityPolicy.TRANSIENT_LOCAL if kept else DurabilityPolicy.VOLATILE,
-            reliability=ReliabilityPolicy.RELIABLE if sure else ReliabilityPolicy.BEST_EFFORT)
-        self._node.create_subscription(message, topic, partial(self._write, topic, connection),
-                                       profile, raw=True)
-
-    def _write(self, topic: str, connection: Connection, message: bytes) -> None:
-        self._writer.write(connection, self._node.get_clock().now().nanoseconds, message)
-        self.counts[topic] += 1
-
-    def close(self) -> None:
-        """Finish the bag, and give it its name.
-
-        Raises:
-            BagError: the disk is full, or the like.
-
-        """
-        self._writer.close()
+def _subscribed(node: Node, recorder: BagRecorder, wanted: Sequence[str]) -> list[str]:
+    """Record what is new on the graph; return the topics."""
+    return [topic for topic, kinds in node.get_topic_names_and_types()
+            if topic not in recorder.counts and topic not in recorder.passed_over
+            and (topic in wanted if wanted else topic not in USUAL)
+            and node.count_publishers(topic) and recorder.subscribe(topic, kinds[0])]

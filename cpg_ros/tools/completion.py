@@ -18,13 +18,15 @@ The library argcomplete does it, where it is installed; it comes with colcon.
 """
 
 from argparse import ArgumentParser, Namespace
-from collections.abc import Callable
+import asyncio
+from collections.abc import Callable, Coroutine
 from importlib.util import find_spec
 from typing import Any, TYPE_CHECKING
 
 from cpg_ros.errors import CpgError
 
 if TYPE_CHECKING:
+    from cpg_ros.nodes.node_client import NodeClient
     from rclpy.node import Node
 
 #: How long a node may take to answer, s: somebody waits for the word, but an announcement of DDS
@@ -56,12 +58,12 @@ def shell_code() -> str:
     return str(shellcode(['cpg']))
 
 
-def _asked(ask: Callable[['Node'], list[Any]]) -> list[Any]:
+def _looked_up(look: Callable[['Node'], list[Any]]) -> list[Any]:
     import rclpy
     from rclpy.utilities import try_shutdown
     rclpy.init(args=[])
     try:
-        return ask(rclpy.create_node('cpg_completion', enable_rosout=False))
+        return look(rclpy.create_node('cpg_completion', enable_rosout=False))
     except CpgError:
         # Nobody answers: there is nothing to complete with.
         return []
@@ -69,21 +71,22 @@ def _asked(ask: Callable[['Node'], list[Any]]) -> list[Any]:
         try_shutdown()
 
 
-def _descriptors(chosen: Namespace) -> list[Any]:
-    from cpg_ros.tools.running_node import RunningNode
-    return _asked(lambda node: RunningNode(node, chosen.node, PATIENCE).parameters())
+def _of_node(chosen: Namespace, look: Callable[['NodeClient'], Coroutine[Any, Any, list[Any]]]
+             ) -> list[Any]:
+    from cpg_ros.nodes.node_client import NodeClient, ServiceClients
+    return _looked_up(lambda node: asyncio.run(
+        look(NodeClient(ServiceClients(node, PATIENCE), chosen.node))))
 
 
 def _choices(chosen: Namespace, name: str) -> list[str]:
-    # A descriptor says what a text may be: 'one of: walk, trot, and those of ...'.
-    return [word for one in _descriptors(chosen) if one.name == name
-            for word in one.additional_constraints.removeprefix('one of: ').split(', ')
-            if word and ' ' not in word]
+    from cpg_ros.nodes.parameter_spec import choices
+    return [word for one in _of_node(chosen, lambda other: other.descriptors([name]))
+            for word in choices(one.additional_constraints)]
 
 
 def parameters(parsed_args: Namespace, **_: Any) -> list[str]:
     """Return the names of the node's parameters."""
-    return [one.name for one in _descriptors(parsed_args)]
+    return _of_node(parsed_args, lambda other: other.parameters())
 
 
 def gaits(parsed_args: Namespace, **_: Any) -> list[str]:
@@ -99,4 +102,4 @@ def values(parsed_args: Namespace, **_: Any) -> list[str]:
 def topics(parsed_args: Namespace, **_: Any) -> list[str]:
     """Return the graph's topics."""
     from cpg_ros.tools.graph_topics import topics as graph_topics
-    return _asked(lambda node: list(graph_topics(node)))
+    return _looked_up(lambda node: list(graph_topics(node)))

@@ -19,11 +19,11 @@ ros2 comes with ROS and is not on PyPI.
 """
 
 from argparse import ArgumentTypeError, Namespace, RawDescriptionHelpFormatter, REMAINDER
+import asyncio
 from collections.abc import Sequence
 from pathlib import Path
 import signal
 import sys
-import time
 from typing import Any, TYPE_CHECKING
 
 from cpg_ros.errors import CpgError
@@ -34,10 +34,8 @@ from cpg_ros.tools.executables import PLACES, start
 import yaml
 
 if TYPE_CHECKING:
+    from cpg_ros.nodes.node_client import NodeClient
     from rclpy.node import Node
-
-#: How often the graph is asked for new topics while recording, s.
-LOOK = 0.5
 
 DESCRIPTION = """\
 Run an executable of the package, or inspect, change, record and play back a running graph: a small
@@ -141,21 +139,34 @@ def rate(text: str) -> float:
     return number(text)
 
 
-def _asked(chosen: Namespace, node: 'Node') -> str:
-    from cpg_ros.tools.running_node import RunningNode
-    other = RunningNode(node, chosen.node, chosen.wait)
+def _called(chosen: Namespace, node: 'Node') -> str:
+    from cpg_ros.nodes.node_client import NodeClient, NoService, ServiceClients
+    other = NodeClient(ServiceClients(node, chosen.wait), chosen.node)
+    try:
+        return asyncio.run(_call(chosen, other))
+    except NoService as error:
+        raise CpgError(f'{other.name} does not answer (no service {error.service})') from error
+
+
+async def _call(chosen: Namespace, other: 'NodeClient') -> str:
+    from std_srvs.srv import SetBool, Trigger
     if chosen.action in ('enable', 'disable'):
-        return other.enable(chosen.action == 'enable')
+        return await other.command(SetBool, 'enable', data=chosen.action == 'enable')
     if chosen.action == 'reset':
-        return other.reset()
+        return await other.command(Trigger, 'reset')
     if chosen.action == 'gait':
-        other.set('gait', chosen.gait)
+        await other.set_parameters({'gait': chosen.gait})
     elif chosen.what == 'set':
-        other.set(chosen.parameter, chosen.value)
+        await other.set_parameters({chosen.parameter: chosen.value})
     elif chosen.what == 'get':
-        return str(other.get(chosen.parameter))
+        value, = await other.values([chosen.parameter])
+        if value is None:
+            raise CpgError(f"{other.name} has no parameter '{chosen.parameter}'")
+        return str(value)
     else:
-        return '\n'.join(f'{one.name}  {one.description}' for one in other.parameters())
+        names = await other.parameters()
+        return '\n'.join(f'{one.name}  {one.description}'
+                         for one in await other.descriptors(names))
     return ''
 
 
@@ -174,21 +185,8 @@ def _listened(chosen: Namespace, node: 'Node') -> str:
 
 
 def _recorded(chosen: Namespace, node: 'Node') -> str:
-    from cpg_ros.tools.bag_recording import Recorder
-    import rclpy
-    recorder = Recorder(node, chosen.bag, chosen.topics)
-    try:
-        looked = 0.0
-        while True:
-            if time.monotonic() > looked + LOOK:
-                looked = time.monotonic()
-                for topic in recorder.look():
-                    print(f'recording {topic}', file=sys.stderr, flush=True)
-            rclpy.spin_once(node, timeout_sec=0.05)
-    except KeyboardInterrupt:
-        pass
-    finally:
-        recorder.close()
+    from cpg_ros.tools.bag_recording import record
+    recorder = record(node, chosen.bag, chosen.topics)
     for topic, why in recorder.passed_over.items():
         print(f'{topic} was not recorded: {why}', file=sys.stderr)
     count = sum(recorder.counts.values())
@@ -201,8 +199,8 @@ def _played(chosen: Namespace, node: 'Node') -> str:
     return '\n'.join(f'{topic}: {count} messages' for topic, count in counts.items())
 
 
-_DOERS = {'param': _asked, 'gait': _asked, 'enable': _asked, 'disable': _asked, 'reset': _asked,
-          'topic': _listened, 'record': _recorded, 'play': _played}
+_DOERS = {'param': _called, 'gait': _called, 'enable': _called, 'disable': _called,
+          'reset': _called, 'topic': _listened, 'record': _recorded, 'play': _played}
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -18,6 +18,7 @@
 generator's parameter ``gait``, by itself or as typed. A film and a footfall diagram are left.
 """
 
+import asyncio
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, ExitStack
 from importlib.util import find_spec
@@ -32,14 +33,13 @@ import time
 
 from ament_index_python.packages import get_package_prefix
 from cpg_ros.errors import CpgError
+from cpg_ros.nodes.node_client import CallError, NodeClient, RequestRefused, ServiceClients
+from cpg_ros.nodes.qos_profiles import latched
 from cpg_ros.tools import demo_course
 from cpg_ros.tools.arguments import Parser, say
 from nav_msgs.msg import Odometry
-from rcl_interfaces.srv import SetParametersAtomically
 import rclpy
 from rclpy.node import Node
-from rclpy.parameter import Parameter
-from rclpy.qos import DurabilityPolicy, QoSProfile
 from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import try_shutdown
 from std_msgs.msg import String
@@ -70,13 +70,11 @@ class Operator(Node):
         super().__init__('cpg_demo')
         self.place: tuple[float, float] | None = None
         self.time = 0.0
-        self._client = self.create_client(SetParametersAtomically,
-                                          'cpg_generator/set_parameters_atomically')
+        self._generator = NodeClient(ServiceClients(self), 'cpg_generator')
         self._asked, self.taken_over, self._heard = gait, False, False
         self.create_subscription(Odometry, 'odom', self._odom, 1)
         # As it is published: a gait that was chosen before the two had found each other counts.
-        self.create_subscription(String, 'cpg_generator/gait', self._gait, QoSProfile(
-            depth=10, durability=DurabilityPolicy.TRANSIENT_LOCAL))
+        self.create_subscription(String, 'cpg_generator/gait', self._gait, latched(10))
 
     def _odom(self, message: Odometry) -> None:
         self.place = message.pose.pose.position.x, message.pose.pose.position.y
@@ -107,19 +105,18 @@ class Operator(Node):
 
         """
         self._asked = gait
-        request = SetParametersAtomically.Request(
-            parameters=[Parameter('gait', value=gait).to_parameter_msg()])
-        answer = self._client.call_async(request)
-        rclpy.spin_until_future_complete(self, answer, timeout_sec=10.0)
-        response = answer.result()
-        if response is None:
-            raise DemoError('the generator does not answer')
-        return '' if response.result.successful else response.result.reason
+        try:
+            asyncio.run(self._generator.set_parameters({'gait': gait}, 10.0))
+        except RequestRefused as error:
+            return str(error)
+        except CallError as error:
+            raise DemoError('the generator does not answer') from error
+        return ''
 
     @property
     def ready(self) -> bool:
         """Whether the body moves, as it does once it is commanded, and the generator is heard."""
-        return self.place is not None and self._heard and self._client.service_is_ready()
+        return self.place is not None and self._heard
 
 
 @contextmanager

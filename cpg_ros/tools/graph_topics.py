@@ -18,31 +18,33 @@ from collections.abc import Iterator
 import time
 from typing import Any
 
+from cpg_ros.errors import CpgError
 from cpg_ros.nodes.message_types import message_class
-from cpg_ros.tools.running_node import Unanswered
-import rclpy
+from cpg_ros.nodes.polled_group import PolledSubscription
+from cpg_ros.nodes.qos_profiles import best_effort
 from rclpy.node import Node
-from rclpy.qos import qos_profile_sensor_data
 
 #: How long the graph is looked at before its topics are listed, s: discovery takes a moment.
 LOOK = 1.0
-#: How long messages are counted, s.
-COUNT = 3.0
+#: How long messages are counted, s, how often they are taken, s, and how many may wait until then.
+COUNT, EVERY, DEPTH = 3.0, 0.02, 1000
+
+
+class SilentTopic(CpgError):
+    """Nobody publishes on a topic, or nothing came."""
 
 
 def topics(node: Node) -> dict[str, str]:
     """Return the topics that are published or listened to, and their types, sorted."""
-    end = time.monotonic() + LOOK
-    while time.monotonic() < end:
-        rclpy.spin_once(node, timeout_sec=0.05)
+    time.sleep(LOOK)
     return {name: ' '.join(kinds) for name, kinds in sorted(node.get_topic_names_and_types())}
 
 
 class Topic:
-    """A topic, listened to."""
+    """A topic, subscribed to."""
 
     def __init__(self, node: Node, name: str, wait: float) -> None:
-        """Find a topic's type and listen.
+        """Find a topic's type and subscribe.
 
         Args:
             node: ours.
@@ -50,45 +52,41 @@ class Topic:
             wait: for a publisher and for the first message, s.
 
         Raises:
-            Unanswered: nobody publishes on it.
+            SilentTopic: nobody publishes on it.
 
         """
-        self._node, self._name = node, name
-        self._end = time.monotonic() + wait
-        self._heard: list[Any] = []
-        node.create_subscription(message_class(self._kind()), name, self._heard.append,
-                                 qos_profile_sensor_data)
-
-    def _kind(self) -> str:
-        topic = self._node.resolve_topic_name(self._name)
-        while time.monotonic() < self._end:
-            rclpy.spin_once(self._node, timeout_sec=0.05)
-            if found := dict(self._node.get_topic_names_and_types()).get(topic):
-                return found[0]
-        raise Unanswered(f'nobody publishes on {topic}')
+        self._name, self._end = name, time.monotonic() + wait
+        topic = node.resolve_topic_name(name)
+        while not (kinds := dict(node.get_topic_names_and_types()).get(topic)):
+            if time.monotonic() > self._end:
+                raise SilentTopic(f'nobody publishes on {topic}')
+            time.sleep(EVERY)
+        self._subscription = PolledSubscription(node, message_class(kinds[0]), name,
+                                                best_effort(DEPTH), overridable=False)
 
     def messages(self) -> Iterator[Any]:
         """Yield messages as they come.
 
         Raises:
-            Unanswered: none comes.
+            SilentTopic: none comes.
 
         """
-        while not self._heard:
-            if time.monotonic() > self._end:
-                raise Unanswered(f'nothing came on {self._name}')
-            rclpy.spin_once(self._node, timeout_sec=0.05)
+        silent = True
         while True:
-            while self._heard:
-                yield self._heard.pop(0)
-            rclpy.spin_once(self._node, timeout_sec=0.05)
+            for message, _ in self._subscription.take():
+                silent = False
+                yield message
+            if silent and time.monotonic() > self._end:
+                raise SilentTopic(f'nothing came on {self._name}')
+            time.sleep(EVERY)
 
     def rate(self) -> float:
         """Count messages for a while; return how many came a second (Hz)."""
-        end = time.monotonic() + COUNT
+        count, end = 0, time.monotonic() + COUNT
         while time.monotonic() < end:
-            rclpy.spin_once(self._node, timeout_sec=0.05)
-        return len(self._heard) / COUNT
+            time.sleep(EVERY)
+            count += sum(1 for _ in self._subscription.take())
+        return count / COUNT
 
 
 def shown(message: Any) -> str:

@@ -27,15 +27,16 @@ from cpg_ros.nodes.command_topics import Commands, KINDS
 from cpg_ros.nodes.deadline_thread import Ticker
 from cpg_ros.nodes.log_queue import QUEUE
 from cpg_ros.nodes.node_base import asked_for_help, run, StartedNode, StartError
+from cpg_ros.nodes.polled_group import PolledSubscription
+from cpg_ros.nodes.qos_profiles import latched
 from cpg_ros.nodes.shutdown import endings
 from cpg_ros.nodes.unitree.interfaces import message
 from cpg_ros.nodes.unitree.local_socket import address, listening, NameTaken
 from cpg_ros.nodes.unitree.parameters import SPECS
-from cpg_ros.nodes.unitree.robot_graph import best_effort, BRIDGE, Others, quality
+from cpg_ros.nodes.unitree.robot_graph import BRIDGE, Others, quality
 from cpg_ros.nodes.unitree.sensors import Sensors
 from cpg_ros.nodes.unitree.start import Start
 from cpg_ros.nodes.unitree.watchdog_link import WatchdogLink
-from cpg_ros.nodes.unserved import subscribe, taken
 from cpg_ros.robots.robot_file import load_robot
 from cpg_ros.unitree.low_state import BUTTONS
 from cpg_ros.unitree.models import MODELS
@@ -48,7 +49,6 @@ from rclpy.clock_type import ClockType
 from rclpy.impl.logging_severity import LoggingSeverity
 from rclpy.parameter import Parameter
 from rclpy.publisher import Publisher
-from rclpy.qos import DurabilityPolicy, QoSProfile
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
@@ -106,7 +106,7 @@ class UnitreeBridge(StartedNode):
         self._announcements = Announcements(domain)
         self._harmful = ''
         self._others = Others(self, topic, int(not self._dry), value('own_publishers'))
-        self._states = subscribe(self, kinds[1], '/lowstate', best_effort(), raw=True)
+        self._states = PolledSubscription(self, kinds[1], '/lowstate', raw=True)
         self._commands = Commands(self, robot, value('command'), period,
                                   settings.stand.take(self._order.argsort()))
         self._sensors = Sensors(self, robot, self._supervisor.state)
@@ -116,8 +116,7 @@ class UnitreeBridge(StartedNode):
         self._refused = ''
         self._ending = False
         self._new, self._received, self._sent, self._before = False, 0, 0, (0, 0, 0)
-        self._phase = self.create_publisher(String, '~/state', QoSProfile(
-            depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL))
+        self._phase = self.create_publisher(String, '~/state', latched())
         self._phase.publish(String(data=Phase.IDLE.value))
         self.create_service(Trigger, '~/stop', self._stop)
         self.create_service(Trigger, '~/start', self._start_again)
@@ -163,7 +162,7 @@ class UnitreeBridge(StartedNode):
 
     def _take_state(self, now: float) -> None:
         last = None
-        for found, _ in taken(self._states):
+        for found, _ in self._states.take():
             last = found
             self._received += 1
         if last is not None and self._supervisor.state.read(last):

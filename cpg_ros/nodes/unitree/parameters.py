@@ -15,7 +15,7 @@
 """The parameters of ``unitree_bridge``."""
 
 from cpg_ros.nodes.command_topics import KINDS
-from cpg_ros.nodes.parameter_spec import Spec
+from cpg_ros.nodes.parameter_spec import one_of, Spec
 from cpg_ros.unitree.low_state import BUTTONS
 from cpg_ros.unitree.models import MODELS
 
@@ -23,9 +23,9 @@ SPECS = {
     'robot': Spec('unitree_go2', 'robot file, or the name of a shipped one',
                   constraints='a shipped name, or the path of a YAML file'),
     'model': Spec('go2', 'robot model, which determines the torque limits',
-                  constraints='one of: ' + ', '.join(MODELS)),
+                  constraints=one_of(MODELS)),
     'command': Spec('joint_states', 'kind of command messages to follow',
-                    constraints='one of: ' + ', '.join(KINDS)),
+                    constraints=one_of(KINDS)),
     'kp': Spec([60.0], 'proportional gains [N m / rad]',
                constraints='one number, three for hip, thigh and calf, or twelve in motor order'),
     'kd': Spec([2.0], 'damping gains [N m s / rad]', constraints='as kp'),
@@ -41,7 +41,7 @@ SPECS = {
     'hottest': Spec(85.0, 'motor temperature at which the robot is damped [deg C]', 30.0, 110.0),
     'stop_button': Spec('B', 'button of the wireless remote that stops the robot, pressed alone '
                         'or with others',
-                        constraints='one of: ' + ', '.join(BUTTONS)),
+                        constraints=one_of(BUTTONS)),
     'motion_switcher': Spec(True, "ask the robot's own service to release its motion modes; set "
                             'to false for simulators, which have none'),
     'own_publishers': Spec(0, "number of the robot's own publishers on the command topic", 0, 4),

@@ -15,7 +15,7 @@
 """What of the ROS graph belongs to a Unitree robot: topics, and who else commands it."""
 
 from rclpy.node import Node
-from rclpy.qos import QoSProfile, ReliabilityPolicy
+from rclpy.qos import QoSProfile
 
 #: Names of the nodes, of which there is one each.
 BRIDGE, WATCHDOG = 'unitree_bridge', 'unitree_watchdog'
@@ -28,11 +28,6 @@ UNKNOWN = '_NODE_NAMESPACE_UNKNOWN_/_NODE_NAME_UNKNOWN_'
 def quality() -> QoSProfile:
     """Return the quality of service of commands: an old one is of no use any more."""
     return QoSProfile(depth=1)
-
-
-def best_effort() -> QoSProfile:
-    """Return that of states: it goes with every publisher."""
-    return QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
 
 
 class Others:

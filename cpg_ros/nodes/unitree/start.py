@@ -21,9 +21,9 @@ import time
 from typing import Any
 
 from cpg_ros.errors import CpgError
+from cpg_ros.nodes.polled_group import PolledSubscription
 from cpg_ros.nodes.unitree.interfaces import message
 from cpg_ros.nodes.unitree.robot_graph import BRIDGE, Others
-from cpg_ros.nodes.unserved import subscribe, taken
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
 
@@ -52,8 +52,8 @@ class Service:
         self._request = message('unitree_api/Request')
         self._publisher = node.create_publisher(self._request, f'/api/{name}/request',
                                                 QoSProfile(depth=10))
-        self._answers = subscribe(node, message('unitree_api/Response'), f'/api/{name}/response',
-                                  QoSProfile(depth=10))
+        self._answers = PolledSubscription(node, message('unitree_api/Response'),
+                                           f'/api/{name}/response', QoSProfile(depth=10))
 
     def call(self, number: int) -> dict[str, Any]:
         """Ask for something; return what the answer says.
@@ -68,14 +68,14 @@ class Service:
         request.parameter = '{}'
         end = time.monotonic() + ANSWER
         while not (self._publisher.get_subscription_count()
-                   and self._node.count_publishers(self._answers.topic_name)):
+                   and self._node.count_publishers(self._answers.topic)):
             if time.monotonic() > end:
                 raise Refused(f"the robot has no service '{self._name}'; a simulator has none: "
                               'motion_switcher:=false')
             self._wait(0.05)
         self._publisher.publish(request)
         while time.monotonic() < end + ANSWER:
-            for answer, _ in taken(self._answers):
+            for answer, _ in self._answers.take():
                 if answer.header.identity.id == request.header.identity.id:
                     if code := answer.header.status.code:
                         raise Refused(f"the robot's service '{self._name}' refuses request "

@@ -20,6 +20,7 @@ import time
 from rclpy.clock import Clock
 from rclpy.clock_type import ClockType
 from rclpy.node import Node
+from rclpy.topic_endpoint_info import TopicEndpointInfo
 
 #: How often they are looked for, s.
 LOOK = 0.25
@@ -29,7 +30,13 @@ NAMING = 1.0
 UNKNOWN, NAMELESS = '_NODE_NAME_UNKNOWN_', 'a node of unknown name'
 
 
-class Rivals:
+def node_of(endpoint: TopicEndpointInfo) -> str:
+    """Return the full name of an endpoint's node, NAMELESS if it is not known."""
+    return (NAMELESS if endpoint.node_name == UNKNOWN
+            else f'{endpoint.node_namespace.rstrip("/")}/{endpoint.node_name}')
+
+
+class OtherPublishers:
     """Warns as soon as another node publishes on one of a node's own topics.
 
     Attributes:
@@ -73,9 +80,7 @@ class Rivals:
         if self._node.count_publishers(topic) < 2:
             return ''
         own = self._node.get_fully_qualified_name()
-        names = [NAMELESS if one.node_name == UNKNOWN
-                 else f'{one.node_namespace.rstrip("/")}/{one.node_name}'
-                 for one in self._node.get_publishers_info_by_topic(topic)]
+        names = [node_of(one) for one in self._node.get_publishers_info_by_topic(topic)]
         if own in names:
             names.remove(own)
         return ', '.join(sorted(names))
