@@ -17,10 +17,12 @@
 Imports every room but ``tools``.
 """
 
-__all__ = ['bounded_request', 'cells_publisher', 'cmd_vel', 'command_topics', 'console',
-           'deadline_thread', 'diagnostics', 'feedback_loop', 'feedback_parameters',
-           'feedback_switch', 'generator', 'generator_parameters', 'inversion_node',
-           'joint_publishers', 'kernels', 'launch_arguments', 'lockstep', 'log_queue',
-           'measured_pose', 'message_block', 'message_types', 'node_base', 'parameter_services',
-           'parameter_spec', 'raw_messages', 'real_time', 'rivals', 'robot_sim', 'senses_input',
-           'sensor_publishers', 'shutdown', 'unitree', 'unserved']
+__all__ = ['bounded_request', 'bridge_base', 'bridge_health', 'bridge_interface', 'bridge_loop',
+           'bridge_parameters', 'bridge_start', 'cells_publisher', 'cmd_vel', 'command_publishers',
+           'command_topics', 'console', 'deadline_thread', 'diagnostics', 'feedback_loop',
+           'feedback_parameters', 'feedback_switch', 'generator', 'generator_parameters',
+           'inversion_node', 'joint_publishers', 'kernels', 'launch_arguments', 'local_socket',
+           'lockstep', 'log_queue', 'measured_pose', 'message_block', 'message_types', 'node_base',
+           'parameter_services', 'parameter_spec', 'raw_messages', 'real_time', 'rivals',
+           'robot_sim', 'senses_input', 'sensor_publishers', 'shutdown', 'unitree', 'unserved',
+           'watchdog', 'watchdog_link']
