@@ -24,7 +24,7 @@ import sys
 import threading
 import time
 
-from cpg_ros.robots.robot_file import find_robot
+from cpg_ros.robots.robot_file import load_robot
 from cpg_ros.safety.tick_monitor import TickMonitor
 from graph import free_domain, Process, until
 import numpy as np
@@ -38,7 +38,7 @@ from std_msgs.msg import Float64MultiArray, String
 from std_srvs.srv import Trigger
 
 FOLDER = Path(__file__).resolve().parent
-BIPED = find_robot('biped')
+BIPED = load_robot('biped')
 #: The stand of the robot file, in motor order: knees 0.5 rad, ankles -0.1 rad.
 STAND = np.array([-0.1, 0.5, -0.1, 0.5])
 #: Angles of motors in the order of the robot file.

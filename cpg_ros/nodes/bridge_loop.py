@@ -31,7 +31,7 @@ from cpg_ros.nodes.parameter_spec import Spec
 from cpg_ros.nodes.unserved import subscribe, taken
 from cpg_ros.nodes.watchdog_link import WatchdogLink
 from cpg_ros.robots.robot import Robot
-from cpg_ros.robots.robot_file import find_robot
+from cpg_ros.robots.robot_file import load_robot
 from cpg_ros.safety.bridge_settings import BridgeSettings
 from cpg_ros.safety.robot_state import RobotState
 from cpg_ros.safety.supervisor import BridgeState, Supervisor
@@ -86,7 +86,7 @@ class BridgeLoop(StartedNode):
         self.dry: bool = value('dry_run')
         try:
             command_type, state_type = interface.command_type(), interface.state_type()
-            self.robot = find_robot(value('robot'))
+            self.robot = load_robot(value('robot'))
             settings = self.make_settings(self.robot, {
                 'period': period, 'tilt': math.radians(value('tilt')),
                 'target_timeout': value('target_timeout'),

@@ -31,7 +31,7 @@ from cpg_ros.files.regular_file import read_bytes
 from cpg_ros.gaits.stride import NoSteadyGait
 from cpg_ros.motion.plan import Refused
 from cpg_ros.robots.robot import Robot
-from cpg_ros.robots.robot_file import find_robot, write_robot
+from cpg_ros.robots.robot_file import load_robot, write_robot
 from cpg_ros.tools.arguments import Parser, say
 
 DESCRIPTION = """\
@@ -113,7 +113,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if out.suffix not in ('.yaml', '.yml'):
         parser.error(f'argument --out: {out} does not end in .yaml')
     try:
-        robot = find_robot(chosen.robot)
+        robot = load_robot(chosen.robot)
         rows: list[tuple[str, ...]] = [('from', 'gait', 'speed [m/s]', 'strides')]
         if chosen.model:
             robot = _simulated(robot, chosen)

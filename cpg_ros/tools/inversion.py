@@ -36,12 +36,12 @@ from cpg_ros.gaits.stride import NoSteadyGait
 from cpg_ros.inversion.model_choice import as_rows, Explained, explained, undecided
 from cpg_ros.inversion.paper_fit import paper_fits, PaperFit, refuse_others
 from cpg_ros.inversion.parameter_files import write_fitted
-from cpg_ros.inversion.recording_fit import Inverted, inverted, network_of, preset_of
+from cpg_ros.inversion.recording_fit import fit_recording, network_of, preset_of, RecordingFit
 from cpg_ros.networks.registry import SHIPPED
 from cpg_ros.recordings.formats import FORMATS, read_recording
 from cpg_ros.recordings.recording import Recording
 from cpg_ros.robots.robot import Robot
-from cpg_ros.robots.robot_file import find_robot
+from cpg_ros.robots.robot_file import load_robot
 from cpg_ros.tools.arguments import assignment, Parser, say, twice
 from cpg_ros.tools.reading_options import (
     add_reading_options,
@@ -166,7 +166,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     chosen = parser.parse_args(sys.argv[1:] if arguments is None else arguments)
     _checked(parser, chosen)
     try:
-        robot = None if chosen.robot is None else find_robot(chosen.robot)
+        robot = None if chosen.robot is None else load_robot(chosen.robot)
         starts = [dict(start) for start in chosen.start] or [{}]
         if chosen.paper:
             refuse_others(robot, chosen.network or '')
@@ -177,9 +177,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         recording = _recording(chosen, robot)
         network, compared = _explained(chosen, recording, robot)
         with progress_bar('fitting', 100) as bar:
-            found = inverted(recording, robot, network, chosen.gait or '',
-                             chosen.free, chosen.order, chosen.preset or '', starts,
-                             done=lambda share: bar(round(100.0 * share)))
+            found = fit_recording(recording, robot, network, chosen.gait or '',
+                                  chosen.free, chosen.order, chosen.preset or '', starts,
+                                  done=lambda share: bar(round(100.0 * share)))
         fits = _paper(chosen, found, starts)
         written = _written(chosen, found, robot)
     except NoSteadyGait as error:
@@ -223,7 +223,7 @@ def _explained(chosen: Namespace, recording: Recording, robot: Robot | None
     return found[0].network, found
 
 
-def _paper(chosen: Namespace, found: Inverted, starts: list[dict[str, float]]
+def _paper(chosen: Namespace, found: RecordingFit, starts: list[dict[str, float]]
            ) -> list[PaperFit]:
     """Fit as the paper does, if that is wanted."""
     if not chosen.paper:
@@ -233,7 +233,7 @@ def _paper(chosen: Namespace, found: Inverted, starts: list[dict[str, float]]
                       list(found.fit.parameters), starts)
 
 
-def _written(chosen: Namespace, found: Inverted, robot: Robot | None) -> list[Path]:
+def _written(chosen: Namespace, found: RecordingFit, robot: Robot | None) -> list[Path]:
     written = [] if chosen.out is None else write_fitted(chosen.out, found, robot)
     if chosen.report is not None:
         # matplotlib takes half a second, and only pages need it.

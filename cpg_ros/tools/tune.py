@@ -31,7 +31,7 @@ from cpg_ros.files.plain_text import table
 from cpg_ros.fleet.options import add_options, working
 from cpg_ros.networks.registry import NETWORKS
 from cpg_ros.robots.robot import Robot
-from cpg_ros.robots.robot_file import find_robot, LIMITS, write_robot
+from cpg_ros.robots.robot_file import LIMITS, load_robot, write_robot
 from cpg_ros.simulation.gait_design import AIMS
 from cpg_ros.simulation.tuning import GOOD, LONG, NoDesign, tune, Tuned
 from cpg_ros.tools.arguments import number, Parser, say, twice
@@ -119,7 +119,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if name := twice(chosen.gaits or []):
         parser.error(f'argument --gaits: {name} is given twice')
     try:
-        robot = find_robot(chosen.robot)
+        robot = load_robot(chosen.robot)
         if chosen.gaits is None:
             known = NETWORKS[robot.networks[0]].gaits()
             chosen.gaits = [gait for gait in AIMS if gait in known]
