@@ -18,10 +18,11 @@ import math
 
 from cpg_ros.errors import CpgError
 from cpg_ros.robots.robot_file import load_robot
-from cpg_ros.unitree.models import JOINTS, MODELS
-from cpg_ros.unitree.settings import settings_of
-from cpg_ros.unitree.supervisor import Phase, Supervisor
-from cpg_ros.unitree.vigil import Vigil
+from cpg_ros.safety.supervisor import BridgeState, Supervisor
+from cpg_ros.safety.tick_monitor import TickMonitor
+from cpg_ros.unitree.low_cmd import LowCmd
+from cpg_ros.unitree.low_state import LowState
+from cpg_ros.unitree.models import JOINTS, MODELS, settings_of
 import numpy as np
 import pytest
 
@@ -34,9 +35,10 @@ class Rig:
     """A supervisor and joints that do at once what they are told."""
 
     def __init__(self, q=LIE, settings=GO2):
-        self.told = []
-        self.machine = Supervisor(settings, lambda phase, reason: self.told.append(phase))
-        self.state, self.now, self.tick = self.machine.state, 10.0, 0
+        self.states = []
+        self.state, self.now, self.tick = LowState(), 10.0, 0
+        self.machine = Supervisor(settings, self.state, LowCmd(),
+                                  lambda state, reason: self.states.append(state))
         self.state.q[:] = q
         self.state.quaternion[:] = 1.0, 0.0, 0.0, 0.0
         self.mute, self.target, self.commands = False, None, []
@@ -46,9 +48,9 @@ class Rig:
             self.now += DT
             self.tick += 1
             if not self.mute:
-                self.machine.heard(self.now)
+                self.machine.state_received(self.now)
             if self.target is not None and not self.tick % every:
-                self.machine.ask(np.array(self.target, dtype=float), self.now)
+                self.machine.set_target(np.array(self.target, dtype=float), self.now)
             if self.machine.step(self.now):
                 command = self.machine.command
                 self.commands.append(np.array([command.q, command.kp, command.kd]))
@@ -60,10 +62,10 @@ class Rig:
         self.run(0.01)
         assert not self.machine.rise(self.now)
         self.run(2.1)
-        assert self.machine.phase is Phase.STANDING
+        assert self.machine.state is BridgeState.STANDING
         self.target = GO2.stand + 0.1
         self.run(1.2)
-        assert self.machine.phase is Phase.FOLLOWING
+        assert self.machine.state is BridgeState.FOLLOWING
         assert np.allclose(self.machine.command.q, GO2.stand + 0.1, atol=1e-6)
         return self
 
@@ -71,7 +73,7 @@ class Rig:
 def test_nothing_is_sent_before_it_rises():
     rig = Rig()
     rig.target = GO2.stand
-    assert not rig.run(0.5).commands and rig.machine.phase is Phase.IDLE
+    assert not rig.run(0.5).commands and rig.machine.state is BridgeState.IDLE
 
 
 def test_it_rises_from_where_it_is_follows_and_sits():
@@ -84,13 +86,13 @@ def test_it_rises_from_where_it_is_follows_and_sits():
     rig.run(0.25)
     assert np.allclose(rig.machine.command.q, GO2.stand + 0.05, atol=1e-3)
     rig.run(1.65)
-    assert rig.machine.phase is Phase.SITTING
+    assert rig.machine.state is BridgeState.SITTING
     rig.run(0.2)
-    assert rig.machine.phase is Phase.DAMPING
+    assert rig.machine.state is BridgeState.DAMPING
     assert not rig.machine.command.kp.any() and (rig.machine.command.kd == 5.0).all()
     assert np.allclose(rig.state.q, LIE, atol=0.02)
-    assert rig.told == [Phase.RISING, Phase.STANDING, Phase.FOLLOWING, Phase.SITTING,
-                        Phase.DAMPING]
+    assert rig.states == [BridgeState.RISING, BridgeState.STANDING, BridgeState.FOLLOWING,
+                          BridgeState.SITTING, BridgeState.DAMPING]
 
 
 def test_slow_commands_are_interpolated():
@@ -109,19 +111,19 @@ def test_no_fresh_target_holds_then_gathers_then_sits_then_damps():
     rig.run(0.026)
     assert np.allclose(rig.machine.command.q, GO2.stand + 0.1, atol=1e-6)
     rig.run(0.07)
-    assert rig.machine.phase is Phase.FOLLOWING
+    assert rig.machine.state is BridgeState.FOLLOWING
     assert np.allclose(rig.machine.command.q, GO2.stand, atol=1e-6)
     rig.run(0.008)
-    assert rig.machine.phase is Phase.SITTING and 'no fresh target' in rig.machine.reason
+    assert rig.machine.state is BridgeState.SITTING and 'no fresh target' in rig.machine.reason
     # A generator that comes back does not lift it again.
     rig.target = GO2.stand
     rig.run(1.6)
-    assert rig.machine.phase is Phase.DAMPING
+    assert rig.machine.state is BridgeState.DAMPING
     rig.run(1.0)
-    assert rig.machine.phase is Phase.DAMPING
+    assert rig.machine.state is BridgeState.DAMPING
     assert not rig.machine.rise(rig.now)
     rig.run(2.1)
-    assert rig.machine.phase is Phase.FOLLOWING
+    assert rig.machine.state is BridgeState.FOLLOWING
 
 
 def test_targets_that_come_back_in_time_are_joined_smoothly():
@@ -130,7 +132,7 @@ def test_targets_that_come_back_in_time_are_joined_smoothly():
     rig.run(0.096)
     first, rig.target = len(rig.commands), GO2.stand + 0.1
     rig.run(0.1)
-    assert rig.machine.phase is Phase.FOLLOWING
+    assert rig.machine.state is BridgeState.FOLLOWING
     assert np.allclose(rig.machine.command.q, GO2.stand + 0.1, atol=1e-6)
     assert np.abs(np.diff([row[0] for row in rig.commands[first:]], axis=0)).max() < 0.01
 
@@ -141,7 +143,7 @@ def test_a_generator_that_ends_amid_the_fading_is_not_waited_for():
     rig.run(0.2)
     rig.target = None
     rig.run(1.55)
-    assert rig.machine.phase is Phase.DAMPING
+    assert rig.machine.state is BridgeState.DAMPING
 
 
 def test_a_leap_of_a_target_is_not_followed():
@@ -151,13 +153,13 @@ def test_a_leap_of_a_target_is_not_followed():
     rig.run(0.026)
     assert np.allclose(rig.machine.command.q, held)
     rig.run(0.084)
-    assert rig.machine.phase is Phase.SITTING and 'leapt by 0.' in rig.machine.reason
+    assert rig.machine.state is BridgeState.SITTING and 'leapt by 0.' in rig.machine.reason
     again = Rig().following()
     again.target = GO2.stand - 0.8
     again.run(0.05)
     again.target = GO2.stand + 0.1
     again.run(0.2)
-    assert again.machine.phase is Phase.FOLLOWING
+    assert again.machine.state is BridgeState.FOLLOWING
 
 
 def set_(name, value):
@@ -180,22 +182,22 @@ def lean(rig):
     (set_('temperature', 85), 'FR_thigh_joint has 85 deg C'),
     (set_('lost', 1000), 'FR_thigh_joint does not hear'),
     (lambda rig: setattr(rig, 'target', GO2.stand * np.nan), 'a target is not a number'),
-    (lambda rig: rig.machine.refuse('joint a is missing', rig.now), 'joint a is missing'),
+    (lambda rig: rig.machine.reject_target('joint a is missing', rig.now), 'joint a is missing'),
     (lambda rig: rig.machine.damp(rig.now, '~/stop'), '~/stop')])
 def test_it_damps_at_once(what, reason):
     rig = Rig().following()
     what(rig)
     rig.run(DT)
-    assert rig.machine.phase is Phase.DAMPING and reason in rig.machine.reason
+    assert rig.machine.state is BridgeState.DAMPING and reason in rig.machine.reason
     assert not rig.machine.command.kp.any() and rig.machine.command.kd.all()
 
 
 def test_joints_beyond_their_limits_damp_at_once():
     rig = Rig().following()
     rig.state.q[2] = GO2.lower[2] - 0.22
-    rig.machine.heard(rig.now)
+    rig.machine.state_received(rig.now)
     rig.machine.step(rig.now + DT)
-    assert rig.machine.phase is Phase.DAMPING
+    assert rig.machine.state is BridgeState.DAMPING
     assert 'FR_calf_joint is at -2.94 rad' in rig.machine.reason
 
 
@@ -203,9 +205,9 @@ def test_a_mute_robot_damps_after_20_ms():
     rig = Rig().following()
     rig.mute = True
     rig.run(0.018)
-    assert rig.machine.phase is Phase.FOLLOWING
+    assert rig.machine.state is BridgeState.FOLLOWING
     rig.run(0.006)
-    assert rig.machine.phase is Phase.DAMPING and 'no fresh state' in rig.machine.reason
+    assert rig.machine.state is BridgeState.DAMPING and 'no fresh state' in rig.machine.reason
 
 
 def test_without_a_fresh_state_joints_are_held_where_they_were_told_last():
@@ -215,7 +217,7 @@ def test_without_a_fresh_state_joints_are_held_where_they_were_told_last():
         rig.target, rig.mute = GO2.stand + 0.1 - 0.01 * k, k >= 5
         rig.run(DT)
     wanted = np.array([row[0] for row in rig.commands[first:]])
-    assert rig.machine.phase is Phase.FOLLOWING
+    assert rig.machine.state is BridgeState.FOLLOWING
     # Two periods without a state may be a late one.
     assert np.allclose(np.diff(wanted[:7], axis=0), -0.01, atol=1e-6)
     assert not np.diff(wanted[6:], axis=0).any()
@@ -224,8 +226,8 @@ def test_without_a_fresh_state_joints_are_held_where_they_were_told_last():
 def test_a_frozen_robot_is_mute():
     rig = Rig()
     rig.state._all['tick'] = 77
-    rig.machine.heard(1.0)
-    rig.machine.heard(2.0)
+    rig.machine.state_received(1.0)
+    rig.machine.state_received(2.0)
     assert 'no fresh state' in rig.machine.rise(2.0)
 
 
@@ -233,7 +235,7 @@ def test_a_bridge_that_stood_still_damps():
     rig = Rig().following()
     rig.now += 0.03
     rig.run(DT)
-    assert rig.machine.phase is Phase.DAMPING and 'itself stood still' in rig.machine.reason
+    assert rig.machine.state is BridgeState.DAMPING and 'itself stood still' in rig.machine.reason
 
 
 def test_it_does_not_rise_in_danger_and_rises_after_it():
@@ -241,7 +243,7 @@ def test_it_does_not_rise_in_danger_and_rises_after_it():
     rig.state.temperature[3] = 90
     rig.run(0.01)
     assert 'FL_hip_joint has 90' in rig.machine.rise(rig.now)
-    assert rig.machine.phase is Phase.IDLE and not rig.commands
+    assert rig.machine.state is BridgeState.IDLE and not rig.commands
     rig.state.temperature[3] = 40
     assert not rig.machine.rise(rig.now)
     assert 'rising already' in rig.machine.rise(rig.now)
@@ -257,13 +259,13 @@ def test_no_command_asks_for_more_torque_than_joints_bear(seed):
         rig.state.q[:] = rng.uniform(GO2.lower, GO2.upper)
         rig.state.dq[:] = rng.normal(0.0, 15.0, 12)
         rig.now += DT
-        rig.machine.heard(rig.now)
-        rig.machine.ask(GO2.stand + 0.1 + rng.uniform(-0.05, 0.05, 12), rig.now)
+        rig.machine.state_received(rig.now)
+        rig.machine.set_target(GO2.stand + 0.1 + rng.uniform(-0.05, 0.05, 12), rig.now)
         rig.machine.step(rig.now)
         command, state = rig.machine.command, rig.state
         torque = command.kp * (command.q - state.q) - command.kd * state.dq
         assert (np.abs(torque) <= limit * (1.0 + 1e-4)).all()
-    assert rig.machine.phase is Phase.FOLLOWING
+    assert rig.machine.state is BridgeState.FOLLOWING
     rig.machine.damp(rig.now, 'now')
     rig.machine.step(rig.now)
     assert (np.abs(command.kd * state.dq) <= limit * (1.0 + 1e-4)).all()
@@ -291,15 +293,15 @@ def test_another_robot_is_refused():
 # -- the watchdog ------------------------------------------------------------------------------
 
 def test_the_watchdog_damps_after_two_missing_ticks_until_the_next():
-    vigil, kd = Vigil(DT), np.full(12, 5.0)
-    assert vigil.wait(0.0) is None and not vigil.due(100.0)
-    vigil.hear(Vigil.HELLO, 100.0)
-    assert vigil.wait(100.0) is None
-    vigil.hear(Vigil.tick(kd), 100.0)
-    assert not vigil.due(100.0 + 2.4 * DT) and vigil.due(100.0 + 2.6 * DT)
-    assert vigil.kd.tolist() == kd.tolist() and vigil.alarms == 1
-    assert not vigil.due(100.0 + 3.5 * DT) and vigil.due(100.0 + 3.7 * DT)
-    vigil.hear(Vigil.tick(kd), 100.1)
-    assert not vigil.due(100.1 + DT) and not vigil.over
-    vigil.hear(Vigil.END, 100.2)
-    assert vigil.over and vigil.alarms == 1
+    monitor, kd = TickMonitor(DT), np.full(12, 5.0)
+    assert monitor.timeout(0.0) is None and not monitor.due(100.0)
+    monitor.receive(TickMonitor.HELLO, 100.0)
+    assert monitor.timeout(100.0) is None
+    monitor.receive(TickMonitor.tick(kd), 100.0)
+    assert not monitor.due(100.0 + 2.4 * DT) and monitor.due(100.0 + 2.6 * DT)
+    assert monitor.kd.tolist() == kd.tolist() and monitor.alarms == 1
+    assert not monitor.due(100.0 + 3.5 * DT) and monitor.due(100.0 + 3.7 * DT)
+    monitor.receive(TickMonitor.tick(kd), 100.1)
+    assert not monitor.due(100.1 + DT) and not monitor.ended
+    monitor.receive(TickMonitor.END, 100.2)
+    assert monitor.ended and monitor.alarms == 1

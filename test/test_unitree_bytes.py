@@ -41,7 +41,7 @@ def test_crc_of_the_standard():
 
 def test_crc_of_200_random_commands_is_the_table_driven_one():
     for seed in range(200):
-        fields = COMMAND.unpack(filled(seed).sealed()[4:])
+        fields = COMMAND.unpack(filled(seed).encode()[4:])
         assert check_sum(C_STRUCT.pack(*fields)[:808]) == fields[-1]
 
 
@@ -49,7 +49,7 @@ def test_a_command_is_what_rclpy_serialises():
     messages = pytest.importorskip('unitree_go.msg', reason='make unitree has not been run')
     from rclpy.serialization import deserialize_message, serialize_message
     command = filled(7)
-    sealed = command.sealed()
+    sealed = command.encode()
     message = deserialize_message(sealed, messages.LowCmd)
     assert message.head.tolist() == [0xfe, 0xef] and message.level_flag == 0xff
     for k, motor in enumerate(message.motor_cmd):

@@ -16,7 +16,7 @@
 
 from types import SimpleNamespace
 
-from cpg_ros.nodes.unitree.robot_graph import Others
+from cpg_ros.nodes.command_publishers import OtherCommandPublishers
 import pytest
 
 BRIDGE, WATCHDOG = ('/', 'unitree_bridge'), ('/', 'unitree_watchdog')
@@ -32,6 +32,11 @@ def graph(*publishers):
                            get_fully_qualified_name=lambda: '/unitree_bridge')
 
 
+def others(publishers, tolerated):
+    return OtherCommandPublishers(graph(*publishers), '/lowcmd', 'unitree_watchdog', own=1,
+                                  tolerated=tolerated)
+
+
 @pytest.mark.parametrize(('publishers', 'found'), [
     ([BRIDGE], ''), ([BRIDGE, WATCHDOG], ''),
     ([BRIDGE, WATCHDOG, ('/', 'rival')], '/rival'), ([BRIDGE, ('/lab', 'rival')], '/lab/rival'),
@@ -40,9 +45,8 @@ def graph(*publishers):
     ([BRIDGE, UNKNOWN], ''), ([BRIDGE, WATCHDOG, UNKNOWN], '/'.join(UNKNOWN)),
     ([BRIDGE, UNKNOWN, UNKNOWN], '/'.join(UNKNOWN))])
 def test_who_else_commands(publishers, found):
-    assert Others(graph(*publishers), '/lowcmd', own=1, tolerated=0).found() == found
+    assert others(publishers, 0).names() == found
 
 
 def test_publishers_of_the_robot_itself_are_tolerated():
-    others = Others(graph(BRIDGE, WATCHDOG, BARE), '/lowcmd', own=1, tolerated=1)
-    assert others.found() == ''
+    assert others([BRIDGE, WATCHDOG, BARE], 1).names() == ''

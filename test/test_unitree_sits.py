@@ -23,10 +23,11 @@ pytest.importorskip('mujoco', reason='the extra [sim] is not installed')
 from cpg_ros.motion.pattern import Pattern  # noqa: E402, I100
 from cpg_ros.motion.plan import plan  # noqa: E402
 from cpg_ros.networks.registry import PRESETS  # noqa: E402
+from cpg_ros.safety.supervisor import BridgeState, Supervisor  # noqa: E402
 from cpg_ros.simulation.body import Body  # noqa: E402
-from cpg_ros.unitree.models import MODELS  # noqa: E402
-from cpg_ros.unitree.settings import settings_of  # noqa: E402
-from cpg_ros.unitree.supervisor import Phase, Supervisor  # noqa: E402
+from cpg_ros.unitree.low_cmd import LowCmd  # noqa: E402
+from cpg_ros.unitree.low_state import LowState  # noqa: E402
+from cpg_ros.unitree.models import MODELS, settings_of  # noqa: E402
 from go2 import DT, GO2  # noqa: E402
 
 #: The gait is at its full speed for some strides by then, s.
@@ -40,24 +41,25 @@ def hastened(gait, factor):
 
 
 def sits(program, last, goes_on):
-    """Sit down at a time s; return the largest lean, rad, the last height, m, and the phases.
+    """Sit down at a time s; return the largest lean, rad, the last height, m, and the states.
 
-    Either no target comes from then on, or they go on, and the bridge is told to sit.
+    Either no target comes from then on, or they go on, and the bridge is states to sit.
     """
-    body, told = Body('go2', GO2, timestep=DT), []
-    machine = Supervisor(settings_of(GO2, MODELS['go2'], [60.0], [2.0]),
-                         lambda phase, reason: told.append((phase, reason)))
-    pattern, state, model, now, leans = Pattern(program), machine.state, body.model, 0.0, []
+    body, states = Body('go2', GO2, timestep=DT), []
+    state = LowState()
+    machine = Supervisor(settings_of(GO2, MODELS['go2'], [60.0], [2.0]), state, LowCmd(),
+                         lambda *change: states.append(change))
+    pattern, model, now, leans = Pattern(program), body.model, 0.0, []
     for k in range(round((last + 2.5) / DT)):
         now += DT
         state.q[:], state.dq[:] = body.position, body.velocity
         state.quaternion[:] = body.quaternion
-        machine.heard(now)
+        machine.state_received(now)
         if k == 5:
             assert not machine.rise(now)
         if now > 2.1 and (goes_on or now < last):
             pattern.advance(DT)
-            machine.ask(pattern.position[GO2.places].copy(), now)
+            machine.set_target(pattern.position[GO2.places].copy(), now)
         if goes_on and now >= last:
             machine.sit(now, 'SIGINT')
         machine.step(now)
@@ -66,9 +68,9 @@ def sits(program, last, goes_on):
         model.actuator_biasprm[:, 1], model.actuator_biasprm[:, 2] = -command.kp, -command.kd
         body.command(command.q)
         body.step()
-        leans.append(math.acos(min(1.0, machine.state.tilt_cosine)))
-    assert 'sat down' in told[-1][1]
-    return max(leans[round(last / DT):]), body.base[2], [phase for phase, _ in told]
+        leans.append(math.acos(min(1.0, state.tilt_cosine)))
+    assert 'sat down' in states[-1][1]
+    return max(leans[round(last / DT):]), body.base[2], [one for one, _ in states]
 
 
 # Faster than the robot file's; held as they were for 0.1 s, these toppled at some of the moments.
@@ -77,6 +79,6 @@ def sits(program, last, goes_on):
 @pytest.mark.parametrize('moment', [0.125, 0.375, 0.625, 0.875])
 def test_it_does_not_topple(gait, factor, goes_on, moment):
     program, frequency = hastened(gait, factor)
-    lean, height, phases = sits(program, WALKING + moment / frequency, goes_on)
-    assert phases[-3:] == [Phase.FOLLOWING, Phase.SITTING, Phase.DAMPING]
+    lean, height, states = sits(program, WALKING + moment / frequency, goes_on)
+    assert states[-3:] == [BridgeState.FOLLOWING, BridgeState.SITTING, BridgeState.DAMPING]
     assert height < 0.15 and lean < math.radians(25.0 if goes_on else 45.0)

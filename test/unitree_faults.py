@@ -25,7 +25,7 @@ import subprocess
 import sys
 import time
 
-from cpg_ros.unitree.vigil import Vigil
+from cpg_ros.safety.tick_monitor import TickMonitor
 from graph import EXECUTABLE, free_domain, Process, until, Watcher
 import numpy as np
 from rclpy.qos import DurabilityPolicy, QoSProfile
@@ -164,7 +164,7 @@ class Walk:
         self.bridge.end()
         # A bridge that has never driven leaves the watchdog of the one before at work.
         with contextlib.suppress(ConnectionRefusedError), self.to_watchdog() as line:
-            line.send(Vigil.END)
+            line.send(TickMonitor.END)
         for one in (self.generator, self.watcher, self.robot):
             one.end()
 

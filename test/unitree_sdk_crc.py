@@ -42,7 +42,7 @@ for k in range(count):
     for part in (ours.q, ours.dq, ours.tau, ours.kp, ours.kd):
         part[:] = rng.normal(0.0, 30.0, 12)
     began = time.perf_counter()
-    sealed = ours.sealed()
+    sealed = ours.encode()
     times.append(1e6 * (time.perf_counter() - began))
     if k % 50 == 0:
         # Their own reader of the message, their own packing of the struct.

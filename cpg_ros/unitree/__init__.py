@@ -12,10 +12,9 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Unitree's robots: their messages as bytes, and what keeps robot and people safe.
+"""Unitree's robots: their messages as bytes, their motors' limits.
 
-Imports ``motion`` and ``robots`` and what is below; knows nothing of ROS.
+Imports ``safety`` and what is below; knows nothing of ROS.
 """
 
-__all__ = ['crc', 'dangers', 'low_cmd', 'low_state', 'models', 'participants', 'settings',
-           'supervisor', 'targets', 'vigil']
+__all__ = ['crc', 'low_cmd', 'low_state', 'models', 'participants']

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The message ``unitree_go/msg/LowCmd`` as bytes: made once, filled in place, sealed, sent.
+"""The message ``unitree_go/msg/LowCmd`` as bytes: made once, filled in place, encoded, sent.
 
 Little-endian CDR puts 4 bytes of header before the message; positions below count from the
 message. The check sum is over the C struct of Unitree's firmware, 812 bytes with its own padding,
@@ -20,6 +20,7 @@ of which CDR differs only around the first motor: CDR aligns the mode of a motor
 C as the struct it is in. Padding is zero in both.
 """
 
+from cpg_ros.safety.robot_state import JointCommand
 from cpg_ros.unitree.crc import crc32
 import numpy as np
 
@@ -30,27 +31,19 @@ SIZE = 808
 MOTORS = 20
 #: Angle and speed that mean: not controlled (unitree_sdk2's PosStopF and VelStopF).
 POSITION_STOP, VELOCITY_STOP = 2.146e9, 16000.0
-#: Control mode of a motor that is driven.
-DRIVEN = 1
+#: Mode of a motor under control.
+SERVO_MODE = 1
 #: Where the floats of the first motor begin, and from motor to motor.
 _FLOATS, _STRIDE = 24, 36
 #: After the last motor's ``reserve``; ``crc`` is the last word.
 _CRC = 804
 
 
-class LowCmd:
-    """A command for all motors, in the order of Unitree's motors.
+class LowCmd(JointCommand):
+    """A command for all motors, in the order of Unitree's motors; arrays are views of the bytes.
 
     The first motors are those of a robot's joints, FR, FL, RR, RL with hip, thigh and calf each;
     the others are left uncontrolled.
-
-    Attributes:
-        q: angles wanted, rad, shape (joints,); like the others a view of the bytes.
-        dq: speeds wanted, rad/s.
-        tau: torques added, N m.
-        kp: N m / rad.
-        kd: N m s / rad.
-
     """
 
     def __init__(self, joints: int = 12) -> None:
@@ -66,7 +59,7 @@ class LowCmd:
         # As in Unitree's examples: start of frame, low level.
         message[0:3] = b'\xfe\xef\xff'
         for motor in range(MOTORS):
-            message[self._mode(motor)] = DRIVEN
+            message[self._mode(motor)] = SERVO_MODE
         table = np.ndarray((MOTORS, 5), '<f4', message, _FLOATS, (_STRIDE, 4))
         table[:] = POSITION_STOP, VELOCITY_STOP, 0.0, 0.0, 0.0
         self.q, self.dq, self.tau, self.kp, self.kd = table[:joints].T
@@ -76,13 +69,8 @@ class LowCmd:
     def _mode(motor: int) -> int:
         return 22 if motor == 0 else _FLOATS - 4 + _STRIDE * motor
 
-    def damp(self, kd: float | np.ndarray) -> None:
-        """Let the joints only be braked: kp 0, no torque, ``kd`` in N m s / rad."""
-        self.q[:] = self.dq[:] = self.tau[:] = self.kp[:] = 0.0
-        self.kd[:] = kd
-
-    def sealed(self) -> bytes:
-        """Put in the check sum, and return the message as it is sent."""
+    def encode(self) -> bytes:
+        """Set the checksum, and return the message as it is sent."""
         m = self._message
         struct = b''.join((m[:22], b'\0\0', m[22:24], b'\0\0', m[24:_CRC]))
         m[_CRC:] = crc32(struct).to_bytes(4, 'little')

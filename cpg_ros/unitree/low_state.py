@@ -14,6 +14,9 @@
 
 """What ``unitree_go/msg/LowState`` says, read from its bytes (little-endian CDR)."""
 
+from cpg_ros.safety.robot_state import RobotState
+from cpg_ros.unitree.low_cmd import SERVO_MODE
+from cpg_ros.unitree.models import JOINTS
 import numpy as np
 
 #: Of the message with CDR's header of 4 bytes.
@@ -24,6 +27,8 @@ _LITTLE_ENDIAN = 1
 BUTTONS = {name: 1 << k for k, name in enumerate((
     'R1', 'L1', 'start', 'select', 'R2', 'L2', 'F1', 'F2',
     'A', 'B', 'X', 'Y', 'up', 'right', 'down', 'left'))}
+#: Packets that a motor may lose while the bridge drives it.
+MOST_LOST = 100
 #: From the angle of a motor on: CDR packs the mode of the first one more closely.
 _MOTOR = np.dtype({
     'names': ['q', 'dq', 'ddq', 'torque', 'temperature', 'lost', 'next_mode'],
@@ -39,14 +44,11 @@ _FIELDS = np.dtype({
     'itemsize': SIZE - _HEADER})
 
 
-class LowState:
-    """The robot's state, of which ``read`` takes the newest; arrays are views of one buffer.
+class LowState(RobotState):
+    """The measured state; arrays are views of one buffer, joints in the order of Unitree's motors.
 
     Attributes:
-        q: angles, rad, shape (joints,), joints in the order of Unitree's motors.
-        dq: speeds, rad/s.
-        torque: estimated, N m.
-        temperature: of the motors, deg C.
+        torque: estimated, N m, shape (joints,).
         lost: packets that each motor has lost so far.
         quaternion: orientation, w x y z.
         gyroscope: rad/s.
@@ -55,21 +57,17 @@ class LowState:
 
     """
 
-    def __init__(self, joints: int = 12) -> None:
-        """Be ready; everything is zero.
-
-        Args:
-            joints: how many of the motors the robot has, at most 19.
-
-        """
+    def __init__(self) -> None:
+        """Start with everything at zero."""
         self._buffer = bytearray(SIZE)
         self._all = np.ndarray((), _FIELDS, self._buffer, _HEADER)
-        motors = self._all['motors'][:joints]
+        motors = self._all['motors'][:len(JOINTS)]
         self.q, self.dq, self.torque, self.temperature, self.lost = (
             motors[name] for name in ('q', 'dq', 'torque', 'temperature', 'lost'))
         self._modes = motors['next_mode'][:-1]
         self.quaternion, self.gyroscope, self.accelerometer, self.feet = (
             self._all[name] for name in ('quaternion', 'gyroscope', 'accelerometer', 'feet'))
+        self.reset_motor_faults()
 
     def read(self, message: bytes) -> bool:
         """Take a message over; return whether it is one of these."""
@@ -85,6 +83,25 @@ class LowState:
     def modes(self) -> tuple[int, ...]:
         """Control modes of the joints' motors."""
         return int(self._number('first_mode')), *self._modes.tolist()
+
+    def reset_motor_faults(self) -> None:
+        """Compare the motors with their modes and lost packets as they are now."""
+        self._modes_before, self._lost_before = self.modes, self.lost.copy()
+
+    def motor_fault(self) -> str:
+        """Return which motor has left its mode or lost contact with the robot, or ''."""
+        modes, before = self.modes, self._modes_before
+        self._modes_before = modes
+        if modes != before:
+            for name, now, then in zip(JOINTS, modes, before, strict=True):
+                if then == SERVO_MODE != now:
+                    return f'the motor of {name} has stopped by itself: mode {now}'
+        # Unsigned: a counter that began anew is a motor that did.
+        lost = self.lost - self._lost_before
+        if lost.max() > MOST_LOST:
+            worst = int(lost.argmax())
+            return f'the motor of {JOINTS[worst]} does not hear the robot any more'
+        return ''
 
     @property
     def tick(self) -> int:

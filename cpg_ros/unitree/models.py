@@ -12,11 +12,13 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Unitree's four-legged robots: the order of their motors, what these bear, how they lie."""
+"""Unitree's four-legged robots: motor order, torque limits, gains and the lying pose."""
 
 from dataclasses import dataclass
 
 from cpg_ros.errors import InputError
+from cpg_ros.robots.robot import Robot
+from cpg_ros.safety.bridge_settings import BridgeSettings, motor_places, settings_for
 import numpy as np
 
 PARTS = ('hip', 'thigh', 'calf')
@@ -29,10 +31,10 @@ class Model:
     """One kind of robot; columns are hip, thigh and calf.
 
     Attributes:
-        torque: what the joints bear, N m.
+        torque: limits of the joints, N m.
         most_kp: largest proportional gain, N m / rad.
         most_kd: largest damping gain, N m s / rad.
-        lying: how it lies on its belly, rad (the first pose of Unitree's own examples).
+        lying: pose on its belly, rad (the first pose of Unitree's own examples).
 
     """
 
@@ -70,3 +72,36 @@ def each(values: list[float], what: str, most: float) -> np.ndarray:
         if not 0.0 <= value <= most:
             raise InputError(f'{what}: {value:g} is not from 0 to {most:g}')
     return np.resize(np.array(values, dtype=float), len(JOINTS))
+
+
+def places(robot: Robot) -> np.ndarray:
+    """Return the position of each of Unitree's motors in ``robot.order``, shape (12,).
+
+    Raises:
+        InputError: the robot's joints are not those of a Unitree robot.
+
+    """
+    return motor_places(robot, JOINTS, "Unitree's robots")
+
+
+def settings_of(robot: Robot, model: Model, kp: list[float], kd: list[float],
+                torque_factor: float = 1.0, **others: float) -> BridgeSettings:
+    """Return the settings of a robot file and a model.
+
+    Args:
+        robot: provides limits, speeds and the stand (offsets).
+        model: provides torque limits and the lying pose.
+        kp: proportional gains, as ``each`` takes them.
+        kd: damping gains, likewise.
+        torque_factor: fraction of the torque limits that commands may use.
+        others: further attributes of ``BridgeSettings``.
+
+    Raises:
+        InputError: the robot is not one of Unitree's, or a gain is out of range.
+
+    """
+    n = len(JOINTS)
+    return settings_for(
+        robot, places(robot), kp=each(kp, 'kp', model.most_kp), kd=each(kd, 'kd', model.most_kd),
+        torque=torque_factor * np.resize(model.torque, n), lying=np.resize(model.lying, n),
+        **others)

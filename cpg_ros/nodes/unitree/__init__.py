@@ -12,7 +12,6 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The bridge to Unitree's robots: its node, its start, what it publishes, its watchdog."""
+"""The bridge to Unitree's robots: messages, motion modes, measurements."""
 
-__all__ = ['bridge', 'interfaces', 'local_socket', 'parameters', 'robot_graph', 'sensors', 'start',
-           'watchdog', 'watchdog_link']
+__all__ = ['bridge', 'interfaces', 'motion_modes', 'parameters', 'sensors']

@@ -12,13 +12,15 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Unitree's message types, or one line that says how to get them."""
+"""Unitree's message types and topics; a missing package is one line that says how to get it."""
 
 from importlib import import_module
 from pathlib import Path
 import sys
 
 from cpg_ros.errors import MissingLibraryError
+from cpg_ros.nodes.bridge_interface import RobotInterface
+from cpg_ros.unitree.low_cmd import LowCmd
 import rclpy
 
 
@@ -40,3 +42,26 @@ def message(name: str) -> type:
                 'build unitree_go and unitree_api of '
                 'https://github.com/unitreerobotics/unitree_ros2 with colcon, and source that '
                 'workspace')) from error
+
+
+class Unitree(RobotInterface):
+    """Low-level commands and states of the robots that use ``unitree_go``."""
+
+    maker = 'unitree'
+    command_topic, state_topic = '/lowcmd', '/lowstate'
+    raw_states = True
+
+    @staticmethod
+    def command_type() -> type:
+        """Return ``LowCmd``; errors as of ``message``."""
+        return message('unitree_go/LowCmd')
+
+    @staticmethod
+    def state_type() -> type:
+        """Return ``LowState``; errors as of ``message``."""
+        return message('unitree_go/LowState')
+
+    @staticmethod
+    def make_command() -> LowCmd:
+        """Return a command in which no joint is driven."""
+        return LowCmd()

@@ -14,36 +14,19 @@
 
 """The parameters of ``unitree_bridge``."""
 
-from cpg_ros.nodes.command_topics import KINDS
+from cpg_ros.nodes.bridge_parameters import bridge_specs
 from cpg_ros.nodes.parameter_spec import one_of, Spec
 from cpg_ros.unitree.low_state import BUTTONS
 from cpg_ros.unitree.models import MODELS
 
-SPECS = {
-    'robot': Spec('unitree_go2', 'robot file, or the name of a shipped one',
-                  constraints='a shipped name, or the path of a YAML file'),
-    'model': Spec('go2', 'robot model, which determines the torque limits',
-                  constraints=one_of(MODELS)),
-    'command': Spec('joint_states', 'kind of command messages to follow',
-                    constraints=one_of(KINDS)),
-    'kp': Spec([60.0], 'proportional gains [N m / rad]',
-               constraints='one number, three for hip, thigh and calf, or twelve in motor order'),
-    'kd': Spec([2.0], 'damping gains [N m s / rad]', constraints='as kp'),
-    'torque_factor': Spec(1.0, "fraction of the motors' torque limits that commands may use", 0.1,
-                          1.0),
-    'rate': Spec(500.0, 'commands per second [Hz]', 100.0, 1000.0),
-    'sensor_rate': Spec(500.0, 'measured states published per second, at most [Hz]', 1.0, 1000.0),
-    'target_timeout': Spec(0.1, 'time without a new target after which the robot sits down [s]',
-                           0.02, 1.0),
-    'state_timeout': Spec(0.02, 'time without a new state, or without a tick of the bridge, after '
-                          'which the robot is damped [s]', 0.005, 0.2),
-    'tilt': Spec(50.0, 'tilt of the body at which the robot is damped [deg]', 10.0, 90.0),
-    'hottest': Spec(85.0, 'motor temperature at which the robot is damped [deg C]', 30.0, 110.0),
-    'stop_button': Spec('B', 'button of the wireless remote that stops the robot, pressed alone '
-                        'or with others',
-                        constraints=one_of(BUTTONS)),
-    'motion_switcher': Spec(True, "ask the robot's own service to release its motion modes; set "
-                            'to false for simulators, which have none'),
-    'own_publishers': Spec(0, "number of the robot's own publishers on the command topic", 0, 4),
-    'autostart': Spec(True, 'start the robot at launch; if false, wait for ~/start'),
-    'dry_run': Spec(False, 'compute and log everything, but send nothing')}
+SPECS = bridge_specs(
+    'unitree_go2',
+    model=Spec('go2', 'robot model, which determines the torque limits',
+               constraints=one_of(MODELS)),
+    kp=Spec([60.0], 'proportional gains [N m / rad]',
+            constraints='one number, three for hip, thigh and calf, or twelve in motor order'),
+    kd=Spec([2.0], 'damping gains [N m s / rad]', constraints='as kp'),
+    stop_button=Spec('B', 'button of the wireless remote that stops the robot, pressed alone or '
+                     'with others', constraints=one_of(BUTTONS)),
+    motion_switcher=Spec(True, "ask the robot's own service to release its motion modes; set to "
+                         'false for simulators, which have none'))

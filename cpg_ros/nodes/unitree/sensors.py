@@ -12,17 +12,13 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What a Unitree robot measures, under the topics that robot_sim has, and its health."""
-
-from collections.abc import Mapping
+"""The measurements of a Unitree robot, on the topics that robot_sim has."""
 
 from cpg_ros.nodes.joint_publishers import joint_state, labelled
 from cpg_ros.nodes.message_block import each, MessageBlock, Template
 from cpg_ros.robots.robot import Robot
 from cpg_ros.unitree.low_state import LowState
 from cpg_ros.unitree.models import JOINTS, PARTS
-from cpg_ros.unitree.settings import places
-from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 import numpy as np
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
@@ -38,7 +34,7 @@ class Sensors:
 
     def __init__(self, node: Node, robot: Robot, state: LowState) -> None:
         """Be ready to publish what ``state`` holds, joints in ``robot.order``."""
-        self._node, self._robot, self._state = node, robot, state
+        self._state = state
         names = list(robot.order)
         self._from = [JOINTS.index(name) for name in names]
         self._feet = [FEET.index(leg[0].name.partition('_')[0]) for leg in robot.legs.values()]
@@ -60,8 +56,6 @@ class Sensors:
         self._battery = node.create_publisher(
             BatteryState, 'battery', QoSProfile(depth=100),
             qos_overriding_options=QoSOverridingOptions.with_default_policies())
-        self._health = node.create_publisher(DiagnosticArray, '/diagnostics', 10)
-        places(robot)
 
     def publish(self, stamp: int) -> None:
         """Publish the state; stamp in ns."""
@@ -85,16 +79,10 @@ class Sensors:
         message.header.stamp.sec, message.header.stamp.nanosec = divmod(stamp, 1_000_000_000)
         self._battery.publish(message)
 
-    def publish_health(self, level: bytes, text: str, values: Mapping[str, object]) -> None:
-        """Publish a status with these values, and temperatures in deg C."""
+    def values(self) -> dict[str, object]:
+        """Return temperatures in deg C and the charge of the battery in %, for /diagnostics."""
         state = self._state
         heat = {f'{name} [deg C]': value
                 for name, value in zip(JOINTS, state.temperature.tolist(), strict=True)}
-        known = {**values, **heat, 'imu [deg C]': state.imu_temperature,
-                 'battery [%]': round(100.0 * state.charge)}
-        message = DiagnosticArray(status=[DiagnosticStatus(
-            level=level, name=f'{self._node.get_fully_qualified_name()}: robot', message=text,
-            hardware_id=self._robot.name,
-            values=[KeyValue(key=key, value=str(value)) for key, value in known.items()])])
-        message.header.stamp = self._node.get_clock().now().to_msg()
-        self._health.publish(message)
+        return {**heat, 'imu [deg C]': state.imu_temperature,
+                'battery [%]': round(100.0 * state.charge)}

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The bridge's line to its watchdog: starts it, tells it every tick, hears if it is gone."""
+"""The bridge's connection to its watchdog: starts it, sends it a tick every period."""
 
 import contextlib
 import os
@@ -21,44 +21,54 @@ import sys
 import time
 
 from cpg_ros.errors import CpgError
-from cpg_ros.nodes.unitree.local_socket import address, of_this_user, peer, unconnected
-from cpg_ros.unitree.vigil import Vigil
+from cpg_ros.nodes.bridge_interface import RobotInterface
+from cpg_ros.nodes.local_socket import address, of_this_user, peer, unconnected
+from cpg_ros.safety.tick_monitor import TickMonitor
 import numpy as np
 
 #: A watchdog has this long to get ready, s: it loads ROS.
 READY = 20.0
-#: One that reads nothing for this long hangs, s.
+#: A watchdog that reads nothing for this long hangs, s.
 HANGS = 0.5
 #: Exit code of a watchdog whose name another program has.
 NAME_TAKEN = 3
 
 
-class NotOurs(CpgError):
-    """What listens under the watchdog's name belongs to another user; one line for the user."""
+class ForeignWatchdog(CpgError):
+    """Another user's process listens under the watchdog's name; one line for the user."""
 
 
 class WatchdogLink:
-    """A connection to a process that damps the robot when it hears nothing.
+    """A connection to a process that damps the robot while it receives nothing.
 
     A watchdog outlives its bridge; the next bridge of its user for the same robot takes it over.
     """
 
-    def __init__(self, domain: int, topic: str, period: float) -> None:
-        """Prepare; arguments as of ``local_socket.address``, and the bridge's period in s."""
-        self._address = address('watchdog', domain, topic)
-        self._command = [sys.executable, '-m', 'cpg_ros.nodes.unitree.watchdog', str(domain),
-                         topic, str(period), str(os.getpid())]
+    def __init__(self, interface: type[RobotInterface], domain: int, topic: str, period: float
+                 ) -> None:
+        """Prepare the command line of a watchdog.
+
+        Args:
+            interface: of the robot.
+            domain: of ROS.
+            topic: of the commands, resolved.
+            period: of the bridge, s.
+
+        """
+        self._address = address(interface.maker, 'watchdog', domain, topic)
+        self._command = [sys.executable, '-m', 'cpg_ros.nodes.watchdog', interface.reference(),
+                         str(domain), topic, str(period), str(os.getpid())]
         self._socket = unconnected()
         self._process: subprocess.Popen | None = None
         self._read = float('inf')
-        self._told = False
+        self._ticked = False
 
     def start(self) -> str:
-        """Start a watchdog, or find one that is there; return why not, or ''."""
+        """Connect to a watchdog, and start one if there is none; return why not, or ''."""
         try:
             if self._connected():
                 return ''
-            # A session of its own: what ends the bridge and its launch must not end it.
+            # In a session of its own: what ends the bridge or its launch file must not end it.
             self._process = subprocess.Popen(self._command, start_new_session=True,
                                              stdin=subprocess.DEVNULL)
             end = time.monotonic() + READY
@@ -68,65 +78,65 @@ class WatchdogLink:
                         ': another program on this computer has taken its name and does not '
                         'answer' if code == NAME_TAKEN else '')
                 time.sleep(0.05)
-        except NotOurs as error:
+        except ForeignWatchdog as error:
             return str(error)
         return ''
 
     def _connected(self) -> bool:
-        """Connect to a watchdog, or tell whether it is connected.
+        """Connect to a watchdog if there is one; return whether it is connected.
 
         Raises:
-            NotOurs: another user's process would hear the bridge, and not damp the robot.
+            ForeignWatchdog: it belongs to another user, and might not damp the robot.
 
         """
         with contextlib.suppress(OSError):
-            self._socket.send(Vigil.HELLO)
+            self._socket.send(TickMonitor.HELLO)
             return True
         line, before = unconnected(), self._socket
         try:
             line.connect(self._address)
-        # All that may wait do wait: it is asked again.
+        # Its queue may be full: the caller tries again.
         except (ConnectionRefusedError, BlockingIOError):
             line.close()
             return False
         if not of_this_user(line):
             who = peer(line)
             line.close()
-            raise NotOurs(f'what answers as the watchdog of this robot is {who}, another user '
-                          'than the bridge: end it')
+            raise ForeignWatchdog(f'what answers as the watchdog of this robot is {who}, another '
+                                  'user than the bridge: end it')
         self._socket = line
         before.close()
         return True
 
     def tick(self, kd: np.ndarray, now: float) -> str:
-        """Tell it that the bridge lives; return what is wrong with it, or ''.
+        """Send a tick; return what is wrong with the watchdog, or ''.
 
         Args:
-            kd: how to damp if this was the last tick, N m s / rad.
+            kd: gains for damping if no other tick follows, N m s / rad.
             now: s.
 
         """
         try:
-            self._socket.send(Vigil.tick(kd))
+            self._socket.send(TickMonitor.tick(kd))
         except BlockingIOError:
             self._read = min(self._read, now)
             return 'the watchdog hangs' if now - self._read > HANGS else ''
         except OSError:
             return 'the watchdog is gone'
-        self._read, self._told = now, True
+        self._read, self._ticked = now, True
         return ''
 
     def end(self) -> None:
-        """Tell it that the robot rests, and wait for its end.
+        """End the watchdog, the robot being at rest, and wait until it has ended.
 
-        One that damps for a bridge of before goes on if this one has never driven the robot.
+        A watchdog that damps for an earlier bridge continues if this one never drove the robot.
         """
-        if self._process is None and not self._told:
+        if self._process is None and not self._ticked:
             return
         end = time.monotonic() + HANGS
         while time.monotonic() < end:
             try:
-                self._socket.send(Vigil.END)
+                self._socket.send(TickMonitor.END)
                 break
             except BlockingIOError:
                 time.sleep(0.01)

@@ -12,35 +12,30 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What is wrong with a robot's state, in words; each of it lets the joints go at once."""
+"""Checks of a robot's state; a fault that they find damps the joints at once."""
 
 import math
 
-from cpg_ros.unitree.low_cmd import DRIVEN
-from cpg_ros.unitree.low_state import LowState
-from cpg_ros.unitree.settings import Settings
-
-#: Packets that a motor may lose while the bridge drives it.
-MOST_LOST = 100
+from cpg_ros.safety.bridge_settings import BridgeSettings
+from cpg_ros.safety.robot_state import RobotState
 
 
-class Dangers:
-    """Looks at a state for what no motion is safe with."""
+class SafetyChecks:
+    """Checks a state for everything that makes any motion unsafe."""
 
-    def __init__(self, settings: Settings, state: LowState) -> None:
-        """Look at ``state`` whenever asked, against the limits of ``settings``."""
+    def __init__(self, settings: BridgeSettings, state: RobotState) -> None:
+        """Check ``state`` against the limits of ``settings``."""
         self._settings, self._state = settings, state
         self._lower = settings.lower - settings.margin
         self._upper = settings.upper + settings.margin
         self._upright = math.cos(settings.tilt)
-        self.begin()
 
-    def begin(self) -> None:
-        """Take the motors' modes and lost packets as they are now."""
-        self._modes, self._lost = self._state.modes, self._state.lost.copy()
+    def reset(self) -> None:
+        """Compare motors with their state as it is now."""
+        self._state.reset_motor_faults()
 
-    def found(self) -> str:
-        """Return what is dangerous, or ''."""
+    def fault(self) -> str:
+        """Return the first fault found, or ''."""
         state, settings = self._state, self._settings
         q = state.q
         # One look is enough for all: a sum is finite only where every number is.
@@ -55,18 +50,8 @@ class Dangers:
             worst = int(outside.argmax())
             return (f'{settings.names[worst]} is at {q[worst]:.2f} rad, beyond its limits '
                     f'{settings.lower[worst]:.2f} to {settings.upper[worst]:.2f}')
-        hot = int(state.temperature.argmax())
-        if state.temperature[hot] >= settings.hottest:
-            return f'the motor of {settings.names[hot]} has {state.temperature[hot]} deg C'
-        modes, before = state.modes, self._modes
-        self._modes = modes
-        if modes != before:
-            for name, now, then in zip(settings.names, modes, before, strict=True):
-                if then == DRIVEN != now:
-                    return f'the motor of {name} has stopped by itself: mode {now}'
-        # Unsigned: a counter that began anew is a motor that did.
-        lost = state.lost - self._lost
-        if lost.max() > MOST_LOST:
-            worst = int(lost.argmax())
-            return f'the motor of {settings.names[worst]} does not hear the robot any more'
-        return ''
+        if state.temperature.size:
+            hot = int(state.temperature.argmax())
+            if state.temperature[hot] >= settings.hottest:
+                return f'the motor of {settings.names[hot]} has {state.temperature[hot]} deg C'
+        return state.motor_fault()

@@ -38,20 +38,21 @@ class NameTaken(CpgError):
     """Another program has the name; the message says which, where that can be known."""
 
 
-def address(kind: str, domain: int, topic: str) -> str:
-    """Return the name of a socket of this computer, one for each robot that is commanded.
+def address(maker: str, kind: str, domain: int, topic: str) -> str:
+    """Return the name of a socket on this computer, one for each robot that is commanded.
 
     Args:
-        kind: of whom: ``bridge`` or ``watchdog``.
+        maker: as ``RobotInterface.maker``.
+        kind: ``bridge`` or ``watchdog``.
         domain: of ROS.
-        topic: on which commands are sent, resolved.
+        topic: of the commands, resolved.
 
     """
-    return f'\0cpg_ros/unitree/{kind}/{domain}{topic}'
+    return f'\0cpg_ros/{maker}/{kind}/{domain}{topic}'
 
 
 def unconnected() -> socket.socket:
-    """Return a socket that waits for nothing."""
+    """Return a non-blocking socket."""
     line = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
     line.setblocking(False)
     line.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, BUFFER)
@@ -59,7 +60,7 @@ def unconnected() -> socket.socket:
 
 
 def listening(name: str) -> socket.socket:
-    """Return a socket that has a name and takes connections.
+    """Return a socket that listens under a name.
 
     Raises:
         NameTaken: it is in use.

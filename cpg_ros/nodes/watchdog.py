@@ -12,11 +12,11 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A process that damps the robot while its bridge says nothing: see ``unitree.vigil``.
+"""A process that damps the robot while its bridge is silent: see ``safety.tick_monitor``.
 
-The bridge starts it: python -m cpg_ros.nodes.unitree.watchdog DOMAIN TOPIC PERIOD PROCESS. It ends
-when a bridge says that the robot rests, or when the bridge is gone before it ever drove the robot.
-It hears processes of its own user only.
+The bridge starts it: python -m cpg_ros.nodes.watchdog INTERFACE DOMAIN TOPIC PERIOD PROCESS. It
+ends when a bridge reports that the robot is at rest, or when the bridge ends before it ever drove
+the robot. It accepts connections from processes of its own user only.
 """
 
 import os
@@ -27,21 +27,21 @@ import socket
 import sys
 import time
 
+from cpg_ros.nodes import bridge_interface
+from cpg_ros.nodes.command_publishers import command_qos
+from cpg_ros.nodes.local_socket import address, listening, NameTaken, of_this_user
 from cpg_ros.nodes.log_queue import NO_FILE, QUEUE, QueuedLogger
-from cpg_ros.nodes.unitree.interfaces import message
-from cpg_ros.nodes.unitree.local_socket import address, listening, NameTaken, of_this_user
-from cpg_ros.nodes.unitree.robot_graph import quality, WATCHDOG
-from cpg_ros.nodes.unitree.watchdog_link import NAME_TAKEN
-from cpg_ros.unitree.low_cmd import LowCmd
-from cpg_ros.unitree.vigil import Vigil
+from cpg_ros.nodes.watchdog_link import NAME_TAKEN
+from cpg_ros.safety.robot_state import JointCommand
+from cpg_ros.safety.tick_monitor import TickMonitor
 import rclpy
 from rclpy.impl.rcutils_logger import RcutilsLogger
 from rclpy.publisher import Publisher
 from rclpy.signals import SignalHandlerOptions
 
-#: How often it looks whether a bridge that has not driven yet is there, s.
+#: How often it checks that a bridge that has not driven yet still runs, s.
 LOOK = 1.0
-#: With this score the kernel ends it last, or not at all, when memory runs out: see proc(5).
+#: Score with which the kernel spares a process when memory runs out: see proc(5).
 SPARED = '-1000'
 
 
@@ -63,24 +63,24 @@ def spared() -> bool:
     return True
 
 
-def hear(line: socket.socket, vigil: Vigil) -> bool:
-    """Take what has come over a connection; tell whether it is still open."""
-    # Of what waits, the last word counts: ticks that were late are no sign of life.
-    while not vigil.over:
+def receive(line: socket.socket, monitor: TickMonitor) -> bool:
+    """Read all messages of a connection; return whether it is still open."""
+    # Of those waiting, the last one counts: late ticks do not show that the bridge lives.
+    while not monitor.ended:
         try:
-            word = line.recv(1024)
+            message = line.recv(1024)
         except BlockingIOError:
             return True
         except ConnectionResetError:
             return False
-        if not word:
+        if not message:
             return False
-        vigil.hear(word, time.monotonic())
+        monitor.receive(message, time.monotonic())
     return True
 
 
 def accept(listener: socket.socket) -> list[socket.socket]:
-    """Return the connection that waits, if it is one of this user."""
+    """Return the waiting connection, if it is from a process of this user."""
     try:
         line, _ = listener.accept()
     # It may have gone again.
@@ -93,50 +93,52 @@ def accept(listener: socket.socket) -> list[socket.socket]:
     return []
 
 
-def watch(listener: socket.socket, publisher: Publisher, period: float, process: int,
-          told: RcutilsLogger) -> None:
-    """Damp whenever ticks are missing, until the end is told."""
-    vigil, command, lines = Vigil(period), LowCmd(), [listener]
-    while not vigil.over:
-        wait = vigil.wait(time.monotonic())
+def watch(listener: socket.socket, publisher: Publisher, command: JointCommand,
+          monitor: TickMonitor, process: int, logger: RcutilsLogger) -> None:
+    """Damp whenever ticks are missing, until the bridge announces its end."""
+    lines = [listener]
+    while not monitor.ended:
+        wait = monitor.timeout(time.monotonic())
         ready, _, _ = select.select(lines, [], [], LOOK if wait is None else wait)
         for line in ready:
             if line is listener:
                 lines += accept(listener)
-            elif not hear(line, vigil):
+            elif not receive(line, monitor):
                 line.close()
                 lines.remove(line)
         if not ready and wait is None and not alive(process):
             return
-        if vigil.due(time.monotonic()):
-            before = vigil.alarms
-            command.damp(vigil.kd[:len(command.kd)])
-            publisher.publish(command.sealed())
-            if before != vigil.alarms:
-                told.error('the bridge is silent: damping until it is back')
+        if monitor.due(time.monotonic()):
+            before = monitor.alarms
+            command.damp(monitor.kd[:len(command.kd)])
+            publisher.publish(command.encode())
+            if before != monitor.alarms:
+                logger.error('the bridge is silent: damping until it is back')
 
 
 def main(args: list[str]) -> int:
-    """Watch until told to end; return the exit code."""
-    domain, topic, period, process = int(args[0]), args[1], float(args[2]), int(args[3])
+    """Watch until a bridge announces its end; return the exit code."""
+    interface, domain, topic = bridge_interface.load(args[0]), int(args[1]), args[2]
+    period, process = float(args[3]), int(args[4])
+    name = interface.watchdog_name()
     # Ctrl-C in the bridge's terminal is the bridge's to handle.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    QUEUE.start(WATCHDOG, [])
+    QUEUE.start(name, [])
     rclpy.init(args=['--ros-args', NO_FILE], domain_id=domain,
                signal_handler_options=SignalHandlerOptions.NO)
-    node = rclpy.create_node(WATCHDOG, enable_rosout=False, start_parameter_services=False,
+    node = rclpy.create_node(name, enable_rosout=False, start_parameter_services=False,
                              use_global_arguments=False)
-    publisher = node.create_publisher(message('unitree_go/LowCmd'), topic, quality())
+    publisher = node.create_publisher(interface.command_type(), topic, command_qos())
     logger = QueuedLogger(node.get_logger().name)
     if not spared():
         logger.info('this process may be ended when memory runs out: it lacks CAP_SYS_RESOURCE')
     try:
-        listener = listening(address('watchdog', domain, topic))
+        listener = listening(address(interface.maker, 'watchdog', domain, topic))
     except NameTaken:
         rclpy.shutdown()
         return NAME_TAKEN
     with listener:
-        watch(listener, publisher, period, process, logger)
+        watch(listener, publisher, interface.make_command(), TickMonitor(period), process, logger)
     rclpy.shutdown()
     return 0
 

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What a watchdog knows of the process that it watches: when its ticks are missing."""
+"""What a watchdog knows of the process that it monitors: whether its ticks are missing."""
 
 import numpy as np
 
@@ -20,13 +20,13 @@ import numpy as np
 MISSING = 2.5
 
 
-class Vigil:
-    """Counts the time since the last tick, and what damping is due meanwhile.
+class TickMonitor:
+    """Measures the time since the last tick, and says when the joints are to be damped.
 
     Attributes:
-        kd: with which the joints are to be damped, N m s / rad; as the last tick said.
+        kd: gains for damping, N m s / rad, as sent with the last tick.
         alarms: how often ticks have been missing.
-        over: whether the process has said that it ends, the robot at rest.
+        ended: whether the process has announced its end, the robot at rest.
 
     """
 
@@ -36,36 +36,36 @@ class Vigil:
         self._last = self._sent = np.inf
         self._missing = False
         self.kd = np.zeros(0, '<f4')
-        self.alarms, self.over = 0, False
+        self.alarms, self.ended = 0, False
 
     @staticmethod
     def tick(kd: np.ndarray) -> bytes:
-        """Return what a process says every period: how to damp if it says no more."""
+        """Return the message of a tick: the gains for damping if no other tick follows."""
         return kd.astype('<f4').tobytes()
 
-    #: What it says when it ends.
+    #: Message of a process that ends.
     END = b'end'
-    #: What it says to see whether somebody watches.
+    #: Message that asks only whether a watchdog is connected.
     HELLO = b'hello'
 
-    def hear(self, word: bytes, now: float) -> None:
-        """Take what the process has said, now in s."""
-        if word == self.END:
-            self.over = True
-        elif word != self.HELLO and len(word) % 4 == 0:
-            self.kd = np.frombuffer(word, '<f4')
+    def receive(self, message: bytes, now: float) -> None:
+        """Take a message of the process, now in s."""
+        if message == self.END:
+            self.ended = True
+        elif message != self.HELLO and len(message) % 4 == 0:
+            self.kd = np.frombuffer(message, '<f4')
             self._last, self._missing = now, False
 
-    def wait(self, now: float) -> float | None:
-        """Return for how long, s, nothing need be done unless something is heard; None: ever."""
+    def timeout(self, now: float) -> float | None:
+        """Return how long to wait for a message, s; None: without limit."""
         if self._last == np.inf:
             return None
         due = self._sent + self._period if self._missing else self._last + MISSING * self._period
         return max(0.0, due - now)
 
     def due(self, now: float) -> bool:
-        """Return whether damping is to be sent now; it is taken as sent."""
-        if self._last == np.inf or self.wait(now):
+        """Return whether to send a damping command now; the caller then sends it."""
+        if self._last == np.inf or self.timeout(now):
             return False
         self.alarms += not self._missing
         self._missing, self._sent = True, now

@@ -12,45 +12,44 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""All that a bridge must know of a robot and of what is safe with it."""
+"""What a bridge must know of a robot: joints, gains, poses, limits and times."""
 
 from dataclasses import dataclass
 import math
 
 from cpg_ros.errors import InputError
 from cpg_ros.robots.robot import Robot
-from cpg_ros.unitree.models import each, JOINTS, Model
 import numpy as np
 
 
 @dataclass(frozen=True)
-class Settings:
-    """Joints, limits, poses and times; arrays have shape (12,), joints as Unitree's motors.
+class BridgeSettings:
+    """Joints, gains, poses, limits and times; arrays have shape (joints,), in motor order.
 
     Attributes:
         names: of the joints.
         kp: N m / rad.
         kd: N m s / rad.
         torque: largest that a command may ask for, N m.
-        lower: least angles, rad.
+        lower: smallest angles, rad.
         upper: largest angles, rad.
-        velocity: largest speeds of what is commanded, rad/s.
+        velocity: largest speeds of commanded angles, rad/s.
         stand: pose to rise to, rad.
         lying: pose to sit down to, rad.
         period: between two commands, s.
-        damping: kd once nothing else holds the joints, N m s / rad.
+        damping: kd with which joints are only damped, N m s / rad.
         rise: time from the measured pose to the stand, s.
         approach: time from the stand to the first targets, s.
-        late: longest time at a last target before the legs gather at the stand, s.
+        late: time at the last target after which the legs gather at the stand, s.
         fade: time in which a gait fades to the stand before the robot sits, s; less than ``sit``.
         sit: time from the stand to lying, s.
-        fold: time in which legs amid a stride gather on that way, or at the stand, s.
+        fold: time in which legs in mid-stride join that motion, or gather at the stand, s.
         target_timeout: longest time without a fresh target, s.
         state_timeout: longest time without a fresh state, s.
-        tilt: largest lean of the body, rad.
-        hottest: temperature of a motor at which it is let go, deg C.
-        margin: beyond the joint limits that what is measured may be, rad: a leg that swings
-            runs into its stop.
+        tilt: largest tilt of the body, rad.
+        hottest: motor temperature at which the robot is damped, deg C.
+        margin: how far measured angles may exceed the joint limits, rad: a swinging leg runs
+            into its stop.
         astray: largest distance from the stand after rising, rad.
 
     """
@@ -80,42 +79,43 @@ class Settings:
     astray: float = 0.4
 
 
-def places(robot: Robot) -> np.ndarray:
-    """Return where in ``robot.order`` each of Unitree's motors is, shape (12,).
+def motor_places(robot: Robot, joints: tuple[str, ...], whose: str) -> np.ndarray:
+    """Return the position of each motor's joint in ``robot.order``, shape (joints,).
+
+    Args:
+        robot: of the robot file.
+        joints: names in motor order.
+        whose: whose motors these are, for the message.
 
     Raises:
-        InputError: the robot's joints are not those of a Unitree robot.
+        InputError: the robot file has other joints.
 
     """
-    missing = [name for name in JOINTS if name not in robot.order]
-    extra = [name for name in robot.order if name not in JOINTS]
+    missing = [name for name in joints if name not in robot.order]
+    extra = [name for name in robot.order if name not in joints]
     if missing or extra:
         name = (missing or extra)[0]
         raise InputError(f"the robot file '{robot.name}' has {'no ' if missing else ''}joint "
-                         f"'{name}'; Unitree's robots have {', '.join(JOINTS)}")
-    return np.array([robot.order.index(name) for name in JOINTS])
+                         f"'{name}'; {whose} have {', '.join(joints)}")
+    return np.array([robot.order.index(name) for name in joints])
 
 
-def settings_of(robot: Robot, model: Model, kp: list[float], kd: list[float],
-                torque_factor: float = 1.0, **others: float) -> Settings:
-    """Return the settings of a robot file and a model.
+def settings_for(robot: Robot, places: np.ndarray, *, kp: np.ndarray, kd: np.ndarray,
+                 torque: np.ndarray, lying: np.ndarray, **others: float) -> BridgeSettings:
+    """Return the settings of a robot file; arrays have shape (joints,), in motor order.
 
     Args:
-        robot: whose limits, speeds and stand (offsets) are taken.
-        model: what the motors bear, and how it lies.
-        kp: proportional gains, as ``each`` takes them.
-        kd: damping gains, the same.
-        torque_factor: share of what the motors bear that commands may ask for.
-        others: further attributes of Settings.
-
-    Raises:
-        InputError: the robot is not one of Unitree's, or a gain is out of range.
+        robot: provides limits, speeds and the stand (offsets).
+        places: as returned by ``motor_places``.
+        kp: proportional gains, N m / rad.
+        kd: damping gains, N m s / rad.
+        torque: largest torques, N m.
+        lying: pose to sit down to, rad; clipped to the limits.
+        others: further attributes of ``BridgeSettings``.
 
     """
-    order = robot.places[places(robot)]
+    order = robot.places[places]
     lower, upper, velocity, stand = (robot.column(name)[order] for name in (
         'lower', 'upper', 'velocity', 'offset'))
-    lying = np.clip(np.resize(model.lying, len(JOINTS)), lower, upper)
-    return Settings(JOINTS, each(kp, 'kp', model.most_kp), each(kd, 'kd', model.most_kd),
-                    torque_factor * np.resize(model.torque, len(JOINTS)), lower, upper, velocity,
-                    stand, lying, **others)
+    return BridgeSettings(tuple(robot.order[place] for place in places), kp, kd, torque, lower,
+                          upper, velocity, stand, np.clip(lying, lower, upper), **others)

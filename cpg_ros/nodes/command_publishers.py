@@ -12,49 +12,48 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What of the ROS graph belongs to a Unitree robot: topics, and who else commands it."""
+"""Other publishers of the commands that move a robot, and the QoS of commands."""
 
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
 
-#: Names of the nodes, of which there is one each.
-BRIDGE, WATCHDOG = 'unitree_bridge', 'unitree_watchdog'
-#: Names as DDS participants without ROS have them in the graph.
+#: Name that the graph gives to DDS participants without ROS.
 BARE = '_CREATED_BY_BARE_DDS_APP_'
-#: What the graph calls a node until it has heard the name.
+#: Name that the graph gives to a node until it learns the name.
 UNKNOWN = '_NODE_NAMESPACE_UNKNOWN_/_NODE_NAME_UNKNOWN_'
 
 
-def quality() -> QoSProfile:
-    """Return the quality of service of commands: an old one is of no use any more."""
+def command_qos() -> QoSProfile:
+    """Return the QoS of commands: only the newest one matters."""
     return QoSProfile(depth=1)
 
 
-class Others:
-    """Who else publishes the commands that move the robot."""
+class OtherCommandPublishers:
+    """Other publishers of a bridge's commands, apart from its watchdog."""
 
-    def __init__(self, node: Node, topic: str, own: int, tolerated: int) -> None:
-        """Look at a topic.
+    def __init__(self, node: Node, topic: str, watchdog: str, *, own: int, tolerated: int) -> None:
+        """Monitor a topic.
 
         Args:
-            node: that looks, and publishes there.
+            node: the bridge.
             topic: resolved.
-            own: how many publishers of it the bridge has itself, without the watchdog's.
-            tolerated: how many the robot has by itself.
+            watchdog: name of the watchdog's node.
+            own: number of the bridge's own publishers, without the watchdog's.
+            tolerated: number of the robot's own publishers.
 
         """
-        self._node, self._topic, self._own, self._tolerated = node, topic, own, tolerated
+        self._node, self._topic, self._watchdog = node, topic, f'/{watchdog}'
+        self._own, self._tolerated = own, tolerated
 
-    def found(self) -> str:
+    def names(self) -> str:
         """Return who else publishes there, or ''."""
         if self._node.count_publishers(self._topic) <= self._own + self._tolerated:
             return ''
         names = [f'{one.node_namespace.rstrip("/")}/{one.node_name}'
                  for one in self._node.get_publishers_info_by_topic(self._topic)]
-        watchdog = f'/{WATCHDOG}'
-        # On a busy machine the watchdog's name comes later than its publisher.
+        # On a busy machine, the watchdog's name is known later than its publisher.
         for name in (*[self._node.get_fully_qualified_name()] * self._own,
-                     watchdog if watchdog in names else UNKNOWN):
+                     self._watchdog if self._watchdog in names else UNKNOWN):
             if name in names:
                 names.remove(name)
         if len(names) <= self._tolerated:

@@ -1,0 +1,240 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The base class of bridges: drives a robot by what a generator publishes.
+
+A bridge adds its robot's messages, limits and numbers: CONTRIBUTING.md, section Add a bridge.
+"""
+
+from collections import deque
+from collections.abc import Mapping
+import signal
+import time
+from typing import Any, ClassVar
+
+from cpg_ros.nodes.bridge_health import BridgeHealth
+from cpg_ros.nodes.bridge_loop import BridgeLoop
+from cpg_ros.nodes.bridge_start import StartRefused, StartSequence, Wait
+from cpg_ros.nodes.command_publishers import OtherCommandPublishers
+from cpg_ros.nodes.shutdown import endings
+from cpg_ros.safety.robot_state import RobotState
+from cpg_ros.safety.supervisor import ACTIVE, BridgeState
+from rclpy.clock import Clock
+from rclpy.clock_type import ClockType
+from std_srvs.srv import Trigger
+
+#: How often the network is checked for others who command the robot, s.
+CHECK = 0.25
+#: How long a start waits for the first state, s.
+STATE = 10.0
+#: Two programs on a network have discovered each other after this time, s.
+DISCOVERY = 1.0
+#: The network forgets a bridge that was killed after this time, s.
+FORGOTTEN = 25.0
+
+
+class BridgeNode(BridgeLoop):
+    """Starts, stops and monitors the loop.
+
+    A subclass sets ``interface`` and ``specs`` and overrides ``make_settings``. The other public
+    methods, here and in ``BridgeLoop``, have defaults.
+
+    Attributes:
+        state_hint: what to check if the robot sends no state, added to the message.
+
+    """
+
+    state_hint: ClassVar[str] = ''
+
+    def __init__(self, state: RobotState) -> None:
+        """Declare the parameters, check them, and prepare to start; as the base class does."""
+        super().__init__(state)
+        self._others = OtherCommandPublishers(self, self.topic, self.interface.watchdog_name(),
+                                              own=int(not self.dry),
+                                              tolerated=self._value('own_publishers'))
+        self._start: StartSequence | None = None
+        self._refusal = self._hazard = ''
+        self.create_service(Trigger, '~/stop', self._stop)
+        self.create_service(Trigger, '~/start', self._start_again)
+        self._health = BridgeHealth(self, self.robot.name, self.supervisor, self.ticker)
+        self._steady = Clock(clock_type=ClockType.STEADY_TIME)
+        self._timers = [self.create_timer(CHECK, self._check_network, clock=self._steady),
+                        self.create_timer(1.0, self._report_health, clock=self._steady)]
+        self._warn_of_unknown()
+
+    # -- what a bridge may add ------------------------------------------------------------
+
+    @property
+    def title(self) -> str:
+        """What the robot is called in the log."""
+        return self.robot.name
+
+    def prepare(self, wait: Wait) -> None:
+        """Prepare the robot for commands, such as by ending its own motion modes.
+
+        Called at every start, in a thread of its own; ``wait`` sleeps, s.
+
+        Raises:
+            StartRefused: the robot cannot be commanded, or the start was cancelled.
+
+        """
+
+    def network_hazard(self) -> str:
+        """Return what on the network endangers the robot, and what to do, or ''."""
+        return ''
+
+    def publish_slow_measurements(self, stamp: int) -> None:
+        """Publish what changes slowly, such as the battery, once a second; stamp in ns."""
+
+    def measured_values(self) -> Mapping[str, object]:
+        """Return values for /diagnostics, such as temperatures, by name."""
+        return {}
+
+    # -- start ----------------------------------------------------------------------------
+
+    def _begin_start(self) -> None:
+        self._start = StartSequence(
+            [self._await_state, self._check_publishers, self._start_watchdog, self.prepare,
+             self._check_publishers, self._rise], self._started)
+        self._start.start()
+
+    def _started(self, refusal: str) -> None:
+        self._start, self._refusal = None, refusal
+        if refusal:
+            self.get_logger().error(f'not started: {refusal}')
+
+    def log_step(self, text: str) -> None:
+        """Log a step of the start."""
+        self.get_logger().info(f'start: {text}')
+
+    def _await_state(self, wait: Wait) -> None:
+        end = time.monotonic() + STATE
+        while not self.received:
+            if time.monotonic() > end:
+                name = self.interface.state_type().__name__
+                raise StartRefused(f'no {name} for {STATE:g} s{self.state_hint}')
+            wait(0.02)
+        self.log_step('the robot is heard')
+
+    def _check_publishers(self, wait: Wait) -> None:
+        if self._hazard:
+            raise StartRefused(self._hazard)
+        end, logged = time.monotonic() + FORGOTTEN, False
+        while names := self._others.names():
+            if not names.endswith(f'/{self.interface.bridge_name()}') or ',' in names:
+                raise StartRefused(f'the robot is commanded by {names}, too')
+            if time.monotonic() > end:
+                raise StartRefused(f'the robot is commanded by another bridge ({names}), too')
+            if not logged:
+                self.log_step(f'waiting for {names} to be gone from the network')
+            logged = True
+            wait(0.1)
+        self.log_step('nobody else commands it')
+
+    def _start_watchdog(self, wait: Wait) -> None:
+        if self.watchdog is not None and (refusal := self.watchdog.start()):
+            raise StartRefused(refusal)
+        # So that the robot knows its publisher, too, before it is needed.
+        wait(DISCOVERY)
+
+    def _rise(self, wait: Wait) -> None:
+        """Let the thread that commands begin to rise."""
+        answer: deque[str] = deque()
+        start = self._start
+
+        def rise(now: float) -> None:
+            wanted = start is not None and not start.cancelled and not self._ending
+            answer.append(self.supervisor.rise(now) if wanted else 'it is stopped')
+
+        self._requests.append(rise)
+        while not answer:
+            if self.stop.wait(0.001):
+                raise StartRefused('the bridge ends')
+        if answer[0]:
+            raise StartRefused(answer[0])
+
+    # -- services and timers --------------------------------------------------------------
+
+    def _stop(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        self._requests.append(lambda now: self._halt('~/stop', now))
+        response.success, response.message = True, 'damping'
+        return response
+
+    def _start_again(self, request: Trigger.Request, response: Trigger.Response
+                     ) -> Trigger.Response:
+        state = self.supervisor.state
+        if state in ACTIVE or self._start is not None or self._ending:
+            response.message = ('it is being started already' if self._start is not None else
+                                f'it is {state.value}')
+            return response
+        self._begin_start()
+        response.success, response.message = True, 'starting: ~/state and the log say how it goes'
+        return response
+
+    def _check_network(self) -> None:
+        """Look for others who command the robot, and for what endangers it."""
+        if (hazard := self.network_hazard()) and not self._hazard:
+            self._hazard = hazard
+            self.get_logger().error(hazard)
+        if self.supervisor.state in ACTIVE and (names := self._others.names()):
+            reason = f'the robot is commanded by {names}, too'
+            self._requests.append(lambda now: self.supervisor.sit(now, reason))
+
+    def _report_health(self) -> None:
+        state, command, robot = (self.supervisor.state, self.supervisor.command,
+                                 self.supervisor.robot)
+        if self._health.publish(self.received, self.sent, self._refusal, self.dry,
+                                self.measured_values()):
+            self.publish_slow_measurements(self.get_clock().now().nanoseconds)
+        if self.dry and state is not BridgeState.IDLE:
+            torque = command.kp * (command.q - robot.q) - command.kd * robot.dq
+            self.get_logger().info(f'dry run: {state.value}, the largest torque would be '
+                                   f'{abs(torque).max():.1f} N m')
+
+    # -- beginning and end ----------------------------------------------------------------
+
+    def begin(self) -> None:
+        """Start the thread, and raise the robot to its stand unless that waits for ~/start."""
+        for number in endings():
+            signal.signal(number, self._leave)
+        self.get_logger().info(
+            f"{'dry run: ' * self.dry}a {self.title} at {self._value('rate'):g} Hz; "
+            'commands from ' + ', '.join(self._commands.topics))
+        self.ticker.start()
+        if self._value('autostart'):
+            self._begin_start()
+
+    def _leave(self, number: int, _: Any) -> None:
+        """Sit down, damp, and end; at a second signal, damp at once."""
+        name = signal.Signals(number).name
+        again, self._ending = self._ending, True
+        self._requests.append(lambda now: self._halt(f'{name} again', now) if again
+                              else self._sit_down(name, now))
+
+    def _sit_down(self, reason: str, now: float) -> None:
+        self._cancel_start(reason)
+        self.supervisor.sit(now, reason)
+
+    def _cancel_start(self, reason: str) -> None:
+        # Read once: the thread of the start clears it at its end.
+        if (start := self._start) is not None:
+            start.cancel(reason)
+
+    def finish(self) -> None:
+        """End the threads; the watchdog, too, if the robot is at rest."""
+        self.ticker.end()
+        self.ticker.join(timeout=1.0)
+        self._cancel_start('the bridge ends')
+        if self.watchdog is not None and self.failure is None:
+            self.watchdog.end()
