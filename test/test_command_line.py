@@ -25,7 +25,7 @@ from graph import EXECUTABLE, free_domain, Process
 import pytest
 
 NODES = ('generator', 'robot_sim', 'inversion', 'panel')
-TOOLS = ('demo', 'analyze', 'check_robot', 'optimize', 'reproduce', 'tune')
+TOOLS = ('demo', 'analyze', 'check_robot', 'optimize', 'reproduce', 'tune', 'calibrate', 'atlas')
 
 
 def run(executable, *words):

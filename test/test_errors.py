@@ -30,6 +30,8 @@ def test_every_error_of_the_package_is_of_the_family():
              if issubclass(one, BaseException) and one.__module__.startswith('cpg_ros')}
     assert len(found) > 10
     assert all(issubclass(one, CpgError) for one in found)
+    # 1 is a negative result, 2 unusable input.
+    assert {one.exit_code for one in found} == {1, 2}
 
 
 def broken(*_, **__):
@@ -48,6 +50,6 @@ def test_a_mistake_in_the_program_is_not_one_in_the_arguments(monkeypatch, tmp_p
     monkeypatch.setattr(analyze, 'verdicts', broken)
     with pytest.raises(ValueError, match='not aligned'):
         analyze.main(['--network', 'delayed'])
-    monkeypatch.setattr(inversion, 'read_csv', broken)
+    monkeypatch.setattr(inversion, 'read_recording', broken)
     with pytest.raises(ValueError, match='not aligned'):
         inversion.main(['--csv', str(tmp_path / 'walk.csv')])

@@ -66,6 +66,8 @@ DRIFT = 0.04
 class NoSteadyGait(CpgError):
     """A recording has no steady gait; the message says what it has instead."""
 
+    exit_code = 1
+
 
 class Recorded(Protocol):
     """What is needed of a recording; see Recording."""

@@ -18,7 +18,7 @@
 gait. ``check_robot --urdf my.urdf --make my_robot.yaml`` writes a first robot file.
 """
 
-from argparse import Namespace, RawDescriptionHelpFormatter
+from argparse import Namespace
 from collections.abc import Sequence
 from dataclasses import replace
 from math import isfinite
@@ -28,14 +28,15 @@ import sys
 from cpg_ros.checks.leg_shapes import geometry_from
 from cpg_ros.checks.robot_template import robot_from
 from cpg_ros.checks.urdf_match import checked, RobotCheck
-from cpg_ros.errors import CpgError, InputError
+from cpg_ros.errors import InputError
 from cpg_ros.files.plain_text import as_json
 from cpg_ros.networks.registry import NETWORKS
 from cpg_ros.robots.robot import Robot
 from cpg_ros.robots.robot_file import find_robot, write_robot
 from cpg_ros.robots.urdf import load_urdf, UrdfJoint
 from cpg_ros.robots.urdf_links import load_links
-from cpg_ros.tools.arguments import number, Parser, say
+from cpg_ros.tools.arguments import number
+from cpg_ros.tools.command_line import note, Parser, run, say
 
 DESCRIPTION = """\
 Compare a robot file with the robot's URDF: report joints that are missing from the URDF or cannot
@@ -55,8 +56,7 @@ the small amplitudes are guesses to start from. Tune it in simulation before it 
 
 
 def _parser() -> Parser:
-    parser = Parser(prog='check_robot', description=DESCRIPTION, epilog=EPILOG,
-                    formatter_class=RawDescriptionHelpFormatter)
+    parser = Parser(prog='check_robot', description=DESCRIPTION, epilog=EPILOG)
     parser.add_argument('robot', nargs='?', metavar='ROBOT',
                         help='robot file, or the name of a shipped one')
     parser.add_argument('--urdf', required=True, type=Path, metavar='FILE',
@@ -100,27 +100,19 @@ def _made(chosen: Namespace, urdf: dict[str, UrdfJoint]) -> Robot:
     geometry, said = geometry_from(robot, urdf, load_links(chosen.urdf))
     robot, says = replace(robot, geometry=geometry), f'{says}\n{said}'
     write_robot(chosen.make, robot, COMMENT.format(urdf=chosen.urdf.name, says=says))
-    print(f'check_robot: wrote {chosen.make}, check what it takes each joint for:\n{says}',
-          file=sys.stderr)
+    note('check_robot', f'wrote {chosen.make}, check what it takes each joint for:\n{says}')
     return find_robot(str(chosen.make.absolute()))
+
+
+def _check(chosen: Namespace) -> int:
+    found = _checked(chosen)
+    say(as_json(found.as_dict()) if chosen.json else found.text())
+    return 1 if found.faults else 0
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Check a robot file; return the exit code."""
-    chosen = _parser().parse_args(sys.argv[1:] if arguments is None else arguments)
-    try:
-        found = _checked(chosen)
-    except OSError as error:
-        print(f'check_robot: {error.filename}: {error.strerror}', file=sys.stderr)
-        return 2
-    except CpgError as error:
-        print(f'check_robot: {error}', file=sys.stderr)
-        return 2
-    except KeyboardInterrupt:
-        print('check_robot: stopped', file=sys.stderr)
-        return 130
-    say(as_json(found.as_dict()) if chosen.json else found.text())
-    return 1 if found.faults else 0
+    return run(_parser(), _check, arguments)
 
 
 if __name__ == '__main__':

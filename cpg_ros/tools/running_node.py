@@ -28,6 +28,8 @@ from std_srvs.srv import SetBool, Trigger
 class Unanswered(CpgError):
     """What was asked for was refused, or nobody answered."""
 
+    exit_code = 1
+
 
 class RunningNode:
     """Another node of the graph."""
