@@ -18,7 +18,7 @@
 generator's parameter ``gait``, by itself or as typed. A film and a footfall diagram are left.
 """
 
-from argparse import Namespace
+from argparse import HelpFormatter, Namespace
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, ExitStack
 from importlib.util import find_spec
@@ -264,8 +264,9 @@ def wait_for(operator: Operator, interruption: Interruption) -> None:
 
 def parser() -> Parser:
     """Arguments of the executable."""
-    made = Parser(prog='demo', description='Simulate a walking Unitree Go2, or a hexapod. Type '
-                  'the name of a gait and Enter to\nswitch to it, q to quit.')
+    made = Parser(prog='demo', formatter_class=HelpFormatter, description='Simulate a walking '
+                  'Unitree Go2, or a hexapod. Type the name of a gait and Enter to switch to it, '
+                  'q to quit.')
     made.add_argument('--gaits', nargs='+', metavar='GAIT', help='tour of gaits (default: '
                       f'{" ".join(TOUR)}; for the hexapod {" ".join(SIX_LEGS)})')
     made.add_argument('--hexapod', action='store_true', help='use a robot with six legs')
