@@ -35,7 +35,7 @@ from cpg_ros.atlas.chart import Chart, chart_of
 from cpg_ros.atlas.fold_curves import fold_curves
 from cpg_ros.atlas.hopf_curves import Curve, hopf_curves
 from cpg_ros.atlas.orbit_curves import Edge, orbit_curves
-from cpg_ros.dynamics.continuation import follow
+from cpg_ros.dynamics.continuation import continue_orbit
 from cpg_ros.dynamics.equilibrium import equilibrium
 from cpg_ros.dynamics.orbit import Orbit, solve_orbit, solve_preset
 from cpg_ros.networks.registry import PRESETS
@@ -106,7 +106,7 @@ def of_pace() -> tuple[Chart, list[Curve]]:
     chart = chart_of('quadruped', PACE.network, [('xi', (-0.02, 0.02)),
                                                  ('alpha=beta', (0.1, 0.65))], (9, 9))
     axis, orbit = chart.second, solve_preset(PACE)
-    branch = follow(orbit, axis.line, axis.low, 0.25, most=80)
+    branch = continue_orbit(orbit, axis.line, axis.low, 0.25, most=80)
 
     def edge(orbit: Orbit, *values: float) -> Edge:
         (one, other) = ((value - axis.low) / (axis.high - axis.low) for value in values)

@@ -26,7 +26,7 @@ import time
 import warnings
 
 from common import emit, log
-from cpg_ros.dynamics.continuation import Branch, follow
+from cpg_ros.dynamics.continuation import Branch, continue_orbit
 from cpg_ros.dynamics.fourier.newton import equations
 from cpg_ros.dynamics.mesh.newton import Reduced
 from cpg_ros.dynamics.orbit import solve_preset
@@ -108,7 +108,7 @@ def main() -> None:
         limit, times = {'most': POINTS - 1, 'longest_step': 0.1}, []
         for _ in range(3):
             began = time.perf_counter()
-            branch = follow(orbit, line, low, high, **limit)
+            branch = continue_orbit(orbit, line, low, high, **limit)
             times.append(time.perf_counter() - began)
         if end < value:
             branch = Branch(branch.along, branch.points[::-1], (), branch.ends[::-1])

@@ -35,7 +35,7 @@ from cpg_ros.feedback.gains import Gains
 from cpg_ros.feedback.kinematics import GRAVITY
 from cpg_ros.files.progress_bar import progress_bar
 from cpg_ros.robots.robot import Robot
-from cpg_ros.robots.robot_file import load_robot
+from cpg_ros.robots.robot_file import read_robot
 from cpg_ros.simulation.scenario import SensorNoise
 from feedback_figures import (
     flat,
@@ -221,7 +221,7 @@ def main() -> int:
     try:
         run = Run(path, arguments.model, seed, arguments.quick, changed(arguments.changes),
                   tuple(arguments.impulses))
-        own = jobs(run.quick) if path == ROBOT else jobs_of(load_robot(path))
+        own = jobs(run.quick) if path == ROBOT else jobs_of(read_robot(path))
     except (CpgError, ValueError) as error:
         parser.error(str(error))
     chosen = [job for job in own if job.figure in (arguments.only or [job.figure])

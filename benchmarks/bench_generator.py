@@ -25,7 +25,7 @@ import time
 
 from common import emit, log
 from cpg_ros.networks.registry import NETWORKS
-from cpg_ros.robots.robot_file import find_robot
+from cpg_ros.robots.robot_file import load_robot
 import numpy as np
 from processes import enter_workspace, Listener, start_node
 
@@ -122,7 +122,7 @@ def compare(network: str, seconds: float) -> dict[str, object]:
         'rate_error': worst('rate_error'), 'drift_periods': worst('drift_periods'),
         'missing': worst('missing') + worst('ticks_dropped'), 'misstamped': worst('misstamped')}
     keys = ('cpu_percent', 'cpu_percent_with_subscriber')
-    return {'joints': len(find_robot(NETWORKS[network].usual_robot).joints), **figures,
+    return {'joints': len(load_robot(NETWORKS[network].usual_robot).joints), **figures,
             **{key: {kind: mean(kind, key) for kind in runs} for key in keys},
             'cpu_ratio_with_subscriber': mean('generator', keys[1]) / mean('null', keys[1]),
             'arrival_period_error_us': jitter('arrival_period_error_us'),

@@ -29,7 +29,7 @@ from cpg_ros.motion.pattern import Pattern
 from cpg_ros.motion.plan import plan, Program
 from cpg_ros.motion.steering import Drive
 from cpg_ros.networks.registry import PRESETS
-from cpg_ros.robots.robot_file import load_robot
+from cpg_ros.robots.robot_file import read_robot
 from cpg_ros.simulation.batch import Batch, targets
 from cpg_ros.simulation.body import Body
 from cpg_ros.simulation.run_metrics import RunMetrics
@@ -43,7 +43,7 @@ from pattern_follower import Fallen, Follow, speed  # noqa: E402
 DT, DURATION = 0.002, 10.0
 GAITS = ('walk', 'trot', 'pace', 'bound', 'jump', 'pronk')
 FAR = {'trot': 4.0, 'walk': 2.5, 'pace': 3.5, 'bound': 3.0, 'jump': 1.0, 'pronk': 1.0}
-ROBOT = load_robot(ROOT / 'config' / 'unitree_go2.yaml')
+ROBOT = read_robot(ROOT / 'config' / 'unitree_go2.yaml')
 
 
 def program(gait: str) -> Program:

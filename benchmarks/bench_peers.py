@@ -30,7 +30,7 @@ import time
 
 from common import emit, log, ROOT
 from cpg_ros.dynamics.bifurcation import bifurcations
-from cpg_ros.dynamics.continuation import Branch, follow
+from cpg_ros.dynamics.continuation import Branch, continue_orbit
 from cpg_ros.dynamics.floquet import multipliers
 from cpg_ros.dynamics.orbit import solve_orbit, solve_preset
 from cpg_ros.networks.delayed import Delayed
@@ -57,7 +57,7 @@ def ours(preset: str, low: float, high: float) -> tuple[Branch, float]:
     for _ in range(2):
         # The first time compiles, or loads what was compiled.
         began = time.process_time()
-        branch = follow(orbit, line, low, high, most=60)
+        branch = continue_orbit(orbit, line, low, high, most=60)
         judged = [multipliers(point.orbit) for point in branch.points]
         bifurcations(branch, judged)
         spent = time.process_time() - began
@@ -114,7 +114,7 @@ def dde_biftool() -> dict[str, object]:
         times = []
         for _ in range(5):
             began = time.process_time()
-            branch = follow(orbit, line, 0.2, 0.5)
+            branch = continue_orbit(orbit, line, 0.2, 0.5)
             times.append((time.process_time() - began) / len(branch.points))
         rows[gait] = {'ours_ms': 1e3 * min(times), 'dde_biftool_ms': float(peer),
                       'ratio': float(peer) / (1e3 * min(times)), 'points': len(branch.points),

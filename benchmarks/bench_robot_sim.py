@@ -53,10 +53,10 @@ sys.exit(code)
 
 def bare(robot: str, seconds: float) -> float:
     """Return the steps a second of MuJoCo alone, marching on the spot."""
-    from cpg_ros.robots.robot_file import find_robot
+    from cpg_ros.robots.robot_file import load_robot
     from cpg_ros.simulation.body import Body
     import mujoco
-    body = Body('go2', find_robot(robot))
+    body = Body('go2', load_robot(robot))
     offsets, step, data = body.stand, mujoco.mj_step, body.data
     swing = np.tile([0.0, 0.1, -0.2], 4) * np.repeat([1, -1, -1, 1], 3)
     began, steps = time.perf_counter(), round(seconds * RATE)

@@ -96,8 +96,8 @@ class Checker:
     """Listens to joint states in a thread of its own and holds each message against limits."""
 
     def __init__(self, robot: str) -> None:
-        from cpg_ros.robots.robot_file import find_robot
-        joints = find_robot(robot).joints
+        from cpg_ros.robots.robot_file import load_robot
+        joints = load_robot(robot).joints
         self._limits = {joint.name: (joint.lower, joint.upper, joint.velocity)
                         for joint in joints}
         self.node = rclpy.create_node('checker')

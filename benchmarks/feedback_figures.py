@@ -25,7 +25,7 @@ from cpg_ros.feedback.gains import Gains
 from cpg_ros.motion.plan import plan
 from cpg_ros.networks.registry import PRESETS
 from cpg_ros.robots.robot import Robot
-from cpg_ros.robots.robot_file import load_robot
+from cpg_ros.robots.robot_file import read_robot
 from cpg_ros.simulation.closed_loop import ClosedLoop
 from cpg_ros.simulation.efference_measurement import measure_efference
 from cpg_ros.simulation.scenario import impulse, Outcome, Scenario, SensorNoise
@@ -75,7 +75,7 @@ def subject(robot_file: Path, gait: str, gains: Gains | None, seed: int, quick: 
 
     Seeds are those of the run, so that open and closed meet the same.
     """
-    robot = load_robot(robot_file)
+    robot = read_robot(robot_file)
     programs = [_program(robot, network or robot.networks[0], one) for one in (gait, *others)]
     loop = ClosedLoop(model, *programs)
     expected = {}

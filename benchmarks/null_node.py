@@ -30,7 +30,7 @@ from cpg_ros.nodes.diagnostics import Diagnostics
 from cpg_ros.nodes.rivals import Rivals
 from cpg_ros.nodes.shutdown import ended
 from cpg_ros.robots.robot import Robot
-from cpg_ros.robots.robot_file import find_robot
+from cpg_ros.robots.robot_file import load_robot
 import numpy as np
 import rclpy
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
@@ -93,7 +93,7 @@ def main() -> int:
     node = Node('null_node')
     rate = node.declare_parameter('rate', 100.0).value
     node.declare_parameter('nothing', '')
-    robot = find_robot(node.declare_parameter('robot', 'quadruped').value)
+    robot = load_robot(node.declare_parameter('robot', 'quadruped').value)
     outputs = TypedOutputs(node, robot)
     position, velocity = robot.column('offset'), np.zeros(len(robot.joints))
     phases = np.zeros(len(robot.legs))

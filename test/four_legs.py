@@ -16,9 +16,9 @@
 
 from pathlib import Path
 
-from cpg_ros.robots.robot_file import load_robot
+from cpg_ros.robots.robot_file import read_robot
 
-ROBOT = load_robot(Path(__file__).parent / 'walker.yaml')
+ROBOT = read_robot(Path(__file__).parent / 'walker.yaml')
 
 LINK = """<link name="{name}"><inertial><mass value="{mass}"/>
 <inertia ixx="0.01" iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial>

@@ -19,10 +19,10 @@ from pathlib import Path
 
 from cpg_ros.motion.plan import plan
 from cpg_ros.networks.registry import PRESETS
-from cpg_ros.robots.robot_file import load_robot
+from cpg_ros.robots.robot_file import read_robot
 
 FILE = Path(__file__).parent.parent / 'config' / 'unitree_go2.yaml'
-GO2 = load_robot(FILE)
+GO2 = read_robot(FILE)
 #: Time step of the physics, s.
 DT = 0.002
 

@@ -23,7 +23,7 @@ from ament_index_python.packages import get_package_share_directory
 from cpg_ros.networks.registry import NETWORKS, PRESETS
 from cpg_ros.nodes.feedback_parameters import ENABLED, SWITCH
 from cpg_ros.nodes.generator_parameters import Planner, specs
-from cpg_ros.robots.robot_file import find_robot
+from cpg_ros.robots.robot_file import load_robot
 
 SOURCE = Path(__file__).resolve().parent.parent
 SHARE = Path(get_package_share_directory('cpg_ros'))
@@ -42,7 +42,7 @@ def executables():
 def of_generator(network):
     """Parameters of the generator: name -> spec."""
     kind = NETWORKS[network]
-    planner = Planner(kind, PRESETS[network], find_robot(kind.usual_robot))
+    planner = Planner(kind, PRESETS[network], load_robot(kind.usual_robot))
     return specs(kind) | planner.specs(kind.usual_gait) | {ENABLED: SWITCH}
 
 

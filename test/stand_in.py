@@ -23,7 +23,7 @@ import struct
 import threading
 import time
 
-from cpg_ros.robots.robot_file import find_robot
+from cpg_ros.robots.robot_file import load_robot
 from cpg_ros.simulation.body import Body
 import numpy as np
 import rclpy
@@ -86,7 +86,7 @@ class StandIn(threading.Thread):
         super().__init__(daemon=True)
         from unitree_api.msg import Request, Response
         from unitree_go.msg import LowCmd, LowState
-        self.robot = find_robot('unitree_go2')
+        self.robot = load_robot('unitree_go2')
         self.body = Body('go2', self.robot, kp=60.0, kd=2.0, timestep=DT)
         self.limit = np.tile([23.7, 23.7, 45.43], 4)
         self.context = rclpy.Context()

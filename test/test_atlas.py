@@ -23,7 +23,7 @@ from cpg_ros.atlas.chart import chart_of
 from cpg_ros.atlas.hopf_curves import hopf_curves
 from cpg_ros.atlas.refinement import places, refined
 from cpg_ros.atlas.row_job import assess_row, leading_multipliers, LOCKED, NONE, Row
-from cpg_ros.dynamics.continuation import follow
+from cpg_ros.dynamics.continuation import continue_orbit
 from cpg_ros.dynamics.floquet import multipliers
 from cpg_ros.dynamics.orbit import solve_orbit, solve_preset
 from cpg_ros.errors import InputError
@@ -95,7 +95,7 @@ def test_a_curve_of_folds_is_where_branches_turn(monkeypatch):
     line = ParameterLine.parse('alpha=beta', type(preset.network))
 
     def fold_of(orbit):
-        (fold,) = follow(orbit, line, 0.1, 0.2, most=40, first_step=0.1).folds
+        (fold,) = continue_orbit(orbit, line, 0.1, 0.2, most=40, first_step=0.1).folds
         return fold
 
     first = fold_of(solve_preset(preset))

@@ -17,7 +17,7 @@
 from functools import cache
 
 from cpg_ros.dynamics.bifurcation import bifurcations
-from cpg_ros.dynamics.continuation import follow
+from cpg_ros.dynamics.continuation import continue_orbit
 from cpg_ros.dynamics.floquet import multipliers
 from cpg_ros.dynamics.mesh.refinement import collocate
 from cpg_ros.dynamics.orbit import solve_preset
@@ -35,8 +35,8 @@ import pytest
 
 @cache
 def pace():
-    branch = follow(solve_preset(PRESETS['quadruped']['pace']),
-                    ParameterLine.parse('alpha=beta', Quadruped), 0.05, 0.52)
+    branch = continue_orbit(solve_preset(PRESETS['quadruped']['pace']),
+                            ParameterLine.parse('alpha=beta', Quadruped), 0.05, 0.52)
     return branch, bifurcations(branch)
 
 
@@ -62,13 +62,13 @@ def test_multipliers_at_the_points_lie_on_the_unit_circle():
 
 def test_the_hop_doubles_its_period_where_the_walk_ends():
     line = ParameterLine.parse('w_a', Biped)
-    walk = follow(solve_preset(PRESETS['biped']['walk']), line, -1.0, 0.4)
+    walk = continue_orbit(solve_preset(PRESETS['biped']['walk']), line, -1.0, 0.4)
     assert walk.ends[0].why == 'symmetry'
     last = walk.points[0].orbit
     hop = collocate(last.network, last.network.symmetry('two_legged_hop'),
                     lambda theta: last(0.5 * theta * last.period), 0.5 * last.period)
     value = walk.ends[0].value
-    branch = follow(hop, line, value - 0.05, value + 0.05)
+    branch = continue_orbit(hop, line, value - 0.05, value + 0.05)
     doubled = [one for one in bifurcations(branch) if one.kind == 'period doubling']
     # The walk turns back a little beyond.
     assert min(abs(one.value - value) for one in doubled) < 1e-3
@@ -99,7 +99,7 @@ def unevenness(orbit):
 @pytest.mark.parametrize('preset, name', [('walk', 'tau'), ('liu2024_pace', 'd')])
 def test_a_branch_leaves_a_gait_with_a_delay(preset, name):
     line = ParameterLine.parse(name, Delayed)
-    branch = follow(solve_preset(PRESETS['delayed'][preset]), line, 0.2, 4.0, most=30)
+    branch = continue_orbit(solve_preset(PRESETS['delayed'][preset]), line, 0.2, 4.0, most=30)
     point = next(one for one in bifurcations(branch) if one.kind == 'branch point'
                  and one.value > 0.3)
     leaving = switched(point, line, 0.2, 4.0, most=6)
@@ -116,7 +116,8 @@ def test_a_branch_leaves_a_gait_with_a_delay(preset, name):
 
 def test_a_simulation_keeps_to_the_branch_that_leaves():
     line = ParameterLine.parse('tau', Delayed)
-    branch = follow(solve_preset(PRESETS['delayed']['liu2024_pace']), line, 0.58, 0.8, most=30)
+    branch = continue_orbit(solve_preset(PRESETS['delayed']['liu2024_pace']), line, 0.58, 0.8,
+                            most=30)
     point = next(one for one in bifurcations(branch) if one.kind == 'branch point')
     orbit = switched(point, line, 0.58, 0.8, most=6).points[-1].orbit
     run = simulate(orbit.network, orbit, orbit.period, orbit.network.delay / 400, progress=False)

@@ -31,7 +31,7 @@ from cpg_ros.gaits.stride import NoSteadyGait
 from cpg_ros.motion.pattern import Pattern
 from cpg_ros.motion.plan import Refused
 from cpg_ros.motion.steering import Drive
-from cpg_ros.robots.robot_file import load_robot, RobotError, write_robot
+from cpg_ros.robots.robot_file import read_robot, RobotError, write_robot
 from cpg_ros.simulation.body import Body
 from cpg_ros.tools import calibrate
 from cpg_ros.tools.calibrate import main
@@ -89,7 +89,7 @@ def test_a_bag_gives_the_copy_that_the_simulation_measures(tmp_path, messages, t
               types={topic: TYPES[topic] for topic in TYPES if told or 'phase' not in topic})
     assert main([str(tmp_path / 'bag'), '--robot', str(robot)]) == 0
     assert 'trot' in capsys.readouterr().out
-    made = EfferenceCopy.of(load_robot(robot).motions['trot'].efference)
+    made = EfferenceCopy.of(read_robot(robot).motions['trot'].efference)
     true = EfferenceCopy.of(GO2.motions['trot'].efference)
     assert made.speeds == pytest.approx([0.397], abs=0.01)
     at = np.abs(true.speeds - made.speeds[0]).argmin()
@@ -106,7 +106,7 @@ def test_a_bag_replaces_the_nearest_speed_of_a_full_table_and_the_file_still_loa
     write_bag(tmp_path / 'bag', messages, types=TYPES)
     assert main([str(tmp_path / 'bag'), '--robot', str(robot)]) == 0
     before = GO2.motions['trot'].efference.speeds
-    after = load_robot(robot).motions['trot'].efference.speeds
+    after = read_robot(robot).motions['trot'].efference.speeds
     assert len(after) == len(before) == SPEEDS
     (gone,), (new,) = set(before) - set(after), set(after) - set(before)
     assert new == pytest.approx(0.397, abs=0.01)
@@ -117,7 +117,7 @@ def test_a_measured_speed_is_what_a_copy_is_looked_up_by(tmp_path, messages, cap
     robot = without_copies(tmp_path / 'robot.yaml')
     write_bag(tmp_path / 'bag', messages, types=TYPES)
     assert main([str(tmp_path / 'bag'), '--robot', str(robot), '--speed', '0.37']) == 0
-    made = EfferenceCopy.of(load_robot(robot).motions['trot'].efference)
+    made = EfferenceCopy.of(read_robot(robot).motions['trot'].efference)
     # Velocities stay those of the estimate, whose errors then cancel.
     assert made.speeds == [0.37]
     assert made.table[0, :, 0].mean() == pytest.approx(0.397, abs=0.01)
@@ -132,7 +132,7 @@ def test_a_robot_file_with_more_speeds_than_fit_is_refused_with_its_key(tmp_path
     trot = replace(GO2.motions['trot'], efference=more)
     write_robot(tmp_path / 'robot.yaml', replace(GO2, motions={'trot': trot}))
     with pytest.raises(RobotError, match=r'gaits\.trot\.efference\.speeds.*at most 8'):
-        load_robot(tmp_path / 'robot.yaml')
+        read_robot(tmp_path / 'robot.yaml')
 
 
 @pytest.mark.parametrize('topic', ['/imu', '/foot_contacts'])

@@ -21,7 +21,7 @@ import subprocess
 import sys
 
 from cpg_ros.networks.registry import NETWORKS
-from cpg_ros.robots.robot_file import find_robot
+from cpg_ros.robots.robot_file import load_robot
 from cpg_ros.tools.check_robot import main
 import pytest
 from urdf_texts import joint_of, quadruped_urdf, robot_of, SOURCE, URDF
@@ -46,7 +46,7 @@ def faults(said):
 def test_the_shipped_quadruped_matches_its_urdf(check):
     code, said = check(URDF)
     assert code == 0 and said['matches'] and not said['notes']
-    known = sum(len(NETWORKS[name].gaits()) for name in find_robot('quadruped').networks)
+    known = sum(len(NETWORKS[name].gaits()) for name in load_robot('quadruped').networks)
     assert len(said['joints']) == 12 and len(said['gaits']) == known
     for joint in said['joints']:
         for key in ('lower', 'upper', 'velocity'):
@@ -132,7 +132,7 @@ def test_a_gait_that_the_parameters_of_the_robot_file_speed_up(check, tmp_path):
     path.write_text(yaml.safe_dump(tree))
     code, said = check(URDF, '--gaits', 'trot', 'walk', robot=str(path))
     assert code == 1 and [gait['frequency'] for gait in said['gaits']] == (
-        [9.5, 1.0] * len(find_robot('quadruped').networks))
+        [9.5, 1.0] * len(load_robot('quadruped').networks))
     assert not said['gaits'][0]['fits'] and said['gaits'][1]['fits']
 
 

@@ -22,7 +22,7 @@ import time
 from types import SimpleNamespace
 
 from cpg_ros.nodes import deadline_thread as ticker_module
-from cpg_ros.robots.robot_file import find_robot
+from cpg_ros.robots.robot_file import load_robot
 from graph import EXECUTABLE, off_grid, Process, SimulatedTime, until, Watcher
 import numpy as np
 import pytest
@@ -79,7 +79,7 @@ def check(samples, rate):
 
 
 def stand(watcher):
-    robot = find_robot('quadruped')
+    robot = load_robot('quadruped')
     offsets = {joint.name: joint.offset for joint in robot.joints}
     return np.array([offsets[name] for name in watcher.names])
 

@@ -18,7 +18,7 @@ from dataclasses import replace
 from functools import cache
 import math
 
-from cpg_ros.dynamics.continuation import follow, from_hopf
+from cpg_ros.dynamics.continuation import continue_from_hopf, continue_orbit
 from cpg_ros.dynamics.floquet import multipliers
 from cpg_ros.dynamics.mesh.refinement import collocate
 from cpg_ros.dynamics.orbit import NoOrbit, solve_orbit, solve_preset
@@ -99,21 +99,21 @@ def check_in_order(branch):
 @cache
 def subcritical(name):
     (network, mode, _, _), (omega, tau, _, _) = SUBCRITICAL[name], hopf(*SUBCRITICAL[name])
-    return from_hopf(replace(network, tau=tau), mode, omega, TAU, 0.5 * tau, 1.2 * tau)
+    return continue_from_hopf(replace(network, tau=tau), mode, omega, TAU, 0.5 * tau, 1.2 * tau)
 
 
 @cache
 def pace():
     """Show that the quadruped's pace coexists with rest: its Hopf point must be subcritical."""
-    return follow(solve_preset(PRESETS['quadruped']['pace']),
-                  ParameterLine.parse('alpha=beta', Quadruped), 0.0, 0.25)
+    return continue_orbit(solve_preset(PRESETS['quadruped']['pace']),
+                          ParameterLine.parse('alpha=beta', Quadruped), 0.0, 0.25)
 
 
 @pytest.mark.parametrize('gait', ['trot', 'walk'])
 def test_a_supercritical_branch_of_the_delayed_network(gait):
     mode = EXAMPLE.symmetry(gait)
     omega, tau, k1, k2 = hopf(EXAMPLE, mode, 1, 0)
-    branch = follow(solve_orbit(EXAMPLE, gait), TAU, 0.1, 0.7)
+    branch = continue_orbit(solve_orbit(EXAMPLE, gait), TAU, 0.1, 0.7)
     check_in_order(branch)
     assert [end.why for end in branch.ends] == ['rest', 'bound']
     assert branch.ends[0].value == pytest.approx(tau, abs=1e-9)
@@ -127,7 +127,7 @@ def test_a_supercritical_branch_of_the_delayed_network(gait):
         assert point.amplitude == pytest.approx(there.peak, abs=1e-8)
         assert np.allclose(point.orbit.d_period, there.d_period, 1e-5, 1e-8)
     # The same branch, begun where it begins.
-    grown = from_hopf(replace(EXAMPLE, tau=tau), mode, omega, TAU, 0.1, 0.7)
+    grown = continue_from_hopf(replace(EXAMPLE, tau=tau), mode, omega, TAU, 0.1, 0.7)
     assert grown.points[-1].orbit.period == pytest.approx(branch.periods[-1], rel=1e-11)
     slope = (grown.values[0] - tau) / grown.amplitudes[0]**2
     assert slope == pytest.approx(-k2 / (4.0 * k1), rel=5e-3)
@@ -135,7 +135,7 @@ def test_a_supercritical_branch_of_the_delayed_network(gait):
 
 @pytest.mark.parametrize('value', [0.32, 0.55])
 def test_what_the_locked_network_settles_to_is_on_the_branch(value):
-    branch = follow(solve_orbit(EXAMPLE, 'trot'), TAU, 0.3, 0.6, longest_step=0.5)
+    branch = continue_orbit(solve_orbit(EXAMPLE, 'trot'), TAU, 0.3, 0.6, longest_step=0.5)
     (orbit,) = branch.at(value)
     run = simulate(replace(EXAMPLE, tau=value), lambda t: 0.6 * branch.points[5].orbit(t),
                    80.0, 0.0025, lock=(8.0, orbit.symmetry))
@@ -157,8 +157,8 @@ def test_a_subcritical_hopf_point_of_the_delayed_network_has_a_fold(name):
     assert fold.value == branch.values.min() < tau
     # amplitude^2 is linear in mu at the Hopf point, with the slope of the normal form, ...
     network, mode, _, _ = SUBCRITICAL[name]
-    near = from_hopf(replace(network, tau=tau), mode, omega, TAU, 0.5 * tau, 1.2 * tau,
-                     amplitude=4e-3, most=1).points[0]
+    near = continue_from_hopf(replace(network, tau=tau), mode, omega, TAU, 0.5 * tau, 1.2 * tau,
+                              amplitude=4e-3, most=1).points[0]
     assert (near.value - tau) / near.amplitude**2 == pytest.approx(-k2 / (4.0 * k1), rel=1e-3)
     # ... and (amplitude - that of the fold)^2 in the distance from the fold.
     ahead = 1e-4 * (tau - fold.value) * np.array([1.0, 4.0])
@@ -177,7 +177,7 @@ def test_a_branch_from_one_hopf_point_to_another():
     network, mode = Delayed(-6.0, -0.5, 7.7, -8.6, 1.0), Mode(1, 1)
     omega, tau, k1, k2 = hopf(network, mode, -1, 0)
     assert k1 < 0.0 and k2 < 0.0
-    branch = from_hopf(replace(network, tau=tau), mode, omega, TAU, 0.01, 2.0)
+    branch = continue_from_hopf(replace(network, tau=tau), mode, omega, TAU, 0.01, 2.0)
     check_in_order(branch)
     other, first, _, _ = hopf(network, mode, 1, 0)
     assert [end.why for end in branch.ends] == ['rest', 'rest']
@@ -196,8 +196,8 @@ def test_there_and_back(a, b, d, more, gait, text):
     network = replace(network, tau=1.4 * hopf(network, network.symmetry(gait), 1, 0)[1])
     orbit, line = solve_orbit(network, gait), ParameterLine.parse(text, Delayed)
     value = line.value(network)
-    there = follow(orbit, line, value - 0.1, value + 0.1, both=False, first_step=0.1)
-    back = follow(there.points[-1].orbit, line, value, value + 0.1)
+    there = continue_orbit(orbit, line, value - 0.1, value + 0.1, both=False, first_step=0.1)
+    back = continue_orbit(there.points[-1].orbit, line, value, value + 0.1)
     again = back.points[0].orbit
     assert there.ends[0].why == 'start' and there.ends[1].why in ('bound', 'rest')
     assert again.network == network
@@ -225,8 +225,8 @@ def test_pace_has_a_fold_beside_its_subcritical_hopf_point():
     assert [end.why for end in branch.ends] == ['rest', 'bound']
     assert branch.ends[0].value == pytest.approx(value, abs=1e-8)
     assert branch.ends[0].period == pytest.approx(2.0 * np.pi / root.imag, rel=1e-8)
-    grown = from_hopf(network, network.symmetry('pace'), root.imag, branch.along, 0.0, 0.25,
-                      rest=state, vector=vector)
+    grown = continue_from_hopf(network, network.symmetry('pace'), root.imag, branch.along, 0.0,
+                               0.25, rest=state, vector=vector)
     check_in_order(grown)
     assert grown.folds[0].value == pytest.approx(fold.value, rel=1e-9)
     assert grown.folds[0].orbit.period == pytest.approx(fold.orbit.period, rel=1e-7)
@@ -278,8 +278,8 @@ def test_both_orbits_of_pace_are_those_of_solve_bvp():
 
 def test_a_branch_ends_at_an_orbit_of_more_symmetry():
     # The biped's walk ends where the hop doubles its period: a multiplier of -1.
-    branch = follow(solve_preset(PRESETS['biped']['walk']), ParameterLine.parse('w_a', Biped),
-                    -1.0, 0.4)
+    branch = continue_orbit(solve_preset(PRESETS['biped']['walk']),
+                            ParameterLine.parse('w_a', Biped), -1.0, 0.4)
     assert [end.why for end in branch.ends] == ['symmetry', 'bound']
     last = branch.points[0].orbit
     hop = collocate(last.network, last.network.symmetry('two_legged_hop'),
@@ -293,15 +293,15 @@ def test_a_branch_ends_at_an_orbit_of_more_symmetry():
 def test_a_start_at_a_lower_extreme_is_moved_to_the_peak():
     # The same orbits from a trough, and from the lower one of two peaks.
     orbit = solve_orbit(EXAMPLE, 'trot')
-    trough = follow(replace(orbit, values=-orbit.values), TAU, 0.39, 0.41)
+    trough = continue_orbit(replace(orbit, values=-orbit.values), TAU, 0.39, 0.41)
     line = ParameterLine.parse('w_a', Biped)
-    (two_peaks,) = follow(solve_preset(PRESETS['biped']['walk']), line, -0.3, 0.4).at(-0.2)
+    (two_peaks,) = continue_orbit(solve_preset(PRESETS['biped']['walk']), line, -0.3, 0.4).at(-0.2)
     theta = np.linspace(0.4, 0.6, 2001)
     late = theta[two_peaks.waveform(theta).argmax()]
     lower = collocate(two_peaks.network, two_peaks.symmetry, lambda theta: two_peaks(
         (theta + late) * two_peaks.period), two_peaks.period)
     assert lower.waveform(np.array(0.0)) < two_peaks.peak - 1e-3
-    peak = follow(lower, line, -0.21, -0.19)
+    peak = continue_orbit(lower, line, -0.21, -0.19)
     for branch, known in ((trough, orbit), (peak, two_peaks)):
         check_in_order(branch)
         again = next(point.orbit for point in branch.points if point.orbit.network
@@ -313,17 +313,17 @@ def test_a_start_at_a_lower_extreme_is_moved_to_the_peak():
 def test_a_branch_ends_where_its_period_has_grown():
     preset = PRESETS['quadruped']['pronk']
     line = ParameterLine.parse('alpha=beta', Quadruped)
-    branch = follow(solve_preset(preset), line, 0.0, 1.0, longest=3.0, both=False)
+    branch = continue_orbit(solve_preset(preset), line, 0.0, 1.0, longest=3.0, both=False)
     assert branch.ends[1].why == 'period'
     assert branch.periods[-2] <= 3.0 * branch.periods[0] < branch.periods[-1]
-    few = follow(solve_preset(preset), line, 0.0, 1.0, most=2)
+    few = continue_orbit(solve_preset(preset), line, 0.0, 1.0, most=2)
     assert few.ends[1].why == 'steps' and len(few.points) <= 5
     assert gap_after_a_period(few.points[-1].orbit) < 1e-7
 
 
 def test_a_waveform_too_steep_ends_the_branch():
     (network, mode, _, _), (omega, tau, _, _) = SUBCRITICAL['pace'], hopf(*SUBCRITICAL['pace'])
-    branch = from_hopf(replace(network, tau=tau), mode, omega, TAU, 0.5, 5.0)
+    branch = continue_from_hopf(replace(network, tau=tau), mode, omega, TAU, 0.5, 5.0)
     assert branch.ends[1].why == 'steep' and branch.points[-1].orbit.values.size == 255
 
 
@@ -333,10 +333,10 @@ def test_a_hopf_point_needs_its_eigenvector():
     for gait, wrong, words in (('bound', vector, 'does not have the symmetry: '),
                                ('pace', None, 'needs the stand and the eigenvector')):
         with pytest.raises(ValueError, match=words):
-            from_hopf(network, network.symmetry(gait), root.imag, line, 0.0, 0.3, rest=state,
-                      vector=wrong)
+            continue_from_hopf(network, network.symmetry(gait), root.imag, line, 0.0, 0.3,
+                               rest=state, vector=wrong)
     # Far from any Hopf point there is no small orbit.
     network = replace(EXAMPLE, tau=0.05)
     with pytest.raises(NoOrbit, match=r'no orbit of amplitude 0.02 was found near tau 0.05'):
-        from_hopf(network, network.symmetry('trot'), 6.3, ParameterLine.parse('tau', Delayed),
-                  0.0, 0.1)
+        continue_from_hopf(network, network.symmetry('trot'), 6.3,
+                           ParameterLine.parse('tau', Delayed), 0.0, 0.1)

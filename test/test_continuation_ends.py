@@ -15,7 +15,7 @@
 """Branches of periodic orbits: a law they follow, where they end, and what is refused."""
 
 from cpg_ros.dynamics import arclength
-from cpg_ros.dynamics.continuation import follow
+from cpg_ros.dynamics.continuation import continue_orbit
 from cpg_ros.dynamics.orbit import NoOrbit, solve_preset
 from cpg_ros.errors import InputError
 from cpg_ros.networks.biped import Biped
@@ -63,8 +63,8 @@ def test_the_folds_of_a_cubic(step):
     ('pronk', 0.3484239174, 1e-9), ('trot', -0.8517, 5e-5)])
 def test_ends_where_the_period_grows_without_bound(gait, value, exact):
     preset = PRESETS['quadruped'][gait]
-    branch = follow(solve_preset(preset), ParameterLine.parse('alpha=beta', Quadruped), -1.5, 1.0,
-                    longest=200.0)
+    branch = continue_orbit(solve_preset(preset), ParameterLine.parse('alpha=beta', Quadruped),
+                            -1.5, 1.0, longest=200.0)
     (end,) = (end for end in branch.ends if end.why == 'period')
     assert end.value == pytest.approx(value, abs=exact)
     assert str(end) == f'homoclinic end near {end.value:.7g}, period grows'
@@ -75,8 +75,8 @@ def test_ends_where_the_period_grows_without_bound(gait, value, exact):
 
 def test_a_fold_at_a_point_of_the_branch_is_no_obstacle():
     # One point came out at the fold itself, where the rate has either sign.
-    branch = follow(solve_preset(PRESETS['biped']['walk']),
-                    ParameterLine.parse('current', Biped), 0.0, 1.0, most=100)
+    branch = continue_orbit(solve_preset(PRESETS['biped']['walk']),
+                            ParameterLine.parse('current', Biped), 0.0, 1.0, most=100)
     assert branch.ends[0].why == 'period' and branch.ends[1].why == 'rest'
     assert branch.folds
     for fold in branch.folds:
@@ -93,8 +93,8 @@ def test_random_lines_end_in_branches_or_are_refused():
         line = ParameterLine.parse(str(draw.choice([*kind.groups, *kind.parameters()])), kind)
         value = line.value(preset.network)
         try:
-            branch = follow(solve_preset(preset), line, value - draw.uniform(0.01, 2.0),
-                            value + draw.uniform(0.01, 2.0), most=4)
+            branch = continue_orbit(solve_preset(preset), line, value - draw.uniform(0.01, 2.0),
+                                    value + draw.uniform(0.01, 2.0), most=4)
         except (NoOrbit, InputError):
             continue
         assert {end.why for end in branch.ends} <= {
@@ -111,4 +111,4 @@ def test_refusals(name, text, low, high, words):
     network = 'biped' if 'w_' in text else 'quadruped'
     orbit = solve_preset(PRESETS[network][name])
     with pytest.raises(ValueError, match=words):
-        follow(orbit, ParameterLine.parse(text, NETWORKS[network]), low, high)
+        continue_orbit(orbit, ParameterLine.parse(text, NETWORKS[network]), low, high)

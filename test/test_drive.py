@@ -19,7 +19,7 @@ from cpg_ros.motion.plan import plan, Refused
 from cpg_ros.motion.steering import Drive
 from cpg_ros.networks.registry import PRESETS
 from cpg_ros.robots.robot import Steering
-from cpg_ros.robots.robot_file import load_robot, RobotError, write_robot
+from cpg_ros.robots.robot_file import read_robot, RobotError, write_robot
 from hypothesis import given, settings
 from hypothesis import strategies as st
 import numpy as np
@@ -32,7 +32,7 @@ TABLE = Steering(**{key: tuple(value) for key, value in steered.STEERING.items()
 
 @pytest.fixture(scope='module')
 def robot(tmp_path_factory):
-    return load_robot(steered.write(tmp_path_factory.mktemp('robot')))
+    return read_robot(steered.write(tmp_path_factory.mktemp('robot')))
 
 
 def program(robot, gait='trot', network='delayed', **more):
@@ -181,15 +181,15 @@ def test_strides_backward_must_stay_within_the_limits_too(robot, tmp_path):
     path = tmp_path / 'steered.yaml'
     path.write_text(steered.yaml.safe_dump(tree))
     with pytest.raises(Refused, match=r'_calf_joint to -0\.550 rad, above its limit -0.7'):
-        program(load_robot(path))
+        program(read_robot(path))
     del tree['gaits']['trot']['steering']
     path.write_text(steered.yaml.safe_dump(tree))
-    program(load_robot(path))
+    program(read_robot(path))
 
 
 def test_motions_survive_writing(robot, tmp_path):
     write_robot(tmp_path / 'steered.yaml', robot)
-    assert load_robot(tmp_path / 'steered.yaml') == robot
+    assert read_robot(tmp_path / 'steered.yaml') == robot
 
 
 @pytest.mark.parametrize(('place', 'value', 'why'), [
@@ -223,5 +223,5 @@ def test_a_wrong_entry_is_named(tmp_path, place, value, why):
     path = tmp_path / 'wrong.yaml'
     path.write_text(steered.yaml.safe_dump(tree))
     with pytest.raises(RobotError, match=why) as caught:
-        load_robot(path)
+        read_robot(path)
     assert str(path) in str(caught.value) and '\n' not in str(caught.value)

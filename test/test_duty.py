@@ -26,7 +26,7 @@ from cpg_ros.motion.pattern import Pattern
 from cpg_ros.motion.plan import plan, Refused
 from cpg_ros.networks.registry import find_network
 from cpg_ros.robots.robot import Motion
-from cpg_ros.robots.robot_file import load_robot, RobotError
+from cpg_ros.robots.robot_file import read_robot, RobotError
 from hypothesis import given, settings
 from hypothesis import strategies as st
 import numpy as np
@@ -40,7 +40,7 @@ CASES = [('quadruped', 'delayed', 'walk'), ('quadruped', 'quadruped', 'trot'),
 @cache
 def program(robot, network, gait, duty=0.0):
     """A gait on legs of one joint more, which is the driving signal itself."""
-    known = load_robot(CONFIG / f'{robot}.yaml')
+    known = read_robot(CONFIG / f'{robot}.yaml')
     legs = {}
     for leg, joints in known.legs.items():
         one = replace(joints[0], name=f'{leg}_signal', weights=(1.0,), offset=0.0, lower=-9.0,
@@ -160,7 +160,7 @@ def test_what_weights_were_made_for_can_be_said(tmp_path):
 
 @pytest.mark.parametrize('duty', [0.55, 0.684, 0.8])
 def test_feet_of_a_tuned_walk_go_back_for_as_long_as_was_asked(duty):
-    robot = load_robot(CONFIG / 'unitree_go2.yaml')
+    robot = read_robot(CONFIG / 'unitree_go2.yaml')
     preset = find_network('delayed').presets()['walk']
     walk = plan(robot, 'walk', preset, preset.network, 1.0, duty=duty)
     swinging = Timetable(walk, geometry_of(robot)).swinging
@@ -178,7 +178,7 @@ def test_what_is_no_share_of_a_stride_is_refused(tmp_path):
         text = (CONFIG / 'quadruped.yaml').read_text().partition('\ngaits:')[0]
         path.write_text(f'{text}\ngaits: {{walk: {{{line}}}}}\n')
         with pytest.raises(RobotError, match=message):
-            load_robot(path)
+            read_robot(path)
 
 
 def test_a_duty_needs_cells_of_legs():

@@ -19,7 +19,7 @@ import inspect
 from cpg_ros.errors import CpgError
 from cpg_ros.motion import plan as planning
 from cpg_ros.networks.registry import PRESETS
-from cpg_ros.robots.robot_file import find_robot
+from cpg_ros.robots.robot_file import load_robot
 from cpg_ros.tools import analyze, inversion
 from modules import modules
 import pytest
@@ -42,7 +42,7 @@ def test_a_mistake_in_a_solver_is_not_a_refusal(monkeypatch):
     monkeypatch.setattr(planning, 'gait_of', broken)
     preset = PRESETS['delayed']['trot']
     with pytest.raises(ValueError, match='not aligned') as error:
-        planning.plan(find_robot('quadruped'), 'trot', preset, preset.network)
+        planning.plan(load_robot('quadruped'), 'trot', preset, preset.network)
     assert not isinstance(error.value, CpgError)
 
 

@@ -16,7 +16,7 @@
 
 from functools import cache
 
-from cpg_ros.dynamics.continuation import follow
+from cpg_ros.dynamics.continuation import continue_orbit
 from cpg_ros.dynamics.floquet import multipliers, smallest_gain
 from cpg_ros.dynamics.mesh.periodic_schur import eigenvalues
 from cpg_ros.dynamics.orbit import solve_preset
@@ -189,7 +189,7 @@ def test_the_smallest_multipliers_are_right_beside_the_largest(change):
     walk = PRESETS['quadruped']['walk']
     along = ParameterLine.parse('alpha', Quadruped)
     value = change.get('alpha', walk.network.alpha)
-    (orbit,) = follow(solve_preset(walk), along, -1.0, 1.0, both=True).at(value)
+    (orbit,) = continue_orbit(solve_preset(walk), along, -1.0, 1.0, both=True).at(value)
     found = multipliers(orbit)
     theta = (np.arange(200_000) + 0.5) / 200_000
     divergence = np.trace(orbit.network.jacobian(orbit(theta * orbit.period)), axis1=-2, axis2=-1)

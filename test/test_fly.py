@@ -25,12 +25,12 @@ from pathlib import Path
 from cpg_ros.gaits.leg_names import legs_of
 from cpg_ros.gaits.stride import find_stride
 from cpg_ros.inversion.parameter_files import robot_file_of, write_fitted
-from cpg_ros.inversion.recording_fit import inverted, network_of
+from cpg_ros.inversion.recording_fit import fit_recording, network_of
 from cpg_ros.motion.pattern import Pattern
 from cpg_ros.motion.plan import plan
 from cpg_ros.networks.registry import find_network
 from cpg_ros.recordings.csv_reader import read_csv
-from cpg_ros.robots.robot_file import load_robot
+from cpg_ros.robots.robot_file import read_robot
 import numpy as np
 import pytest
 from scipy.signal import butter, hilbert, sosfiltfilt
@@ -73,7 +73,7 @@ def stepping(times, angles, stretch):
 
 @cache
 def fitted():
-    return inverted(recording(), free=('tau',))
+    return fit_recording(recording(), free=('tau',))
 
 
 def apart(first, other):
@@ -101,7 +101,7 @@ def test_the_readout_error_falls_with_the_order():
 def test_a_generator_moves_like_the_fly(tmp_path):
     found = fitted()
     write_fitted(tmp_path / 'fly.yaml', found)
-    robot = load_robot(robot_file_of(tmp_path / 'fly.yaml'))
+    robot = read_robot(robot_file_of(tmp_path / 'fly.yaml'))
     assert len(robot.joints) == 42
     preset = find_network('delayed6').presets()[found.fit.gait]
     pattern = Pattern(plan(robot, found.fit.gait, preset, found.fit.network,

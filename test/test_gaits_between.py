@@ -21,7 +21,7 @@ from pathlib import Path
 from cpg_ros.dynamics.orbit import solve_orbit
 from cpg_ros.errors import InputError
 from cpg_ros.inversion.model_choice import as_rows, explained, undecided
-from cpg_ros.inversion.recording_fit import inverted
+from cpg_ros.inversion.recording_fit import fit_recording
 from cpg_ros.networks.registry import NETWORKS, PRESETS
 from cpg_ros.recordings.csv_reader import read_csv
 from cpg_ros.tools import inversion
@@ -44,7 +44,7 @@ def recorded(path, gait, seed=0):
 @pytest.mark.parametrize('gait', ['canter_left', 'unnamed'])
 def test_phases_of_no_gait_are_fitted_as_they_are(tmp_path, gait):
     truth = recorded(tmp_path / 'own.csv', gait)
-    found = inverted(read_csv(tmp_path / 'own.csv'))
+    found = fit_recording(read_csv(tmp_path / 'own.csv'))
     assert found.fit.network.name == 'phase' and found.fit.gait == gait
     said = next(line for line in found.warnings if 'none of the gaits of the network delayed' in
                 line)
@@ -58,7 +58,7 @@ def test_phases_of_no_gait_are_fitted_as_they_are(tmp_path, gait):
         assert 0.0 < one.stderr < found.stride.scatter[leg].spread
     # What was asked for by name is not exchanged.
     with pytest.raises(InputError, match='none of the gaits of the network delayed') as caught:
-        inverted(read_csv(tmp_path / 'own.csv'), network='delayed')
+        fit_recording(read_csv(tmp_path / 'own.csv'), network='delayed')
     assert 'how far single strides are off them: lh 0.000, rh ' in str(caught.value)
 
 

@@ -24,7 +24,7 @@ from cpg_ros.checks.urdf_match import checked
 from cpg_ros.motion.pattern import Pattern
 from cpg_ros.motion.plan import plan
 from cpg_ros.networks.registry import find_network
-from cpg_ros.robots.robot_file import find_robot, load_robot, write_robot
+from cpg_ros.robots.robot_file import load_robot, read_robot, write_robot
 from cpg_ros.robots.urdf import load_urdf
 import numpy as np
 import pytest
@@ -35,7 +35,7 @@ from cpg_ros.simulation.body import Body  # noqa: E402
 from cpg_ros.simulation.robot_model import find_model, legs  # noqa: E402
 
 ROOT = Path(__file__).parents[1]
-HEXAPOD, DT = find_robot('hexapod'), 0.002
+HEXAPOD, DT = load_robot('hexapod'), 0.002
 #: Of the trunk with its round ends, m (models/hexapod.xml).
 LENGTH = 2 * (0.165 + 0.035)
 
@@ -117,4 +117,4 @@ def test_a_robot_file_is_made_from_a_urdf_of_six_legs(tmp_path):
     assert robot.networks[0] == 'delayed6' and len(robot.joints) == 18
     assert 'lm_coxa_joint swings' in says
     write_robot(tmp_path / 'six.yaml', robot)
-    assert load_robot(tmp_path / 'six.yaml') == robot
+    assert read_robot(tmp_path / 'six.yaml') == robot

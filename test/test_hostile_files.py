@@ -27,7 +27,7 @@ from cpg_ros.networks.preset_files import read_presets
 from cpg_ros.networks.registry import find_network, NETWORKS
 from cpg_ros.recordings.bag_reader import read_bag
 from cpg_ros.recordings.csv_reader import read_csv
-from cpg_ros.robots.robot_file import load_robot
+from cpg_ros.robots.robot_file import read_robot
 from cpg_ros.robots.urdf import load_urdf
 from cpg_ros.robots.urdf_links import load_links
 from cpg_ros.simulation.mesh_files import hull
@@ -54,10 +54,10 @@ def panel_description(path):
 def simulated(path):
     pytest.importorskip('mujoco')
     from cpg_ros.simulation.robot_model import load
-    return load(str(path), load_robot(share() / 'config' / 'quadruped.yaml'))
+    return load(str(path), read_robot(share() / 'config' / 'quadruped.yaml'))
 
 
-READERS = {'robot.yaml': load_robot, 'presets.yaml': lambda path: read_presets(
+READERS = {'robot.yaml': read_robot, 'presets.yaml': lambda path: read_presets(
     path, NETWORKS['delayed']), 'network.py': lambda path: find_network(str(path)),
     'robot.urdf': load_urdf, 'links.urdf': load_links, 'shape.urdf': panel_urdf,
     'model.urdf': simulated, 'model.xml': simulated, 'mesh.stl': panel_mesh,
@@ -128,7 +128,7 @@ def test_files_of_proc_are_as_empty_as_they_say():
                                   '{a: ' * 20_000 + '1' + '}' * 20_000, '- ' * 20_000 + '1'])
 def test_yaml_nested_deep_is_one_line(tmp_path, text):
     (tmp_path / 'a.yaml').write_text(text)
-    for read in (load_robot, READERS['presets.yaml']):
+    for read in (read_robot, READERS['presets.yaml']):
         assert 'nested more than 50 deep' in refusal(read, tmp_path / 'a.yaml')
 
 
@@ -137,7 +137,7 @@ def test_yaml_aliases_are_counted_as_what_they_stand_for(tmp_path):
                      for k in range(12))
     for text, words in ((laughs, 'aliases stand for'), ('network: &a [*a]\n', 'part of')):
         (tmp_path / 'a.yaml').write_text(text)
-        assert words in refusal(load_robot, tmp_path / 'a.yaml')
+        assert words in refusal(read_robot, tmp_path / 'a.yaml')
     assert parsed('a: &a [1, 2]\nb: [*a, *a]\n') == {'a': [1, 2], 'b': [[1, 2], [1, 2]]}
 
 
@@ -147,7 +147,7 @@ def test_yaml_aliases_are_counted_as_what_they_stand_for(tmp_path):
 def test_values_that_do_not_fit_their_tags_are_one_line(tmp_path, text):
     for whole in (text, f'network: {text}', f'network: delayed\nlegs: {text}'):
         (tmp_path / 'a.yaml').write_text(whole)
-        refusal(load_robot, tmp_path / 'a.yaml')
+        refusal(read_robot, tmp_path / 'a.yaml')
 
 
 LAUGHS = ('<?xml version="1.0"?><!DOCTYPE robot [<!ENTITY a0 "lol">' + ''.join(

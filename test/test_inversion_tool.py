@@ -24,7 +24,7 @@ import sys
 from bags import joint_state, START, storage_file, write_bag
 from cpg_ros.dynamics.orbit import solve_orbit, solve_preset
 from cpg_ros.networks.registry import PRESETS
-from cpg_ros.robots.robot_file import load_robot
+from cpg_ros.robots.robot_file import read_robot
 from cpg_ros.tools.inversion import main
 import numpy as np
 import pytest
@@ -101,7 +101,7 @@ def test_a_bag_in_a_gait_out(bag, tmp_path, capsys):
     tree = yaml.safe_load(out.read_text())['/**']['ros__parameters']
     assert tree['gait'] == 'trot' and tree['frequency'] == said['frequency']
     assert tree['delayed'] == said['params']
-    robot = load_robot(tree['robot'])
+    robot = read_robot(tree['robot'])
     assert robot.order == tuple(name for name in walked()[0])
     # By itself, too, the robot file knows how fast.
     assert robot.motion('trot', 'trot').frequency == said['frequency']
@@ -166,7 +166,7 @@ def test_a_robot_file_keeps_its_cells_and_limits(tmp_path, capsys):
     assert main(['--bag', str(path), '--robot', str(file), '--out', str(out), '--json']) == 0
     said = json.loads(capsys.readouterr().out)
     assert 'not recorded: lf_gripper' in said['read']
-    fitted = load_robot(tmp_path / 'fitted_robot.yaml')
+    fitted = read_robot(tmp_path / 'fitted_robot.yaml')
     for joint in fitted.joints:
         assert (joint.lower, joint.upper, joint.velocity) == (-3.0, 3.0, 40.0)
         assert joint.weights == (0.1,) if 'gripper' in joint.name else len(joint.weights) == 6

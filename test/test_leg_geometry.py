@@ -18,7 +18,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from cpg_ros.feedback.kinematics import displace, forward, geometry_of
-from cpg_ros.robots.robot_file import load_robot, RobotError, write_robot
+from cpg_ros.robots.robot_file import read_robot, RobotError, write_robot
 from cpg_ros.tools.check_robot import main
 from go2 import FILE, GO2
 import numpy as np
@@ -30,7 +30,7 @@ URDF = Path(__file__).parent.parent / 'urdf' / 'quadruped.urdf'
 def made(tmp_path, urdf=URDF):
     path = tmp_path / 'robot.yaml'
     assert main(['--urdf', str(urdf), '--make', str(path)]) in (0, 1)
-    return load_robot(path)
+    return read_robot(path)
 
 
 def test_check_robot_reads_the_geometry_off_the_urdf(tmp_path, capsys):
@@ -69,7 +69,7 @@ def test_a_leg_that_feedback_cannot_move_is_named_and_stays(tmp_path, capsys):
 
 def test_geometry_and_efference_are_read_as_they_were_written(tmp_path):
     write_robot(tmp_path / 'go2.yaml', GO2)
-    again = load_robot(tmp_path / 'go2.yaml')
+    again = read_robot(tmp_path / 'go2.yaml')
     assert again.geometry == GO2.geometry
     assert ({name: motion.efference for name, motion in again.motions.items()}
             == {name: motion.efference for name, motion in GO2.motions.items()})
@@ -85,7 +85,7 @@ def test_a_mistake_in_the_geometry_is_named(tmp_path, wrong, right, says):
     assert wrong in text
     (tmp_path / 'go2.yaml').write_text(text.replace(wrong, right, 1))
     with pytest.raises(RobotError) as caught:
-        load_robot(tmp_path / 'go2.yaml')
+        read_robot(tmp_path / 'go2.yaml')
     assert says in str(caught.value) and '\n' not in str(caught.value)
 
 
@@ -96,4 +96,4 @@ def test_a_short_row_of_an_efference_table_is_named(tmp_path):
     robot = replace(GO2, motions={'trot': replace(GO2.motions['trot'], efference=short)})
     write_robot(tmp_path / 'go2.yaml', robot)
     with pytest.raises(RobotError, match=r'gaits.trot.efference.roll\[0\]: has 63 numbers'):
-        load_robot(tmp_path / 'go2.yaml')
+        read_robot(tmp_path / 'go2.yaml')

@@ -21,7 +21,7 @@ import re
 import xml.etree.ElementTree as ElementTree
 
 from cpg_ros.nodes.joint_publishers import COMMAND_TOPICS
-from cpg_ros.robots.robot_file import find_robot
+from cpg_ros.robots.robot_file import load_robot
 from cpg_ros.tools.check_robot import main
 import numpy as np
 import pytest
@@ -78,7 +78,7 @@ def test_the_urdf_has_the_joints_and_limits_of_the_robot_file(tree, capsys):
     assert said['matches'] and not said['notes']
     moving = {joint.get('name'): joint for joint in tree.findall('joint')
               if joint.get('type') != 'fixed'}
-    robot = find_robot('quadruped')
+    robot = load_robot('quadruped')
     assert set(moving) == set(robot.order)
     for joint in robot.joints:
         limit = moving[joint.name].find('limit')
@@ -122,7 +122,7 @@ def test_mujoco_takes_the_urdf_and_the_robot_stands(tree):
         <link name="base"/>""")
     spec = mujoco.MjSpec.from_string(text)
     spec.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_PLANE, size=[5, 5, 0.1])
-    robot = find_robot('quadruped')
+    robot = load_robot('quadruped')
     for joint in robot.joints:
         motor = spec.add_actuator(name=joint.name, target=joint.name,
                                   trntype=mujoco.mjtTrn.mjTRN_JOINT)
@@ -173,7 +173,7 @@ def test_rviz_shows_the_robot_on_the_ground(tree):
 
 def test_plotjuggler_draws_what_is_published():
     root = ElementTree.parse(SOURCE / 'plotjuggler' / 'cpg.xml').getroot()
-    robot = find_robot('quadruped')
+    robot = load_robot('quadruped')
     known = fields(robot)
     names = {f'/{leg}/joint_states': {joint.name for joint in joints}
              for leg, joints in robot.legs.items()}
@@ -206,7 +206,7 @@ def panels(layout):
 
 def test_foxglove_draws_what_is_published():
     layout = json.loads((SOURCE / 'foxglove' / 'cpg.json').read_text())
-    known = fields(find_robot('quadruped'))
+    known = fields(load_robot('quadruped'))
     assert sorted(panels(layout['layout'])) == sorted(layout['configById'])
     paths = [path['value'] for panel in layout['configById'].values()
              for path in panel.get('paths', ())]

@@ -17,7 +17,7 @@
 import json
 import math
 
-from cpg_ros.robots.robot_file import load_robot
+from cpg_ros.robots.robot_file import read_robot
 from cpg_ros.tools.check_robot import main
 from hypothesis import given, Phase, settings
 from hypothesis import strategies as st
@@ -33,7 +33,7 @@ def made(tmp_path, urdf, code=0):
     out.unlink(missing_ok=True)
     assert main(['--urdf', str(path), '--make', str(out)]) == code
     assert main([str(out), '--urdf', str(path)]) == code
-    return load_robot(out)
+    return read_robot(out)
 
 
 def feet(robot, thigh, calf, axis=1.0):
@@ -114,7 +114,7 @@ def test_bipeds_with_unusual_names_are_made(tmp_path, capsys, left, right, more)
     path, out = tmp_path / 'my.urdf', tmp_path / 'made.yaml'
     path.write_text(biped_of(left, right, *more))
     assert main(['--urdf', str(path), '--make', str(out)]) == 0
-    robot = load_robot(out)
+    robot = read_robot(out)
     assert {leg: {joint.name for joint in joints} for leg, joints in robot.legs.items()} == {
         leg: {f'{side}_{name}' for name in ('HIP_P', 'KNEE', 'ANKLE_P', *(['HIP_R'] if more
                                                                           else []))}

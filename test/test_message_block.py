@@ -20,7 +20,7 @@ from builtin_interfaces.msg import Duration, Time
 from cpg_ros.nodes.joint_publishers import Outputs
 from cpg_ros.nodes.message_block import MessageBlock, Template
 from cpg_ros.nodes.sensor_publishers import Measurements
-from cpg_ros.robots.robot_file import find_robot
+from cpg_ros.robots.robot_file import load_robot
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from nav_msgs.msg import Odometry
@@ -31,7 +31,7 @@ from sensor_msgs.msg import Imu, JointState
 from std_msgs.msg import Float64MultiArray, Header, MultiArrayDimension, MultiArrayLayout
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
-ROBOTS = [find_robot(name) for name in ('quadruped', 'goat', 'biped', 'unitree_go2')]
+ROBOTS = [load_robot(name) for name in ('quadruped', 'goat', 'biped', 'unitree_go2')]
 SIZES = {'boolean': 1, 'octet': 1, 'uint8': 1, 'uint16': 2, 'int32': 4, 'uint32': 4, 'double': 8}
 
 
@@ -148,7 +148,7 @@ def test_every_output_of_the_generator(robot, command, data):
 @given(values=st.lists(finite, min_size=63, max_size=63))
 def test_what_a_simulated_robot_publishes(values):
     values, felt = np.split(np.array(values), [53])
-    robot = find_robot('unitree_go2')
+    robot = load_robot('unitree_go2')
     graph = Graph()
     body = SimpleNamespace(robot=robot)
     parts = np.split(values, np.cumsum([12, 12, 12, 4, 3, 4]))

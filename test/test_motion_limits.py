@@ -19,7 +19,7 @@ from functools import cache
 from cpg_ros.motion.pattern import Pattern
 from cpg_ros.motion.plan import plan, Refused
 from cpg_ros.networks.registry import PRESETS
-from cpg_ros.robots.robot_file import find_robot
+from cpg_ros.robots.robot_file import load_robot
 from hypothesis import given, settings
 from hypothesis import strategies as st
 import numpy as np
@@ -39,7 +39,7 @@ EACH = pytest.mark.parametrize('network', PRESETS)
 @cache
 def programs(network):
     """All gaits of a network that the robot can take at this frequency."""
-    robot, found = find_robot('biped' if network == 'biped' else 'quadruped'), []
+    robot, found = load_robot('biped' if network == 'biped' else 'quadruped'), []
     for name, preset in PRESETS[network].items():
         try:
             found.append(plan(robot, name, preset, preset.network, 2.5))

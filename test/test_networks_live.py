@@ -21,7 +21,7 @@ from ament_index_python.packages import get_package_share_directory
 from cpg_ros.motion.plan import plan
 from cpg_ros.networks.preset_files import write_presets
 from cpg_ros.networks.registry import NETWORKS, PRESETS
-from cpg_ros.robots.robot_file import load_robot
+from cpg_ros.robots.robot_file import read_robot
 from graph import Process, until, Watcher
 import pytest
 from switches import check_all_switches, off
@@ -71,7 +71,7 @@ def live(request):
 
 def test_all_ordered_pairs_switch_without_a_jerk(live):
     network, _, watcher = live
-    robot = load_robot(CONFIG / f'{network}.yaml')
+    robot = read_robot(CONFIG / f'{network}.yaml')
     programs = {name: plan(robot, name, preset, preset.network, 3.0)
                 for name, preset in PRESETS[network].items() if name == preset.gait}
     check_all_switches(watcher, robot, programs, PHASES[network], 0.35)
@@ -222,7 +222,7 @@ def test_the_zig_zag_assignment_drives_a_leg_by_two_cells(tmp_path, start):
 def test_oscillators_switch_between_all_ordered_pairs(start, network):
     _, watcher = start('-p', f'network:={network}', '-p', 'rate:=200.0', '-p', 'frequency:=3.0',
                        '-p', 'transition:=0.25')
-    robot = load_robot(CONFIG / 'quadruped.yaml')
+    robot = read_robot(CONFIG / 'quadruped.yaml')
     programs = {name: plan(robot, name, preset, preset.network, 3.0)
                 for name, preset in PRESETS[network].items()}
     phases = {name: program.orbit.phases[:4] for name, program in programs.items()}

@@ -30,7 +30,7 @@ from cpg_ros.networks.oscillators import shipped
 from cpg_ros.networks.parameter_line import ParameterLine
 from cpg_ros.networks.registry import NETWORKS, PRESETS
 from cpg_ros.networks.stated_gait import stated_gait
-from cpg_ros.robots.robot_file import find_robot
+from cpg_ros.robots.robot_file import load_robot
 from hypothesis import given, settings
 from hypothesis import strategies as st
 import numpy as np
@@ -107,7 +107,7 @@ def test_simulation_and_orbit_agree_and_noise_is_survived(network, gait):
 
 @pytest.mark.parametrize('network', NAMES)
 def test_every_ordered_pair_switches_within_the_two_gaits_speeds(network):
-    robot = find_robot('quadruped')
+    robot = load_robot('quadruped')
     programs = {name: plan(robot, name, preset, preset.network, 2.0)
                 for name, preset in PRESETS[network].items()}
     for old in programs:
@@ -169,7 +169,7 @@ def test_phase_differences_converge_and_amplitudes_come_back_critically_damped()
 
 
 def test_a_change_without_transition_is_left_to_the_oscillators():
-    robot, presets = find_robot('quadruped'), PRESETS['phase']
+    robot, presets = load_robot('quadruped'), PRESETS['phase']
     walk, canter = (plan(robot, name, presets[name], presets[name].network, 1.0)
                     for name in ('walk', 'canter_right'))
     pattern = Pattern(walk, ramp=0.05)

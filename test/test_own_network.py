@@ -142,7 +142,7 @@ def test_its_orbit_and_multipliers_are_the_exact_ones(gait, k):
 
 
 def test_its_hopf_point_and_branch_are_the_exact_ones():
-    from cpg_ros.dynamics.continuation import follow
+    from cpg_ros.dynamics.continuation import continue_orbit
     from cpg_ros.dynamics.hopf_search import hopf_points
     from cpg_ros.dynamics.orbit import solve_orbit
     from cpg_ros.networks.parameter_line import ParameterLine
@@ -154,7 +154,7 @@ def test_its_hopf_point_and_branch_are_the_exact_ones():
     assert (point.omega, point.supercritical) == (pytest.approx(6.0), True)
     assert point.normal_form.k1 == pytest.approx(1.0, abs=1e-9)
     assert point.amplitude(-0.4) == pytest.approx(np.sqrt(0.1), rel=1e-9)
-    branch = follow(solve_orbit(WALK, 'walk'), line, -1.0, 3.0)
+    branch = continue_orbit(solve_orbit(WALK, 'walk'), line, -1.0, 3.0)
     assert [end.why for end in branch.ends] == ['rest', 'bound']
     assert branch.ends[0].value == pytest.approx(-0.5, abs=1e-5)
     assert np.allclose(branch.amplitudes, np.sqrt(branch.values + 0.5), atol=1e-7)

@@ -24,7 +24,7 @@ pytest.importorskip('websockets')
 from cpg_ros.files.shared_resources import share  # noqa: E402, I100
 from cpg_ros.panel import body_shape as solids  # noqa: E402
 from cpg_ros.panel import mesh_files, shape_source, stick_figure, urdf_shape  # noqa: E402
-from cpg_ros.robots.robot_file import find_robot  # noqa: E402
+from cpg_ros.robots.robot_file import load_robot  # noqa: E402
 
 
 def worlds(shape, angles):
@@ -47,7 +47,7 @@ def worlds(shape, angles):
                                               ('quadruped', '')])
 def test_links_are_where_mujoco_has_them(robot, model):
     mujoco = pytest.importorskip('mujoco')
-    robot_file = find_robot(robot)
+    robot_file = load_robot(robot)
     said = []
     shape = shape_source.find(shape_source.Known(robot=robot, model=model), said.append)
     assert not said

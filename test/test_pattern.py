@@ -24,11 +24,11 @@ from cpg_ros.motion.plan import plan, Refused
 from cpg_ros.networks.delayed import Delayed, PRESETS
 from cpg_ros.networks.symmetry import GAITS
 from cpg_ros.robots.robot import JointMotion, Motion
-from cpg_ros.robots.robot_file import load_robot
+from cpg_ros.robots.robot_file import read_robot
 import numpy as np
 import pytest
 
-ROBOTS = {name: load_robot(Path(__file__).parents[1] / 'config' / f'{name}.yaml')
+ROBOTS = {name: read_robot(Path(__file__).parents[1] / 'config' / f'{name}.yaml')
           for name in ('goat', 'quadruped')}
 PAIRS = [(old, new) for old in GAITS for new in GAITS if old != new]
 

@@ -23,11 +23,11 @@ from cpg_ros.motion.pattern import Pattern
 from cpg_ros.motion.phase_readout import PhaseReadout
 from cpg_ros.motion.plan import plan
 from cpg_ros.networks.registry import PRESETS
-from cpg_ros.robots.robot_file import load_robot
+from cpg_ros.robots.robot_file import read_robot
 import numpy as np
 import pytest
 
-ROBOTS = {name: load_robot(Path(__file__).parents[1] / 'config' / f'{name}.yaml')
+ROBOTS = {name: read_robot(Path(__file__).parents[1] / 'config' / f'{name}.yaml')
           for name in ('quadruped', 'biped')}
 ALL = [(network, name) for network in ROBOTS for name in PRESETS[network]]
 EVERY = pytest.mark.parametrize(('network', 'name'), ALL)

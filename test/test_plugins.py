@@ -23,11 +23,11 @@ import sys
 
 from cpg_ros.dynamics.orbit import solve_preset
 from cpg_ros.inversion.parameter_files import write_fitted
-from cpg_ros.inversion.recording_fit import inverted
+from cpg_ros.inversion.recording_fit import fit_recording
 from cpg_ros.motion.plan import plan
 from cpg_ros.networks.registry import find_network, NetworkError, NETWORKS, PRESETS, SHIPPED
 from cpg_ros.recordings.csv_reader import read_csv
-from cpg_ros.robots.robot_file import load_robot, RobotError, write_robot
+from cpg_ros.robots.robot_file import read_robot, RobotError, write_robot
 from cpg_ros.search.search_space import search_space
 import numpy as np
 import pytest
@@ -158,11 +158,11 @@ def test_names_that_lead_nowhere(tmp_path):
 
 def test_robot_files_name_it_and_say_where_legs_are(tmp_path, twin):
     tree = robot_tree('unitree_go2', os.path.relpath(twin, tmp_path), side=SIDES, girdle=GIRDLES)
-    robot = load_robot(saved(tmp_path / 'mine.yaml', tree))
+    robot = read_robot(saved(tmp_path / 'mine.yaml', tree))
     assert robot.networks == ('twin',) and robot.girdles['p'] == 'hind'
     write_robot(tmp_path / 'deep.yaml', robot)
-    assert load_robot(tmp_path / 'deep.yaml').legs == robot.legs
-    known = load_robot(CONFIG / 'unitree_go2.yaml')
+    assert read_robot(tmp_path / 'deep.yaml').legs == robot.legs
+    known = read_robot(CONFIG / 'unitree_go2.yaml')
     strides = [plan(one, 'trot', PRESETS[name]['trot'], PRESETS[name]['trot'].network,
                     one.motions['trot'].frequency).steer(0.3, 0.4)[0]
                for one, name in ((robot, 'twin'), (known, 'delayed'))]
@@ -175,27 +175,27 @@ def test_robot_files_name_it_and_say_where_legs_are(tmp_path, twin):
 def test_sides_that_are_wrong_or_missing(tmp_path, twin, sides, words):
     path = saved(tmp_path / 'mine.yaml', robot_tree('unitree_go2', twin, side=sides))
     with pytest.raises(RobotError, match=words):
-        load_robot(path)
+        read_robot(path)
 
 
 def test_a_robot_file_does_not_contradict_its_network(tmp_path):
     tree = yaml.safe_load((CONFIG / 'goat.yaml').read_text())
     tree['legs']['lh']['side'] = 'left'
-    assert load_robot(saved(tmp_path / 'goat.yaml', tree)).sides == SIDES
+    assert read_robot(saved(tmp_path / 'goat.yaml', tree)).sides == SIDES
     tree['legs']['lh']['side'] = 'right'
     with pytest.raises(RobotError, match=r"legs\.lh\.side: 'right' is not what the network"):
-        load_robot(saved(tmp_path / 'goat.yaml', tree))
+        read_robot(saved(tmp_path / 'goat.yaml', tree))
 
 
 def test_a_fit_names_the_file(tmp_path, twin):
-    robot = load_robot(saved(tmp_path / 'mine.yaml', robot_tree('goat', twin)))
+    robot = read_robot(saved(tmp_path / 'mine.yaml', robot_tree('goat', twin)))
     orbit, t = solve_preset(PRESETS['twin']['trot']), np.arange(0.0, 8.0, 0.01)
     angles = [joint.offset + 0.2 * orbit.waveform(t + orbit.phases[joint.cell - 1]) / orbit.peak
               for joint in robot.joints]
     head = ','.join(['time', *(joint.name for joint in robot.joints)])
     np.savetxt(tmp_path / 'trot.csv', np.array([t, *angles]).T, delimiter=',', header=head,
                comments='')
-    found = inverted(read_csv(tmp_path / 'trot.csv'), robot, free=('c',), order=1)
+    found = fit_recording(read_csv(tmp_path / 'trot.csv'), robot, free=('c',), order=1)
     assert found.fit.gait == 'trot' and found.fit.network.name == 'twin'
     assert found.stride.frequency == pytest.approx(1.0, abs=1e-4)
     assert found.fit.network.c == pytest.approx(6.5, rel=1e-2)

@@ -17,7 +17,7 @@
 import copy
 from pathlib import Path
 
-from cpg_ros.robots.robot_file import load_robot, RobotError, write_robot
+from cpg_ros.robots.robot_file import read_robot, RobotError, write_robot
 from hypothesis import given, HealthCheck, settings
 from hypothesis import strategies as st
 import numpy as np
@@ -44,7 +44,7 @@ def broken(path, value):
 
 def error_of(path):
     with pytest.raises(RobotError) as caught:
-        load_robot(path)
+        read_robot(path)
     message = str(caught.value)
     assert str(path) in message
     assert len(message.splitlines()) == 1, message
@@ -52,7 +52,7 @@ def error_of(path):
 
 
 def test_the_goat():
-    robot = load_robot(CONFIG / 'goat.yaml')
+    robot = read_robot(CONFIG / 'goat.yaml')
     # docs/theory.md, section The delayed network: cells 1, 7 LH; 2, 8 RH; 3, 5 LF; 4, 6 RF.
     assert [(joint.leg, joint.cell) for joint in robot.joints] == [
         ('lh', 1), ('lh', 7), ('rh', 2), ('rh', 8), ('lf', 3), ('lf', 5), ('rf', 4), ('rf', 6)]
@@ -67,7 +67,7 @@ def test_the_goat():
 
 
 def test_the_quadruped_whose_controllers_have_an_order_of_their_own():
-    robot = load_robot(CONFIG / 'quadruped.yaml')
+    robot = read_robot(CONFIG / 'quadruped.yaml')
     names = [joint.name for joint in robot.joints]
     assert len(names) == 12
     assert sorted(robot.order) == sorted(names) and list(robot.order) != names
@@ -77,7 +77,7 @@ def test_the_quadruped_whose_controllers_have_an_order_of_their_own():
 def test_without_an_order_joints_come_as_in_the_file(tmp_path):
     tree = broken('joint_order', DROP)
     (path := tmp_path / 'robot.yaml').write_text(yaml.safe_dump(tree, sort_keys=False))
-    assert load_robot(path).order == tuple(joint.name for joint in load_robot(path).joints)
+    assert read_robot(path).order == tuple(joint.name for joint in read_robot(path).joints)
 
 
 @pytest.mark.parametrize(('path', 'value', 'words'), [
@@ -156,7 +156,7 @@ PLACES = [f'legs.lh.joints.0.{key}' for key in GOAT['legs']['lh']['joints'][0]] 
 def test_whatever_stands_there_it_loads_or_says_why_not(tmp_path, path, value):
     (file := tmp_path / 'goat.yaml').write_text(yaml.safe_dump(broken(path, value)))
     try:
-        robot = load_robot(file)
+        robot = read_robot(file)
     except RobotError as error:
         assert str(file) in str(error) and len(str(error).splitlines()) == 1
     else:
@@ -165,9 +165,9 @@ def test_whatever_stands_there_it_loads_or_says_why_not(tmp_path, path, value):
 
 @pytest.mark.parametrize('file', sorted(CONFIG.glob('*.yaml')), ids=lambda path: path.stem)
 def test_what_is_written_is_what_is_read(tmp_path, file):
-    robot = load_robot(file)
+    robot = read_robot(file)
     write_robot(tmp_path / file.name, robot, 'two lines\nof comment')
-    assert load_robot(tmp_path / file.name) == robot
+    assert read_robot(tmp_path / file.name) == robot
     assert [path.name for path in tmp_path.iterdir()] == [file.name]
     with pytest.raises(OSError, match='nowhere'):
         write_robot(tmp_path / 'nowhere' / 'robot.yaml', robot)

@@ -21,7 +21,7 @@ from pathlib import Path
 import re
 import signal
 
-from cpg_ros.robots.robot_file import load_robot
+from cpg_ros.robots.robot_file import read_robot
 from geometry_msgs.msg import Wrench
 from graph import EXECUTABLE, Process, until, Watcher
 from nav_msgs.msg import Odometry
@@ -39,7 +39,7 @@ if any(importlib.util.find_spec(name) is None for name in ('mujoco', 'gym_quadru
 
 SIM = EXECUTABLE.with_name('robot_sim')
 WALKER = Path(__file__).parent / 'walker.yaml'
-ROBOT = load_robot(WALKER)
+ROBOT = read_robot(WALKER)
 STAND = np.tile([0.0, 0.9, -1.8], 4)
 
 

@@ -21,7 +21,7 @@ import time
 from cpg_ros.motion.pattern import Pattern
 from cpg_ros.motion.plan import plan
 from cpg_ros.networks.registry import PRESETS
-from cpg_ros.robots.robot_file import find_robot
+from cpg_ros.robots.robot_file import load_robot
 from diagnostic_msgs.msg import DiagnosticStatus
 from graph import until
 import numpy as np
@@ -90,7 +90,7 @@ def test_what_was_missed_is_not_run_through(start, rate, seconds):
 
 @pytest.mark.parametrize('stalls', [[0.5], [0.02], [0.003], [0.3, 0.3], [0.5, 0.004]])
 def test_positions_and_velocities_go_on_together(stalls):
-    robot, dt = find_robot('quadruped'), 0.002
+    robot, dt = load_robot('quadruped'), 0.002
     preset = PRESETS['delayed']['trot']
     pattern = Pattern(plan(robot, 'trot', preset, preset.network, 2.0), ramp=0.2)
     for _ in range(400):

@@ -20,7 +20,7 @@ import time
 from cpg_ros.motion.pattern import Pattern
 from cpg_ros.motion.plan import plan
 from cpg_ros.networks.registry import PRESETS
-from cpg_ros.robots.robot_file import find_robot
+from cpg_ros.robots.robot_file import load_robot
 from diagnostic_msgs.msg import DiagnosticStatus
 from graph import until
 import numpy as np
@@ -30,7 +30,7 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray
 from std_srvs.srv import SetBool
 
-ROBOT = find_robot('quadruped')
+ROBOT = load_robot('quadruped')
 STAND = np.tile([0.0, 0.8, -1.5], 4)
 CROUCH = np.tile([0.2, 1.6, -2.4], 4)
 COMMANDS = 'forward_position_controller/commands'

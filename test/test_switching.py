@@ -20,14 +20,14 @@ from ament_index_python.packages import get_package_share_directory
 from cpg_ros.motion.plan import plan
 from cpg_ros.networks.delayed import PRESETS
 from cpg_ros.networks.symmetry import GAITS
-from cpg_ros.robots.robot_file import load_robot
+from cpg_ros.robots.robot_file import read_robot
 from graph import until
 import numpy as np
 import pytest
 from std_srvs.srv import SetBool
 from switches import by_leg, check_all_switches, off
 
-ROBOT = load_robot(Path(get_package_share_directory('cpg_ros')) / 'config' / 'quadruped.yaml')
+ROBOT = read_robot(Path(get_package_share_directory('cpg_ros')) / 'config' / 'quadruped.yaml')
 OFFSET, LOWER, UPPER = (ROBOT.column(key) for key in ('offset', 'lower', 'upper'))
 # Phases of LH, RH, LF, RF (docs/theory.md, section The delayed network); walk and jump run
 # backward round the ring, as d > 0.

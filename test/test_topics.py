@@ -17,7 +17,7 @@
 from pathlib import Path
 
 from ament_index_python.packages import get_package_share_directory
-from cpg_ros.robots.robot_file import load_robot
+from cpg_ros.robots.robot_file import read_robot
 from diagnostic_msgs.msg import DiagnosticStatus
 from graph import off_grid, until
 import numpy as np
@@ -28,7 +28,7 @@ from std_msgs.msg import Float64MultiArray
 from trajectory_msgs.msg import JointTrajectory
 
 CONFIG = Path(get_package_share_directory('cpg_ros')) / 'config'
-QUADRUPED = load_robot(CONFIG / 'quadruped.yaml')
+QUADRUPED = read_robot(CONFIG / 'quadruped.yaml')
 
 
 def collect(watcher, kind, topic, count=50):

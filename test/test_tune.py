@@ -22,7 +22,7 @@ from cpg_ros.fleet.executors import Fleet
 from cpg_ros.motion.plan import plan
 from cpg_ros.networks.registry import PRESETS
 from cpg_ros.robots.robot import Motion
-from cpg_ros.robots.robot_file import load_robot
+from cpg_ros.robots.robot_file import read_robot
 from cpg_ros.simulation.robot_model import SimulationError
 from go2 import FILE, GO2
 import pytest
@@ -67,7 +67,7 @@ def test_the_tool_writes_a_robot_file_that_can_be_read(quick, tmp_path, capsys, 
     out = tmp_path / 'my_go2.yaml'
     assert tool.main(['--robot', str(FILE), '--model', 'go2', '--gaits', 'trot', '--evaluations',
                       '7', '--seed', '2', '--jobs', '1', '--out', str(out)]) == 1
-    made = load_robot(out)
+    made = read_robot(out)
     assert made.motions['walk'] == GO2.motions['walk'] != made.motions['trot']
     assert made.motions['trot'].frequency and not made.motions['trot'].steering
     preset = PRESETS['delayed']['trot']

@@ -17,7 +17,7 @@
 import math
 
 from cpg_ros.errors import CpgError
-from cpg_ros.robots.robot_file import find_robot
+from cpg_ros.robots.robot_file import load_robot
 from cpg_ros.unitree.models import JOINTS, MODELS
 from cpg_ros.unitree.settings import settings_of
 from cpg_ros.unitree.supervisor import Phase, Supervisor
@@ -26,7 +26,7 @@ import numpy as np
 import pytest
 
 DT = 0.002
-GO2 = settings_of(find_robot('unitree_go2'), MODELS['go2'], [60.0], [2.0])
+GO2 = settings_of(load_robot('unitree_go2'), MODELS['go2'], [60.0], [2.0])
 LIE = np.tile([0.0, 1.36, -2.65], 4)
 
 
@@ -275,17 +275,17 @@ def test_no_command_asks_for_more_torque_than_joints_bear(seed):
     ([math.nan], 'kp: nan is not')])
 def test_gains_are_limited(kp, words):
     with pytest.raises(CpgError, match=words):
-        settings_of(find_robot('unitree_go2'), MODELS['go2'], kp, [2.0])
+        settings_of(load_robot('unitree_go2'), MODELS['go2'], kp, [2.0])
 
 
 def test_gains_for_each_kind_of_joint():
-    settings = settings_of(find_robot('unitree_go2'), MODELS['go2'], [10.0, 20.0, 30.0], [2.0])
+    settings = settings_of(load_robot('unitree_go2'), MODELS['go2'], [10.0, 20.0, 30.0], [2.0])
     assert dict(zip(JOINTS, settings.kp, strict=True))['RL_thigh_joint'] == 20.0
 
 
 def test_another_robot_is_refused():
     with pytest.raises(CpgError, match="'goat' has no joint 'FR_hip_joint'"):
-        settings_of(find_robot('goat'), MODELS['go2'], [60.0], [2.0])
+        settings_of(load_robot('goat'), MODELS['go2'], [60.0], [2.0])
 
 
 # -- the watchdog ------------------------------------------------------------------------------

@@ -24,7 +24,7 @@ from cpg_ros.motion.plan import Refused
 from cpg_ros.networks.delayed import Delayed
 from cpg_ros.networks.registry import PRESETS
 from cpg_ros.recordings.recording import Recording
-from cpg_ros.robots.robot_file import load_robot
+from cpg_ros.robots.robot_file import read_robot
 from cpg_ros.tools.inversion import main
 import numpy as np
 import pytest
@@ -51,7 +51,7 @@ def test_three_cycles_are_written(tmp_path, capsys):
     path = table_of(tmp_path / 'walk.csv', *walked(seconds=1.5, noise=0.01))
     assert trot_found(said_of(capsys, '--csv', path, '--out', tmp_path / 'fitted.yaml'))
     tree = yaml.safe_load((tmp_path / 'fitted.yaml').read_text())['/**']['ros__parameters']
-    assert len(load_robot(tree['robot']).joints) == 8
+    assert len(read_robot(tree['robot']).joints) == 8
 
 
 def test_what_the_generator_would_refuse_is_not_written(tmp_path, capsys, monkeypatch):

@@ -29,11 +29,11 @@ from cpg_ros.integration.stepper import Stepper
 from cpg_ros.motion.pattern import Pattern
 from cpg_ros.motion.plan import plan, Refused
 from cpg_ros.networks.registry import PRESETS
-from cpg_ros.robots.robot_file import load_robot
+from cpg_ros.robots.robot_file import read_robot
 import numpy as np
 import pytest
 
-ROBOTS = {name: load_robot(Path(__file__).parents[1] / 'config' / f'{name}.yaml')
+ROBOTS = {name: read_robot(Path(__file__).parents[1] / 'config' / f'{name}.yaml')
           for name in ('quadruped', 'biped')}
 #: Steep orbits: cells double back, and the angle in their plane hardly turns, or turns back.
 STEEP = [('trot', {'alpha': -0.6549, 'beta': -1.3162, 'gamma': -0.6, 'delta': -0.6}),

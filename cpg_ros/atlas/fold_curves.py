@@ -29,7 +29,7 @@ from cpg_ros.atlas.orbit_curves import Edge
 from cpg_ros.atlas.refinement import places, Sheet
 from cpg_ros.atlas.row_job import NONE, path_of
 from cpg_ros.dynamics.arclength import along, Place, resolved
-from cpg_ros.dynamics.continuation import follow
+from cpg_ros.dynamics.continuation import continue_orbit
 from cpg_ros.dynamics.orbit import NoOrbit, solve_from_path
 from cpg_ros.errors import CpgError
 import numpy as np
@@ -85,7 +85,8 @@ def _folds(chart: Chart, gait: str, edge: Edge) -> list[Place]:
     orbit = solve_from_path(network, network.symmetry(gait), path_of(edge.wave), edge.period)
     if orbit is None:
         raise NoOrbit('the orbit cannot be had')
-    branch = follow(orbit, chart.second.line, chart.second.low, chart.second.high, most=MOST)
+    branch = continue_orbit(orbit, chart.second.line, chart.second.low, chart.second.high,
+                            most=MOST)
     return [point.place for point in branch.folds]
 
 

@@ -20,7 +20,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from cpg_ros.atlas.chart import Chart
-from cpg_ros.dynamics.continuation import from_hopf
+from cpg_ros.dynamics.continuation import continue_from_hopf
 from cpg_ros.dynamics.equilibrium import NoEquilibrium
 from cpg_ros.dynamics.floquet import ATTRACTS, multipliers
 from cpg_ros.dynamics.fourier import collocation
@@ -184,7 +184,7 @@ class _Finder:
                 low, high = ((0.9 * point.value, axis.high) if point.normal_form.side >= 0
                              else (axis.low, 1.1 * point.value))
                 try:
-                    self._branches.append(from_hopf(
+                    self._branches.append(continue_from_hopf(
                         point.network, point.block.symmetry, point.omega, line, low, high,
                         rest=point.state, vector=point.eigenvector, most=MOST))
                 except CpgError:

@@ -119,9 +119,9 @@ class Branch:
         return tuple(found)
 
 
-def follow(orbit: Orbit, along: ParameterLine, low: float, high: float, *,
-           first_step: float = arclength.FIRST, longest_step: float = arclength.LONGEST,
-           most: int = 200, both: bool = True, longest: float = 20.0) -> Branch:
+def continue_orbit(orbit: Orbit, along: ParameterLine, low: float, high: float, *,
+                   first_step: float = arclength.FIRST, longest_step: float = arclength.LONGEST,
+                   most: int = 200, both: bool = True, longest: float = 20.0) -> Branch:
     """Follow a gait's orbit along a line of parameters, past folds.
 
     Args:
@@ -167,12 +167,13 @@ def follow(orbit: Orbit, along: ParameterLine, low: float, high: float, *,
                   (begin, end))
 
 
-def from_hopf(network: Network, symmetry: Symmetry, omega: float,
-              along: ParameterLine, low: float, high: float, *,
-              rest: np.ndarray | None = None, vector: np.ndarray | None = None,
-              amplitude: float = 0.02, first_step: float = arclength.FIRST,
-              longest_step: float = arclength.LONGEST, most: int = 200, longest: float = 20.0
-              ) -> Branch:
+def continue_from_hopf(network: Network, symmetry: Symmetry, omega: float,
+                       along: ParameterLine, low: float, high: float, *,
+                       rest: np.ndarray | None = None, vector: np.ndarray | None = None,
+                       amplitude: float = 0.02, first_step: float = arclength.FIRST,
+                       longest_step: float = arclength.LONGEST, most: int = 200,
+                       longest: float = 20.0
+                       ) -> Branch:
     """Follow the orbits that bifurcate at a Hopf point, whichever side of it they are on.
 
     The first orbit has a given amplitude and the value that goes with it, which near the Hopf
@@ -211,7 +212,7 @@ def from_hopf(network: Network, symmetry: Symmetry, omega: float,
     # Cell 1 peaks at phase 0.
     vector = vector / vector[0]
     _check_vector(vector, symmetry, network)
-    branch = from_disturbance(
+    branch = continue_from_disturbance(
         network, symmetry, along, low, high, lambda theta: np.tile(rest, (theta.size, 1)),
         lambda theta: np.outer(np.exp(2j * np.pi * theta), vector).real, period,
         amplitude=amplitude, first_step=first_step, longest_step=longest_step, most=most,
@@ -219,12 +220,12 @@ def from_hopf(network: Network, symmetry: Symmetry, omega: float,
     return replace(branch, ends=(End('rest', value, period), branch.ends[1]))
 
 
-def from_disturbance(network: Network, symmetry: Symmetry, along: ParameterLine, low: float,
-                     high: float, path: Callable[[np.ndarray], np.ndarray],
-                     disturbance: Callable[[np.ndarray], np.ndarray], period: float, *,
-                     amplitude: float = 0.02, first_step: float = arclength.FIRST,
-                     longest_step: float = arclength.LONGEST, most: int = 200,
-                     longest: float = 20.0) -> Branch:
+def continue_from_disturbance(network: Network, symmetry: Symmetry, along: ParameterLine,
+                              low: float, high: float, path: Callable[[np.ndarray], np.ndarray],
+                              disturbance: Callable[[np.ndarray], np.ndarray], period: float, *,
+                              amplitude: float = 0.02, first_step: float = arclength.FIRST,
+                              longest_step: float = arclength.LONGEST, most: int = 200,
+                              longest: float = 20.0) -> Branch:
     """Follow the orbits that leave a state or another orbit, on whichever side of it they are.
 
     Args:

@@ -22,7 +22,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
-from cpg_ros.dynamics.continuation import from_hopf
+from cpg_ros.dynamics.continuation import continue_from_hopf
 from cpg_ros.dynamics.equilibrium import NoEquilibrium
 from cpg_ros.dynamics.floquet import attracts_with, Multipliers, multipliers, smallest_gain
 from cpg_ros.dynamics.hopf import first_hopf
@@ -155,8 +155,9 @@ def _beyond(network: Network, gait: str, why: str) -> GaitAssessment:
         low, high = sorted((0.9 * point.value, delay)) if point.normal_form.side > 0 else (
             0.5 * delay, 1.1 * point.value)
         try:
-            branch = from_hopf(point.network, point.block.symmetry, point.omega, line, low, high,
-                               rest=point.state, vector=point.eigenvector, most=80)
+            branch = continue_from_hopf(point.network, point.block.symmetry, point.omega, line,
+                                        low, high,
+                                        rest=point.state, vector=point.eigenvector, most=80)
             orbits = branch.at(delay)
         except NoOrbit:
             continue

@@ -21,7 +21,7 @@ belongs to the multiplier 1 or -1, and have the symmetries that this keeps.
 from fractions import Fraction
 
 from cpg_ros.dynamics.bifurcation import Bifurcation
-from cpg_ros.dynamics.continuation import Branch, from_disturbance
+from cpg_ros.dynamics.continuation import Branch, continue_from_disturbance
 from cpg_ros.dynamics.orbit import way
 from cpg_ros.dynamics.periodic import NoOrbit, richer
 from cpg_ros.errors import InputError
@@ -61,7 +61,7 @@ def switched(bifurcation: Bifurcation, along: ParameterLine, low: float, high: f
     symmetry = kept(orbit.symmetry, disturbance(cycles * theta), doubled)
     for amplitude in AMPLITUDES:
         try:
-            found = from_disturbance(
+            found = continue_from_disturbance(
                 orbit.network, symmetry, along, low, high,
                 lambda theta: orbit(cycles * theta * orbit.period),
                 lambda theta: disturbance(cycles * theta), cycles * orbit.period,

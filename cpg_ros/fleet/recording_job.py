@@ -25,7 +25,7 @@ from typing import Any
 from cpg_ros.errors import CpgError
 from cpg_ros.fleet.recordings_found import digest
 from cpg_ros.inversion.parameter_files import robot_file_of, write_fitted
-from cpg_ros.inversion.recording_fit import Inverted, inverted
+from cpg_ros.inversion.recording_fit import fit_recording, RecordingFit
 from cpg_ros.recordings.formats import format_of, read_recording
 from cpg_ros.recordings.recording import Recording
 from cpg_ros.robots.robot import Robot
@@ -93,9 +93,9 @@ def invert_recording(task: Task) -> dict[str, Any]:
         if task.known and row['digest'] == task.known:
             return {'digest': task.known}
         settings = task.settings
-        found = inverted(read(task.recording, settings), settings.robot, settings.network,
-                         settings.gait, settings.free, settings.order, settings.preset,
-                         settings.starts)
+        found = fit_recording(read(task.recording, settings), settings.robot, settings.network,
+                              settings.gait, settings.free, settings.order, settings.preset,
+                              settings.starts)
         row |= {**_facts(found), 'picture': picture(found)}
         row['files'] = _files(task, found)
     except (CpgError, OSError) as error:
@@ -108,7 +108,7 @@ def invert_recording(task: Task) -> dict[str, Any]:
     return row
 
 
-def _facts(found: Inverted) -> dict[str, Any]:
+def _facts(found: RecordingFit) -> dict[str, Any]:
     told = found.as_dict()
     return {'gait': told['gait'], 'recognised': told['recognised'] or '',
             'frequency': told['frequency'], 'frequency_error': told['frequency_error'],
@@ -120,7 +120,7 @@ def _facts(found: Inverted) -> dict[str, Any]:
             'warnings': told['warnings']}
 
 
-def _files(task: Task, found: Inverted) -> dict[str, str]:
+def _files(task: Task, found: RecordingFit) -> dict[str, str]:
     """The parameter file and the robot file, as they will be in their folder."""
     with TemporaryDirectory(prefix='cpg_ros_') as folder:
         written = write_fitted(Path(folder, f'{task.name}.yaml'), found, task.settings.robot,
@@ -128,7 +128,7 @@ def _files(task: Task, found: Inverted) -> dict[str, str]:
         return {path.name: path.read_text() for path in written}
 
 
-def picture(found: Inverted) -> str:
+def picture(found: RecordingFit) -> str:
     """Mean cycles of the joints that move most, recorded and fitted, as a small SVG."""
     recorded, fitted = found.fit.recorded, found.fit.fitted
     span = recorded.max(axis=1) - recorded.min(axis=1)

@@ -16,7 +16,7 @@
 
 from typing import Any
 
-from cpg_ros.inversion.recording_fit import Inverted, POOR
+from cpg_ros.inversion.recording_fit import POOR, RecordingFit
 import matplotlib
 from matplotlib.figure import Figure
 import numpy as np
@@ -57,7 +57,7 @@ def _grid(count: int, height: float) -> tuple[Figure, np.ndarray]:
     return figure, grid.flat[:count]
 
 
-def joints(found: Inverted) -> Figure:
+def joints(found: RecordingFit) -> Figure:
     """Draw the recorded mean cycle with its spread, and the fitted one, joint by joint."""
     fit, stride = found.fit, found.stride
     figure, grid = _grid(len(fit.joints), 1.9)
@@ -82,7 +82,7 @@ def joints(found: Inverted) -> Figure:
     return figure
 
 
-def errors(found: Inverted) -> Figure:
+def errors(found: RecordingFit) -> Figure:
     """Fitted minus recorded at even instants of the cycle, joint by joint."""
     theta, values = found.fit.synchronisation(POINTS)
     figure, grid = _grid(len(found.fit.joints), 1.5)
@@ -95,7 +95,7 @@ def errors(found: Inverted) -> Figure:
     return figure
 
 
-def phases(found: Inverted) -> Figure:
+def phases(found: RecordingFit) -> Figure:
     """Draw the recorded phases of the legs beside those of the gait, round the cycle."""
     matplotlib.use('Agg')
     from matplotlib import pyplot
@@ -131,7 +131,7 @@ def phases(found: Inverted) -> Figure:
     return figure
 
 
-def stretch(found: Inverted) -> Figure:
+def stretch(found: RecordingFit) -> Figure:
     """Draw the whole recording of the joint that moves most, and the stretch in it."""
     matplotlib.use('Agg')
     from matplotlib import pyplot
@@ -156,7 +156,7 @@ def stretch(found: Inverted) -> Figure:
     return figure
 
 
-def convergence(found: Inverted) -> Figure:
+def convergence(found: RecordingFit) -> Figure:
     """Objective and parameters over the iterations of each start."""
     matplotlib.use('Agg')
     from matplotlib import pyplot

@@ -22,7 +22,7 @@ from cpg_ros.files.page_style import STYLE
 from cpg_ros.files.plain_text import table
 from cpg_ros.inversion import fit_figures
 from cpg_ros.inversion.paper_fit import PaperFit
-from cpg_ros.inversion.recording_fit import Inverted
+from cpg_ros.inversion.recording_fit import RecordingFit
 from matplotlib.figure import Figure
 
 FIGURES = (('The recording', fit_figures.stretch),
@@ -32,7 +32,7 @@ FIGURES = (('The recording', fit_figures.stretch),
            ('Convergence', fit_figures.convergence))
 
 
-def _stride(found: Inverted) -> list[str]:
+def _stride(found: RecordingFit) -> list[str]:
     stride, fit = found.stride, found.fit
     named = (f'{stride.gait}' if stride.gait else f'none of the gaits; nearest {stride.nearest}')
     return [
@@ -50,7 +50,7 @@ def _stride(found: Inverted) -> list[str]:
         f'{": a poor fit" if found.poor else ""}.']
 
 
-def parameters(found: Inverted) -> list[tuple[str, ...]]:
+def parameters(found: RecordingFit) -> list[tuple[str, ...]]:
     """Rows of the fitted parameters, with a head."""
     rows: list[tuple[str, ...]] = [('parameter', 'value', 'standard error', '95 % interval')]
     for name, one in found.fit.parameters.items():
@@ -60,7 +60,7 @@ def parameters(found: Inverted) -> list[tuple[str, ...]]:
     return rows
 
 
-def joints(found: Inverted) -> list[tuple[str, ...]]:
+def joints(found: RecordingFit) -> list[tuple[str, ...]]:
     """Rows of the joints' errors, with a head."""
     fit = found.fit
     rms, share = fit.rms, fit.rms_share
@@ -69,7 +69,7 @@ def joints(found: Inverted) -> list[tuple[str, ...]]:
                    for name in fit.joints]
 
 
-def starts(found: Inverted) -> list[tuple[str, ...]]:
+def starts(found: RecordingFit) -> list[tuple[str, ...]]:
     """Rows of the starts as in Liu & Zhang's Tables 1 and 2, with a head."""
     names = list(found.fit.parameters)
     rows: list[tuple[str, ...]] = [('start', 'iterations', 'half the sum of squares', 'end')]
@@ -81,7 +81,7 @@ def starts(found: Inverted) -> list[tuple[str, ...]]:
     return rows
 
 
-def _judged(found: Inverted) -> list[str]:
+def _judged(found: RecordingFit) -> list[str]:
     fit = found.fit
     said = []
     if fit.hopf is not None:
@@ -98,12 +98,12 @@ def _judged(found: Inverted) -> list[str]:
     return said
 
 
-def _shares(found: Inverted) -> str:
+def _shares(found: RecordingFit) -> str:
     return 'Mean RMS error over range by order of the readout: ' + ', '.join(
         f'{order}: {100 * share:.2f} %' for order, share in found.shares.items()) + '.'
 
 
-def as_text(found: Inverted) -> str:
+def as_text(found: RecordingFit) -> str:
     """Return the report for a terminal."""
     notes = [*found.recording.notes, *found.stride.notes]
     lines = [*_stride(found), '', *table(parameters(found), '<>>'), '',
@@ -152,7 +152,7 @@ def _image(figure: Figure, name: str) -> str:
             f'{base64.b64encode(out.getvalue()).decode("ascii")}"></figure>')
 
 
-def _warned(found: Inverted) -> str:
+def _warned(found: RecordingFit) -> str:
     """Return the warnings, before anything else; red where the fit is poor."""
     if not found.warnings:
         return ''
@@ -161,7 +161,7 @@ def _warned(found: Inverted) -> str:
     return f'<table><thead><tr><th>Warnings</th></tr></thead><tbody>{rows}</tbody></table>'
 
 
-def as_html(found: Inverted) -> str:
+def as_html(found: RecordingFit) -> str:
     """Return the report as one page with its figures in it."""
     def paragraphs(lines: list[str]) -> str:
         return '\n'.join(f'<p>{escape(line)}</p>' for line in lines)

@@ -20,11 +20,11 @@ from typing import Any
 
 from cpg_ros.errors import InputError
 from cpg_ros.files.atomic_write import write_atomically
-from cpg_ros.inversion.recording_fit import Inverted
+from cpg_ros.inversion.recording_fit import RecordingFit
 from cpg_ros.motion.plan import plan, Refused
 from cpg_ros.networks.registry import find_network, reference
 from cpg_ros.robots.robot import Joint, Motion, Robot
-from cpg_ros.robots.robot_file import load_robot, write_robot
+from cpg_ros.robots.robot_file import read_robot, write_robot
 import numpy as np
 import yaml
 
@@ -38,7 +38,7 @@ def robot_file_of(path: Path) -> Path:
     return path.with_name(f'{path.stem}_robot.yaml')
 
 
-def fitted_robot(found: Inverted, robot: Robot | None) -> Robot:
+def fitted_robot(found: RecordingFit, robot: Robot | None) -> Robot:
     """Return a robot whose joints move as the recorded ones.
 
     Args:
@@ -73,7 +73,7 @@ def fitted_robot(found: Inverted, robot: Robot | None) -> Robot:
                  motions)
 
 
-def _moved(joint: Joint, found: Inverted) -> Joint:
+def _moved(joint: Joint, found: RecordingFit) -> Joint:
     if joint.name not in found.fit.readouts:
         return joint
     offset, weights = found.fit.readouts[joint.name]
@@ -85,7 +85,7 @@ def _moved(joint: Joint, found: Inverted) -> Joint:
                  joint.velocity)
 
 
-def _guessed(name: str, leg: str, found: Inverted) -> Joint:
+def _guessed(name: str, leg: str, found: RecordingFit) -> Joint:
     fit = found.fit
     offset, weights = fit.readouts[name]
     row = fit.joints.index(name)
@@ -97,7 +97,7 @@ def _guessed(name: str, leg: str, found: Inverted) -> Joint:
                  float(angles.max()) + room, max(FASTER * fastest, 1.0))
 
 
-def parameter_tree(found: Inverted, robot: Path) -> dict[str, Any]:
+def parameter_tree(found: RecordingFit, robot: Path) -> dict[str, Any]:
     """Return the generator's parameters as ``--params-file`` takes them, for any node name."""
     fit = found.fit
     return {'/**': {'ros__parameters': {
@@ -112,11 +112,11 @@ def _planned(parameters: Path, robot: Path) -> None:
     tree = yaml.safe_load(parameters.read_text())['/**']['ros__parameters']
     kind = find_network(tree['network'])
     network = kind(**tree[kind.name])
-    plan(load_robot(robot), tree['gait'], kind.presets()[tree['gait']], network,
+    plan(read_robot(robot), tree['gait'], kind.presets()[tree['gait']], network,
          tree['frequency'], tree['amplitude'])
 
 
-def write_fitted(path: Path, found: Inverted, robot: Robot | None = None,
+def write_fitted(path: Path, found: RecordingFit, robot: Robot | None = None,
                  named: Path | None = None) -> list[Path]:
     """Write the parameter file, and beside it the robot file that it names.
 

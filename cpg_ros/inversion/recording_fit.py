@@ -47,7 +47,7 @@ ORDERS = (1, 2, 3)
 
 
 @dataclass(frozen=True, eq=False)
-class Inverted:
+class RecordingFit:
     """What came of a recording.
 
     Attributes:
@@ -191,10 +191,10 @@ def _phases_as_estimates(fit: Fit, stride: Stride) -> dict[str, Estimate]:
     return found
 
 
-def inverted(recording: Recording, robot: Robot | None = None, network: str = '', gait: str = '',
-             free: Sequence[str] = (), order: int = 3, preset: str = '',
-             starts: Sequence[Mapping[str, float]] = ({},),
-             done: Callable[[float], None] = lambda share: None) -> Inverted:
+def fit_recording(recording: Recording, robot: Robot | None = None, network: str = '',
+                  gait: str = '', free: Sequence[str] = (), order: int = 3, preset: str = '',
+                  starts: Sequence[Mapping[str, float]] = ({},),
+                  done: Callable[[float], None] = lambda share: None) -> RecordingFit:
     """Find the steady gait of a recording and fit a network's gait and readouts to it.
 
     Args:
@@ -248,9 +248,9 @@ def inverted(recording: Recording, robot: Robot | None = None, network: str = ''
         parameters = as_recorded
     fit, given_up = fit_at_all(stride, cells, parameters, gait, free, order, starts, done)
     fit = replace(fit, parameters={**_phases_as_estimates(fit, stride), **fit.parameters})
-    found = Inverted(recording, read, legs, stride, fit,
-                     {order: fit.share_at(order) for order in ORDERS},
-                     (*warnings, *given_up, *fit.warnings))
+    found = RecordingFit(recording, read, legs, stride, fit,
+                         {order: fit.share_at(order) for order in ORDERS},
+                         (*warnings, *given_up, *fit.warnings))
     if not found.poor:
         return found
     return replace(found, warnings=(

@@ -49,7 +49,7 @@ from cpg_ros.nodes.real_time import NoSuchCore, RealTime, SPECS
 from cpg_ros.nodes.rivals import Rivals
 from cpg_ros.nodes.senses_input import CONTACTS
 from cpg_ros.robots.robot import Robot
-from cpg_ros.robots.robot_file import find_robot, RobotError
+from cpg_ros.robots.robot_file import load_robot, RobotError
 from rcl_interfaces.msg import ParameterType, SetParametersResult
 from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, QoSProfile
@@ -94,7 +94,7 @@ class Generator(StartedNode):
         self._list_gaits(network, presets)
         self._one_of('command', COMMANDS)
         try:
-            robot = find_robot(self._value('robot'))
+            robot = load_robot(self._value('robot'))
         except RobotError as error:
             raise StartError(str(error)) from error
         if network.name not in robot.networks:

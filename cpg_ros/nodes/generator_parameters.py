@@ -28,7 +28,7 @@ from cpg_ros.networks.registry import find_network, NETWORKS, with_legs_of
 from cpg_ros.nodes import real_time
 from cpg_ros.nodes.parameter_spec import Spec
 from cpg_ros.robots.robot import Robot
-from cpg_ros.robots.robot_file import find_robot
+from cpg_ros.robots.robot_file import load_robot
 from rclpy.parameter import Parameter
 
 COMMANDS = ('none', 'joint_trajectory', 'forward_position')
@@ -80,7 +80,7 @@ def network_for(network: Any, robot: Any) -> Any:
     if not (isinstance(network, str) and isinstance(robot, str)):
         return network
     with contextlib.suppress(CpgError):
-        kind, found = find_network(network), find_robot(robot)
+        kind, found = find_network(network), load_robot(robot)
         like = with_legs_of(kind, found.legs).name
         if kind.name not in found.networks and like in found.networks:
             return like

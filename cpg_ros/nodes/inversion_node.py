@@ -27,7 +27,7 @@ from cpg_ros.errors import CpgError
 from cpg_ros.files.atomic_write import write_atomically
 from cpg_ros.files.plain_text import finite
 from cpg_ros.inversion.parameter_files import write_fitted
-from cpg_ros.inversion.recording_fit import Inverted, inverted
+from cpg_ros.inversion.recording_fit import fit_recording, RecordingFit
 from cpg_ros.networks.registry import is_path
 from cpg_ros.nodes import node_base as starting
 from cpg_ros.nodes.node_base import StartedNode, StartError
@@ -35,7 +35,7 @@ from cpg_ros.nodes.parameter_spec import Spec
 from cpg_ros.recordings.live_buffer import Live
 from cpg_ros.recordings.servo import Servo
 from cpg_ros.robots.robot import Robot
-from cpg_ros.robots.robot_file import find_robot
+from cpg_ros.robots.robot_file import load_robot
 from rcl_interfaces.msg import SetParametersResult
 from rcl_interfaces.srv import SetParametersAtomically
 from rclpy.callback_groups import ReentrantCallbackGroup
@@ -87,7 +87,7 @@ class Inversion(StartedNode):
         for name, spec in SPECS.items():
             self._declare(name, spec)
         name = self._value('robot')
-        self._robot: Robot | None = find_robot(name) if name else None
+        self._robot: Robot | None = load_robot(name) if name else None
         if not self.get_parameter_or('topics').value:
             raise StartError('parameter topics must not be empty')
         for topic in self._value('topics'):
@@ -187,8 +187,8 @@ class Inversion(StartedNode):
             names = () if robot is None else [joint.name for joint in robot.joints]
             kp, kd = self._value('kp'), self._value('kd')
             recording = heard.recording(names, True, Servo(kp, kd) if kp else None)
-            found = inverted(recording, robot, self._value('network'), self._value('gait'),
-                             free, self._value('order'), self._value('preset'))
+            found = fit_recording(recording, robot, self._value('network'), self._value('gait'),
+                                  free, self._value('order'), self._value('preset'))
             work.set_result(('; '.join([_summary(found), *self._written(found)]), found))
         except (CpgError, OSError) as error:
             work.set_result((str(error), None))
@@ -197,7 +197,7 @@ class Inversion(StartedNode):
             self.get_logger().error('a fit failed:\n' + traceback.format_exc())
             work.set_result((f'{type(error).__name__}: {error}', None))
 
-    def _written(self, found: Inverted) -> list[str]:
+    def _written(self, found: RecordingFit) -> list[str]:
         written = []
         if self._value('out'):
             written += write_fitted(Path(self._value('out')).expanduser(), found, self._robot)
@@ -209,7 +209,7 @@ class Inversion(StartedNode):
             written.append(path)
         return [f'written: {", ".join(map(str, written))}'] if written else []
 
-    async def _applied(self, target: str, found: Inverted) -> str:
+    async def _applied(self, target: str, found: RecordingFit) -> str:
         """Set a running generator; return why that failed, or ''."""
         name = f'{target}/set_parameters_atomically'
         try:
@@ -236,7 +236,7 @@ class Inversion(StartedNode):
             self.destroy_client(client)
 
 
-def _summary(found: Inverted) -> str:
+def _summary(found: RecordingFit) -> str:
     fit = found.fit
     values = ', '.join(f'{name} {one.value:.4g} +- {one.stderr:.2g}'
                        for name, one in fit.parameters.items())

@@ -28,7 +28,7 @@ from cpg_ros.nodes.parameter_spec import Spec
 from cpg_ros.nodes.sensor_publishers import Measurements
 from cpg_ros.nodes.shutdown import endings
 from cpg_ros.robots.robot import Robot
-from cpg_ros.robots.robot_file import find_robot, RobotError
+from cpg_ros.robots.robot_file import load_robot, RobotError
 from cpg_ros.simulation.body import Body
 from cpg_ros.simulation.camera import without_opengl
 from cpg_ros.simulation.inertial_unit import InertialUnit
@@ -133,7 +133,7 @@ class RobotSim(StartedNode):
         film, footfalls = (Path(name).expanduser() if name else None
                            for name in map(self._value, ('film', 'footfalls')))
         try:
-            robot = find_robot(self._value('robot'))
+            robot = load_robot(self._value('robot'))
             self._one_of('terrain', TERRAINS)
             terrain = None
             if self._value('terrain') in GROUNDS:

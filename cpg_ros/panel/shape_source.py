@@ -24,7 +24,7 @@ from cpg_ros.files.shared_resources import share
 from cpg_ros.panel import stick_figure, urdf_shape
 from cpg_ros.panel.body_shape import Shape
 from cpg_ros.robots.robot import Robot
-from cpg_ros.robots.robot_file import find_robot, RobotError
+from cpg_ros.robots.robot_file import load_robot, RobotError
 from cpg_ros.robots.urdf import load_urdf
 
 #: Robot files of this package -> the model or the URDF that goes with each.
@@ -59,7 +59,7 @@ def shipped_robot(name: str) -> Robot | None:
     """
     shipped = {file.stem for file in (share() / 'config').glob('*.yaml')}
     try:
-        return find_robot(name) if name in shipped else None
+        return load_robot(name) if name in shipped else None
     except RobotError:  # what else is in that folder
         return None
 

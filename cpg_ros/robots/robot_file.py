@@ -201,7 +201,7 @@ class _Reader(Reader):
         return Steering(**rows)
 
 
-def load_robot(path: str | Path) -> Robot:
+def read_robot(path: str | Path) -> Robot:
     """Read and check a robot file.
 
     Raises:
@@ -288,7 +288,7 @@ def _alike(cells: Mapping[str, tuple[int, ...]], others: Mapping[str, tuple[int,
     return set(cells) == set(others) and all(cells[leg][0] == others[leg][0] for leg in cells)
 
 
-def find_robot(name: str) -> Robot:
+def load_robot(name: str) -> Robot:
     """Load a robot file, or a shipped one by its bare name.
 
     Raises:
@@ -296,16 +296,16 @@ def find_robot(name: str) -> Robot:
 
     """
     if name.endswith(('.yaml', '.yml')) or '/' in name:
-        return load_robot(Path(name).expanduser())
+        return read_robot(Path(name).expanduser())
     path = share() / 'config' / f'{name}.yaml'
     if not path.is_file():
         shipped = ', '.join(sorted(file.stem for file in path.parent.glob('*.yaml')))
         raise RobotError(f"robot '{name}' is neither a .yaml file nor one of: {shipped}")
-    return load_robot(path)
+    return read_robot(path)
 
 
 def write_robot(path: str | Path, robot: Robot, comment: str = '') -> None:
-    """Write a robot file that load_robot reads back; the name is that of the file."""
+    """Write a robot file that read_robot reads back; the name is that of the file."""
     tree: dict[str, Any] = {'network': [reference(name) for name in robot.networks],
                             'assignment': robot.assignment,
                             'harmonics': robot.harmonics, 'joint_order': list(robot.order),

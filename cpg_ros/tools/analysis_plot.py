@@ -20,7 +20,7 @@ from itertools import chain, count, pairwise
 from typing import Literal
 
 from cpg_ros.dynamics.bifurcation import bifurcations
-from cpg_ros.dynamics.continuation import Branch, follow, from_hopf
+from cpg_ros.dynamics.continuation import Branch, continue_from_hopf, continue_orbit
 from cpg_ros.dynamics.floquet import ATTRACTS, multipliers
 from cpg_ros.dynamics.hopf import HopfPoint
 from cpg_ros.dynamics.orbit import NoOrbit, Orbit
@@ -94,8 +94,9 @@ def branches(analysis: Analysis) -> list[tuple[str, Branch]]:
         orbit = verdict.orbit
         if low <= value <= high and orbit is not None and not any(
                 gait == verdict.gait and _holds(branch, value, orbit) for gait, branch in found):
-            found.append((verdict.gait, follow(orbit, analysis.along, low, high, most=POINTS,
-                                               longest_step=LONGEST, longest=SLOWEST)))
+            found.append((verdict.gait,
+                          continue_orbit(orbit, analysis.along, low, high, most=POINTS,
+                                         longest_step=LONGEST, longest=SLOWEST)))
     return found
 
 
@@ -118,9 +119,10 @@ def _born(point: HopfPoint, analysis: Analysis) -> list[Branch]:
     """Return the branch of a Hopf point; none where the first orbit cannot be found."""
     low, high = analysis.span
     try:
-        return [from_hopf(point.network, point.block.symmetry, point.omega, analysis.along, low,
-                          high, rest=point.state, vector=point.eigenvector, most=POINTS,
-                          longest=SLOWEST, longest_step=LONGEST)]
+        return [continue_from_hopf(point.network, point.block.symmetry, point.omega,
+                                   analysis.along, low,
+                                   high, rest=point.state, vector=point.eigenvector, most=POINTS,
+                                   longest=SLOWEST, longest_step=LONGEST)]
     except NoOrbit:
         return []
 

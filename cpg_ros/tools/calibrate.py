@@ -30,7 +30,7 @@ from cpg_ros.errors import CpgError, InputError
 from cpg_ros.files.plain_text import table
 from cpg_ros.files.regular_file import read_bytes
 from cpg_ros.robots.robot import Robot
-from cpg_ros.robots.robot_file import find_robot, write_robot
+from cpg_ros.robots.robot_file import load_robot, write_robot
 from cpg_ros.tools.command_line import note, Parser, run, say
 
 DESCRIPTION = """\
@@ -108,7 +108,7 @@ def _calibrate(chosen: argparse.Namespace) -> int:
     out = chosen.out or Path(chosen.robot)
     if out.suffix not in ('.yaml', '.yml'):
         raise InputError(f'argument --out: {out} does not end in .yaml')
-    robot = find_robot(chosen.robot)
+    robot = load_robot(chosen.robot)
     rows: list[tuple[str, ...]] = [('from', 'gait', 'speed [m/s]', 'strides')]
     if chosen.model:
         robot = _simulated(robot, chosen)

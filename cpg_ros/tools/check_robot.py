@@ -32,7 +32,7 @@ from cpg_ros.errors import InputError
 from cpg_ros.files.plain_text import as_json
 from cpg_ros.networks.registry import NETWORKS
 from cpg_ros.robots.robot import Robot
-from cpg_ros.robots.robot_file import find_robot, write_robot
+from cpg_ros.robots.robot_file import load_robot, write_robot
 from cpg_ros.robots.urdf import load_urdf, UrdfJoint
 from cpg_ros.robots.urdf_links import load_links
 from cpg_ros.tools.arguments import number
@@ -81,7 +81,7 @@ def _checked(chosen: Namespace) -> RobotCheck:
         if value is not None and not (isfinite(value) and 0.0 <= value <= highest):
             raise InputError(f'--{option}: {value:g} is not from 0 to {highest:g}')
     urdf = load_urdf(chosen.urdf)
-    robot = find_robot(chosen.robot) if chosen.make is None else _made(chosen, urdf)
+    robot = load_robot(chosen.robot) if chosen.make is None else _made(chosen, urdf)
     known = [name for network in robot.networks for name in NETWORKS[network].presets()]
     for name in chosen.gaits:
         if name not in known:
@@ -101,7 +101,7 @@ def _made(chosen: Namespace, urdf: dict[str, UrdfJoint]) -> Robot:
     robot, says = replace(robot, geometry=geometry), f'{says}\n{said}'
     write_robot(chosen.make, robot, COMMENT.format(urdf=chosen.urdf.name, says=says))
     note('check_robot', f'wrote {chosen.make}, check what it takes each joint for:\n{says}')
-    return find_robot(str(chosen.make.absolute()))
+    return load_robot(str(chosen.make.absolute()))
 
 
 def _check(chosen: Namespace) -> int:

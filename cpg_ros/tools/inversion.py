@@ -36,12 +36,12 @@ from cpg_ros.gaits.leg_names import BIPED, QUADRUPED
 from cpg_ros.inversion.model_choice import as_rows, Explained, explained, undecided
 from cpg_ros.inversion.paper_fit import paper_fits, PaperFit, refuse_others
 from cpg_ros.inversion.parameter_files import write_fitted
-from cpg_ros.inversion.recording_fit import Inverted, inverted, network_of, preset_of
+from cpg_ros.inversion.recording_fit import fit_recording, network_of, preset_of, RecordingFit
 from cpg_ros.networks.registry import SHIPPED
 from cpg_ros.recordings.formats import FORMATS, read_recording
 from cpg_ros.recordings.recording import Recording
 from cpg_ros.robots.robot import Robot
-from cpg_ros.robots.robot_file import find_robot
+from cpg_ros.robots.robot_file import load_robot
 from cpg_ros.tools.arguments import assignment, refuse_repeated
 from cpg_ros.tools.command_line import note, Parser, run, say
 from cpg_ros.tools.reading_options import (
@@ -173,7 +173,7 @@ def _invert_many(chosen: Namespace, robot: Robot | None, starts: list[dict[str, 
 
 def _invert(chosen: Namespace) -> int:
     _refuse_options(chosen)
-    robot = None if chosen.robot is None else find_robot(chosen.robot)
+    robot = None if chosen.robot is None else load_robot(chosen.robot)
     starts = [dict(start) for start in chosen.start] or [{}]
     if chosen.paper:
         refuse_others(robot, chosen.network or '')
@@ -182,9 +182,9 @@ def _invert(chosen: Namespace) -> int:
     recording = _recording(chosen, robot)
     network, compared = _explained(chosen, recording, robot)
     with progress_bar('fitting', 100) as bar:
-        found = inverted(recording, robot, network, chosen.gait or '',
-                         chosen.free, chosen.order, chosen.preset or '', starts,
-                         done=lambda share: bar(round(100.0 * share)))
+        found = fit_recording(recording, robot, network, chosen.gait or '',
+                              chosen.free, chosen.order, chosen.preset or '', starts,
+                              done=lambda share: bar(round(100.0 * share)))
     fits = _paper(chosen, found, starts)
     written = _written(chosen, found, robot)
     if chosen.json:
@@ -218,7 +218,7 @@ def _explained(chosen: Namespace, recording: Recording, robot: Robot | None
     return found[0].network, found
 
 
-def _paper(chosen: Namespace, found: Inverted, starts: list[dict[str, float]]
+def _paper(chosen: Namespace, found: RecordingFit, starts: list[dict[str, float]]
            ) -> list[PaperFit]:
     """Fit as the paper does, if that is wanted."""
     if not chosen.paper:
@@ -228,7 +228,7 @@ def _paper(chosen: Namespace, found: Inverted, starts: list[dict[str, float]]
                       list(found.fit.parameters), starts)
 
 
-def _written(chosen: Namespace, found: Inverted, robot: Robot | None) -> list[Path]:
+def _written(chosen: Namespace, found: RecordingFit, robot: Robot | None) -> list[Path]:
     written = [] if chosen.out is None else write_fitted(chosen.out, found, robot)
     if chosen.report is not None:
         # matplotlib takes half a second, and only pages need it.

@@ -29,7 +29,7 @@ from cpg_ros.files.plain_text import table
 from cpg_ros.fleet.options import add_options, executor_for
 from cpg_ros.networks.registry import NETWORKS
 from cpg_ros.robots.robot import Robot
-from cpg_ros.robots.robot_file import find_robot, LIMITS, write_robot
+from cpg_ros.robots.robot_file import LIMITS, load_robot, write_robot
 from cpg_ros.simulation.gait_design import AIMS
 from cpg_ros.simulation.tuning import GOOD, LONG, tune, Tuned
 from cpg_ros.tools.arguments import number, refuse_repeated
@@ -115,7 +115,7 @@ def _refuse_options(chosen: argparse.Namespace) -> None:
 
 def _tune(chosen: argparse.Namespace) -> int:
     _refuse_options(chosen)
-    robot, report = find_robot(chosen.robot), partial(note, 'tune')
+    robot, report = load_robot(chosen.robot), partial(note, 'tune')
     if chosen.gaits is None:
         known = NETWORKS[robot.networks[0]].gaits()
         chosen.gaits = [gait for gait in AIMS if gait in known]

@@ -30,7 +30,7 @@ from cpg_ros.nodes import feedback_parameters, generator_parameters, inversion_n
 from cpg_ros.nodes.parameter_spec import Spec
 from cpg_ros.nodes.unitree import parameters as unitree_parameters
 from cpg_ros.panel import panel_node
-from cpg_ros.robots.robot_file import find_robot
+from cpg_ros.robots.robot_file import load_robot
 from docutils import nodes
 import graph_names
 import launch_files
@@ -94,7 +94,7 @@ def parameters(what: str) -> str:
     if what == 'inversion':
         return table(HEAD, parameter_rows(inversion_node.SPECS))
     usual = SHIPPED['delayed' if what == 'generator' else what]
-    planner = generator_parameters.Planner(usual, usual.presets(), find_robot(usual.usual_robot))
+    planner = generator_parameters.Planner(usual, usual.presets(), load_robot(usual.usual_robot))
     own = planner.specs(usual.usual_gait)
     frequency = {'frequency': own.pop('frequency')}
     if what != 'generator':

@@ -20,7 +20,7 @@ from unittest.mock import patch
 
 from cpg_ros.files.yaml_reader import Reader
 from cpg_ros.networks.registry import SHIPPED
-from cpg_ros.robots.robot_file import find_robot
+from cpg_ros.robots.robot_file import load_robot
 
 #: Keys that are names of the user's own, or of the network's.
 NAMED = {'legs': 'LEG', 'gaits': 'GAIT', 'joints': 'JOINT'}
@@ -41,9 +41,9 @@ def asked_for() -> dict[str, bool]:
                 found[f'{place}.{key}'.removeprefix('file.')] = key in required
         return ask(self, tree, where, required, optional)
 
-    names = {joint.name for joint in find_robot('unitree_go2').joints}
+    names = {joint.name for joint in load_robot('unitree_go2').joints}
     with patch.object(Reader, 'keys', noted):
-        find_robot('unitree_go2')
+        load_robot('unitree_go2')
     return found
 
 

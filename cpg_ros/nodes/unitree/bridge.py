@@ -36,7 +36,7 @@ from cpg_ros.nodes.unitree.sensors import Sensors
 from cpg_ros.nodes.unitree.start import Start
 from cpg_ros.nodes.unitree.watchdog_link import WatchdogLink
 from cpg_ros.nodes.unserved import subscribe, taken
-from cpg_ros.robots.robot_file import find_robot
+from cpg_ros.robots.robot_file import load_robot
 from cpg_ros.unitree.low_state import BUTTONS
 from cpg_ros.unitree.models import MODELS
 from cpg_ros.unitree.participants import Announcements
@@ -79,7 +79,7 @@ class UnitreeBridge(StartedNode):
         try:
             kinds = message('unitree_go/LowCmd'), message('unitree_go/LowState')
             message('unitree_api/Request')
-            robot = find_robot(value('robot'))
+            robot = load_robot(value('robot'))
             settings = settings_of(
                 robot, MODELS[value('model')], list(value('kp')), list(value('kd')),
                 value('torque_factor'), period=period, tilt=math.radians(value('tilt')),
