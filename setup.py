@@ -26,10 +26,10 @@ import signal
 if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
     signal.signal(signal.SIGINT, lambda *_: os._exit(130))
 
-from cpg_ros.tools.executables import {name}
+from cpg_ros.tools.executables import start
 
 if __name__ == '__main__':
-    raise SystemExit({name}())
+    raise SystemExit(start('{name}'))
 """
 
 

@@ -21,13 +21,21 @@ the program that calls: nothing here catches it, so that it is never reported as
 from importlib.util import find_spec
 import sys
 from types import TracebackType
+from typing import ClassVar
 
 
 class CpgError(ValueError):
     """What was asked for cannot be done; the message says what and why, in one line.
 
     Its kinds are in the files whose functions raise them.
+
+    Attributes:
+        exit_code: of a tool that it ends: 2 for unusable input; kinds that are a negative result,
+            such as a recording without a gait, have 1.
+
     """
+
+    exit_code: ClassVar[int] = 2
 
 
 class InputError(CpgError):

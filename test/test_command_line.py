@@ -15,17 +15,20 @@
 """Every executable: help, and words that are not for it."""
 
 from functools import partial
+from importlib.metadata import EntryPoint
 import os
 from pathlib import Path
 import resource
 import signal
 import subprocess
 
+from cpg_ros.tools.executables import EXECUTABLES
 from graph import EXECUTABLE, free_domain, Process
+from launch_files import executables
 import pytest
 
 NODES = ('generator', 'robot_sim', 'inversion', 'panel')
-TOOLS = ('demo', 'analyze', 'check_robot', 'optimize', 'reproduce', 'tune')
+TOOLS = ('demo', 'analyze', 'check_robot', 'optimize', 'reproduce', 'tune', 'calibrate', 'atlas')
 
 
 def run(executable, *words):
@@ -42,6 +45,18 @@ def test_help(executable, word):
     assert found.stdout.startswith('usage: ') and executable in found.stdout
     if executable in ('generator', 'robot_sim'):
         assert '\n  command  ' in found.stdout
+
+
+def test_the_entry_points_of_setup_are_the_executables(monkeypatch, capsys):
+    assert executables() == set(EXECUTABLES)
+    loaded = EntryPoint('analyze', 'cpg_ros.tools.executables:analyze', 'console_scripts').load()
+    monkeypatch.setattr('sys.argv', ['analyze', '--set', 'x'])
+    monkeypatch.setattr('signal.signal', lambda *_: None)
+    with pytest.raises(SystemExit) as ended:
+        loaded()
+    assert ended.value.code == 2
+    assert capsys.readouterr().err.endswith("analyze: argument --set: 'x' is not of the form "
+                                            'name=value\n')
 
 
 @pytest.mark.parametrize(('executable', 'words', 'said'), [

@@ -136,7 +136,7 @@ def test_run_starts_every_executable():
     (['param', 'set', 'gait', '{a: 1}'], 2, "'{a: 1}' is not a parameter value"),
     (['--node', 'a b', 'gait', 'walk'], 2, 'Invalid service name'),
     (['topic', 'echo', 'a b'], 2, 'topic name must not contain'),
-    (['play', '/nowhere'], 1, '/nowhere: no such bag'),
+    (['play', '/nowhere'], 2, '/nowhere: no such bag'),
     (['play', '/nowhere', '--rate', '0'], 2, "'0' is not positive"),
     (['run', 'dance'], 2, 'dance'),
     (['dance'], 2, 'dance')])

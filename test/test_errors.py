@@ -30,6 +30,8 @@ def test_every_error_of_the_package_is_of_the_family():
              if issubclass(one, BaseException) and one.__module__.startswith('cpg_ros')}
     assert len(found) > 10
     assert all(issubclass(one, CpgError) for one in found)
+    # 1 is a negative result, 2 unusable input.
+    assert {one.exit_code for one in found} == {1, 2}
 
 
 def broken(*_, **__):

@@ -40,6 +40,17 @@ def test_one_line_says_how_to_get_it(missing, module):
     assert f'needs {missing}' in line and f'pip install {missing}' in line
 
 
+@pytest.mark.parametrize(('missing', 'executable'), [
+    ('numba', 'generator'), ('numba', 'analyze'), ('rosbags', 'inversion')])
+def test_an_executable_without_a_library_ends_in_one_line_with_its_name(missing, executable):
+    found = run(missing, f"""
+from cpg_ros.tools.executables import start
+sys.exit(start({executable!r}))""")
+    assert found.returncode == 2 and not found.stdout
+    (line,) = found.stderr.splitlines()
+    assert line.startswith(f'{executable}: cpg_ros needs {missing}')
+
+
 @pytest.mark.parametrize(('missing', 'module'), [
     ('numba', 'cpg_ros'), ('numba', 'cpg_ros.networks.registry'),
     ('rosbags', 'cpg_ros.nodes.generator'), ('matplotlib', 'cpg_ros.nodes.generator'),

@@ -16,7 +16,8 @@
 
 from argparse import ArgumentParser, Namespace
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from concurrent.futures import Executor
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 
 from cpg_ros.errors import InputError
 from cpg_ros.fleet.executors import cluster, Fleet, processes
@@ -24,6 +25,8 @@ from cpg_ros.fleet.tls import Certificates
 
 #: More processes than this are a mistake.
 MOST = 1024
+#: What Ctrl-C leaves of jobs whose results are kept as they come.
+KEPT = 'stopped; what was finished is kept, and the same command continues from there'
 
 
 def add_options(parser: ArgumentParser) -> None:
@@ -77,3 +80,19 @@ def working(chosen: Namespace, what: str, say: Callable[[str], None]) -> Iterato
         fleet.shutdown(wait=False)
         raise
     fleet.shutdown()
+
+
+def executor_for(count: int, chosen: Namespace, what: str, say: Callable[[str], None]
+                 ) -> AbstractContextManager[Executor | None]:
+    """Return the fleet for jobs, or None for a single one, which runs in this process.
+
+    Args:
+        count: number of jobs.
+        chosen: options; with --dask, a single job is sent, too.
+        what: as of working.
+        say: as of working.
+
+    """
+    if count == 1 and not (chosen.dask or chosen.tls):
+        return nullcontext()
+    return working(chosen, what, say)

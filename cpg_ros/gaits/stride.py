@@ -67,6 +67,8 @@ DRIFT = 0.04
 class NoSteadyGait(CpgError):
     """A recording has no steady gait; the message says what it has instead."""
 
+    exit_code = 1
+
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Stride(ShortRepr):

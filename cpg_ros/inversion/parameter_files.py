@@ -132,7 +132,7 @@ def write_fitted(path: str | Path, found: RecordingFit, robot: Robot | None = No
         The files written.
 
     Raises:
-        Refused: the robot's limits do not let a joint move so.
+        InputError: the robot's limits do not let a joint move so.
         CpgError: as in fitted_robot.
         OSError: a file cannot be written.
 
@@ -152,8 +152,8 @@ def write_fitted(path: str | Path, found: RecordingFit, robot: Robot | None = No
         try:
             _planned(parameters, joints)
         except Refused as error:
-            raise Refused(f'{found.recording.source}: robot {moved.name} cannot do this: '
-                          f'{error}') from error
+            raise InputError(f'{found.recording.source}: robot {moved.name} cannot do this: '
+                             f'{error}') from error
         joints.replace(beside)
         parameters.replace(path)
     return [path, beside]

@@ -41,6 +41,8 @@ SAME = 1e-6
 class Refused(CpgError):
     """The request cannot be run; the message says why, with the figures."""
 
+    exit_code = 1
+
 
 class OutOfLimits(Refused):
     """A joint would leave its limits.

@@ -25,6 +25,8 @@ from cpg_ros.errors import CpgError
 class UnknownType(CpgError):
     """A type of messages that is not installed here; one line."""
 
+    exit_code = 1
+
 
 def message_class(kind: str) -> Any:
     """Return the class of a type such as sensor_msgs/msg/JointState.

@@ -46,6 +46,8 @@ POLL = 0.01
 class CallError(CpgError):
     """A node refused, or did not answer; one line for the user."""
 
+    exit_code = 1
+
 
 class NoService(CallError):
     """A service is not on the graph.

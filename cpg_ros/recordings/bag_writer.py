@@ -27,6 +27,8 @@ from rosbags.typesys import get_types_from_msg, get_typestore, Stores
 class BagError(CpgError):
     """A bag cannot be written; one line."""
 
+    exit_code = 1
+
 
 class BagWriter:
     """Writes a bag in MCAP beside its place, and moves it there at the end.

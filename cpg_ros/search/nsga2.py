@@ -40,6 +40,8 @@ SAME, LARGEST = 0.1, 1.0
 class NothingFound(CpgError):
     """No set passed; the message says how close the search came."""
 
+    exit_code = 1
+
 
 @dataclass(frozen=True)
 class Front:

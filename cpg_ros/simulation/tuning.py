@@ -63,6 +63,8 @@ GENTLE = (0.0, 0.25, 0.5, 0.75, 1.0)
 class NoDesign(SimulationError):
     """None of a gait's designs can be run; the message says what is in the way."""
 
+    exit_code = 1
+
 
 @dataclass(frozen=True)
 class Tuned:

@@ -18,7 +18,7 @@ Imports every room; nothing imports it.
 """
 
 __all__ = ['analysis_plot', 'analysis_report', 'analyze', 'arguments', 'atlas', 'bag_playing',
-           'bag_recording', 'calibrate', 'check_robot', 'completion', 'cpg', 'demo', 'demo_course',
-           'executables', 'gait_diagram', 'graph_topics', 'inversion', 'inversion_many',
+           'bag_recording', 'calibrate', 'check_robot', 'command_line', 'completion', 'cpg',
+           'demo', 'demo_course', 'executables', 'gait_diagram', 'graph_topics', 'inversion',
            'network_options', 'optimize', 'reading_options', 'reproduce', 'reproduction_report',
            'tune']

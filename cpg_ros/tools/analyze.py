@@ -19,20 +19,21 @@ in which gaits, from which delay on, how large and how fast, and how stable each
 centre manifold, in the full network, and with the symmetry lock.
 """
 
-from argparse import Namespace, RawDescriptionHelpFormatter
+from argparse import Namespace
 from collections.abc import Sequence
 from pathlib import Path
 import sys
 
 from cpg_ros.dynamics.gait_assessment import verdicts
-from cpg_ros.errors import CpgError, InputError
+from cpg_ros.errors import InputError
 from cpg_ros.files.atomic_write import write_atomically
 from cpg_ros.files.plain_text import as_json
 from cpg_ros.files.progress_bar import progress_bar
 from cpg_ros.networks.parameter_line import ParameterLine
 from cpg_ros.networks.registry import SHIPPED
 from cpg_ros.tools.analysis_report import Analysis
-from cpg_ros.tools.arguments import interval, number, Parser, say
+from cpg_ros.tools.arguments import interval, number
+from cpg_ros.tools.command_line import Parser, run, say
 from cpg_ros.tools.network_options import add_network_options, chosen_network
 import numpy as np
 
@@ -52,8 +53,7 @@ LONGEST = 100.0
 
 
 def _parser() -> Parser:
-    parser = Parser(prog='analyze', description=DESCRIPTION, epilog=EPILOG,
-                    formatter_class=RawDescriptionHelpFormatter)
+    parser = Parser(prog='analyze', description=DESCRIPTION, epilog=EPILOG)
     add_network_options(parser)
     parser.add_argument('--longest-delay', type=number, metavar='TAU', help='find Hopf points of '
                         'the delayed network up to this delay, model time (default: twice tau)')
@@ -75,7 +75,7 @@ def _parser() -> Parser:
 def _analysed(chosen: Namespace) -> Analysis:
     if chosen.plot is not None and not chosen.plot.absolute().parent.is_dir():
         raise InputError(f'--plot: there is no folder {chosen.plot.parent}')
-    network = chosen_network(chosen.network, chosen.preset, chosen.set)
+    network = chosen_network(chosen)
     longest = 2.0 * network.delay if chosen.longest_delay is None else chosen.longest_delay
     if not 0.0 <= longest <= LONGEST:
         raise InputError(f'--longest-delay: {longest:g} is not from 0 to {LONGEST:g}')
@@ -95,24 +95,19 @@ def _analysed(chosen: Namespace) -> Analysis:
     return Analysis(network, found, along, span, longest)
 
 
+def _analyze(chosen: Namespace) -> int:
+    found = _analysed(chosen)
+    if chosen.plot is not None:
+        # matplotlib takes half a second, and only pictures need it.
+        from cpg_ros.tools.analysis_plot import picture
+        write_atomically(chosen.plot, picture(found, chosen.plot.suffix))
+    say(as_json(found.as_dict()) if chosen.json else found.text())
+    return 0
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     """Analyse a parameter set; return the exit code."""
-    chosen = _parser().parse_args(sys.argv[1:] if arguments is None else arguments)
-    try:
-        found = _analysed(chosen)
-        if chosen.plot is not None:
-            # matplotlib takes half a second, and only pictures need it.
-            from cpg_ros.tools.analysis_plot import picture
-            write_atomically(chosen.plot, picture(found, chosen.plot.suffix))
-        said = as_json(found.as_dict()) if chosen.json else found.text()
-    except (CpgError, OSError) as error:
-        print(f'analyze: {error}', file=sys.stderr)
-        return 2
-    except KeyboardInterrupt:
-        print('analyze: stopped', file=sys.stderr)
-        return 130
-    say(said)
-    return 0
+    return run(_parser(), _analyze, arguments)
 
 
 if __name__ == '__main__':

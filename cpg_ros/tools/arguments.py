@@ -12,23 +12,12 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What the command-line tools share: arguments that are refused in one line, and printing."""
+"""What the tools' options take: numbers, name=value, low:high, names without repetition."""
 
 import argparse
-import os
-import sys
-from typing import NoReturn
+from collections.abc import Sequence
 
-from cpg_ros.files.plain_text import printable
-
-
-class Parser(argparse.ArgumentParser):
-    """Says what is wrong in one line, with code 2."""
-
-    def error(self, message: str) -> NoReturn:
-        """Print the message and end."""
-        print(f'{self.prog}: {message}', file=sys.stderr)
-        sys.exit(2)
+from cpg_ros.errors import InputError
 
 
 def number(text: str) -> float:
@@ -70,15 +59,29 @@ def interval(text: str) -> tuple[float, float]:
     return number(low), number(high)
 
 
-def twice(names: list[str]) -> str:
-    """Return a name that is there twice, or ''."""
-    return next((name for name in names if names.count(name) > 1), '')
+def named_interval(text: str, name: str = 'name') -> tuple[str, tuple[float, float]]:
+    """Read ``name=low:high``, where the name may be a line of parameters, as ``alpha=beta``.
+
+    Args:
+        text: to read.
+        name: what the message calls the name.
+
+    Raises:
+        argparse.ArgumentTypeError: it is not of this form.
+
+    """
+    line, sign, limits = text.rpartition('=')
+    if not (line and sign and ':' in limits):
+        raise argparse.ArgumentTypeError(f"'{text}' is not of the form {name}=low:high")
+    return line, interval(limits)
 
 
-def say(text: str) -> None:
-    """Print to a reader that may leave, as in ``... | head -1``."""
-    try:
-        print(printable(text), flush=True)
-    except BrokenPipeError:
-        # Python flushes once more at its end: into nothing.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+def refuse_repeated(option: str, names: Sequence[str]) -> None:
+    """Refuse names that an option has twice.
+
+    Raises:
+        InputError: one is; the message begins with the option.
+
+    """
+    if name := next((name for name in names if names.count(name) > 1), ''):
+        raise InputError(f'{option}: {name} is given twice')

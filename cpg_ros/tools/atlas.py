@@ -20,6 +20,7 @@ its refinement need, follows the exact boundaries, and draws the map.
 
 import argparse
 from collections.abc import Iterable, Iterator, Sequence
+from functools import partial
 from itertools import chain
 from pathlib import Path
 import sys
@@ -33,14 +34,14 @@ from cpg_ros.atlas.orbit_curves import edges, orbit_curves
 from cpg_ros.atlas.refinement import refined, Sheet
 from cpg_ros.atlas.row_job import assess_row, Row
 from cpg_ros.atlas.stored import Stored
-from cpg_ros.errors import CpgError
 from cpg_ros.fleet.executors import Fleet
-from cpg_ros.fleet.options import add_options, working
+from cpg_ros.fleet.options import add_options, KEPT, working
 from cpg_ros.fleet.outcomes import outcomes
 from cpg_ros.fleet.results_table import library
 from cpg_ros.fleet.tally import Tally
 from cpg_ros.networks.network import known
-from cpg_ros.tools.arguments import interval, Parser, say, twice
+from cpg_ros.tools.arguments import named_interval, refuse_repeated
+from cpg_ros.tools.command_line import note, Parser, run, say
 from cpg_ros.tools.network_options import add_network_options, chosen_network
 
 DESCRIPTION = """\
@@ -55,13 +56,6 @@ with --interactive. Run the same command again to continue where it stopped.
 exit codes: 0 drawn, 2 invalid arguments, 130 stopped (finished parts are kept)."""
 
 
-def _over(text: str) -> tuple[str, tuple[float, float]]:
-    line, sign, limits = text.rpartition('=')
-    if not (line and sign and ':' in limits):
-        raise argparse.ArgumentTypeError(f"'{text}' is not of the form parameter=low:high")
-    return line, interval(limits)
-
-
 def _points(text: str) -> tuple[int, int]:
     one, sign, other = text.partition('x')
     if not (one.isdecimal() and (other.isdecimal() or not sign)):
@@ -70,10 +64,10 @@ def _points(text: str) -> tuple[int, int]:
 
 
 def _parser() -> Parser:
-    parser = Parser(prog='atlas', description=DESCRIPTION, epilog=EPILOG,
-                    formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = Parser(prog='atlas', description=DESCRIPTION, epilog=EPILOG)
     add_network_options(parser)
-    parser.add_argument('--over', nargs=2, required=True, type=_over, metavar='PARAMETER=LOW:HIGH',
+    parser.add_argument('--over', nargs=2, required=True, metavar='PARAMETER=LOW:HIGH',
+                        type=partial(named_interval, name='parameter'),
                         help='the two parameters, or lines of them, such as alpha=beta=0:0.5')
     parser.add_argument('--gaits', nargs='+', default=[], metavar='GAIT',
                         help='gaits to map (default: all)')
@@ -87,12 +81,8 @@ def _parser() -> Parser:
     return parser
 
 
-def _note(line: str) -> None:
-    print(f'atlas: {line}', file=sys.stderr)
-
-
 def _planned(chosen: argparse.Namespace) -> tuple[Chart, tuple[str, ...]]:
-    base = chosen_network(chosen.network, chosen.preset, chosen.set)
+    base = chosen_network(chosen)
     for gait in chosen.gaits:
         known(gait, base.gaits())
     return (chart_of(chosen.network, base, chosen.over, chosen.points),
@@ -152,34 +142,27 @@ def _called(job: tuple[Any, ...]) -> Any:
     return function(told)
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Draw an atlas; return the exit code."""
-    parser = _parser()
-    chosen = parser.parse_args(sys.argv[1:] if arguments is None else arguments)
-    if name := twice(chosen.gaits):
-        parser.error(f'{name} is given twice')
-    try:
-        library()
-        chart, gaits = _planned(chosen)
-        with working(chosen, '', _note) as fleet:
-            sheets, curves, written = drawn(chart, gaits, fleet, chosen.out)
-        if chosen.interactive:
-            # Only pages need it.
-            from cpg_ros.atlas.map_page import write_page
-            written.append(write_page(chosen.out / 'index.html', chart, sheets, curves))
-    except (CpgError, OSError) as error:
-        print(f'atlas: {error}', file=sys.stderr)
-        return 2
-    except KeyboardInterrupt:
-        print('atlas: stopped; what was finished is kept, and the same command continues from '
-              'there', file=sys.stderr)
-        return 130
+def _map(chosen: argparse.Namespace) -> int:
+    refuse_repeated('argument --gaits', chosen.gaits)
+    library()
+    chart, gaits = _planned(chosen)
+    with working(chosen, '', partial(note, 'atlas')) as fleet:
+        sheets, curves, written = drawn(chart, gaits, fleet, chosen.out)
+    if chosen.interactive:
+        # Only pages need it.
+        from cpg_ros.atlas.map_page import write_page
+        written.append(write_page(chosen.out / 'index.html', chart, sheets, curves))
     counted = ', '.join(f'{gait} {100 * (sheet.label > 0).mean():.0f} %'
                         for gait, sheet in sheets.items())
     say(f'share of the plane in which each gait exists: {counted}\n'
         f'boundaries: {", ".join(f"{c.kind} of {c.gait}" for c in curves) or "none"}\n'
         f'written: {", ".join(map(str, written))}')
     return 0
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Draw an atlas; return the exit code."""
+    return run(_parser(), _map, arguments, KEPT)
 
 
 if __name__ == '__main__':

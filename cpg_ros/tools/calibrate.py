@@ -20,19 +20,18 @@ the gait that the bag has; ``calibrate --model go2 --robot ...`` measures it in 
 
 import argparse
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 import sys
 
 from cpg_ros.calibration.recorded_efference import Calibrated, efference_from, with_efference
 from cpg_ros.calibration.walk_recording import read_walk, TYPES
-from cpg_ros.errors import CpgError
+from cpg_ros.errors import CpgError, InputError
 from cpg_ros.files.plain_text import table
 from cpg_ros.files.regular_file import read_bytes
-from cpg_ros.gaits.stride import NoSteadyGait
-from cpg_ros.motion.plan import Refused
 from cpg_ros.robots.robot import Robot
 from cpg_ros.robots.robot_file import load_robot, write_robot
-from cpg_ros.tools.arguments import Parser, say
+from cpg_ros.tools.command_line import note, Parser, run, say
 
 DESCRIPTION = """\
 Measure a gait's efference copy: the velocity, tilt and angular rates of the base that result from
@@ -52,8 +51,7 @@ exit codes: 0 written, 1 a gait cannot be achieved, 2 invalid arguments or an un
 
 
 def _parser() -> Parser:
-    parser = Parser(prog='calibrate', description=DESCRIPTION, epilog=EPILOG,
-                    formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = Parser(prog='calibrate', description=DESCRIPTION, epilog=EPILOG)
     parser.add_argument('bags', nargs='*', metavar='BAG', help='bags, each with one gait at one '
                         'speed')
     parser.add_argument('--robot', required=True, metavar='FILE',
@@ -79,8 +77,7 @@ def _parser() -> Parser:
 def _simulated(robot: Robot, chosen: argparse.Namespace) -> Robot:
     from cpg_ros.simulation.efference_measurement import calibrated
     gaits = chosen.gait or list(robot.motions)
-    return calibrated(robot, chosen.model, gaits, lambda gait: print(f'calibrate: {gait}',
-                                                                     file=sys.stderr, flush=True))
+    return calibrated(robot, chosen.model, gaits, partial(note, 'calibrate'))
 
 
 def _recorded(robot: Robot, chosen: argparse.Namespace) -> tuple[Robot, list[Calibrated]]:
@@ -99,39 +96,36 @@ def _comment(path: Path) -> str:
     return '\n'.join(line[1:].removeprefix(' ') for line in lines[:first])
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Calibrate; return the exit code."""
-    parser = _parser()
-    chosen = parser.parse_args(sys.argv[1:] if arguments is None else arguments)
+def _calibrate(chosen: argparse.Namespace) -> int:
     if bool(chosen.bags) == bool(chosen.model):
-        parser.error('give either bags or --model MODEL')
+        raise InputError('give either bags or --model MODEL')
     if chosen.bags and len(chosen.gait) not in (0, 1, len(chosen.bags)):
-        parser.error(f'argument --gait: {len(chosen.gait)} gaits for {len(chosen.bags)} bags')
+        raise InputError(f'argument --gait: {len(chosen.gait)} gaits for {len(chosen.bags)} '
+                         'bags')
     if len(chosen.speed) not in (0, len(chosen.bags)):
-        parser.error(f'argument --speed: {len(chosen.speed)} speeds for {len(chosen.bags)} bags')
+        raise InputError(f'argument --speed: {len(chosen.speed)} speeds for {len(chosen.bags)} '
+                         'bags')
     out = chosen.out or Path(chosen.robot)
     if out.suffix not in ('.yaml', '.yml'):
-        parser.error(f'argument --out: {out} does not end in .yaml')
-    try:
-        robot = load_robot(chosen.robot)
-        rows: list[tuple[str, ...]] = [('from', 'gait', 'speed [m/s]', 'strides')]
-        if chosen.model:
-            robot = _simulated(robot, chosen)
-            rows += [(chosen.model, gait, ', '.join(f'{speed:.3f}' for speed in measured.speeds),
-                      '') for gait in chosen.gait or robot.motions
-                     if (measured := robot.motions[gait].efference) is not None]
-        else:
-            robot, found = _recorded(robot, chosen)
-            rows += [(one.source, one.gait, f'{one.speed:.3f}', str(one.cycles)) for one in found]
-        write_robot(out, robot, _comment(Path(chosen.robot)))
-    except (CpgError, OSError) as error:
-        print(f'calibrate: {error}', file=sys.stderr)
-        return 1 if isinstance(error, NoSteadyGait | Refused) else 2
-    except KeyboardInterrupt:
-        print('calibrate: stopped, nothing written', file=sys.stderr)
-        return 130
+        raise InputError(f'argument --out: {out} does not end in .yaml')
+    robot = load_robot(chosen.robot)
+    rows: list[tuple[str, ...]] = [('from', 'gait', 'speed [m/s]', 'strides')]
+    if chosen.model:
+        robot = _simulated(robot, chosen)
+        rows += [(chosen.model, gait, ', '.join(f'{speed:.3f}' for speed in measured.speeds),
+                  '') for gait in chosen.gait or robot.motions
+                 if (measured := robot.motions[gait].efference) is not None]
+    else:
+        robot, found = _recorded(robot, chosen)
+        rows += [(one.source, one.gait, f'{one.speed:.3f}', str(one.cycles)) for one in found]
+    write_robot(out, robot, _comment(Path(chosen.robot)))
     say('\n'.join([*table(rows, '<<><'), f'written: {out}']))
     return 0
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Calibrate; return the exit code."""
+    return run(_parser(), _calibrate, arguments, 'stopped, nothing written')
 
 
 if __name__ == '__main__':

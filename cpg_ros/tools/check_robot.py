@@ -19,7 +19,7 @@ gait. ``check_robot --urdf my.urdf --make my_robot.yaml`` writes a first robot f
 takes a MuJoCo model instead.
 """
 
-from argparse import Namespace, RawDescriptionHelpFormatter
+from argparse import Namespace
 from collections.abc import Sequence
 from dataclasses import replace
 from math import isfinite
@@ -29,7 +29,7 @@ import sys
 from cpg_ros.checks.leg_shapes import geometry_from, usable
 from cpg_ros.checks.robot_template import robot_from
 from cpg_ros.checks.urdf_match import checked, RobotCheck
-from cpg_ros.errors import CpgError, InputError
+from cpg_ros.errors import InputError
 from cpg_ros.files.plain_text import as_json
 from cpg_ros.networks.registry import NETWORKS
 from cpg_ros.robots.body_keys import BodyGeometry
@@ -42,7 +42,8 @@ from cpg_ros.simulation.leg_geometry import read_geometry
 from cpg_ros.simulation.mjcf_description import load_mjcf
 from cpg_ros.simulation.model_indices import Anatomy
 from cpg_ros.simulation.robot_model import find_model, SimulationError
-from cpg_ros.tools.arguments import number, Parser, say
+from cpg_ros.tools.arguments import number
+from cpg_ros.tools.command_line import note, Parser, run, say
 
 DESCRIPTION = """\
 Compare a robot file with the robot's URDF or MuJoCo model (MJCF): report joints that are missing
@@ -64,8 +65,7 @@ the small amplitudes are guesses to start from. Tune it in simulation before it 
 
 
 def _parser() -> Parser:
-    parser = Parser(prog='check_robot', description=DESCRIPTION, epilog=EPILOG,
-                    formatter_class=RawDescriptionHelpFormatter)
+    parser = Parser(prog='check_robot', description=DESCRIPTION, epilog=EPILOG)
     parser.add_argument('robot', nargs='?', metavar='ROBOT',
                         help='robot file, or the name of a shipped one')
     source = parser.add_mutually_exclusive_group(required=True)
@@ -118,8 +118,7 @@ def _made(chosen: Namespace, known: RobotDescription) -> Robot:
     source = find_model(chosen.mjcf) if chosen.urdf is None else chosen.urdf
     write_robot(chosen.make, robot, COMMENT.format(source=source.name, format=known.format,
                                                    says=says))
-    print(f'check_robot: wrote {chosen.make}, check what it takes each joint for:\n{says}',
-          file=sys.stderr)
+    note('check_robot', f'wrote {chosen.make}, check what it takes each joint for:\n{says}')
     return load_robot(str(chosen.make.absolute()))
 
 
@@ -130,22 +129,15 @@ def _geometry(chosen: Namespace, robot: Robot, known: RobotDescription) -> BodyG
     return read_geometry(body, Anatomy(body))
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Check a robot file; return the exit code."""
-    chosen = _parser().parse_args(sys.argv[1:] if arguments is None else arguments)
-    try:
-        found = _checked(chosen)
-    except OSError as error:
-        print(f'check_robot: {error.filename}: {error.strerror}', file=sys.stderr)
-        return 2
-    except CpgError as error:
-        print(f'check_robot: {error}', file=sys.stderr)
-        return 2
-    except KeyboardInterrupt:
-        print('check_robot: stopped', file=sys.stderr)
-        return 130
+def _check(chosen: Namespace) -> int:
+    found = _checked(chosen)
     say(as_json(found.as_dict()) if chosen.json else found.text())
     return 1 if found.faults else 0
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Check a robot file; return the exit code."""
+    return run(_parser(), _check, arguments)
 
 
 if __name__ == '__main__':

@@ -37,6 +37,8 @@ PATIENCE = 4.0
 class NoCompletion(CpgError):
     """The library is not installed."""
 
+    exit_code = 1
+
 
 def complete(parser: ArgumentParser) -> None:
     """Print completions and end, if a shell asks for them."""

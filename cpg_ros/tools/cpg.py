@@ -18,19 +18,21 @@
 ros2 comes with ROS and is not on PyPI.
 """
 
-from argparse import ArgumentTypeError, Namespace, RawDescriptionHelpFormatter, REMAINDER
+from argparse import ArgumentTypeError, Namespace, REMAINDER
 import asyncio
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 import signal
 import sys
 from typing import Any, TYPE_CHECKING
 
-from cpg_ros.errors import CpgError
+from cpg_ros.errors import InputError
 from cpg_ros.files.yaml_reader import parsed
 from cpg_ros.tools import completion
-from cpg_ros.tools.arguments import number, Parser, say
-from cpg_ros.tools.executables import PLACES, start
+from cpg_ros.tools.arguments import number
+from cpg_ros.tools.command_line import Parser, run, say
+from cpg_ros.tools.executables import EXECUTABLES, start
 import yaml
 
 if TYPE_CHECKING:
@@ -57,8 +59,7 @@ exit codes: 0 done, 1 refused, or nothing answered in time, 2 wrong arguments.""
 
 def parser() -> Parser:
     """Return the arguments of the executable."""
-    made = Parser(prog='cpg', description=DESCRIPTION, epilog=EPILOG,
-                  formatter_class=RawDescriptionHelpFormatter)
+    made = Parser(prog='cpg', description=DESCRIPTION, epilog=EPILOG)
     made.add_argument('--node', default='/cpg_generator', metavar='NAME',
                       help='node to talk to (default: %(default)s)')
     made.add_argument('--wait', type=number, default=60.0, metavar='S',
@@ -68,10 +69,10 @@ def parser() -> Parser:
     def add(group: Any, name: str, text: str) -> Any:
         return group.add_parser(name, help=text, description=text.capitalize() + '.')
 
-    run = add(actions, 'run', 'run an executable of the package')
-    run.add_argument('executable', choices=[name for name in PLACES if name != 'cpg'],
+    one = add(actions, 'run', 'run an executable of the package')
+    one.add_argument('executable', choices=[name for name in EXECUTABLES if name != 'cpg'],
                      metavar='EXECUTABLE')
-    run.add_argument('arguments', nargs=REMAINDER, metavar='...',
+    one.add_argument('arguments', nargs=REMAINDER, metavar='...',
                      help='arguments of the executable')
     gait = add(actions, 'gait', 'switch the gait')
     gait.add_argument('gait', metavar='NAME').completer = completion.gaits
@@ -140,15 +141,16 @@ def rate(text: str) -> float:
 
 
 def _called(chosen: Namespace, node: 'Node') -> str:
-    from cpg_ros.nodes.node_client import NodeClient, NoService, ServiceClients
+    from cpg_ros.nodes.node_client import CallError, NodeClient, NoService, ServiceClients
     other = NodeClient(ServiceClients(node, chosen.wait), chosen.node)
     try:
         return asyncio.run(_call(chosen, other))
     except NoService as error:
-        raise CpgError(f'{other.name} does not answer (no service {error.service})') from error
+        raise CallError(f'{other.name} does not answer (no service {error.service})') from error
 
 
 async def _call(chosen: Namespace, other: 'NodeClient') -> str:
+    from cpg_ros.nodes.node_client import CallError
     from std_srvs.srv import SetBool, Trigger
     if chosen.action in ('enable', 'disable'):
         return await other.command(SetBool, 'enable', data=chosen.action == 'enable')
@@ -161,7 +163,7 @@ async def _call(chosen: Namespace, other: 'NodeClient') -> str:
     elif chosen.what == 'get':
         value, = await other.values([chosen.parameter])
         if value is None:
-            raise CpgError(f"{other.name} has no parameter '{chosen.parameter}'")
+            raise CallError(f"{other.name} has no parameter '{chosen.parameter}'")
         return str(value)
     else:
         names = await other.parameters()
@@ -203,50 +205,54 @@ _DOERS = {'param': _called, 'gait': _called, 'enable': _called, 'disable': _call
           'reset': _called, 'topic': _listened, 'record': _recorded, 'play': _played}
 
 
+@contextmanager
+def _graph() -> Iterator['Node']:
+    """Join the graph with a node.
+
+    Raises:
+        InputError: rclpy refuses the name of a node or topic, or the domain in the environment.
+
+    """
+    import rclpy
+    from rclpy.exceptions import NameValidationException
+    from rclpy.signals import SignalHandlerOptions
+    from rclpy.utilities import try_shutdown
+    # A shell that starts it in the background would have it deaf to Ctrl-C.
+    for one in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(one, signal.default_int_handler)
+    try:
+        # The context stays valid while a signal ends what goes on.
+        rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
+        yield rclpy.create_node('cpg', enable_rosout=False)
+    except (NameValidationException, RuntimeError) as error:
+        # What follows is about the sources of rclpy.
+        raise InputError(str(error).splitlines()[0].partition(', at /')[0]) from error
+    finally:
+        try_shutdown()
+
+
+def _do(chosen: Namespace) -> int:
+    if chosen.action == 'run':
+        sys.argv = [chosen.executable, *chosen.arguments]
+        return start(chosen.executable)
+    if chosen.action == 'completion':
+        told = completion.shell_code()
+    else:
+        with _graph() as node:
+            told = _DOERS[chosen.action](chosen, node)
+    if told:
+        say(told)
+    return 0
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     """Do one thing; return the exit code."""
     made = parser()
     completion.complete(made)
     words = list(sys.argv[1:] if arguments is None else arguments)
-    if words and words[0] in PLACES and words[0] != 'cpg':
+    if words and words[0] in EXECUTABLES and words[0] != 'cpg':
         words.insert(0, 'run')
-    chosen = made.parse_args(words)
-    if chosen.action == 'completion':
-        try:
-            say(completion.shell_code())
-        except CpgError as error:
-            print(f'cpg: {error}', file=sys.stderr)
-            return 1
-        return 0
-    if chosen.action == 'run':
-        sys.argv = [chosen.executable, *chosen.arguments]
-        return start(chosen.executable)
-    # A shell that starts it in the background would have it deaf to Ctrl-C.
-    for one in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(one, signal.default_int_handler)
-    import rclpy
-    from rclpy.exceptions import NameValidationException
-    from rclpy.signals import SignalHandlerOptions
-    from rclpy.utilities import try_shutdown
-    try:
-        # The context stays valid while a signal ends what goes on.
-        rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
-        told = _DOERS[chosen.action](chosen, rclpy.create_node('cpg', enable_rosout=False))
-    except CpgError as error:
-        print(f'cpg: {error}', file=sys.stderr)
-        return 1
-    except (NameValidationException, RuntimeError) as error:
-        # The name of a node or topic, or the domain in the environment; what follows is about
-        # the sources of rclpy.
-        print(f"cpg: {str(error).splitlines()[0].partition(', at /')[0]}", file=sys.stderr)
-        return 2
-    except KeyboardInterrupt:
-        return 130
-    finally:
-        try_shutdown()
-    if told:
-        say(told)
-    return 0
+    return run(made, _do, words, stopped='')
 
 
 if __name__ == '__main__':

@@ -18,6 +18,7 @@
 generator's parameter ``gait``, by itself or as typed. A film and a footfall diagram are left.
 """
 
+from argparse import HelpFormatter, Namespace
 import asyncio
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, ExitStack
@@ -32,11 +33,11 @@ import threading
 import time
 
 from ament_index_python.packages import get_package_prefix
-from cpg_ros.errors import CpgError
+from cpg_ros.errors import CpgError, InputError
 from cpg_ros.nodes.node_client import CallError, NodeClient, RequestRefused, ServiceClients
 from cpg_ros.nodes.qos_profiles import latched
 from cpg_ros.tools import demo_course
-from cpg_ros.tools.arguments import Parser, say
+from cpg_ros.tools.command_line import Parser, run, say
 from nav_msgs.msg import Odometry
 import rclpy
 from rclpy.node import Node
@@ -56,6 +57,8 @@ RATE = 500
 
 class DemoError(CpgError):
     """The demonstration cannot go on; one line for the user."""
+
+    exit_code = 1
 
 
 class Operator(Node):
@@ -258,8 +261,9 @@ def wait_for(operator: Operator, interruption: Interruption) -> None:
 
 def parser() -> Parser:
     """Arguments of the executable."""
-    made = Parser(prog='demo', description='Simulate a walking Unitree Go2, or a hexapod. Type '
-                  'the name of a gait and Enter to switch to it, q to quit.')
+    made = Parser(prog='demo', formatter_class=HelpFormatter, description='Simulate a walking '
+                  'Unitree Go2, or a hexapod. Type the name of a gait and Enter to switch to it, '
+                  'q to quit.')
     made.add_argument('--gaits', nargs='+', metavar='GAIT', help='tour of gaits (default: '
                       f'{" ".join(TOUR)}; for the hexapod {" ".join(SIX_LEGS)})')
     made.add_argument('--hexapod', action='store_true', help='use a robot with six legs')
@@ -276,21 +280,23 @@ def parser() -> Parser:
     return made
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the demonstration; return 0, or 1 if the nodes failed, or 2 for wrong arguments."""
-    chosen = parser().parse_args(arguments)
+def demonstrate(chosen: Namespace) -> int:
+    """Run the demonstration; return 0, or 1 if the nodes failed.
+
+    Raises:
+        DemoError: a node ended, does not answer, or is not the only one.
+        InputError: options that do not go together.
+        OSError: there can be no folder for the files.
+
+    """
     if not chosen.every > 0.0:
-        parser().error(f'argument --every: {chosen.every:g} must be positive')
+        raise InputError(f'argument --every: {chosen.every:g} must be positive')
     if chosen.hexapod and chosen.course:
-        parser().error('argument --course: not with --hexapod, which has no feedback')
+        raise InputError('argument --course: not with --hexapod, which has no feedback')
     robot, model = ('hexapod', 'hexapod') if chosen.hexapod else ('unitree_go2', 'go2')
     chosen.gaits = chosen.gaits or list(SIX_LEGS if chosen.hexapod else TOUR)
     film, footfalls = chosen.out / f'{model}.gif', chosen.out / 'footfalls.png'
-    try:
-        chosen.out.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        print(f'demo: {chosen.out}: {error.strerror}', file=sys.stderr)
-        return 2
+    chosen.out.mkdir(parents=True, exist_ok=True)
     body = ['robot_sim', '-p', 'lockstep:=true', '-p', f'rate:={RATE}.0',
             '-p', f'footfalls:={footfalls}', '-p', f'robot:={robot}', '-p', f'model:={model}']
     if not chosen.no_film:
@@ -326,13 +332,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 guide(operator, chosen.gaits, None if chosen.drive else chosen.every, interruption)
     except KeyboardInterrupt:
         pass
-    except DemoError as error:
-        print(f'demo: {error}', file=sys.stderr)
-        return 1
     finally:
         try_shutdown()
     # One that was still starting, and was ended by our signal, did not fail.
     return 1 if any(node.returncode not in (0, -signal.SIGTERM) for node in nodes) else 0
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the demonstration; return the exit code."""
+    return run(parser(), demonstrate, arguments)
 
 
 if __name__ == '__main__':

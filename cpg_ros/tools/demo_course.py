@@ -16,7 +16,7 @@
 
 from collections.abc import Callable
 
-from cpg_ros.tools.arguments import say
+from cpg_ros.tools.command_line import say
 from geometry_msgs.msg import Twist, Wrench
 from nav_msgs.msg import Odometry
 import rclpy

@@ -14,6 +14,8 @@
 
 """The executables: each loads what it runs, and can be interrupted while it does."""
 
+from collections.abc import Callable
+from functools import partial
 from importlib import import_module
 import os
 import signal
@@ -21,14 +23,16 @@ import sys
 from types import FrameType
 from typing import NoReturn
 
+from cpg_ros.errors import MissingLibraryError
+
 #: The signals by which users, terminals and launch files end a process.
 ENDINGS = signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT
 #: Executable -> module whose ``main`` it runs.
-PLACES = {'generator': 'nodes.generator', 'robot_sim': 'nodes.robot_sim',
-          'unitree_bridge': 'nodes.unitree.bridge', 'panel': 'panel.panel_node',
-          **{name: f'tools.{name}'
-             for name in ('inversion', 'cpg', 'demo', 'analyze', 'check_robot', 'optimize',
-                          'reproduce', 'tune', 'calibrate', 'atlas')}}
+EXECUTABLES = {'generator': 'nodes.generator', 'robot_sim': 'nodes.robot_sim',
+               'unitree_bridge': 'nodes.unitree.bridge', 'panel': 'panel.panel_node',
+               **{name: f'tools.{name}'
+                  for name in ('inversion', 'cpg', 'demo', 'analyze', 'check_robot', 'optimize',
+                               'reproduce', 'tune', 'calibrate', 'atlas')}}
 
 
 def start(name: str) -> int:
@@ -38,14 +42,17 @@ def start(name: str) -> int:
         print(f'{name}: stopped', file=sys.stderr, flush=True)
         os._exit(128 + number)
 
-    heeded = [number for number in ENDINGS if signal.getsignal(number) != signal.SIG_IGN]
-    for number in heeded:
-        signal.signal(number, leave)
-    main = import_module(f'cpg_ros.{PLACES[name]}').main
+    # Nodes heed SIGINT also where a script has started them in the background, as launches may.
+    before = {number: signal.signal(number, leave) for number in ENDINGS
+              if number != signal.SIGHUP or signal.getsignal(number) != signal.SIG_IGN}
     try:
-        for number in heeded:
-            signal.signal(number, signal.default_int_handler if number == signal.SIGINT
-                          else signal.SIG_DFL)
+        main = import_module(f'cpg_ros.{EXECUTABLES[name]}').main
+    except MissingLibraryError as error:
+        print(f'{name}: {error}', file=sys.stderr)
+        return error.exit_code
+    try:
+        for number, handler in before.items():
+            signal.signal(number, signal.default_int_handler if callable(handler) else handler)
         code: int = main()
     except KeyboardInterrupt:
         # What it runs has not begun to handle it.
@@ -53,71 +60,8 @@ def start(name: str) -> int:
     return code
 
 
-def generator() -> int:
-    """Run the executable generator; return its exit code."""
-    return start('generator')
-
-
-def robot_sim() -> int:
-    """Run the executable robot_sim; return its exit code."""
-    return start('robot_sim')
-
-
-def unitree_bridge() -> int:
-    """Run the executable unitree_bridge; return its exit code."""
-    return start('unitree_bridge')
-
-
-def panel() -> int:
-    """Run the executable panel; return its exit code."""
-    return start('panel')
-
-
-def inversion() -> int:
-    """Run the executable inversion; return its exit code."""
-    return start('inversion')
-
-
-def cpg() -> int:
-    """Run the executable cpg; return its exit code."""
-    return start('cpg')
-
-
-def demo() -> int:
-    """Run the executable demo; return its exit code."""
-    return start('demo')
-
-
-def analyze() -> int:
-    """Run the executable analyze; return its exit code."""
-    return start('analyze')
-
-
-def check_robot() -> int:
-    """Run the executable check_robot; return its exit code."""
-    return start('check_robot')
-
-
-def optimize() -> int:
-    """Run the executable optimize; return its exit code."""
-    return start('optimize')
-
-
-def reproduce() -> int:
-    """Run the executable reproduce; return its exit code."""
-    return start('reproduce')
-
-
-def tune() -> int:
-    """Run the executable tune; return its exit code."""
-    return start('tune')
-
-
-def calibrate() -> int:
-    """Run the executable calibrate; return its exit code."""
-    return start('calibrate')
-
-
-def atlas() -> int:
-    """Run the executable atlas; return its exit code."""
-    return start('atlas')
+def __getattr__(name: str) -> Callable[[], int]:
+    """Return what runs an executable, for the entry points of setup.py."""
+    if name in EXECUTABLES:
+        return partial(start, name)
+    raise AttributeError(f'module {__name__!r} has no attribute {name!r}')

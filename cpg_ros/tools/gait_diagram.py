@@ -19,19 +19,20 @@ their orbits. A leg stands while the signal that drives it falls, from peak to t
 drive muscles, a muscle is active while its cell is above the middle of its range.
 """
 
-import argparse
+from argparse import Namespace
 from collections.abc import Sequence
 from pathlib import Path
 import sys
 
 from cpg_ros.dynamics.orbit import Orbit, solve_preset
-from cpg_ros.errors import CpgError, InputError
+from cpg_ros.errors import InputError
 from cpg_ros.gaits.steady_stretch import true_runs
 from cpg_ros.motion.phase_readout import evaluate, phase_map
 from cpg_ros.networks.leg_numbers import footfall_order
 from cpg_ros.networks.network import Network
 from cpg_ros.networks.registry import find_network, SHIPPED
 from cpg_ros.robots.robot import HARMONICS
+from cpg_ros.tools.command_line import Parser, run
 import matplotlib
 from matplotlib.axes import Axes
 import numpy as np
@@ -141,21 +142,22 @@ def picture(network: type[Network], path: Path) -> None:
         raise InputError(str(error)) from error
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Write the picture; return the exit code."""
-    parser = argparse.ArgumentParser(prog='python -m cpg_ros.tools.gait_diagram',
-                                     description=__doc__,
-                                     formatter_class=argparse.RawDescriptionHelpFormatter)
+def _parser() -> Parser:
+    parser = Parser(prog='python -m cpg_ros.tools.gait_diagram', description=__doc__)
     parser.add_argument('picture', type=Path, help='file to write, .png or .pdf or .svg')
     parser.add_argument('--network', default='delayed', metavar='NAME',
                         help=f'{", ".join(SHIPPED)}, or a file (default: %(default)s)')
-    chosen = parser.parse_args(arguments)
-    try:
-        picture(find_network(chosen.network), chosen.picture)
-    except (OSError, CpgError) as error:
-        print(f'{chosen.picture}: {error}', file=sys.stderr)
-        return 1
+    return parser
+
+
+def _draw(chosen: Namespace) -> int:
+    picture(find_network(chosen.network), chosen.picture)
     return 0
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Write the picture; return the exit code."""
+    return run(_parser(), _draw, arguments)
 
 
 if __name__ == '__main__':

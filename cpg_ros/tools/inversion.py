@@ -19,20 +19,20 @@ steady gait of a recording, fits a network's gait and the joints' readouts to it
 the generator loads. Without a recording the executable is the node ``cpg_inversion``.
 """
 
-from argparse import Namespace, RawDescriptionHelpFormatter
+from argparse import Namespace
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 import sys
 from textwrap import fill
 
-from cpg_ros.errors import CpgError, InputError
+from cpg_ros.errors import InputError
 from cpg_ros.files.atomic_write import write_atomically
 from cpg_ros.files.plain_text import as_json, table
 from cpg_ros.files.progress_bar import progress_bar
 from cpg_ros.files.yaml_reader import shown
-from cpg_ros.fleet.options import add_options
+from cpg_ros.fleet.options import add_options, KEPT, working
 from cpg_ros.gaits.leg_names import BIPED, QUADRUPED
-from cpg_ros.gaits.stride import NoSteadyGait
 from cpg_ros.inversion.model_choice import as_rows, Explained, explained, undecided
 from cpg_ros.inversion.paper_fit import paper_fits, PaperFit, refuse_others
 from cpg_ros.inversion.parameter_files import write_fitted
@@ -42,7 +42,8 @@ from cpg_ros.recordings.formats import FORMATS, read_recording
 from cpg_ros.recordings.recording import Recording
 from cpg_ros.robots.robot import Robot
 from cpg_ros.robots.robot_file import load_robot
-from cpg_ros.tools.arguments import assignment, Parser, say, twice
+from cpg_ros.tools.arguments import assignment, refuse_repeated
+from cpg_ros.tools.command_line import note, Parser, run, say
 from cpg_ros.tools.reading_options import (
     add_reading_options,
     check_reading_options,
@@ -69,8 +70,7 @@ exit codes: 0 fitted, 1 no steady gait or none that fits, 2 invalid arguments or
 
 def _parser() -> Parser:
     parser = Parser(
-        prog='inversion', formatter_class=RawDescriptionHelpFormatter,
-        description=fill(DESCRIPTION.format(
+        prog='inversion', description=fill(DESCRIPTION.format(
             ', or '.join(one.contents for one in FORMATS.values())), 98),
         epilog=EPILOG.format(' and '.join(f'--{name}' for name in FORMATS)))
     add_reading_options(parser)
@@ -116,82 +116,77 @@ def _recording(chosen: Namespace, robot: Robot | None) -> Recording:
         **reading_arguments(chosen))
 
 
-def _checked(parser: Parser, chosen: Namespace) -> None:
+def _refuse_options(chosen: Namespace) -> None:
     """Refuse what can be refused before any work."""
     if chosen.bags is not None:
-        _checked_many(parser, chosen)
+        _refuse_for_many(chosen)
     elif given := [option for option in ('watch', 'dask', 'tls', 'jobs')
                     if getattr(chosen, option)]:
-        parser.error(f'argument --{given[0]}: one recording is one job; see --bags')
-    check_reading_options(parser, chosen)
+        raise InputError(f'argument --{given[0]}: one recording is one job; see --bags')
+    check_reading_options(chosen)
     if chosen.bags is None:
-        _checked_files(parser, chosen)
-    _checked_names(parser, chosen)
+        _refuse_files(chosen)
+    for start in chosen.start:
+        refuse_repeated('argument --start', [name for name, _ in start])
+    refuse_repeated('argument --free', chosen.free)
 
 
-def _checked_many(parser: Parser, chosen: Namespace) -> None:
+def _refuse_for_many(chosen: Namespace) -> None:
     if chosen.out is None:
-        parser.error('argument --bags: --out FOLDER is needed for the results')
+        raise InputError('argument --bags: --out FOLDER is needed for the results')
     if chosen.out.exists() and not chosen.out.is_dir():
-        parser.error(f'argument --out: {chosen.out} is not a folder')
+        raise InputError(f'argument --out: {chosen.out} is not a folder')
     for option in ('report', 'json', 'paper'):
         if getattr(chosen, option):
-            parser.error(f'argument --{option}: not with --bags')
+            raise InputError(f'argument --{option}: not with --bags')
 
 
-def _checked_files(parser: Parser, chosen: Namespace) -> None:
+def _refuse_files(chosen: Namespace) -> None:
     for option in ('out', 'report'):
         path = getattr(chosen, option)
         if path is not None and not path.absolute().parent.is_dir():
-            parser.error(f'argument --{option}: there is no folder {path.parent}')
+            raise InputError(f'argument --{option}: there is no folder {path.parent}')
     if chosen.out is not None and chosen.out.suffix not in ('.yaml', '.yml'):
-        parser.error(f'argument --out: {shown(str(chosen.out))} does not end in .yaml')
+        raise InputError(f'argument --out: {shown(str(chosen.out))} does not end in .yaml')
 
 
-def _checked_names(parser: Parser, chosen: Namespace) -> None:
-    for start in chosen.start:
-        if name := twice([name for name, _ in start]):
-            parser.error(f'argument --start: {name} is given twice')
-    if name := twice(chosen.free):
-        parser.error(f'argument --free: {name} is given twice')
-
-
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Invert a recording, or run the node if the command line has none; return the exit code."""
-    if arguments is None and sys.argv[1:2] in ([], ['--ros-args']):
-        # Without ROS installed, recordings can be inverted all the same.
-        from cpg_ros.nodes.inversion_node import run
-        return run()
-    parser = _parser()
-    chosen = parser.parse_args(sys.argv[1:] if arguments is None else arguments)
-    _checked(parser, chosen)
+def _invert_many(chosen: Namespace, robot: Robot | None, starts: list[dict[str, float]]) -> int:
+    """Invert what folders hold; 0 if any recording could be fitted."""
+    # Their tables need a library that one recording does not.
+    from cpg_ros.fleet.many_recordings import Folders
+    from cpg_ros.fleet.recording_job import Settings
+    report = partial(note, 'inversion')
+    work = Folders(chosen.bags, chosen.out, Settings(
+        robot, chosen.network or '', chosen.gait or '', chosen.preset or '', tuple(chosen.free),
+        chosen.order, tuple(starts), reading_arguments(chosen)))
     try:
-        robot = None if chosen.robot is None else load_robot(chosen.robot)
-        starts = [dict(start) for start in chosen.start] or [{}]
-        if chosen.paper:
-            refuse_others(robot, chosen.network or '')
-        if chosen.bags is not None:
-            # Its tables need a library that one recording does not.
-            from cpg_ros.tools.inversion_many import run as run_many
-            return run_many(chosen, robot)
-        recording = _recording(chosen, robot)
-        network, compared = _explained(chosen, recording, robot)
-        with progress_bar('fitting', 100) as bar:
-            found = fit_recording(recording, robot, network, chosen.gait or '',
-                                  chosen.free, chosen.order, chosen.preset or '', starts,
-                                  done=lambda share: bar(round(100.0 * share)))
-        fits = _paper(chosen, found, starts)
-        written = _written(chosen, found, robot)
-    except NoSteadyGait as error:
-        print(f'inversion: {error}', file=sys.stderr)
-        return 1
-    except (CpgError, OSError) as error:
-        print(f'inversion: {error}', file=sys.stderr)
-        return 2
+        with working(chosen, 'recordings', report) as fleet:
+            summary = work.watch(fleet, report) if chosen.watch else work.run(fleet)
     except KeyboardInterrupt:
-        kept = '; what was finished is kept, and the same command continues from there'
-        print(f'inversion: stopped{"" if chosen.bags is None else kept}', file=sys.stderr)
-        return 130
+        raise KeyboardInterrupt(KEPT) from None
+    kept = f'; {summary.kept} were done before' if summary.kept else ''
+    say(f'{summary.done} recordings, {summary.done - summary.failed} fitted, '
+        f'{summary.failed} not (the table says why){kept}\n'
+        f'written: {", ".join(map(str, summary.written))}')
+    return 0 if summary.failed < summary.done else 1
+
+
+def _invert(chosen: Namespace) -> int:
+    _refuse_options(chosen)
+    robot = None if chosen.robot is None else load_robot(chosen.robot)
+    starts = [dict(start) for start in chosen.start] or [{}]
+    if chosen.paper:
+        refuse_others(robot, chosen.network or '')
+    if chosen.bags is not None:
+        return _invert_many(chosen, robot, starts)
+    recording = _recording(chosen, robot)
+    network, compared = _explained(chosen, recording, robot)
+    with progress_bar('fitting', 100) as bar:
+        found = fit_recording(recording, robot, network, chosen.gait or '',
+                              chosen.free, chosen.order, chosen.preset or '', starts,
+                              done=lambda share: bar(round(100.0 * share)))
+    fits = _paper(chosen, found, starts)
+    written = _written(chosen, found, robot)
     if chosen.json:
         say(as_json({**found.as_dict(), **({'networks': [{
             key: value for key, value in vars(one).items() if value != float('inf')}
@@ -241,6 +236,15 @@ def _written(chosen: Namespace, found: RecordingFit, robot: Robot | None) -> lis
         write_atomically(chosen.report, as_html(found))
         written.append(chosen.report)
     return written
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Invert a recording, or run the node if the command line has none; return the exit code."""
+    if arguments is None and sys.argv[1:2] in ([], ['--ros-args']):
+        # Without ROS installed, recordings can be inverted all the same.
+        from cpg_ros.nodes.inversion_node import run as run_node
+        return run_node()
+    return run(_parser(), _invert, arguments)
 
 
 if __name__ == '__main__':

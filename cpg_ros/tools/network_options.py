@@ -14,13 +14,13 @@
 
 """The options --network, --preset and --set, which choose a network and its parameters."""
 
-from argparse import ArgumentParser
+from argparse import ArgumentParser, Namespace
 from dataclasses import replace
 
 from cpg_ros.errors import InputError
 from cpg_ros.networks.network import Network
 from cpg_ros.networks.registry import find_network, NetworkError, SHIPPED
-from cpg_ros.tools.arguments import assignment, twice
+from cpg_ros.tools.arguments import assignment, refuse_repeated
 import numpy as np
 
 #: No parameter is larger: beyond, the arithmetic breaks down before it tells anything.
@@ -40,26 +40,25 @@ def add_network_options(parser: ArgumentParser) -> None:
                         'w_a sets all four weights of the biped')
 
 
-def chosen_network(name: str, preset: str | None, changes: list[tuple[str, float]]) -> Network:
-    """Return a network with a preset's parameters, some of them changed.
+def chosen_network(chosen: Namespace) -> Network:
+    """Return the network that the options choose: a preset's parameters, some of them changed.
 
     Raises:
         InputError: an unknown name, or a value that makes no sense; the message says which.
 
     """
     try:
-        kind = find_network(name)
+        kind = find_network(chosen.network)
     except NetworkError as error:
         raise InputError(f'--network: {error}') from error
     presets = kind.presets()
-    chosen = kind.usual_gait if preset is None else preset
-    if chosen not in presets:
-        raise InputError(f"--preset: '{chosen}' is not one of {', '.join(presets)}")
-    network = presets[chosen].network
-    given = [member for key, _ in changes for member in kind.groups.get(key, (key,))]
-    if twice(given):
-        raise InputError(f'--set: {twice(given)} is given twice')
-    for key, value in changes:
+    preset = kind.usual_gait if chosen.preset is None else chosen.preset
+    if preset not in presets:
+        raise InputError(f"--preset: '{preset}' is not one of {', '.join(presets)}")
+    network = presets[preset].network
+    refuse_repeated('--set', [member for key, _ in chosen.set
+                              for member in kind.groups.get(key, (key,))])
+    for key, value in chosen.set:
         if key not in (*kind.parameters(), *kind.groups):
             known = ', '.join((*kind.groups, *kind.parameters()))
             raise InputError(f"--set: '{key}' is not a parameter of the {kind.name} network: "

@@ -20,20 +20,18 @@ Pareto front (``front.csv``, ``front.png``) and a preset file that ``generator``
 
 import argparse
 from collections.abc import Sequence
-from concurrent.futures import Executor
-from contextlib import AbstractContextManager, nullcontext
+from functools import partial
 from pathlib import Path
 import re
-import shlex
 import sys
 
-from cpg_ros.errors import CpgError
-from cpg_ros.fleet.options import add_options, working
+from cpg_ros.fleet.options import add_options, executor_for
 from cpg_ros.networks.preset_files import write_presets
-from cpg_ros.search.nsga2 import Front, NothingFound, optimise
+from cpg_ros.search.nsga2 import Front, optimise
 from cpg_ros.search.pareto_front import draw_front, write_front
 from cpg_ros.search.search_space import SEARCHED
-from cpg_ros.tools.arguments import assignment, interval, Parser, say, twice
+from cpg_ros.tools.arguments import assignment, named_interval, refuse_repeated
+from cpg_ros.tools.command_line import note, Parser, run, say
 
 DESCRIPTION = """\
 Search with NSGA-II for weights that give a network a gait. The objectives to minimise are the
@@ -53,13 +51,6 @@ files: front.csv, front.png and preset.yaml, for
 exit codes: 0 found, 1 nothing found, 2 invalid arguments."""
 
 
-def _bounds(text: str) -> tuple[str, tuple[float, float]]:
-    name, sign, limits = text.partition('=')
-    if not (name and sign and ':' in limits):
-        raise argparse.ArgumentTypeError(f"'{text}' is not of the form name=low:high")
-    return name, interval(limits)
-
-
 def _name(text: str) -> str:
     if not re.fullmatch(r'[A-Za-z]\w*', text, re.ASCII):
         raise argparse.ArgumentTypeError(f"'{text}' is not a name of letters, digits and _")
@@ -67,8 +58,7 @@ def _name(text: str) -> str:
 
 
 def _parser() -> Parser:
-    parser = Parser(prog='optimize', description=DESCRIPTION, epilog=EPILOG,
-                    formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = Parser(prog='optimize', description=DESCRIPTION, epilog=EPILOG)
     parser.add_argument('--network', default='biped', metavar='NAME',
                         help=f'{", ".join(SEARCHED)}, or the path of a Python file with a '
                         'network (default: %(default)s)')
@@ -89,7 +79,7 @@ def _parser() -> Parser:
     parser.add_argument('--fix', nargs='+', action='extend', default=[], type=assignment,
                         metavar='VARIABLE=VALUE', help='keep variables at a value, such as '
                         'current=0.229 phi=0.254')
-    parser.add_argument('--bounds', nargs='+', action='extend', default=[], type=_bounds,
+    parser.add_argument('--bounds', nargs='+', action='extend', default=[], type=named_interval,
                         metavar='VARIABLE=LOW:HIGH', help='search bounds other than the default, '
                         'such as w_a=-0.5:0.5')
     parser.add_argument('--out', type=Path, default=Path('out'), metavar='DIR',
@@ -120,51 +110,30 @@ def table(front: Front) -> str:
                                 for name, value, unit in rows)])
 
 
-def _executor(chosen: argparse.Namespace) -> AbstractContextManager[Executor | None]:
-    """Where the islands are: a single one is in this process, if nothing else is asked for."""
-    if chosen.islands < 2 and not (chosen.dask or chosen.tls):
-        return nullcontext()
-    return working(chosen, 'epochs of islands', _note)
-
-
-def _note(line: str) -> None:
-    print(f'optimize: {line}', file=sys.stderr)
+def _optimize(chosen: argparse.Namespace) -> int:
+    for option in ('fix', 'bounds'):
+        refuse_repeated(f'argument --{option}', [name for name, _ in getattr(chosen, option)])
+    name = chosen.name or f'{chosen.gait}_optimised'
+    # Now, and not when the work is done.
+    chosen.out.mkdir(parents=True, exist_ok=True)
+    with executor_for(max(1, chosen.islands), chosen, 'epochs of islands',
+                      partial(note, 'optimize')) as executor:
+        front = optimise(chosen.network, chosen.gait, chosen.population, chosen.generations,
+                         chosen.seed, dict(chosen.bounds), dict(chosen.fix),
+                         progress=executor is None and sys.stderr.isatty(),
+                         islands=chosen.islands, executor=executor)
+    write_front(chosen.out / 'front.csv', front)
+    draw_front(chosen.out / 'front.png', front)
+    write_presets(chosen.out / 'preset.yaml', front.space.network, {name: front.chosen.preset},
+                  f'Found by: {chosen.command}')
+    say(f'{table(front)}\n'
+        f'written: front.csv, front.png and preset.yaml (preset {name}) in {chosen.out}')
+    return 0
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the search; return the exit code."""
-    arguments = sys.argv[1:] if arguments is None else arguments
-    parser = _parser()
-    chosen = parser.parse_args(arguments)
-    for option in ('fix', 'bounds'):
-        if name := twice([name for name, _ in getattr(chosen, option)]):
-            parser.error(f'argument --{option}: {name} is given twice')
-    name = chosen.name or f'{chosen.gait}_optimised'
-    try:
-        # Now, and not when the work is done.
-        chosen.out.mkdir(parents=True, exist_ok=True)
-        with _executor(chosen) as executor:
-            front = optimise(chosen.network, chosen.gait, chosen.population, chosen.generations,
-                             chosen.seed, dict(chosen.bounds), dict(chosen.fix),
-                             progress=executor is None and sys.stderr.isatty(),
-                             islands=chosen.islands, executor=executor)
-        write_front(chosen.out / 'front.csv', front)
-        draw_front(chosen.out / 'front.png', front)
-        command = shlex.join(['optimize', *arguments])
-        write_presets(chosen.out / 'preset.yaml', front.space.network,
-                      {name: front.chosen.preset}, f'Found by: {command}')
-    except NothingFound as error:
-        print(f'optimize: {error}', file=sys.stderr)
-        return 1
-    except (CpgError, OSError) as error:
-        print(f'optimize: {error}', file=sys.stderr)
-        return 2
-    except KeyboardInterrupt:
-        print('optimize: stopped', file=sys.stderr)
-        return 130
-    say(f'{table(front)}\n'
-        f'written: front.csv, front.png and preset.yaml (preset {name}) in {chosen.out}')
-    return 0
+    return run(_parser(), _optimize, arguments)
 
 
 if __name__ == '__main__':

@@ -18,9 +18,10 @@ from argparse import Namespace
 from pathlib import Path
 from typing import Any
 
+from cpg_ros.errors import InputError
 from cpg_ros.recordings.formats import FORMATS, reading_options
 from cpg_ros.recordings.servo import Servo
-from cpg_ros.tools.arguments import Parser
+from cpg_ros.tools.command_line import Parser
 
 
 def add_reading_options(parser: Parser) -> None:
@@ -48,16 +49,21 @@ def chosen_format(chosen: Namespace) -> str:
     return next((name for name in FORMATS if getattr(chosen, name) is not None), '')
 
 
-def check_reading_options(parser: Parser, chosen: Namespace) -> None:
-    """Refuse options that the chosen format's reader does not take."""
+def check_reading_options(chosen: Namespace) -> None:
+    """Refuse options that the chosen format's reader does not take.
+
+    Raises:
+        InputError: one was given.
+
+    """
     if name := chosen_format(chosen):
         for option in reading_options():
             if getattr(chosen, option.name) and (why := FORMATS[name].refusal(option.name)):
-                parser.error(f'argument --{option.name}: {why}')
+                raise InputError(f'argument --{option.name}: {why}')
         if chosen.kp is not None and (why := FORMATS[name].refusal('servo')):
-            parser.error(f'argument --kp: {why}')
+            raise InputError(f'argument --kp: {why}')
     if chosen.kp is None and chosen.kd is not None:
-        parser.error('argument --kd: without --kp')
+        raise InputError('argument --kd: without --kp')
 
 
 def reading_arguments(chosen: Namespace) -> dict[str, Any]:

@@ -28,7 +28,7 @@ from cpg_ros.files.atomic_write import write_atomically
 from cpg_ros.files.progress_bar import progress_bar
 from cpg_ros.papers.catalogue import PAPERS
 from cpg_ros.papers.reproduction import parts, reproduce
-from cpg_ros.tools.arguments import Parser, say
+from cpg_ros.tools.command_line import Parser, run, say
 from cpg_ros.tools.reproduction_report import as_html, as_json, table
 
 DESCRIPTION = """\
@@ -44,8 +44,7 @@ def _jobs(text: str) -> int:
 
 
 def _parser() -> Parser:
-    parser = Parser(prog='reproduce', description=DESCRIPTION, epilog=EPILOG,
-                    formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = Parser(prog='reproduce', description=DESCRIPTION, epilog=EPILOG)
     parser.add_argument('--paper', metavar='NAME', choices=tuple(PAPERS),
                         help=f'one of {", ".join(PAPERS)} (default: all)')
     parser.add_argument('--json', metavar='FILE', help='write the rows as JSON; - writes them to '
@@ -73,32 +72,27 @@ def _ready(path: Path) -> None:
         raise PermissionError(f'{path.parent} cannot be written to')
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Reproduce the papers; return the exit code."""
-    chosen = _parser().parse_args(arguments)
+def _reproduce(chosen: argparse.Namespace) -> int:
     names = tuple(PAPERS) if chosen.paper is None else (chosen.paper,)
     json = None if chosen.json in (None, '-') else Path(chosen.json)
-    try:
-        # Now, and not when the work is done.
-        for path in (json, chosen.html):
-            if path is not None:
-                _ready(path)
-        with progress_bar('reproducing', parts(names)) as progress:
-            found = reproduce(names, chosen.jobs, chosen.html is not None, progress)
-        if json is not None:
-            write_atomically(json, as_json(found))
-        if chosen.html is not None:
-            write_atomically(chosen.html, as_html(found))
-    except OSError as error:
-        print(f'reproduce: {error}', file=sys.stderr)
-        return 2
-    except KeyboardInterrupt:
-        print('reproduce: stopped', file=sys.stderr)
-        return 130
-    written = [str(path) for path in (json, chosen.html) if path is not None]
+    files = [path for path in (json, chosen.html) if path is not None]
+    # Now, and not when the work is done.
+    for path in files:
+        _ready(path)
+    with progress_bar('reproducing', parts(names)) as progress:
+        found = reproduce(names, chosen.jobs, chosen.html is not None, progress)
+    if json is not None:
+        write_atomically(json, as_json(found))
+    if chosen.html is not None:
+        write_atomically(chosen.html, as_html(found))
     say(as_json(found).rstrip() if chosen.json == '-' else '\n'.join(
-        [table(found), *([f'written: {", ".join(written)}'] if written else [])]))
+        [table(found), *([f'written: {", ".join(map(str, files))}'] if files else [])]))
     return 1 if found.failed else 0
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Reproduce the papers; return the exit code."""
+    return run(_parser(), _reproduce, arguments)
 
 
 if __name__ == '__main__':

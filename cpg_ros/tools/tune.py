@@ -20,21 +20,20 @@ upright, measures how to steer them, and writes the robot file with its part ``g
 
 import argparse
 from collections.abc import Sequence
-from concurrent.futures import Executor
-from contextlib import AbstractContextManager, nullcontext
+from functools import partial
 from pathlib import Path
-import shlex
 import sys
 
-from cpg_ros.errors import CpgError
+from cpg_ros.errors import InputError
 from cpg_ros.files.plain_text import table
-from cpg_ros.fleet.options import add_options, working
+from cpg_ros.fleet.options import add_options, executor_for
 from cpg_ros.networks.registry import NETWORKS
 from cpg_ros.robots.robot import Robot
 from cpg_ros.robots.robot_file import LIMITS, load_robot, write_robot
 from cpg_ros.simulation.gait_design import AIMS
-from cpg_ros.simulation.tuning import GOOD, LONG, NoDesign, tune, Tuned
-from cpg_ros.tools.arguments import number, Parser, say, twice
+from cpg_ros.simulation.tuning import GOOD, LONG, tune, Tuned
+from cpg_ros.tools.arguments import number, refuse_repeated
+from cpg_ros.tools.command_line import note, Parser, run, say
 
 DESCRIPTION = """\
 Tune a robot's gaits in simulation. CMA-ES optimises foot paths described by a few lengths and
@@ -48,8 +47,7 @@ of the target speed."""
 
 
 def _parser() -> Parser:
-    parser = Parser(prog='tune', description=DESCRIPTION, epilog=EPILOG,
-                    formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = Parser(prog='tune', description=DESCRIPTION, epilog=EPILOG)
     parser.add_argument('--robot', required=True, metavar='FILE',
                         help='robot file, or the name of a shipped one; its stand, limits and '
                         'first network are used')
@@ -102,67 +100,49 @@ def invented(robot: Robot) -> list[str]:
     return lines
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the search; return the exit code."""
-    arguments = sys.argv[1:] if arguments is None else arguments
-    parser = _parser()
-    chosen = parser.parse_args(arguments)
+def _refuse_options(chosen: argparse.Namespace) -> None:
     if chosen.evaluations < 1:
-        parser.error(f'argument --evaluations: {chosen.evaluations} is not positive')
+        raise InputError(f'argument --evaluations: {chosen.evaluations} is not positive')
     for option, value in (('kp', chosen.kp), ('kd', chosen.kd)):
         if value is not None and not 0.0 < value <= 1e5:
-            parser.error(f'argument --{option}: {value:g} is not above 0 and up to 100000')
+            raise InputError(f'argument --{option}: {value:g} is not above 0 and up to 100000')
     if chosen.jobs < 0:
-        parser.error(f'argument --jobs: {chosen.jobs} is negative')
+        raise InputError(f'argument --jobs: {chosen.jobs} is negative')
     if chosen.seeds < 1:
-        parser.error(f'argument --seeds: {chosen.seeds} is not positive')
-    if name := twice(chosen.gaits or []):
-        parser.error(f'argument --gaits: {name} is given twice')
-    try:
-        robot = load_robot(chosen.robot)
-        if chosen.gaits is None:
-            known = NETWORKS[robot.networks[0]].gaits()
-            chosen.gaits = [gait for gait in AIMS if gait in known]
-        # Now, and not when the work is done.
-        if not chosen.out.parent.is_dir():
-            parser.error(f'argument --out: there is no directory {chosen.out.parent}')
-        if chosen.out.is_dir():
-            parser.error(f'argument --out: {chosen.out} is a directory')
-        with _executor(chosen) as executor:
-            robot, found, missing = tune(
-                robot, chosen.model, chosen.gaits, chosen.evaluations, chosen.seed, executor,
-                chosen.seeds, chosen.kp, chosen.kd, 1 if executor else chosen.jobs, _note)
-        lines = [*figures(found), *missing, *invented(robot)]
-        command = shlex.join(['ros2', 'run', 'cpg_ros', 'tune', *arguments])
-        write_robot(chosen.out, robot, '\n'.join([
-            f'Gaits made by: {command}',
-            f'{LONG:g} s in simulation from the stand:', *lines]))
-    except NoDesign as error:
-        print(f'tune: {error}', file=sys.stderr)
-        return 1
-    except (CpgError, OSError) as error:
-        print(f'tune: {error}', file=sys.stderr)
-        return 2
-    except KeyboardInterrupt:
-        print('tune: stopped, nothing written', file=sys.stderr)
-        return 130
+        raise InputError(f'argument --seeds: {chosen.seeds} is not positive')
+    refuse_repeated('argument --gaits', chosen.gaits or [])
+
+
+def _tune(chosen: argparse.Namespace) -> int:
+    _refuse_options(chosen)
+    robot, report = load_robot(chosen.robot), partial(note, 'tune')
+    if chosen.gaits is None:
+        known = NETWORKS[robot.networks[0]].gaits()
+        chosen.gaits = [gait for gait in AIMS if gait in known]
+    # Now, and not when the work is done.
+    if not chosen.out.parent.is_dir():
+        raise InputError(f'argument --out: there is no directory {chosen.out.parent}')
+    if chosen.out.is_dir():
+        raise InputError(f'argument --out: {chosen.out} is a directory')
+    with executor_for(len(chosen.gaits) * chosen.seeds, chosen, 'searches', report) as executor:
+        robot, found, missing = tune(
+            robot, chosen.model, chosen.gaits, chosen.evaluations, chosen.seed, executor,
+            chosen.seeds, chosen.kp, chosen.kd, 1 if executor else chosen.jobs, report)
+    lines = [*figures(found), *missing, *invented(robot)]
+    write_robot(chosen.out, robot, '\n'.join([
+        f'Gaits made by: ros2 run cpg_ros {chosen.command}',
+        f'{LONG:g} s in simulation from the stand:', *lines]))
     say('\n'.join([f'{LONG:g} s from the stand in simulation:', *lines,
                    f'written: {chosen.out}']))
     if not any(one.good for one in found):
-        print('tune: no gait is good', file=sys.stderr)
+        report('no gait is good')
         return 1
     return 0
 
 
-def _executor(chosen: argparse.Namespace) -> AbstractContextManager[Executor | None]:
-    """Where the searches are: a single one is in this process, and has all cores."""
-    if len(chosen.gaits) * chosen.seeds == 1 and not (chosen.dask or chosen.tls):
-        return nullcontext()
-    return working(chosen, 'searches', _note)
-
-
-def _note(line: str) -> None:
-    print(f'tune: {line}', file=sys.stderr)
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the search; return the exit code."""
+    return run(_parser(), _tune, arguments, 'stopped, nothing written')
 
 
 if __name__ == '__main__':
