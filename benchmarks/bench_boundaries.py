@@ -33,7 +33,7 @@ from bench_peers import said
 from common import emit, log, ROOT
 from cpg_ros.atlas.chart import Chart, chart_of
 from cpg_ros.atlas.fold_curves import fold_curves
-from cpg_ros.atlas.hopf_curves import Curve, hopf_curves
+from cpg_ros.atlas.hopf_curves import Boundary, hopf_curves
 from cpg_ros.atlas.orbit_curves import Edge, orbit_curves
 from cpg_ros.dynamics.continuation import continue_orbit
 from cpg_ros.dynamics.equilibrium import equilibrium
@@ -69,12 +69,12 @@ def formula(gait: str, c: float, tau: float, omega: float) -> float:
     return min(gaps, default=np.inf)
 
 
-def some(curve: Curve, count: int) -> np.ndarray:
+def some(curve: Boundary, count: int) -> np.ndarray:
     """Numbers of points, evenly along a curve, without its ends."""
     return np.linspace(0, len(curve.points) - 1, count + 2).astype(int)[1:-1]
 
 
-def dde_biftool(chart: Chart, curves: list[Curve]) -> dict[str, object]:
+def dde_biftool(chart: Chart, curves: list[Boundary]) -> dict[str, object]:
     """Return the largest difference in c or tau, whichever is not held, and how many points."""
     place = os.environ.get('DDE_BIFTOOL', '')
     if not shutil.which('octave-cli'):
@@ -101,7 +101,7 @@ def dde_biftool(chart: Chart, curves: list[Curve]) -> dict[str, object]:
             'curves': len(curves), 'points': len(theirs), 'corrected': int(theirs[:, 1].sum())}
 
 
-def of_pace() -> tuple[Chart, list[Curve]]:
+def of_pace() -> tuple[Chart, list[Boundary]]:
     """Return the plane of the pace, and curves of its Hopf points, folds and torus points."""
     chart = chart_of('quadruped', PACE.network, [('xi', (-0.02, 0.02)),
                                                  ('alpha=beta', (0.1, 0.65))], (9, 9))
@@ -121,7 +121,7 @@ def of_pace() -> tuple[Chart, list[Curve]]:
                    *orbit_curves((chart, 'pace', small))]
 
 
-def auto(chart: Chart, curves: list[Curve]) -> dict[str, object]:
+def auto(chart: Chart, curves: list[Boundary]) -> dict[str, object]:
     """Return the largest difference in alpha=beta for each kind, with how many points of what."""
     if not shutil.which('autox') or not shutil.which('gfortran'):
         return {'skipped': 'AUTO-07p is not installed (Debian: auto-07p, gfortran)'}
@@ -153,7 +153,7 @@ def joined(values: Iterable[float]) -> str:
     return ','.join(repr(float(value)) for value in values)
 
 
-def compared(curves: list[Curve], points: list[tuple[float, float]]) -> dict[str, object]:
+def compared(curves: list[Boundary], points: list[tuple[float, float]]) -> dict[str, object]:
     """Differences of a peer's points from the points of curves with the same first value.
 
     AUTO also follows Hopf points of other gaits, and folds where no point of ours was chosen:

@@ -38,7 +38,7 @@ from cpg_ros.fleet import many_recordings
 from cpg_ros.fleet.executors import cluster, processes
 from cpg_ros.fleet.many_recordings import Folders
 from cpg_ros.fleet.outcomes import outcomes
-from cpg_ros.fleet.recording_job import Settings
+from cpg_ros.fleet.recording_job import FitSettings
 from cpg_ros.tools.atlas import main as draw
 
 GOALS = {'efficiency': 1.8, 'overhead': 0.10}
@@ -58,12 +58,12 @@ def table(folder: Path, count: int, damaged: int) -> dict[str, object]:
     many_recordings.invert_recording = counted
     began = time.monotonic()
     with processes(2) as calm:
-        Folders([folder / 'in'], folder / 'calm', Settings()).run(calm)
+        Folders([folder / 'in'], folder / 'calm', FitSettings()).run(calm)
     spent = time.monotonic() - began
     os.environ[COUNT] = str(folder / 'count')
     events: list[str] = []
     with dask_cluster(folder, 2) as dask, cluster(dask.address, events.append) as fleet:
-        work = Folders([folder / 'in'], folder / 'rough', Settings())
+        work = Folders([folder / 'in'], folder / 'rough', FitSettings())
         done, room, memory = 0, fleet.room, {}
         keep = work.keep
 
@@ -107,7 +107,7 @@ def table(folder: Path, count: int, damaged: int) -> dict[str, object]:
 
 def inverted_in(executor: Executor, folder: Path, out: Path) -> float:
     began = time.monotonic()
-    Folders([folder], out, Settings(), progress=False).run(executor)
+    Folders([folder], out, FitSettings(), progress=False).run(executor)
     return time.monotonic() - began
 
 

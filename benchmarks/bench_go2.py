@@ -26,7 +26,7 @@ import time
 
 from common import emit, log, ROOT
 from cpg_ros.motion.pattern import Pattern
-from cpg_ros.motion.plan import plan, Program
+from cpg_ros.motion.plan import GaitPlan, plan
 from cpg_ros.motion.steering import Drive
 from cpg_ros.networks.registry import PRESETS
 from cpg_ros.robots.robot_file import read_robot
@@ -46,12 +46,12 @@ FAR = {'trot': 4.0, 'walk': 2.5, 'pace': 3.5, 'bound': 3.0, 'jump': 1.0, 'pronk'
 ROBOT = read_robot(ROOT / 'config' / 'unitree_go2.yaml')
 
 
-def program(gait: str) -> Program:
+def program(gait: str) -> GaitPlan:
     preset = PRESETS['delayed'][gait]
     return plan(ROBOT, gait, preset, preset.network, ROBOT.motion(gait, gait).frequency or 0.0)
 
 
-def sines(made: Program) -> np.ndarray:
+def sines(made: GaitPlan) -> np.ndarray:
     """Plain formulas on the gait's phases, (steps, joints), with the same ramp of a second."""
     time_ = DT * np.arange(1, round(DURATION / DT) + 1)
     level = np.minimum(time_, 1.0)**2 * (3.0 - 2.0 * np.minimum(time_, 1.0))
@@ -80,7 +80,7 @@ def pushed(batch: Batch, angles: np.ndarray, force: float) -> int:
     return sum(trial.upright for trial in batch.run(runs))
 
 
-def tour(body: Body, made: dict[str, Program]) -> str:
+def tour(body: Body, made: dict[str, GaitPlan]) -> str:
     """All 30 switches, one after the other, from standing: the first that fails, or ''."""
     for one in GAITS:
         for other in GAITS:
@@ -96,7 +96,7 @@ def tour(body: Body, made: dict[str, Program]) -> str:
     return ''
 
 
-def steered(body: Body, made: Program, forward: float, turn: float) -> tuple[float, float]:
+def steered(body: Body, made: GaitPlan, forward: float, turn: float) -> tuple[float, float]:
     """Speed and yaw rate that are had of those asked for."""
     pattern = Pattern(made, drive=Drive(4))
     pattern.steer(*made.steer(forward, turn))

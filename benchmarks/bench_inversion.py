@@ -38,8 +38,8 @@ from cpg_ros.dynamics.orbit import solve_orbit  # noqa: E402, I100
 from cpg_ros.inversion.fit_data import joints_of  # noqa: E402
 from cpg_ros.inversion.free_parameters import free_numbers  # noqa: E402
 from cpg_ros.inversion.invert import invert, TOLERANCE  # noqa: E402
-from cpg_ros.inversion.least_squares import Problem  # noqa: E402
-from cpg_ros.inversion.trust_region import descend  # noqa: E402
+from cpg_ros.inversion.least_squares import CycleProblem  # noqa: E402
+from cpg_ros.inversion.trust_region import minimise  # noqa: E402
 from cpg_ros.motion.readout import monomials, TURN  # noqa: E402
 from cpg_ros.networks.delayed import Delayed, PRESETS  # noqa: E402
 from cpg_ros.robots.robot import HARMONICS  # noqa: E402
@@ -59,7 +59,7 @@ EXACT, LOOSE = (1e-8, 1e-6, 1e-4), (1e-6, 1e-4, 1e-3)
 class Simulated:
     """The residual by jitcdde."""
 
-    def __init__(self, problem: Problem, history: Delayed) -> None:
+    def __init__(self, problem: CycleProblem, history: Delayed) -> None:
         self._problem, self._orbit = problem, solve_orbit(history, GAIT)
         self.rtol, self.agree, self.step = EXACT
         a, b, _, d, _ = history.as_dict().values()
@@ -131,10 +131,10 @@ def main() -> None:
     low = np.array([*(one.low for one in numbers), -np.inf])
     high = np.array([*(one.high for one in numbers), np.inf])
 
-    def posed() -> Problem:
-        return Problem(joints, joints.stated, start, GAIT, numbers, 3, HARMONICS)
+    def posed() -> CycleProblem:
+        return CycleProblem(joints, joints.stated, start, GAIT, numbers, 3, HARMONICS)
 
-    def begun(problem: Problem) -> np.ndarray:
+    def begun(problem: CycleProblem) -> np.ndarray:
         values = np.array([*START.values(), 0.0])
         problem.begin(values)
         values[-1] = problem.first_phase(values)
@@ -142,7 +142,7 @@ def main() -> None:
 
     def ours() -> object:
         problem = posed()
-        return descend(problem, begun(problem), low, high, TOLERANCE)
+        return minimise(problem, begun(problem), low, high, TOLERANCE)
 
     peer = Simulated(posed(), start)
     begin = begun(posed())
@@ -155,7 +155,7 @@ def main() -> None:
     gap = float(np.abs(peer(mine.values) - posed()(mine.values)[0]).max())
     log(f'ours {mine.values} in {mine.evaluations} evaluations, peer {found.x} in '
         f'{peer.evaluations}; residuals differ by {gap:.2g} standard errors')
-    best = descend(posed(), mine.values, low, high, 1e-12).values
+    best = minimise(posed(), mine.values, low, high, 1e-12).values
     errors = {'ours': mine.values - best, 'peer': found.x - best}
     peer.evaluations, began = 0, time.perf_counter()
     theirs()

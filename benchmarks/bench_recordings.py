@@ -53,7 +53,7 @@ def outcome(number: int, folder: Path, seed: int = SEED) -> tuple[str, Stride | 
     # Hopping, turning and other units are no mistake of the gait's name, but must be said.
     must_say = way in ('milliseconds', 'microseconds', 'degrees', 'on the spot', 'turn',
                        'slow change', 'another between')
-    warned = bool(found.doubts) and found.confidence < 0.95
+    warned = bool(found.issues) and found.confidence < 0.95
     if right and not must_say:
         return 'right', found, said
     return ('warned' if warned else 'wrong'), found, said

@@ -18,7 +18,7 @@ from cpg_ros.errors import CpgError
 from cpg_ros.feedback.estimate import SensorData
 from cpg_ros.motion.pattern import Pattern
 from cpg_ros.simulation.body import Body
-from cpg_ros.simulation.proprioception import felt
+from cpg_ros.simulation.proprioception import fill_sensor_data
 import numpy as np
 
 
@@ -84,7 +84,7 @@ class Proprioception:
         senses.joint_positions[0] = body.position[self._order]
         senses.joint_velocities[0] = body.velocity[self._order]
         senses.foot_forces[0] = body.feet
-        felt(senses, body.quaternion[None], body.rates[None], self._before,
-             body.model.opt.timestep, self._velocity)
+        fill_sensor_data(senses, body.quaternion[None], body.rates[None], self._before,
+                         body.model.opt.timestep, self._velocity)
         self._before[0] = body.rates
         return senses

@@ -23,7 +23,7 @@ import sys
 from cpg_ros.nodes.bridge_base import BridgeNode
 from cpg_ros.nodes.bridge_interface import RobotInterface
 from cpg_ros.nodes.bridge_parameters import bridge_specs
-from cpg_ros.nodes.node_base import asked_for_help, run
+from cpg_ros.nodes.node_base import help_or_error, run
 from cpg_ros.nodes.parameter_spec import Spec
 from cpg_ros.safety.bridge_settings import motor_places, settings_for
 from cpg_ros.safety.robot_state import JointCommand, RobotState
@@ -101,7 +101,7 @@ class ServoBridge(BridgeNode):
 def main():
     """Run the node; return the exit code."""
     name = Servos.bridge_name()
-    code = asked_for_help(name, 'Drives a biped of servo motors.', ServoBridge.specs, None)
+    code = help_or_error(name, 'Drives a biped of servo motors.', ServoBridge.specs, None)
     return run(ServoBridge, name, None) if code is None else code
 
 

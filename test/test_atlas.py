@@ -21,8 +21,8 @@ from cpg_ros.atlas import fold_curves
 from cpg_ros.atlas import orbit_curves as curves
 from cpg_ros.atlas.chart import chart_of
 from cpg_ros.atlas.hopf_curves import hopf_curves
-from cpg_ros.atlas.refinement import places, refined
-from cpg_ros.atlas.row_job import assess_row, leading_multipliers, LOCKED, NONE, Row
+from cpg_ros.atlas.refinement import grid_indices, refine
+from cpg_ros.atlas.row_job import assess_row, AtlasRow, leading_multipliers, LOCKED, NONE
 from cpg_ros.dynamics.continuation import continue_orbit
 from cpg_ros.dynamics.floquet import multipliers
 from cpg_ros.dynamics.orbit import solve_orbit, solve_preset
@@ -64,7 +64,7 @@ def test_curves_of_hopf_points_are_those_of_the_formula():
 
 def test_a_row_is_where_the_formula_says_and_as_orbits_alone_are():
     chart = chart_of('delayed', TROT, OVER, (9, 33))
-    found = assess_row(Row(chart, 'trot', 5, tuple(range(0, 33, 4))))
+    found = assess_row(AtlasRow(chart, 'trot', 5, tuple(range(0, 33, 4))))
     for one in found:
         tau = chart.second.values[one['column']]
         assert (one['label'] != NONE) == (tau > critical(6.5, 2, 1, True, 0)[1])
@@ -163,14 +163,14 @@ def test_the_page_is_one_file_with_everything_in_it(drawn):
 
 @pytest.mark.parametrize('count', [2, 3, 9, 12, 20, 200])
 def test_a_grid_of_any_size_is_halved_until_it_is_whole(count):
-    assert places(count, 1) == list(range(count))
+    assert grid_indices(count, 1) == list(range(count))
     chart = chart_of('delayed', TROT, OVER, (count, 9))
 
     def run(jobs, number):
         for row in jobs:
             yield row, [{'row': row.row, 'column': column, 'label': int(3 * row.row > count)}
                         for column in row.columns]
-    (sheet,) = refined(chart, ('trot',), (), run).values()
+    (sheet,) = refine(chart, ('trot',), (), run).values()
     assert (sheet.label == (3 * np.arange(count) > count)[:, None]).all()
 
 
@@ -181,7 +181,7 @@ def test_a_gait_that_is_born_on_a_steep_curve_is_found_beside_it():
     def run(jobs, number):
         for row in jobs:
             yield row, assess_row(row)
-    (sheet,) = refined(chart, ('jump',), hopf_curves((chart, ('jump',))), run).values()
+    (sheet,) = refine(chart, ('jump',), hopf_curves((chart, ('jump',))), run).values()
     for k, tau in enumerate(chart.second.values):
         # The slow wave of the class, where its delay is the first critical one at this c.
         born = brentq(lambda c, tau=tau: critical(c, 1, 0, False, 0)[1] - tau, 3.55, 3.9)

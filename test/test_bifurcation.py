@@ -21,7 +21,7 @@ from cpg_ros.dynamics.continuation import continue_orbit
 from cpg_ros.dynamics.floquet import multipliers
 from cpg_ros.dynamics.mesh.refinement import collocate
 from cpg_ros.dynamics.orbit import solve_preset
-from cpg_ros.dynamics.switching import switched
+from cpg_ros.dynamics.switching import switch_branch
 from cpg_ros.errors import InputError
 from cpg_ros.integration.simulate import simulate
 from cpg_ros.networks.biped import Biped
@@ -74,7 +74,7 @@ def test_the_hop_doubles_its_period_where_the_walk_ends():
     assert min(abs(one.value - value) for one in doubled) < 1e-3
     # There the walk leaves: left and right, flexor and extensor half a cycle apart.
     (point,) = (one for one in doubled if abs(one.value - value) < 1e-3)
-    leaving = switched(point, line, -1.0, 0.4, most=4)
+    leaving = switch_branch(point, line, -1.0, 0.4, most=4)
     assert dict(leaving.points[0].orbit.symmetry.shifts) == dict(
         last.network.symmetry('walk').shifts)
     assert leaving.points[0].orbit.period == pytest.approx(2.0 * hop.period, rel=1e-3)
@@ -102,7 +102,7 @@ def test_a_branch_leaves_a_gait_with_a_delay(preset, name):
     branch = continue_orbit(solve_preset(PRESETS['delayed'][preset]), line, 0.2, 4.0, most=30)
     point = next(one for one in bifurcations(branch) if one.kind == 'branch point'
                  and one.value > 0.3)
-    leaving = switched(point, line, 0.2, 4.0, most=6)
+    leaving = switch_branch(point, line, 0.2, 4.0, most=6)
     near, far = (one.orbit for one in leaving.points[1:3])
     assert max(map(delayed_residual, (near, far))) < 1e-9
     # A pitchfork: what breaks the symmetry x -> -x grows by the square root of the way.
@@ -119,7 +119,7 @@ def test_a_simulation_keeps_to_the_branch_that_leaves():
     branch = continue_orbit(solve_preset(PRESETS['delayed']['liu2024_pace']), line, 0.58, 0.8,
                             most=30)
     point = next(one for one in bifurcations(branch) if one.kind == 'branch point')
-    orbit = switched(point, line, 0.58, 0.8, most=6).points[-1].orbit
+    orbit = switch_branch(point, line, 0.58, 0.8, most=6).points[-1].orbit
     run = simulate(orbit.network, orbit, orbit.period, orbit.network.delay / 400, progress=False)
     # Disturbances grow three times in a period: errors of the method stay small.
     assert run.x == pytest.approx(orbit(run.t), abs=1e-7)
@@ -129,4 +129,4 @@ def test_no_branch_of_orbits_leaves_at_a_torus_point():
     branch, found = pace()
     torus = next(one for one in found if one.kind == 'torus')
     with pytest.raises(InputError, match='torus point at alpha=beta'):
-        switched(torus, branch.along, 0.05, 0.52)
+        switch_branch(torus, branch.along, 0.05, 0.52)

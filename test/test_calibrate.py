@@ -29,7 +29,7 @@ from cpg_ros.errors import InputError  # noqa: I100
 from cpg_ros.feedback.efference_copy import EfferenceCopy, SPEEDS
 from cpg_ros.gaits.stride import NoSteadyGait
 from cpg_ros.motion.pattern import Pattern
-from cpg_ros.motion.plan import Refused
+from cpg_ros.motion.plan import PlanError
 from cpg_ros.motion.steering import Drive
 from cpg_ros.robots.robot_file import read_robot, RobotError, write_robot
 from cpg_ros.simulation.body import Body
@@ -147,7 +147,7 @@ def test_a_bag_without_a_topic_is_refused_and_nothing_written(tmp_path, messages
     assert robot.read_text() == before
 
 
-@pytest.mark.parametrize(('kind', 'code'), [(NoSteadyGait, 1), (Refused, 1), (InputError, 2)])
+@pytest.mark.parametrize(('kind', 'code'), [(NoSteadyGait, 1), (PlanError, 1), (InputError, 2)])
 def test_a_gait_that_cannot_be_has_its_own_code_whatever_the_error_is_called(
         monkeypatch, capsys, kind, code):
     def fail(*_):

@@ -47,10 +47,11 @@ class Cubic:
 
 @pytest.mark.parametrize('step', [0.01, 0.1])
 def test_the_folds_of_a_cubic(step):
-    places, start = [], arclength.resolved(Cubic(), np.array([-1.5, 1.0, -1.5**3 + 1.5]),
-                                           arclength.held(3, -1))
-    folds, why = arclength.follow(start, -3.0, 1.0, lambda place: places.append(place) or '',
-                                  longest_step=step, most=1000)
+    places, start = [], arclength.resolve_point(Cubic(), np.array([-1.5, 1.0, -1.5**3 + 1.5]),
+                                                arclength.fixed_unknown(3, -1))
+    folds, why = arclength.continue_curve(start, -3.0, 1.0,
+                                          lambda place: places.append(place) or '',
+                                          longest_step=step, most=1000)
     assert why == 'bound' and places[-1].value == 1.0
     assert [places[k].z[0] for k in folds] == pytest.approx([-3**-0.5, 3**-0.5], abs=1e-8)
     x = np.array([place.z[0] for place in places])

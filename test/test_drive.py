@@ -15,10 +15,10 @@
 """Gaits with motions of their own, and steering: what a stride factor does to the joints."""
 
 from cpg_ros.motion.pattern import Pattern
-from cpg_ros.motion.plan import plan, Refused
+from cpg_ros.motion.plan import plan, PlanError
 from cpg_ros.motion.steering import Drive
 from cpg_ros.networks.registry import PRESETS
-from cpg_ros.robots.robot import Steering
+from cpg_ros.robots.robot import SteeringTable
 from cpg_ros.robots.robot_file import read_robot, RobotError, write_robot
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -27,7 +27,7 @@ import pytest
 import steered
 
 TURN = 2.0 * np.pi
-TABLE = Steering(**{key: tuple(value) for key, value in steered.STEERING.items()})
+TABLE = SteeringTable(**{key: tuple(value) for key, value in steered.STEERING.items()})
 
 
 @pytest.fixture(scope='module')
@@ -123,10 +123,10 @@ def test_strides_are_at_once_what_is_asked_while_nothing_moves(robot):
 def test_a_drive_approaches_as_a_critically_damped_oscillator():
     # Against a fine integration of s'' = (target - s) / T^2 - 2 s' / T.
     drive, s, v, dt = Drive(1), 1.0, 0.0, 1e-5
-    drive.ask(np.array([-0.5]), 1.0)
+    drive.set_target(np.array([-0.5]), 1.0)
     for tick in range(100):
         if tick == 20:
-            drive.ask(np.array([0.8]), 1.0)
+            drive.set_target(np.array([0.8]), 1.0)
         for _ in range(1000):
             v += dt * (((-0.5 if tick < 20 else 0.8) - s) / 0.04 - 2.0 * v / 0.2)
             s += dt * v
@@ -136,7 +136,7 @@ def test_a_drive_approaches_as_a_critically_damped_oscillator():
 
 @given(speed=st.floats(-1.0, 1.0), turn=st.floats(-3.0, 3.0))
 def test_the_steering_table_is_inverted(speed, turn):
-    left, right, frequency = TABLE.ask(speed, turn)
+    left, right, frequency = TABLE.set_target(speed, turn)
     assert -1.0 <= min(left, right) <= max(left, right) <= 1.0 + 1e-12
     assert 1.0 <= frequency <= 2.0
     if abs(turn) > 1e-9:
@@ -180,7 +180,7 @@ def test_strides_backward_must_stay_within_the_limits_too(robot, tmp_path):
             entry.update(offset=-1.0, weights=[0.0, 0.0, -0.45, 0.0])
     path = tmp_path / 'steered.yaml'
     path.write_text(steered.yaml.safe_dump(tree))
-    with pytest.raises(Refused, match=r'_calf_joint to -0\.550 rad, above its limit -0.7'):
+    with pytest.raises(PlanError, match=r'_calf_joint to -0\.550 rad, above its limit -0.7'):
         program(read_robot(path))
     del tree['gaits']['trot']['steering']
     path.write_text(steered.yaml.safe_dump(tree))

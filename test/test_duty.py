@@ -21,9 +21,9 @@ from pathlib import Path
 
 from cpg_ros.feedback.kinematics import geometry_of
 from cpg_ros.feedback.timetable import Timetable
-from cpg_ros.motion.duty import Duty, told
+from cpg_ros.motion.duty import Duty, retimed_phase
 from cpg_ros.motion.pattern import Pattern
-from cpg_ros.motion.plan import plan, Refused
+from cpg_ros.motion.plan import plan, PlanError
 from cpg_ros.networks.registry import find_network
 from cpg_ros.robots.robot import Motion
 from cpg_ros.robots.robot_file import read_robot, RobotError
@@ -68,16 +68,16 @@ def falling(pattern, strides=3, ticks=2000):
 def test_the_map_takes_stance_to_stance_and_is_smooth(own, asked, begin, phase):
     k = math.tan(0.5 * math.pi * own) / math.tan(0.5 * math.pi * asked)
     one = k, begin + 0.5 * asked, begin + 0.5 * own
-    gap = told(begin + asked, *one)[0] - begin - own
-    assert abs(gap - round(gap)) < 1e-12 and abs(told(begin, *one)[0] - begin) < 1e-12
-    slope, bend = told(phase, *one)[1:]
+    gap = retimed_phase(begin + asked, *one)[0] - begin - own
+    assert abs(gap - round(gap)) < 1e-12 and abs(retimed_phase(begin, *one)[0] - begin) < 1e-12
+    slope, bend = retimed_phase(phase, *one)[1:]
     h = 1e-6
-    after, before = told(phase + h, *one), told(phase - h, *one)
+    after, before = retimed_phase(phase + h, *one), retimed_phase(phase - h, *one)
     rise = (after[0] - before[0] + 0.5) % 1.0 - 0.5
     assert slope > 0.0 and abs(rise / (2.0 * h) - slope) < 1e-5 * (1.0 + slope**3)
     assert abs((after[1] - before[1]) / (2.0 * h) - bend) < 1e-4 * (1.0 + abs(bend) + slope**3)
     # Of halves it is hardly steeper than it has to be.
-    half = told(phase, 1.0 / math.tan(0.5 * math.pi * asked), 0.0, 0.0)[1]
+    half = retimed_phase(phase, 1.0 / math.tan(0.5 * math.pi * asked), 0.0, 0.0)[1]
     assert half < 4.0 / math.pi * 0.5 / min(asked, 1.0 - asked) + 1e-9
 
 
@@ -169,7 +169,7 @@ def test_feet_of_a_tuned_walk_go_back_for_as_long_as_was_asked(duty):
 
 def test_what_is_no_share_of_a_stride_is_refused(tmp_path):
     for duty in (0.29, 0.91, 1e-3):
-        with pytest.raises(Refused, match=r'is not from 0\.3 to 0\.9'):
+        with pytest.raises(PlanError, match=r'is not from 0\.3 to 0\.9'):
             program(*CASES[0], duty)
     for line, message in (('duty: 0.2', r'gaits\.walk\.duty: 0\.2 is not from 0\.3'),
                           ('stance: [0.1]', 'takes a phase'),

@@ -21,9 +21,9 @@ from cpg_ros.feedback.input_monitor import FADE, GOOD, STALE
 from cpg_ros.feedback.kinematics import geometry_of
 from cpg_ros.motion.pattern import Pattern
 from cpg_ros.motion.steering import Drive
-from cpg_ros.nodes import senses_input
+from cpg_ros.nodes import sensor_input
 from cpg_ros.nodes.feedback_loop import FeedbackLoop
-from cpg_ros.nodes.senses_input import SensesInput
+from cpg_ros.nodes.sensor_input import SensorInput
 from geometry_msgs.msg import WrenchStamped
 from go2 import DT, GO2, program
 import numpy as np
@@ -86,7 +86,7 @@ class Robot:
     """A body whose topics may lie."""
 
     def __init__(self, monkeypatch, contacts='foot_contacts', lag=0, **dull):
-        monkeypatch.setattr(senses_input, 'PolledSubscription', Wire)
+        monkeypatch.setattr(sensor_input, 'PolledSubscription', Wire)
         Wire.wires = {}
         made = program('trot')
         self.body = Body('go2', GO2)
@@ -94,7 +94,7 @@ class Robot:
         self.pattern = Pattern(made, 0.4, drive=Drive(4))
         geometry = geometry_of(GO2)
         self.loop = FeedbackLoop(self.pattern, geometry, lambda: (made.own_speed, 0.0, 0.0))
-        self.loop.listen(SensesInput(None, GO2, geometry, 'imu', 'measured', contacts,
+        self.loop.listen(SensorInput(None, GO2, geometry, 'imu', 'measured', contacts,
                                      'foot_contacts'))
         self.loop.wanted = True
         self.late, self.lag = {topic: [] for topic in Wire.wires}, lag
@@ -203,7 +203,7 @@ def test_feet_are_felt_by_their_own_sensors_or_by_the_motors(monkeypatch, contac
     felt, true = [], []
     for _ in range(round(2.0 / DT)):
         robot.tick()
-        felt.append(robot.loop._inputs.senses.foot_forces[0].copy())
+        felt.append(robot.loop._inputs.sensor_data.foot_forces[0].copy())
         true.append(robot.body.feet.copy())
     assert not robot.loop.faults and robot.loop.share == 1.0 and not robot.body.fallen
     felt, true = np.array(felt[500:]), np.array(true[500:])

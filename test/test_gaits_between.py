@@ -20,7 +20,7 @@ from pathlib import Path
 
 from cpg_ros.dynamics.orbit import solve_orbit
 from cpg_ros.errors import InputError
-from cpg_ros.inversion.model_choice import as_rows, explained, undecided
+from cpg_ros.inversion.model_choice import as_rows, compare_networks, indistinguishable
 from cpg_ros.inversion.recording_fit import fit_recording
 from cpg_ros.networks.registry import NETWORKS, PRESETS
 from cpg_ros.recordings.csv_reader import read_csv
@@ -64,7 +64,7 @@ def test_phases_of_no_gait_are_fitted_as_they_are(tmp_path, gait):
 
 def test_the_network_that_explains_a_canter(tmp_path, capsys):
     recorded(tmp_path / 'canter.csv', 'canter_right')
-    found = explained(read_csv(tmp_path / 'canter.csv'))
+    found = compare_networks(read_csv(tmp_path / 'canter.csv'))
     assert found[0].network == 'phase' and found[0].gait == 'canter_right'
     assert 0.0 < found[0].fitted <= 1.2 * found[0].error < 0.02
     # Three phases; an offset and six weights for each of eight joints.
@@ -103,13 +103,15 @@ def test_the_network_that_made_a_trot_explains_it(tmp_path, monkeypatch):
     # The others take longer to fit.
     monkeypatch.setattr('cpg_ros.inversion.model_choice.networks_of', lambda *_: [
         NETWORKS[name] for name in ('delayed', 'phase', 'hopf')])
-    plain, shaped = (explained(read_csv(tmp_path / 'own.csv'), order=order) for order in (1, 3))
+    plain, shaped = (compare_networks(read_csv(tmp_path / 'own.csv'), order=order) for order in (1,
+                                                                                                 3))
     assert plain[0].network == 'hopf' and plain[0].error < 0.005
     assert [one.alike for one in plain] == [True, False, False]
-    assert plain[1].error > 5.0 * plain[0].error and undecided(plain, 1) == ''
+    assert plain[1].error > 5.0 * plain[0].error and indistinguishable(plain, 1) == ''
     # Readouts of order 3 make such a waveform of several: the fewest numbers come first.
     assert shaped[0].network == 'hopf' and shaped[1].alike and shaped[0].numbers == 1 + 8 * 7
-    assert 'does not tell hopf' in undecided(shaped, 3) and '--order 1' in undecided(shaped, 3)
+    text = indistinguishable(shaped, 3)
+    assert 'does not tell hopf' in text and '--order 1' in text
     assert sorted(row[-1] for row in as_rows(plain)) == ['', 'told from the least', 'yes', 'yes']
 
 

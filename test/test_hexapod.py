@@ -19,8 +19,8 @@ from itertools import pairwise
 import math
 from pathlib import Path
 
+from cpg_ros.checks.description_match import checked
 from cpg_ros.checks.robot_template import robot_from
-from cpg_ros.checks.urdf_match import checked
 from cpg_ros.motion.pattern import Pattern
 from cpg_ros.motion.plan import plan
 from cpg_ros.networks.registry import find_network

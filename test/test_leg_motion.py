@@ -49,11 +49,11 @@ def lifted(turn):
 
 def test_legs_that_travel_are_not_doubted():
     found = stride_of(hip, knee)
-    assert found.gait == 'trot' and found.confidence > 0.95 and not found.doubts
+    assert found.gait == 'trot' and found.confidence > 0.95 and not found.issues
     # Knees that bend the other way behind than in front do not turn a robot.
     found = stride_of(lambda turn, leg: hip(turn, leg) * (1.0 if leg[1] == 'f' else -1.0),
                       lambda turn, leg: knee(turn, leg) * (1.0 if leg[1] == 'f' else -1.0))
-    assert found.gait == 'trot' and not any('turns' in doubt for doubt in found.doubts)
+    assert found.gait == 'trot' and not any('turns' in doubt for doubt in found.issues)
 
 
 @pytest.mark.parametrize('phases', [PHASES, dict.fromkeys(PHASES, 0.0)])
@@ -61,12 +61,12 @@ def test_on_the_spot(phases):
     found = stride_of(lambda turn, leg: 0.7 + 0.15 * lifted(turn),
                       lambda turn, leg: -1.4 - 0.3 * lifted(turn), phases)
     assert found.nearest == ('trot' if any(phases.values()) else 'pronk')
-    assert found.confidence <= 0.5 and 'step, or hop, on the spot' in found.doubts[0]
+    assert found.confidence <= 0.5 and 'step, or hop, on the spot' in found.issues[0]
 
 
 def test_a_turn_on_the_spot():
     found = stride_of(lambda turn, leg: 0.7 + 0.3 * np.cos(turn) * (-1.0) ** (leg[0] == 'l'), knee)
-    assert found.confidence <= 0.3 and 'it turns on the spot' in ' '.join(found.doubts)
+    assert found.confidence <= 0.3 and 'it turns on the spot' in ' '.join(found.issues)
 
 
 def bumps(turn, *places):

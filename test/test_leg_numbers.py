@@ -24,7 +24,7 @@ from cpg_ros.dynamics.orbit import solve_orbit, solve_preset
 from cpg_ros.dynamics.periodic import richer
 from cpg_ros.dynamics.stability import stability
 from cpg_ros.errors import CpgError
-from cpg_ros.gaits.leg_phases import named
+from cpg_ros.gaits.leg_phases import match_gait
 from cpg_ros.integration.simulate import simulate
 from cpg_ros.networks.delayed import Delayed, PRESETS
 from cpg_ros.networks.leg_numbers import footfall_order
@@ -72,7 +72,7 @@ def test_six_legs_and_their_gaits():
     assert network.gaits() == tuple(HEXAPOD)
     for gait, wanted in HEXAPOD.items():
         assert np.allclose(list(phases(network, gait).values()), np.array(wanted) / 6), gait
-        found = named(phases(network, gait), network)
+        found = match_gait(phases(network, gait), network)
         assert (found.gait, found.alike) == (gait, (gait,))
 
 

@@ -26,14 +26,14 @@ import time
 from bags import walk, write_bag
 from cpg_ros.errors import InputError
 from cpg_ros.fleet.many_recordings import Folders
-from cpg_ros.fleet.recording_job import Settings
+from cpg_ros.fleet.recording_job import FitSettings
 from cpg_ros.fleet.recordings_found import digest, found
 import numpy as np
 import pytest
 
 parquet = pytest.importorskip('pyarrow.parquet')
 INVERSION = [sys.executable, '-P', '-m', 'cpg_ros.tools.inversion']
-QUICK = Settings(network='delayed', free=('tau',), order=1)
+QUICK = FitSettings(network='delayed', free=('tau',), order=1)
 
 
 def table(phases=(0.0, 0.5, 0.5, 0.0), frequency=1.5, seed=0):
@@ -119,7 +119,7 @@ def test_it_goes_on_by_content_and_ends_with_the_same_table(folder, tmp_path):
     assert [{**row, 'fitted': ''} for row in bare(out)] == [
         {**row, 'fitted': ''} for row in bare(other)]
     # Fitted otherwise, all are done again.
-    assert invert(folder, out, Settings(network='delayed', free=('c',), order=1)).kept == 0
+    assert invert(folder, out, FitSettings(network='delayed', free=('c',), order=1)).kept == 0
 
 
 def test_what_was_repaired_or_spoiled_has_its_own_files_only(folder, tmp_path):

@@ -17,7 +17,7 @@
 from functools import cache
 
 from cpg_ros.motion.pattern import Pattern
-from cpg_ros.motion.plan import plan, Refused
+from cpg_ros.motion.plan import plan, PlanError
 from cpg_ros.networks.registry import PRESETS
 from cpg_ros.robots.robot_file import load_robot
 from hypothesis import given, settings
@@ -43,7 +43,7 @@ def programs(network):
     for name, preset in PRESETS[network].items():
         try:
             found.append(plan(robot, name, preset, preset.network, 2.5))
-        except Refused:
+        except PlanError:
             continue
     assert found
     return found

@@ -22,8 +22,8 @@ pytest.importorskip('websockets')
 
 from cpg_ros.files.loopback import is_loopback  # noqa: E402, I100
 from cpg_ros.nodes.parameter_spec import choices  # noqa: E402
+from cpg_ros.panel.access_control import AccessControl, AccessError, Delays, PEERS, token_for  # noqa: E402
 from cpg_ros.panel.controls import unit  # noqa: E402
-from cpg_ros.panel.door import Delays, Door, DoorError, PEERS, token_for  # noqa: E402
 from cpg_ros.panel.requests import LONGEST, read, RequestError  # noqa: E402
 
 
@@ -42,7 +42,7 @@ LONG = 'a_token-of-128-bits_22'
     ('', r"host '0\.0\.0\.0'.* set the parameter token"), ('word', 'the token has 4 characters'),
     ('x' * 21, 'token:=auto makes one'), ('auto', 'there is none: make one')])
 def test_another_host_needs_a_token_that_cannot_be_guessed(wish, said):
-    with pytest.raises(DoorError, match=said):
+    with pytest.raises(AccessError, match=said):
         token_for('0.0.0.0', wish, terminal=False)
 
 
@@ -89,18 +89,18 @@ def test_the_memory_of_wrong_tokens_is_bounded():
     ('/socket', 'evil.example:8080', 'http://evil.example:8080', 'not a name of this machine'),
     ('/socket', '', '', 'not a name of this machine')])
 def test_on_loopback_pages_of_this_machine_come_in(path, host, origin, said):
-    found = Door('').refuses(path, host, origin)
+    found = AccessControl('').refuses(path, host, origin)
     assert (said in found) if said else not found
 
 
 @pytest.mark.parametrize('query', ['', '?token=', '?token=wor', '?token=wordy', '?token=WORD',
                                    '?Token=word', '?token=w%00ord', '?token=\udcff'])
 def test_a_wrong_token_does_not(query):
-    assert 'token' in Door('word').refuses(f'/socket{query}', 'robot:8080', '')
+    assert 'token' in AccessControl('word').refuses(f'/socket{query}', 'robot:8080', '')
 
 
 def test_the_token_does_from_anywhere_but_another_sites_page():
-    door = Door('a b&c')
+    door = AccessControl('a b&c')
     assert not door.refuses('/socket?token=a%20b%26c', 'robot:8080', 'http://robot:8080')
     assert door.refuses('/socket?token=a%20b%26c', 'robot:8080', 'http://evil.example')
 

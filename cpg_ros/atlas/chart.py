@@ -64,7 +64,7 @@ class Chart:
         whole = find_network(self.network)(**self.base)
         return self.second.line.at(self.first.line.at(whole, one), other)
 
-    def told(self) -> dict[str, Any]:
+    def as_dict(self) -> dict[str, Any]:
         """Everything in plain types."""
         return {'network': self.network, 'base': self.base,
                 'axes': [{'line': str(axis.line), 'low': axis.low, 'high': axis.high,

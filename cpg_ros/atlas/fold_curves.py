@@ -24,11 +24,11 @@ from itertools import pairwise
 from typing import Any
 
 from cpg_ros.atlas.chart import Chart, COARSE
-from cpg_ros.atlas.hopf_curves import Curve
+from cpg_ros.atlas.hopf_curves import Boundary
 from cpg_ros.atlas.orbit_curves import Edge
-from cpg_ros.atlas.refinement import places, Sheet
+from cpg_ros.atlas.refinement import grid_indices, Sheet
 from cpg_ros.atlas.row_job import NONE, path_of
-from cpg_ros.dynamics.arclength import along, Place, resolved
+from cpg_ros.dynamics.arclength import CurvePoint, predict_and_correct, resolve_point
 from cpg_ros.dynamics.continuation import continue_orbit
 from cpg_ros.dynamics.orbit import NoOrbit, solve_from_path
 from cpg_ros.errors import CpgError
@@ -44,10 +44,10 @@ TRIED, MOST, SAME = 8, 80, 0.02
 
 def lost_edges(chart: Chart, sheet: Sheet) -> list[Edge]:
     """Neighbours on the coarse grid, along the second axis, of which one has no orbit."""
-    columns = places(chart.second.count, COARSE)
+    columns = grid_indices(chart.second.count, COARSE)
     size = np.array([chart.first.count - 1, chart.second.count - 1])
     found = []
-    for row in places(chart.first.count, COARSE):
+    for row in grid_indices(chart.first.count, COARSE):
         for one, other in pairwise(columns):
             for at, there in (((row, one), (row, other)), ((row, other), (row, one))):
                 if at in sheet.waves and sheet.label[there] == NONE:
@@ -56,10 +56,10 @@ def lost_edges(chart: Chart, sheet: Sheet) -> list[Edge]:
     return found
 
 
-def fold_curves(job: tuple[Chart, str, list[Edge]]) -> list[Curve]:
+def fold_curves(job: tuple[Chart, str, list[Edge]]) -> list[Boundary]:
     """Follow the folds at which a gait is lost over some edges; most are lost at Hopf points."""
     chart, gait, edges = job
-    found: list[Curve] = []
+    found: list[Boundary] = []
     size = np.array([chart.first.high - chart.first.low, chart.second.high - chart.second.low])
     for edge in edges[::max(1, len(edges) // TRIED)]:
         try:
@@ -72,12 +72,12 @@ def fold_curves(job: tuple[Chart, str, list[Edge]]) -> list[Curve]:
                    for curve in found):
                 continue
             back, ahead = (followed(chart, fold, one, way) for way in (-1.0, 1.0))
-            found.append(Curve('fold', gait, np.array(
+            found.append(Boundary('fold', gait, np.array(
                 [*back[::-1], (one, fold.value), *ahead])))
     return found
 
 
-def _folds(chart: Chart, gait: str, edge: Edge) -> list[Place]:
+def _folds(chart: Chart, gait: str, edge: Edge) -> list[CurvePoint]:
     """Folds of the branch in the row of an edge."""
     one, other = (float(axis.low + part * (axis.high - axis.low)) for axis, part in zip(
         (chart.first, chart.second), edge.here, strict=True))
@@ -90,7 +90,7 @@ def _folds(chart: Chart, gait: str, edge: Edge) -> list[Place]:
     return [point.place for point in branch.folds]
 
 
-def followed(chart: Chart, fold: Place, one: float, way: float) -> list[tuple[float, float]]:
+def followed(chart: Chart, fold: CurvePoint, one: float, way: float) -> list[tuple[float, float]]:
     """Folds from one on while the first parameter moves a way, as values on both axes.
 
     Args:
@@ -124,24 +124,24 @@ def followed(chart: Chart, fold: Place, one: float, way: float) -> list[tuple[fl
     return found
 
 
-def _next(chart: Chart, fold: Place, new: float, guess: np.ndarray) -> Place | None:
+def _next(chart: Chart, fold: CurvePoint, new: float, guess: np.ndarray) -> CurvePoint | None:
     """The fold at a value of the first parameter, from one nearby; None if it is not found."""
     curve: Any = fold.curve
     moved = replace(curve, network=chart.at(new, fold.value))
     try:
-        near = resolved(moved, guess, fold.tangent)
+        near = resolve_point(moved, guess, fold.tangent)
         if near is None:
             return None
 
         def rate(step: float) -> float:
-            place = along(near, step)
+            place = predict_and_correct(near, step)
             if place is None:
                 raise np.linalg.LinAlgError('no point')
             return place.rate
 
         for reach in REACHES:
             if rate(-reach) * rate(reach) < 0.0:
-                return along(near, brentq(rate, -reach, reach, xtol=1e-11))
+                return predict_and_correct(near, brentq(rate, -reach, reach, xtol=1e-11))
     except (NoOrbit, np.linalg.LinAlgError):
         return None
     return None

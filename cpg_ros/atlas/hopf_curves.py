@@ -39,7 +39,7 @@ SAME = 5e-3
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Curve(ShortRepr):
+class Boundary(ShortRepr):
     """A boundary in the plane of an atlas.
 
     Attributes:
@@ -130,10 +130,10 @@ def _followed(condition: _Condition, start: np.ndarray, way: float) -> list[np.n
     return found
 
 
-def hopf_curves(job: tuple[Chart, tuple[str, ...]]) -> list[Curve]:
+def hopf_curves(job: tuple[Chart, tuple[str, ...]]) -> list[Boundary]:
     """All curves of Hopf points of some gaits in a plane that a few lines across it meet."""
     chart, gaits = job
-    found: list[Curve] = []
+    found: list[Boundary] = []
     seen: dict[tuple[int, ...], list[np.ndarray]] = {}
     for value in np.linspace(chart.first.low, chart.first.high, BEGINNINGS):
         network = chart.at(float(value), chart.second.low)
@@ -157,7 +157,7 @@ def hopf_curves(job: tuple[Chart, tuple[str, ...]]) -> list[Curve]:
             back = _followed(condition, exact[0], -1.0)
             shares = np.array([*back[::-1], exact[0], *_followed(condition, exact[0], 1.0)])
             seen.setdefault(point.mode, []).append(shares)
-            found.append(Curve('Hopf', gait, condition.low + shares * condition.size))
+            found.append(Boundary('Hopf', gait, condition.low + shares * condition.size))
     return found
 
 

@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import Any
 
 from cpg_ros.atlas.chart import Chart
-from cpg_ros.atlas.hopf_curves import Curve
+from cpg_ros.atlas.hopf_curves import Boundary
 from cpg_ros.atlas.map_picture import COLOURS, LINES
 from cpg_ros.atlas.refinement import Sheet
 from cpg_ros.files.atomic_write import write_atomically
@@ -157,7 +157,7 @@ def _waves(sheet: Sheet, cells: int) -> list[Any]:
     return found
 
 
-def write_page(path: Path, chart: Chart, sheets: dict[str, Sheet], curves: list[Curve]) -> Path:
+def write_page(path: Path, chart: Chart, sheets: dict[str, Sheet], curves: list[Boundary]) -> Path:
     """Write the page and return its path.
 
     Raises:

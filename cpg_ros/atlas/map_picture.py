@@ -18,7 +18,7 @@ import io
 from pathlib import Path
 
 from cpg_ros.atlas.chart import Chart
-from cpg_ros.atlas.hopf_curves import Curve
+from cpg_ros.atlas.hopf_curves import Boundary
 from cpg_ros.atlas.refinement import Sheet
 from cpg_ros.files.atomic_write import write_atomically
 import numpy as np
@@ -29,7 +29,7 @@ LINES = {'Hopf': ('#1a202c', '-'), 'torus': ('#c53030', '-'), 'branch point': ('
          'period doubling': ('#276749', '-'), 'fold': ('#6b46c1', '--')}
 
 
-def draw_map(path: Path, chart: Chart, sheets: dict[str, Sheet], curves: list[Curve]) -> None:
+def draw_map(path: Path, chart: Chart, sheets: dict[str, Sheet], curves: list[Boundary]) -> None:
     """Write the picture, PNG.
 
     Raises:

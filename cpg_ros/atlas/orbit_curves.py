@@ -23,8 +23,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from cpg_ros.atlas.chart import Chart, COARSE
-from cpg_ros.atlas.hopf_curves import Curve
-from cpg_ros.atlas.refinement import places, Sheet
+from cpg_ros.atlas.hopf_curves import Boundary
+from cpg_ros.atlas.refinement import grid_indices, Sheet
 from cpg_ros.atlas.row_job import largest_of, NONE, path_of
 from cpg_ros.dynamics.bifurcation import REAL
 from cpg_ros.dynamics.floquet import ATTRACTS, multipliers
@@ -56,7 +56,8 @@ class Edge:
 
 def edges(chart: Chart, sheet: Sheet) -> list[Edge]:
     """Neighbours on the coarse grid whose orbits differ in how many multipliers are outside."""
-    rows, columns = places(chart.first.count, COARSE), places(chart.second.count, COARSE)
+    rows, columns = grid_indices(chart.first.count, COARSE), grid_indices(chart.second.count,
+                                                                          COARSE)
     size = np.array([chart.first.count - 1, chart.second.count - 1])
     found = []
     for k, row in enumerate(rows):
@@ -84,8 +85,8 @@ def spectrum(orbit: Orbit) -> list[np.ndarray]:
         parts = [np.delete(inside, np.abs(inside - 1.0).argmin()),
                  *(largest_of(equation, part, exact=1e-12) for part in equation.outside)]
     else:
-        told = multipliers(orbit)
-        parts = [told.within, *told.parts]
+        spectrum_of_orbit = multipliers(orbit)
+        parts = [spectrum_of_orbit.within, *spectrum_of_orbit.parts]
     return [part[np.argsort(-np.abs(part), kind='stable')] for part in parts]
 
 
@@ -108,10 +109,10 @@ class _Plane:
         return found
 
 
-def orbit_curves(job: tuple[Chart, str, list[Edge]]) -> list[Curve]:
+def orbit_curves(job: tuple[Chart, str, list[Edge]]) -> list[Boundary]:
     """Follow the curves that some edges cross; those that cannot be had are left out."""
     chart, gait, crossed = job
-    found: list[Curve] = []
+    found: list[Boundary] = []
     size = np.array([chart.first.high - chart.first.low, chart.second.high - chart.second.low])
     low = np.array([chart.first.low, chart.second.low])
     for edge in crossed:
@@ -129,7 +130,7 @@ def orbit_curves(job: tuple[Chart, str, list[Edge]]) -> list[Curve]:
     return found
 
 
-def _through(chart: Chart, gait: str, edge: Edge) -> Iterator[Curve]:
+def _through(chart: Chart, gait: str, edge: Edge) -> Iterator[Boundary]:
     plane = _Plane(chart, gait)
     one, other = np.array(edge.here), np.array(edge.there)
     network = chart.at(*(float(axis.low + part * (axis.high - axis.low)) for axis, part in zip(
@@ -164,7 +165,7 @@ def _through(chart: Chart, gait: str, edge: Edge) -> Iterator[Curve]:
         shares = np.array([*ways[0][::-1], share, *ways[1]])
         low = np.array([chart.first.low, chart.second.low])
         size = np.array([chart.first.high, chart.second.high]) - low
-        yield Curve(kind, gait, low + shares * size)
+        yield Boundary(kind, gait, low + shares * size)
         plane.last = start
 
 

@@ -24,8 +24,8 @@ import itertools
 from typing import Any
 
 from cpg_ros.atlas.chart import Chart, COARSE
-from cpg_ros.atlas.hopf_curves import Curve
-from cpg_ros.atlas.row_job import NONE, Row
+from cpg_ros.atlas.hopf_curves import Boundary
+from cpg_ros.atlas.row_job import AtlasRow, NONE
 from cpg_ros.short_repr import ShortRepr
 import numpy as np
 
@@ -79,7 +79,7 @@ class Sheet(ShortRepr):
             values[at] = np.mean([values[corner] for corner in corners])
 
 
-def places(count: int, stride: int) -> list[int]:
+def grid_indices(count: int, stride: int) -> list[int]:
     """Indices of a grid of this stride: the coarse one, the last index in it, and halvings."""
     found, halved = sorted({*range(0, count, COARSE), count - 1}), COARSE
     while halved > stride:
@@ -88,13 +88,14 @@ def places(count: int, stride: int) -> list[int]:
     return found
 
 
-def coarse_rows(chart: Chart, gaits: tuple[str, ...], curves: Iterable[Curve]) -> Iterator[Row]:
+def coarse_rows(chart: Chart, gaits: tuple[str, ...],
+                curves: Iterable[Boundary]) -> Iterator[AtlasRow]:
     """The jobs of the coarse grid, and of rows that cross curves of Hopf points between its own.
 
     Branches are looked for in rows: a steep curve that lies between two would have none.
     """
-    columns = tuple(places(chart.second.count, COARSE))
-    rows = {gait: set(places(chart.first.count, COARSE)) for gait in gaits}
+    columns = tuple(grid_indices(chart.second.count, COARSE))
+    rows = {gait: set(grid_indices(chart.first.count, COARSE)) for gait in gaits}
     for curve in curves:
         low, high = np.interp([curve.points[:, 0].min(), curve.points[:, 0].max()],
                               chart.first.values, np.arange(chart.first.count))
@@ -103,10 +104,10 @@ def coarse_rows(chart: Chart, gaits: tuple[str, ...], curves: Iterable[Curve]) -
     for row in sorted(set().union(*rows.values())):
         for gait in gaits:
             if row in rows[gait]:
-                yield Row(chart, gait, row, columns, basin=True)
+                yield AtlasRow(chart, gait, row, columns, basin=True)
 
 
-def again(chart: Chart, gait: str, sheet: Sheet, before: np.ndarray) -> list[Row]:
+def worse_points(chart: Chart, gait: str, sheet: Sheet, before: np.ndarray) -> list[AtlasRow]:
     """Return jobs for points of the coarse grid that are worse than one beside them.
 
     An orbit may reach where no branch from a Hopf point of its row does.
@@ -120,24 +121,25 @@ def again(chart: Chart, gait: str, sheet: Sheet, before: np.ndarray) -> list[Row
     """
     jobs = []
     new = [at for at in sheet.waves if sheet.label[at] != before[at]]
-    for row in places(chart.first.count, COARSE):
+    for row in grid_indices(chart.first.count, COARSE):
         some: list[int] = []
         near: set[tuple[int, int]] = set()
-        for column in places(chart.second.count, COARSE):
+        for column in grid_indices(chart.second.count, COARSE):
             close = {at for at in new if max(abs(at[0] - row), abs(at[1] - column)) <= COARSE
                      and sheet.label[at] > sheet.label[row, column]}
             if close:
                 some.append(column)
                 near |= close
         if some:
-            jobs.append(Row(chart, gait, row, tuple(some), tuple(
+            jobs.append(AtlasRow(chart, gait, row, tuple(some), tuple(
                 (*at, *sheet.waves[at]) for at in sorted(near)), basin=True, again=True))
     return jobs
 
 
-def finer(chart: Chart, gait: str, sheet: Sheet, stride: int) -> list[Row]:
+def refine_once(chart: Chart, gait: str, sheet: Sheet, stride: int) -> list[AtlasRow]:
     """Halve the grid of a stride: fill in what is clear, and return jobs for what is not."""
-    rows, columns = places(chart.first.count, stride), places(chart.second.count, stride)
+    rows, columns = grid_indices(chart.first.count, stride), grid_indices(chart.second.count,
+                                                                          stride)
     wanted: set[tuple[int, int]] = set()
     fillable: dict[tuple[int, int], list[tuple[int, int]]] = {}
     for top, bottom in itertools.pairwise(rows):
@@ -157,7 +159,7 @@ def finer(chart: Chart, gait: str, sheet: Sheet, stride: int) -> list[Row]:
     by_row: dict[int, list[int]] = {}
     for row, column in sorted(wanted):
         by_row.setdefault(row, []).append(column)
-    return [Row(chart, gait, row, tuple(some), tuple(_near(sheet, row, some, stride)))
+    return [AtlasRow(chart, gait, row, tuple(some), tuple(_near(sheet, row, some, stride)))
             for row, some in by_row.items()]
 
 
@@ -188,9 +190,10 @@ def _near(sheet: Sheet, row: int, columns: list[int], stride: int
                 yield r, c, wave, period
 
 
-def refined(chart: Chart, gaits: tuple[str, ...], curves: Iterable[Curve],
-            run: Callable[[Iterable[Row], int], Iterable[tuple[Row, list[dict[str, Any]]]]]
-            ) -> dict[str, Sheet]:
+def refine(chart: Chart, gaits: tuple[str, ...], curves: Iterable[Boundary],
+           run: Callable[[Iterable[AtlasRow], int],
+                         Iterable[tuple[AtlasRow, list[dict[str, Any]]]]]
+           ) -> dict[str, Sheet]:
     """Fill sheets for all gaits, from the coarse grid to the finest.
 
     Args:
@@ -201,21 +204,21 @@ def refined(chart: Chart, gaits: tuple[str, ...], curves: Iterable[Curve],
 
     """
     sheets = {gait: Sheet((chart.first.count, chart.second.count)) for gait in gaits}
-    jobs: list[Row] = list(coarse_rows(chart, gaits, curves))
+    jobs: list[AtlasRow] = list(coarse_rows(chart, gaits, curves))
     before = {gait: np.full_like(sheet.label, -1) for gait, sheet in sheets.items()}
     stride = COARSE
     while True:
         for row, points in run(jobs, len(jobs)):
             sheets[row.gait].take(points)
         if stride == COARSE:
-            jobs = [job for gait in gaits for job in again(chart, gait, sheets[gait],
-                                                           before[gait])]
+            jobs = [job for gait in gaits for job in worse_points(chart, gait, sheets[gait],
+                                                                  before[gait])]
             before = {gait: sheet.label.copy() for gait, sheet in sheets.items()}
             if jobs:
                 continue
         if stride == 1:
             break
-        jobs = [job for gait in gaits for job in finer(chart, gait, sheets[gait], stride)]
+        jobs = [job for gait in gaits for job in refine_once(chart, gait, sheets[gait], stride)]
         stride //= 2
     for sheet in sheets.values():
         assert (sheet.label >= NONE).all()

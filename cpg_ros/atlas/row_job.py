@@ -53,7 +53,7 @@ MOST, TRIED, STEPS = 60, 3, (1, 4)
 
 
 @dataclass(frozen=True)
-class Row:
+class AtlasRow:
     """Points of one gait in a row of the grid.
 
     Attributes:
@@ -76,7 +76,7 @@ class Row:
     again: bool = False
 
 
-def assess_row(row: Row) -> list[dict[str, Any]]:
+def assess_row(row: AtlasRow) -> list[dict[str, Any]]:
     """Judge the gait at the points of a row: a dictionary of plain types for each.
 
     Where several orbits are found it is the first that attracts, if only with a lock.
@@ -86,7 +86,7 @@ def assess_row(row: Row) -> list[dict[str, Any]]:
 
 
 class _Finder:
-    def __init__(self, row: Row) -> None:
+    def __init__(self, row: AtlasRow) -> None:
         self.row = row
         self.one = float(row.chart.first.values[row.row])
         self.last: Orbit | None = None
@@ -106,15 +106,15 @@ class _Finder:
                 best = orbit, judged
             if best[1]['label'] >= LOCKED:
                 break
-        told: dict[str, Any] = {'gait': self.row.gait, 'row': self.row.row, 'column': column,
-                                'label': NONE}
+        point_data: dict[str, Any] = {'gait': self.row.gait, 'row': self.row.row, 'column': column,
+                                      'label': NONE}
         self.last = best[0] if best else None
         if best:
             orbit, judged = best
-            told |= judged | {'wave': _wave(orbit)}
+            point_data |= judged | {'wave': _wave(orbit)}
             if self.row.basin:
-                told['basin'] = basin(orbit, told['lock'])
-        return told
+                point_data['basin'] = basin(orbit, point_data['lock'])
+        return point_data
 
     def _orbits(self, network: Network, column: int, value: float) -> Iterator[Orbit]:
         gait = self.row.gait
@@ -233,9 +233,9 @@ def leading_multipliers(orbit: Orbit) -> tuple[float, float, int]:
     each subspace, which a map does not need more exactly than TRIVIAL.
     """
     if not isinstance(orbit, FourierOrbit):
-        told = multipliers(orbit)
-        whole = np.concatenate([told.within, told.transverse])
-        return told.leading_within, told.leading, int((np.abs(whole) >= ATTRACTS).sum())
+        spectrum = multipliers(orbit)
+        whole = np.concatenate([spectrum.within, spectrum.transverse])
+        return spectrum.leading_within, spectrum.leading, int((np.abs(whole) >= ATTRACTS).sum())
     n = max(1, int(np.ceil(orbit.network.delay / (SPAN * orbit.period))))
     for halving in range(HALVINGS):
         equation = Variation(orbit, n * 2**halving)

@@ -22,9 +22,9 @@ from pathlib import Path
 from typing import Any
 
 from cpg_ros.atlas.chart import Chart
-from cpg_ros.atlas.hopf_curves import Curve
+from cpg_ros.atlas.hopf_curves import Boundary
 from cpg_ros.atlas.refinement import NUMBERS, Sheet
-from cpg_ros.atlas.row_job import Row
+from cpg_ros.atlas.row_job import AtlasRow
 from cpg_ros.errors import InputError
 from cpg_ros.files.atomic_write import write_atomically
 from cpg_ros.fleet.results_table import library
@@ -35,7 +35,7 @@ MARK, PARTS = 'atlas.json', 'parts'
 LABELS = ('none', 'unstable', 'with lock', 'stable')
 
 
-class Stored:
+class AtlasFolder:
     """A folder that an atlas grows in."""
 
     def __init__(self, folder: Path, chart: Chart, gaits: tuple[str, ...]) -> None:
@@ -47,21 +47,21 @@ class Stored:
 
         """
         self.folder, self.chart = folder, chart
-        told = json.dumps({**chart.told(), 'gaits': gaits}, indent=1)
+        text = json.dumps({**chart.as_dict(), 'gaits': gaits}, indent=1)
         mark = folder / MARK
         if mark.exists():
-            if mark.read_text() != told:
+            if mark.read_text() != text:
                 raise InputError(f'{folder} holds an atlas of other parameters or gaits')
         elif folder.exists() and any(folder.iterdir()):
             raise InputError(f'{folder} is not the folder of an atlas: it contains other files')
         (folder / PARTS).mkdir(parents=True, exist_ok=True)
-        write_atomically(mark, told)
+        write_atomically(mark, text)
 
-    def _place(self, row: Row) -> Path:
-        told = json.dumps([row.gait, row.row, row.columns, row.near, row.basin])
-        return self.folder / PARTS / f'{hashlib.sha256(told.encode()).hexdigest()[:20]}.json'
+    def _place(self, row: AtlasRow) -> Path:
+        text = json.dumps([row.gait, row.row, row.columns, row.near, row.basin])
+        return self.folder / PARTS / f'{hashlib.sha256(text.encode()).hexdigest()[:20]}.json'
 
-    def get(self, row: Row) -> list[dict[str, Any]] | None:
+    def get(self, row: AtlasRow) -> list[dict[str, Any]] | None:
         """Return what a job found, if it is done."""
         try:
             found: list[dict[str, Any]] = json.loads(self._place(row).read_text())
@@ -69,22 +69,22 @@ class Stored:
             return None
         return found
 
-    def put(self, row: Row, points: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    def put(self, row: AtlasRow, points: list[dict[str, Any]]) -> list[dict[str, Any]]:
         """Keep what a job found, and return it as get will."""
         text = json.dumps(points)
         write_atomically(self._place(row), text)
         kept: list[dict[str, Any]] = json.loads(text)
         return kept
 
-    def curves(self) -> list[Curve] | None:
+    def curves(self) -> list[Boundary] | None:
         """Return the boundaries, if they are done."""
         try:
-            told = json.loads((self.folder / 'boundaries.json').read_text())
+            text = json.loads((self.folder / 'boundaries.json').read_text())
         except (FileNotFoundError, ValueError):
             return None
-        return [Curve(one['kind'], one['gait'], np.array(one['points'])) for one in told]
+        return [Boundary(one['kind'], one['gait'], np.array(one['points'])) for one in text]
 
-    def put_curves(self, curves: list[Curve]) -> None:
+    def put_curves(self, curves: list[Boundary]) -> None:
         """Keep the boundaries."""
         write_atomically(self.folder / 'boundaries.json', json.dumps([
             {**asdict(curve), 'points': curve.points.tolist()} for curve in curves]))

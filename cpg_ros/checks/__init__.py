@@ -17,4 +17,4 @@
 Imports ``motion``, ``gaits``, ``robots`` and what is below; knows nothing of ROS.
 """
 
-__all__ = ['leg_shapes', 'robot_template', 'urdf_match']
+__all__ = ['description_match', 'leg_shapes', 'robot_template']

@@ -22,7 +22,7 @@ and the end of the leg below its hip, if upper and lower leg are equally long.
 from dataclasses import replace
 from math import copysign, inf, pi
 
-from cpg_ros.checks.urdf_match import unlimited
+from cpg_ros.checks.description_match import unlimited
 from cpg_ros.gaits.leg_names import Legs, legs_of
 from cpg_ros.motion.plan import plan
 from cpg_ros.networks.registry import NETWORKS, numbered
@@ -54,14 +54,14 @@ def robot_from(known: RobotDescription, name: str) -> tuple[Robot, str]:
     usual = {kind.name: next(iter(kind.legs.items())) for kind in numbered(len(legs))}
     assignment, cells = next(one for one in usual.values() if set(one[1]) == set(legs))
     networks = tuple(name for name, one in usual.items() if one == (assignment, cells))
-    joints, says = {}, []
+    joints, notes = {}, []
     for leg in legs:
-        joints[leg], said = _leg(known, legs, leg, cells[leg][0])
-        says.append(said)
+        joints[leg], note = _leg(known, legs, leg, cells[leg][0])
+        notes.append(note)
     driven = {joint.name for one in joints.values() for joint in one}
     robot = Robot(name, networks, assignment, HARMONICS, joints,
                   tuple(joint for joint in known.joints if joint in driven))
-    return _fitting(robot), '\n'.join(says)
+    return _fitting(robot), '\n'.join(notes)
 
 
 def _leg(known: RobotDescription, legs: Legs, leg: str, cell: int

@@ -51,7 +51,7 @@ class NoOrbit(CpgError):
     """The parameter set has no such gait; the message says what stands against it."""
 
 
-class Curve(Protocol):
+class SolutionCurve(Protocol):
     """A curve in a fixed discretisation; the last two unknowns are a period and the parameter."""
 
     def product(self, one: np.ndarray, other: np.ndarray) -> float:
@@ -74,7 +74,7 @@ class Curve(Protocol):
         """Make an orbit of a solution."""
 
     def renewed(self, z: np.ndarray, border: np.ndarray, again: bool
-                ) -> tuple['Curve', np.ndarray, np.ndarray] | None:
+                ) -> tuple['SolutionCurve', np.ndarray, np.ndarray] | None:
         """Discretise anew where z is not resolved: curve, z and border; None if it is.
 
         Again: this discretisation was itself made to resolve z, and may have failed.
@@ -86,7 +86,7 @@ class Curve(Protocol):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Place(ShortRepr):
+class CurvePoint(ShortRepr):
     """A point of a curve and the unit tangent there.
 
     Attributes:
@@ -98,7 +98,7 @@ class Place(ShortRepr):
 
     """
 
-    curve: Curve
+    curve: SolutionCurve
     z: np.ndarray
     tangent: np.ndarray
     steps: int = 0
@@ -119,13 +119,13 @@ class Place(ShortRepr):
         """Half the range of what is continued."""
         return self.curve.amplitude(self.z)
 
-    def reversed(self) -> 'Place':  # noqa: A003
+    def reversed(self) -> 'CurvePoint':  # noqa: A003
         """Return the same point, to be left the other way."""
         return replace(self, tangent=-self.tangent)
 
 
-def corrected(curve: Curve, z: np.ndarray, border: np.ndarray, *, exact: bool = True
-              ) -> Place | None:
+def correct_point(curve: SolutionCurve, z: np.ndarray, border: np.ndarray, *, exact: bool = True
+                  ) -> CurvePoint | None:
     """Find the curve's point z + v with (v, border) = 0; None if Newton's method has lost it.
 
     Args:
@@ -151,47 +151,47 @@ def corrected(curve: Curve, z: np.ndarray, border: np.ndarray, *, exact: bool = 
             # Newton's next step is C size^2, with C = size / before^2 as in this one.
             if size <= TOLERANCE or (not exact and size**3 <= NEGLIGIBLE * before**2):
                 length = math.sqrt(curve.product(direction, direction))
-                return Place(curve, z, direction / length, count, 1.0 / length)
+                return CurvePoint(curve, z, direction / length, count, 1.0 / length)
             before = size
     return None
 
 
-def resolved(curve: Curve, z: np.ndarray, border: np.ndarray, *, exact: bool = True
-             ) -> Place | None:
+def resolve_point(curve: SolutionCurve, z: np.ndarray, border: np.ndarray, *, exact: bool = True
+                  ) -> CurvePoint | None:
     """Return the curve's point near z in a discretisation that resolves it.
 
     Raises:
         NoOrbit: it cannot be resolved.
 
     """
-    place = first = corrected(curve, z, border, exact=exact)
+    place = first = correct_point(curve, z, border, exact=exact)
     while place is not None and first is not None:
         new = place.curve.renewed(place.z, border, place is not first)
         if new is None:
             return place if place is first else replace(place, steps=first.steps,
                                                         cosine=first.cosine)
         border = new[2]
-        place = corrected(*new, exact=exact)
+        place = correct_point(*new, exact=exact)
     return None
 
 
-def held(size: int, which: int) -> np.ndarray:
+def fixed_unknown(size: int, which: int) -> np.ndarray:
     """Return the border that holds one of the unknowns."""
     border = np.zeros(size)
     border[which] = 1.0
     return border
 
 
-def along(place: Place, step: float) -> Place | None:
+def predict_and_correct(place: CurvePoint, step: float) -> CurvePoint | None:
     """Return the point a step along the tangent, in the same discretisation."""
-    return corrected(place.curve, place.z + step * place.tangent, place.tangent)
+    return correct_point(place.curve, place.z + step * place.tangent, place.tangent)
 
 
-def pinned(place: Place, value: float) -> Place | None:
+def point_at_value(place: CurvePoint, value: float) -> CurvePoint | None:
     """Return the curve's point with a value of the parameter, from one nearby; None if lost."""
     z = place.z + (value - place.value) / place.rate * place.tangent
     z[-1] = value
-    found = resolved(place.curve, z, held(z.size, -1))
+    found = resolve_point(place.curve, z, fixed_unknown(z.size, -1))
     if found is None:
         return None
     found.z[-1] = value
@@ -199,7 +199,7 @@ def pinned(place: Place, value: float) -> Place | None:
     return found if place.rate > 0.0 else found.reversed()
 
 
-def crossing(here: Place, way: float, value: float) -> Place | None:
+def next_crossing(here: CurvePoint, way: float, value: float) -> CurvePoint | None:
     """Return the next point with a value of the parameter; None if Newton's method finds none.
 
     Args:
@@ -209,7 +209,7 @@ def crossing(here: Place, way: float, value: float) -> Place | None:
 
     """
     def gap(step: float) -> float:
-        found = along(here, way * step)
+        found = predict_and_correct(here, way * step)
         if found is None:
             raise np.linalg.LinAlgError('no point')
         return found.value - value
@@ -219,17 +219,17 @@ def crossing(here: Place, way: float, value: float) -> Place | None:
         while sign * gap(reach) > 0.0:
             reach *= 2.0
         # Newton's method may put the point itself beyond a value that is next to it.
-        near = along(here, way * brentq(gap, 0.0, reach, xtol=1e-2 * reach)
-                     if sign * gap(0.0) > 0.0 else 0.0)
+        near = predict_and_correct(here, way * brentq(gap, 0.0, reach, xtol=1e-2 * reach)
+                                   if sign * gap(0.0) > 0.0 else 0.0)
     except np.linalg.LinAlgError:
         return None
-    return pinned(near, value) if near is not None and near.rate else None
+    return point_at_value(near, value) if near is not None and near.rate else None
 
 
-def fold(after: Place, step: float) -> Place | None:
+def locate_fold(after: CurvePoint, step: float) -> CurvePoint | None:
     """Return the fold that lies up to about a step before a point; None if it cannot be had."""
     def rate(back: float) -> float:
-        found = along(after, back)
+        found = predict_and_correct(after, back)
         if found is None:
             raise np.linalg.LinAlgError('no point')
         return found.rate
@@ -241,16 +241,18 @@ def fold(after: Place, step: float) -> Place | None:
             return None
         for reach in (1.1, 1.4, 2.0):
             if rate(-reach * step) * after.rate < 0.0:
-                found = along(after, brentq(rate, -reach * step, last, xtol=1e-9 * step,
-                                            rtol=1e-12))
-                return None if found is None else resolved(found.curve, found.z, found.tangent)
+                found = predict_and_correct(after,
+                                            brentq(rate, -reach * step, last, xtol=1e-9 * step,
+                                                   rtol=1e-12))
+                return None if found is None else resolve_point(found.curve, found.z,
+                                                                found.tangent)
     except (np.linalg.LinAlgError, NoOrbit):
         # Where two curves cross, as at a gain of symmetry, Newton's method may fail.
         return None
     return None
 
 
-def _room(here: Place) -> float:
+def _room(here: CurvePoint) -> float:
     """Longest step that takes no more than its share of the amplitude."""
     size = here.amplitude
     ahead = here.curve.amplitude(here.z + 1e-3 * size * here.tangent)
@@ -258,9 +260,9 @@ def _room(here: Place) -> float:
     return SHARE * size / falling if falling > 0.0 else math.inf
 
 
-def follow(start: Place, low: float, high: float, visit: Callable[[Place], str], *,
-           first_step: float = FIRST, longest_step: float = LONGEST, most: int = 200
-           ) -> tuple[list[int], str]:
+def continue_curve(start: CurvePoint, low: float, high: float, visit: Callable[[CurvePoint], str],
+                   *, first_step: float = FIRST, longest_step: float = LONGEST, most: int = 200
+                   ) -> tuple[list[int], str]:
     """Follow a curve from a point in the direction of its tangent.
 
     Args:
@@ -287,8 +289,8 @@ def follow(start: Place, low: float, high: float, visit: Callable[[Place], str],
         if step < SHORTEST:
             return folds, 'lost'
         try:
-            ahead = resolved(here.curve, here.z + step * here.tangent, here.tangent,
-                             exact=False)
+            ahead = resolve_point(here.curve, here.z + step * here.tangent, here.tangent,
+                                  exact=False)
         except NoOrbit:
             return folds, 'steep'
         if ahead is None or ahead.cosine < ALIGNED:
@@ -296,7 +298,7 @@ def follow(start: Place, low: float, high: float, visit: Callable[[Place], str],
             continue
         stations = [ahead]
         if ahead.rate * here.rate < 0.0:
-            between = fold(ahead, step)
+            between = locate_fold(ahead, step)
             if between is None and step > 100.0 * SHORTEST:
                 step *= 0.5
                 continue
@@ -304,7 +306,7 @@ def follow(start: Place, low: float, high: float, visit: Callable[[Place], str],
                 stations.insert(0, between)
         for station in stations:
             if not low <= station.value <= high:
-                edge = pinned(station, low if station.value < low else high)
+                edge = point_at_value(station, low if station.value < low else high)
                 # A start on the bound is no second point of the branch.
                 if edge is None or edge.value == here.value:
                     return folds, 'bound'

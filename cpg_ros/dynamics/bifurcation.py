@@ -25,7 +25,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 from cpg_ros.dynamics import arclength
-from cpg_ros.dynamics.arclength import Place
+from cpg_ros.dynamics.arclength import CurvePoint
 from cpg_ros.dynamics.continuation import Branch, BranchPoint
 from cpg_ros.dynamics.floquet import Multipliers, multipliers
 from cpg_ros.dynamics.periodic import NoOrbit
@@ -120,7 +120,7 @@ def _crossings(branch: Branch, spectra: list[list[np.ndarray]]
                     yield k, part, rank
 
 
-def _between(left: Place, right: Place, share: float) -> Place | None:
+def _between(left: CurvePoint, right: CurvePoint, share: float) -> CurvePoint | None:
     """Return the curve's point at a share of the way in the value or, if that stays, the period.
 
     Raises:
@@ -134,7 +134,8 @@ def _between(left: Place, right: Place, share: float) -> Place | None:
     near = left if share < 0.5 else right
     z = near.z + (target - near.z[which]) / near.tangent[which] * near.tangent
     z[which] = target
-    return arclength.resolved(near.curve, z, arclength.held(z.size, which), exact=False)
+    return arclength.resolve_point(near.curve, z, arclength.fixed_unknown(z.size, which),
+                                   exact=False)
 
 
 class _Gap:

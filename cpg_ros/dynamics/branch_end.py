@@ -36,7 +36,7 @@ STEEPER = 4.0
 
 
 @dataclass(frozen=True)
-class End:
+class BranchEnd:
     """How a branch ends.
 
     Attributes:
@@ -55,11 +55,12 @@ class End:
     period: float
 
     def __str__(self) -> str:
-        said = {'rest': 'Hopf point', 'symmetry': 'orbit of more symmetry', 'bound': 'followed to',
-                'period': 'homoclinic end near', 'steps': 'not followed beyond', 'start':
-                'not followed from', 'steep': 'too steep beyond', 'lost': 'lost at'}[self.why]
+        texts = {'rest': 'Hopf point', 'symmetry': 'orbit of more symmetry',
+                 'bound': 'followed to',
+                 'period': 'homoclinic end near', 'steps': 'not followed beyond', 'start':
+                 'not followed from', 'steep': 'too steep beyond', 'lost': 'lost at'}[self.why]
         grows = ', period grows' if self.why == 'period' else ''
-        return f'{said} {self.value:.7g}{grows}'
+        return f'{texts} {self.value:.7g}{grows}'
 
 
 def grows_alone(values: np.ndarray, periods: np.ndarray, scale: float) -> bool:

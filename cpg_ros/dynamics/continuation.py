@@ -23,8 +23,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from cpg_ros.dynamics import arclength
-from cpg_ros.dynamics.arclength import Place
-from cpg_ros.dynamics.branch_end import End, grows_alone, without_period
+from cpg_ros.dynamics.arclength import CurvePoint
+from cpg_ros.dynamics.branch_end import BranchEnd, grows_alone, without_period
 from cpg_ros.dynamics.orbit import curve_beside, curve_through
 from cpg_ros.dynamics.periodic import NoOrbit, Orbit, richer
 from cpg_ros.errors import InputError
@@ -51,7 +51,7 @@ class BranchPoint(ShortRepr):
 
     value: float
     orbit: Orbit
-    place: Place
+    place: CurvePoint
 
     def _summary(self) -> str:
         return f'{self.value:.6g}, {self.orbit!r}'
@@ -77,7 +77,7 @@ class Branch(ShortRepr):
     along: ParameterLine
     points: tuple[BranchPoint, ...]
     turns: tuple[int, ...]
-    ends: tuple[End, End]
+    ends: tuple[BranchEnd, BranchEnd]
 
     def _summary(self) -> str:
         orbit, values = self.points[0].orbit, self.values
@@ -118,9 +118,9 @@ class Branch(ShortRepr):
                 found.append(left.orbit)
             elif (left.value - value) * (right.value - value) < 0.0:
                 # From the end that is nearer to a fold, where the value is yet to pick up.
-                place = (arclength.crossing(left.place, 1.0, value)
+                place = (arclength.next_crossing(left.place, 1.0, value)
                          if abs(left.place.rate) < abs(right.place.rate) else
-                         arclength.crossing(right.place, -1.0, value))
+                         arclength.next_crossing(right.place, -1.0, value))
                 if place is None:
                     raise NoOrbit(f'no orbit was found at {self.along} {value:g}')
                 found.append(_point(place).orbit)
@@ -157,8 +157,8 @@ def continue_orbit(orbit: Orbit, along: ParameterLine | str, low: float, high: f
     value, scales = along.value(orbit.network), (orbit.period, high - low)
     curve, z = curve_through(orbit, along, scales)
     # At a fold the value cannot be held, but the period can.
-    start = (arclength.resolved(curve, z, arclength.held(z.size, -1))
-             or arclength.resolved(curve, z, arclength.held(z.size, -2)))
+    start = (arclength.resolve_point(curve, z, arclength.fixed_unknown(z.size, -1))
+             or arclength.resolve_point(curve, z, arclength.fixed_unknown(z.size, -2)))
     if start is None:
         raise NoOrbit(f"Newton's method fails at the orbit given, {along} {value:g}")
     start = start if start.rate >= 0.0 else start.reversed()
@@ -167,7 +167,7 @@ def continue_orbit(orbit: Orbit, along: ParameterLine | str, low: float, high: f
     points, turns, end = _run(start, limits, steps)
     before: list[BranchPoint] = []
     back: list[int] = []
-    begin = End('start', value, orbit.period)
+    begin = BranchEnd('start', value, orbit.period)
     if both:
         before, back, begin = _run(start.reversed(), limits, steps)
     here = _point(start)
@@ -227,7 +227,7 @@ def continue_from_hopf(network: Network, symmetry: Symmetry, omega: float,
         lambda theta: np.outer(np.exp(2j * np.pi * theta), vector).real, period,
         amplitude=amplitude, first_step=first_step, longest_step=longest_step, most=most,
         longest=longest)
-    return replace(branch, ends=(End('rest', value, period), branch.ends[1]))
+    return replace(branch, ends=(BranchEnd('rest', value, period), branch.ends[1]))
 
 
 def continue_from_disturbance(network: Network, symmetry: Symmetry, along: ParameterLine,
@@ -263,14 +263,14 @@ def continue_from_disturbance(network: Network, symmetry: Symmetry, along: Param
     value = along.value(network)
     curve, still, border = curve_beside(network, symmetry, along, (period, high - low), path,
                                         disturbance, period)
-    start = arclength.resolved(curve, still + amplitude * border, border)
+    start = arclength.resolve_point(curve, still + amplitude * border, border)
     if start is None:
         raise NoOrbit(f'no orbit of amplitude {amplitude:g} was found near {along} {value:g}')
     points, turns, end = _run(start, (low, high, longest * period), {
         'first_step': first_step, 'longest_step': longest_step, 'most': most})
     here = _point(start)
     return Branch(along, (here, *points), tuple(1 + k for k in turns),
-                  (End('start', value, period), end))
+                  (BranchEnd('start', value, period), end))
 
 
 def _check_vector(vector: np.ndarray, symmetry: Symmetry, network: Network) -> None:
@@ -283,7 +283,7 @@ def _check_vector(vector: np.ndarray, symmetry: Symmetry, network: Network) -> N
                              f'something else than {shift}')
 
 
-def _point(place: Place) -> BranchPoint:
+def _point(place: CurvePoint) -> BranchPoint:
     return BranchPoint(place.value, place.curve.orbit(place.z), place)
 
 
@@ -293,13 +293,13 @@ def _course(points: list[BranchPoint]) -> tuple[np.ndarray, np.ndarray]:
             np.array([point.orbit.period for point in points]))
 
 
-def _run(start: Place, limits: tuple[float, float, float], steps: dict
-         ) -> tuple[list[BranchPoint], list[int], End]:
+def _run(start: CurvePoint, limits: tuple[float, float, float], steps: dict
+         ) -> tuple[list[BranchPoint], list[int], BranchEnd]:
     """Follow in one direction: the points after start, which are folds, and the end."""
     low, high, longest = limits
     points: list[BranchPoint] = []
 
-    def visit(place: Place) -> str:
+    def visit(place: CurvePoint) -> str:
         points.append(_point(place))
         orbit = points[-1].orbit
         if place.amplitude < REST:
@@ -308,7 +308,7 @@ def _run(start: Place, limits: tuple[float, float, float], steps: dict
             return 'period'
         return 'symmetry' if richer(orbit) else ''
 
-    turns, why = arclength.follow(start, low, high, visit, **steps)
+    turns, why = arclength.continue_curve(start, low, high, visit, **steps)
     last = points[-1] if points else _point(start)
     value, period = last.value, last.orbit.period
     if why in ('period', 'steep', 'lost'):
@@ -321,7 +321,7 @@ def _run(start: Place, limits: tuple[float, float, float], steps: dict
         share = size / (before.place.amplitude**2 - size)
         value += share * (value - before.value)
         period += share * (period - before.orbit.period)
-    return points, turns, End(why, value, period)
+    return points, turns, BranchEnd(why, value, period)
 
 
 def _check(network: Network, symmetry: Symmetry, along: ParameterLine, low: float,

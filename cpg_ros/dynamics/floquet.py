@@ -20,7 +20,7 @@ which the symmetry lock -g (I - P) x shrinks and nothing else does.
 
 from dataclasses import dataclass
 
-from cpg_ros.dynamics.orbit import Orbit, way
+from cpg_ros.dynamics.orbit import Orbit, orbit_method
 from cpg_ros.short_repr import ShortRepr
 import numpy as np
 from scipy.optimize import brentq
@@ -96,15 +96,15 @@ def multipliers(orbit: Orbit, gain: float = 0.0) -> Multipliers:
         gain: of a symmetry lock, 1/model time.
 
     """
-    rest, trivial = way(orbit.network).floquet.within(orbit)
-    parts = way(orbit.network).floquet.transverse(orbit, gain)
+    rest, trivial = orbit_method(orbit.network).floquet.within(orbit)
+    parts = orbit_method(orbit.network).floquet.transverse(orbit, gain)
     return Multipliers(orbit.period, gain, _sorted(rest),
                        _sorted(np.concatenate([np.zeros(0), *parts])), trivial, parts)
 
 
 def leading_within(orbit: Orbit) -> float:
     """Return the modulus of the leading multiplier within the class but the trivial one."""
-    return float(np.abs(way(orbit.network).floquet.within(orbit)[0]).max(initial=0.0))
+    return float(np.abs(orbit_method(orbit.network).floquet.within(orbit)[0]).max(initial=0.0))
 
 
 def _sorted(values: np.ndarray) -> np.ndarray:
@@ -122,7 +122,7 @@ def attracts_with(orbit: Orbit, gain: float) -> bool:
 
 
 def _largest_outside(orbit: Orbit, gain: float, exact: float = 1e-10) -> float:
-    return float(way(orbit.network).floquet.largest_transverse(orbit, gain, exact))
+    return float(orbit_method(orbit.network).floquet.largest_transverse(orbit, gain, exact))
 
 
 def smallest_gain(orbit: Orbit) -> float:

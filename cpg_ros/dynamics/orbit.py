@@ -37,11 +37,20 @@ from cpg_ros.networks.parameter_line import ParameterLine
 from cpg_ros.networks.symmetry import Symmetry
 import numpy as np
 
-__all__ = ['NoOrbit', 'Orbit', 'curve_beside', 'curve_through', 'solve_beside',
-           'solve_from_path', 'solve_orbit', 'solve_preset', 'way']
+__all__ = [
+    'NoOrbit',
+    'Orbit',
+    'curve_beside',
+    'curve_through',
+    'orbit_method',
+    'solve_beside',
+    'solve_from_path',
+    'solve_orbit',
+    'solve_preset',
+]
 
 
-class Way(NamedTuple):
+class OrbitMethod(NamedTuple):
     """Modules with the same functions, which find, follow and judge orbits."""
 
     solve: ModuleType
@@ -50,11 +59,11 @@ class Way(NamedTuple):
     mode: ModuleType
 
 
-FOURIER = Way(fourier_solve, fourier_curve, fourier_floquet, fourier_mode)
-MESH = Way(mesh_solve, mesh_curve, mesh_floquet, mesh_mode)
+FOURIER = OrbitMethod(fourier_solve, fourier_curve, fourier_floquet, fourier_mode)
+MESH = OrbitMethod(mesh_solve, mesh_curve, mesh_floquet, mesh_mode)
 
 
-def way(network: Network) -> Way:
+def orbit_method(network: Network) -> OrbitMethod:
     """Return how a network's orbits are found, followed and judged."""
     return FOURIER if network.delay_parameter else MESH
 
@@ -74,7 +83,7 @@ def solve_orbit(network: Network, gait: str, near: Orbit | None = None) -> Orbit
             the parameters are.
 
     """
-    found: Orbit = way(network).solve.solve(network, gait, near)
+    found: Orbit = orbit_method(network).solve.solve(network, gait, near)
     return found
 
 
@@ -89,13 +98,13 @@ def solve_beside(network: Network, near: Orbit) -> Orbit:
         NoOrbit: the method leads elsewhere; a shorter way may do.
 
     """
-    found: Orbit = way(network).solve.beside(network, near)
+    found: Orbit = orbit_method(network).solve.beside(network, near)
     return found
 
 
 def solve_preset(preset: Preset) -> Orbit:
     """Solve for a preset's orbit; errors as in solve_orbit."""
-    found: Orbit = way(preset.network).solve.from_preset(preset)
+    found: Orbit = orbit_method(preset.network).solve.from_preset(preset)
     return found
 
 
@@ -111,7 +120,7 @@ def solve_from_path(network: Network, symmetry: Symmetry,
         period: in model time.
 
     """
-    found: Orbit | None = way(network).solve.from_path(network, symmetry, path, period)
+    found: Orbit | None = orbit_method(network).solve.from_path(network, symmetry, path, period)
     return found
 
 
@@ -125,7 +134,7 @@ def curve_through(orbit: Orbit, line: ParameterLine, scales: tuple[float, float]
         scales: against which periods and values on the line are measured.
 
     """
-    curve, place = way(orbit.network).curve.through(orbit, line, scales)
+    curve, place = orbit_method(orbit.network).curve.through(orbit, line, scales)
     return curve, place
 
 
@@ -145,6 +154,6 @@ def curve_beside(network: Network, symmetry: Symmetry, line: ParameterLine,
         period: of the orbits, model time.
 
     """
-    curve, point, border = way(network).curve.beside(network, symmetry, line, scales, path,
-                                                     disturbance, period)
+    curve, point, border = orbit_method(network).curve.beside(network, symmetry, line, scales,
+                                                              path, disturbance, period)
     return curve, point, border

@@ -43,7 +43,7 @@ Path = Callable[[np.ndarray], np.ndarray]
 
 
 @dataclass(frozen=True)
-class Cycle:
+class LimitCycle:
     """What a simulation repeats.
 
     Attributes:
@@ -74,8 +74,8 @@ class _Past:
         return self._run.slopes[self._nodes(times)]
 
 
-def settled(network: Network, symmetry: Symmetry, start: np.ndarray, period: float,
-            hold: float = HOLD) -> tuple[Path, float] | None:
+def settle(network: Network, symmetry: Symmetry, start: np.ndarray, period: float,
+           hold: float = HOLD) -> tuple[Path, float] | None:
     """Let the network run from a state and find its period: (states over cycles, period).
 
     None where it comes to rest or repeats nothing within three of the given periods.
@@ -101,7 +101,7 @@ def _ends(run: Trajectory, first: int) -> bool:
     return not np.isfinite(run.x[-1]).all() or bool(np.abs(run.slopes[first:]).max() < RESTING)
 
 
-def _cycle(run: Trajectory, first: int) -> Cycle | None:
+def _cycle(run: Trajectory, first: int) -> LimitCycle | None:
     """Find what a simulation repeats from a step on."""
     v, rise = run.x[first:, 0], run.slopes[first:, 0]
     if not np.isfinite(run.x[-1]).all() or np.ptp(v) < 1e-3:
@@ -121,7 +121,7 @@ def _cycle(run: Trajectory, first: int) -> Cycle | None:
     share = run.slopes[same, 0] / (run.slopes[same, 0] - run.slopes[same + 1, 0])
     states = run(run.t[same] + share * run.t[1])
     drift = float(np.abs(states - states[0]).max() / size) if len(same) > 2 else np.inf
-    return Cycle(lambda theta: run(begin + theta * found), found, drift)
+    return LimitCycle(lambda theta: run(begin + theta * found), found, drift)
 
 
 def starts(network: Network, symmetry: Symmetry) -> np.ndarray:
@@ -136,7 +136,7 @@ def starts(network: Network, symmetry: Symmetry) -> np.ndarray:
     return np.repeat(equilibrium(network), network.cells) + np.concatenate([waves, inside])
 
 
-def sought(network: Network, gait: str) -> Iterator[tuple[Path, float]]:
+def find_orbit(network: Network, gait: str) -> Iterator[tuple[Path, float]]:
     """Yield what the network settles on in the gait's class, where it has the gait's symmetry.
 
     Args:

@@ -26,7 +26,7 @@ from cpg_ros.feedback.tick import PlannedMotion, tick
 from cpg_ros.feedback.timetable import Timetable
 from cpg_ros.integration.jit import bound
 from cpg_ros.motion.pattern import Pattern
-from cpg_ros.motion.plan import Program
+from cpg_ros.motion.plan import GaitPlan
 import numpy as np
 
 
@@ -48,13 +48,13 @@ class Feedback:
         self.geometry, self.gains = geometry, gains or Gains()
         self.memory = Memory.empty(runs, legs)
         self._legs, self._tables = geometry.arrays, GaitTables.empty(legs)
-        self._programs: list[Program | None] = [None] * SLOTS
+        self._programs: list[GaitPlan | None] = [None] * SLOTS
         self._learnt = 0
         self.angles = np.zeros((runs, joints or int(geometry.columns.max()) + 1))
         self._tick: Callable | None = None
         self._bound: Gains | None = None
 
-    def learn(self, program: Program, expected: EfferenceCopy | None = None) -> int:
+    def learn(self, program: GaitPlan, expected: EfferenceCopy | None = None) -> int:
         """Add a gait to the tables; return its slot.
 
         It replaces the oldest where there is no room. Without an efference copy, and without one
@@ -69,7 +69,7 @@ class Feedback:
         self._learnt += 1
         return slot
 
-    def slot(self, program: Program) -> int:
+    def slot(self, program: GaitPlan) -> int:
         """Return the slot of a gait; one that is new is learnt without an efference copy."""
         for k, known in enumerate(self._programs):
             if known is program:
@@ -125,7 +125,7 @@ def close(pattern: Pattern, feedback: Feedback, measure: Callable[[], SensorData
         gaits[0] = feedback.slot(old), feedback.slot(new)
         planned = PlannedMotion(angles[None], pattern.phases[:1], gaits, mix, velocity, heading)
         corrected = feedback.advance(measure(), planned, dt, 1.0, pattern.level)
-        pattern.hurry = float(memory.frequency_scale[0])
+        pattern.frequency_scale = float(memory.frequency_scale[0])
         if pattern.drive is not None and new.motion.steering is not None:
             stride, pace = new.steer(float(velocity[0, 0]), 0.0)
             pattern.steer(np.clip(stride + memory.stride[0], -1.0, 1.0), pace)

@@ -19,7 +19,7 @@ from typing import NamedTuple
 from cpg_ros.errors import InputError
 from cpg_ros.feedback.efference_copy import BINS, EfferenceCopy, SIGNALS, SPEEDS
 from cpg_ros.feedback.timetable import POINTS, Timetable
-from cpg_ros.motion.plan import Program
+from cpg_ros.motion.plan import GaitPlan
 import numpy as np
 
 #: Gaits known at the same time, and most rows of a steering table.
@@ -63,7 +63,7 @@ class GaitTables(NamedTuple):
                    np.zeros((SLOTS, SPEEDS, BINS, SIGNALS)), np.zeros(SLOTS, dtype=bool),
                    np.zeros((SLOTS, ROWS)), np.ones((SLOTS, ROWS)), np.zeros(legs))
 
-    def fill(self, slot: int, timetable: Timetable, expected: EfferenceCopy, program: Program
+    def fill(self, slot: int, timetable: Timetable, expected: EfferenceCopy, program: GaitPlan
              ) -> None:
         """Take in a gait.
 

@@ -39,7 +39,7 @@ class Gain:
 
 
 @dataclass(frozen=True)
-class Variable:
+class StateVariable:
     """An array that is kept from tick to tick; its first axis is that of the runs.
 
     Attributes:
@@ -71,7 +71,7 @@ class Law:
     text: str
     on: bool
     gains: Mapping[str, Gain]
-    memory: Mapping[str, Variable] = field(default_factory=dict)
+    memory: Mapping[str, StateVariable] = field(default_factory=dict)
 
 
 def named_tuple(name: str, fields: Iterable[str], defaults: Iterable[Any] = ()) -> Any:

@@ -18,28 +18,28 @@ from typing import Any
 
 from cpg_ros.feedback.efference_copy import SIGNALS
 from cpg_ros.feedback.gains import LAWS
-from cpg_ros.feedback.law import named_tuple, Variable
+from cpg_ros.feedback.law import named_tuple, StateVariable
 import numpy as np
 
 #: State that is no single law's.
 COMMON = {
-    'velocity': Variable('of the base in its own frame [m/s]', (3,)),
-    'contact': Variable('whether each foot is on the ground', ('legs',), False),
-    'displacement': Variable('of each foot, smoothed [m]', ('legs', 3)),
-    'stride': Variable("to be added to each leg's stride", ('legs',)),
-    'frequency_scale': Variable('factor of the stride frequency', (), 1.0),
-    'last_phase': Variable('of the first leg at the last tick [cycles]'),
-    'wanted_velocity': Variable('forward and to the left as it is approached [m/s], and in a '
-                                'second row its rate [m/s^2]', (2, 2))}
+    'velocity': StateVariable('of the base in its own frame [m/s]', (3,)),
+    'contact': StateVariable('whether each foot is on the ground', ('legs',), False),
+    'displacement': StateVariable('of each foot, smoothed [m]', ('legs', 3)),
+    'stride': StateVariable("to be added to each leg's stride", ('legs',)),
+    'frequency_scale': StateVariable('factor of the stride frequency', (), 1.0),
+    'last_phase': StateVariable('of the first leg at the last tick [cycles]'),
+    'wanted_velocity': StateVariable('forward and to the left as it is approached [m/s], and in a '
+                                     'second row its rate [m/s^2]', (2, 2))}
 VARIABLES = {name: variable for part in (COMMON, *(law.memory for law in LAWS))
              for name, variable in part.items()}
 #: Arrays without an axis of the runs, which pass values on within a tick.
 SCRATCH = {
-    'previous_contact': Variable('contact before this tick', ('legs',), False),
-    'leg_velocities': Variable("see estimate.update; then the planned feet's places [m]",
-                               ('legs', 4)),
-    'scratch': Variable('see estimate.update', (5, 3)),
-    'expected': Variable('signals of the efference copy', (SIGNALS,))}
+    'previous_contact': StateVariable('contact before this tick', ('legs',), False),
+    'leg_velocities': StateVariable("see estimate.update; then the planned feet's places [m]",
+                                    ('legs', 4)),
+    'scratch': StateVariable('see estimate.update', (5, 3)),
+    'expected': StateVariable('signals of the efference copy', (SIGNALS,))}
 _Fields: Any = named_tuple('Memory', [*VARIABLES, *SCRATCH])
 
 
@@ -51,7 +51,7 @@ class Memory(_Fields):  # type: ignore[misc]
     @classmethod
     def empty(cls, runs: int, legs: int) -> 'Memory':
         """Return the memory of robots that have not moved yet."""
-        def array(variable: Variable, *first: int) -> np.ndarray:
+        def array(variable: StateVariable, *first: int) -> np.ndarray:
             shape = [legs if size == 'legs' else int(size) for size in variable.shape]
             return np.full((*first, *shape), variable.initial)
 

@@ -21,7 +21,7 @@ from the frequency itself.
 
 import math
 
-from cpg_ros.feedback.law import Gain, Law, Variable
+from cpg_ros.feedback.law import Gain, Law, StateVariable
 from cpg_ros.integration.jit import jit
 
 LAW = Law(
@@ -37,7 +37,7 @@ LAW = Law(
                              'a new one'),
         'pace_memory': Gain(2.0, 20.0, 's', 'time constant of the mean of recent increases')},
     memory={
-        'fatigue': Variable('low-passed relative increase of the stride frequency')})
+        'fatigue': StateVariable('low-passed relative increase of the stride frequency')})
 
 
 @jit

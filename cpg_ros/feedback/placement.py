@@ -16,7 +16,7 @@
 
 import math
 
-from cpg_ros.feedback.law import Gain, Law, Variable
+from cpg_ros.feedback.law import Gain, Law, StateVariable
 from cpg_ros.integration.jit import jit
 
 LAW = Law(
@@ -44,7 +44,7 @@ LAW = Law(
         'give_left': Gain(0.8, 8.0, '',
                           'share of the sideways velocity error to which feet in stance yield')},
     memory={
-        'placement_displacement': Variable('of each foot [m]', ('legs', 2))})
+        'placement_displacement': StateVariable('of each foot [m]', ('legs', 2))})
 
 
 @jit

@@ -16,7 +16,7 @@
 
 import math
 
-from cpg_ros.feedback.law import Gain, Law, Variable
+from cpg_ros.feedback.law import Gain, Law, StateVariable
 from cpg_ros.integration.jit import jit
 
 LAW = Law(
@@ -33,7 +33,7 @@ LAW = Law(
                             'rate at which the lift, the reach and the height held after an '
                             'early landing decay')},
     memory={
-        'reflex_state': Variable('of each leg, see LIFT to LANDED', ('legs', 5))})
+        'reflex_state': StateVariable('of each leg, see LIFT to LANDED', ('legs', 5))})
 
 #: Shares of the swing in which a foot may stumble, and from which on it may land early; before,
 #: it may still be on its way off the ground.

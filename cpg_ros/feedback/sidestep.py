@@ -18,7 +18,7 @@ How fast that is depends on how the gait rocks the body, so the speed is correct
 """
 
 from cpg_ros.feedback import placement
-from cpg_ros.feedback.law import Gain, Law, Variable
+from cpg_ros.feedback.law import Gain, Law, StateVariable
 from cpg_ros.integration.jit import jit
 
 LAW = Law(
@@ -34,8 +34,8 @@ LAW = Law(
                               'largest such correction, as a share of the commanded sideways '
                               'speed')},
     memory={
-        'sidestep_displacement': Variable('of each foot to the left [m]', ('legs',)),
-        'sidestep_correction': Variable('added to the commanded sideways speed [m/s]')})
+        'sidestep_displacement': StateVariable('of each foot to the left [m]', ('legs',)),
+        'sidestep_correction': StateVariable('added to the commanded sideways speed [m/s]')})
 
 
 @jit

@@ -16,7 +16,7 @@
 
 import math
 
-from cpg_ros.feedback.law import Gain, Law, Variable
+from cpg_ros.feedback.law import Gain, Law, StateVariable
 from cpg_ros.integration.jit import jit
 
 LAW = Law(
@@ -30,7 +30,7 @@ LAW = Law(
                              'time constant of the filter on the angles of the ground'),
         'slope_most': Gain(0.1, 1.0, 'm', 'the most that slope moves the feet')},
     memory={
-        'ground_angles': Variable('low-passed roll and pitch [rad]', (2,))})
+        'ground_angles': StateVariable('low-passed roll and pitch [rad]', (2,))})
 
 
 @jit

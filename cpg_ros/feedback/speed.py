@@ -14,7 +14,7 @@
 
 """Speed: a robot that is too slow takes longer strides."""
 
-from cpg_ros.feedback.law import Gain, Law, Variable
+from cpg_ros.feedback.law import Gain, Law, StateVariable
 from cpg_ros.integration.jit import jit
 
 LAW = Law(
@@ -27,7 +27,7 @@ LAW = Law(
         'speed_most': Gain(0.3, 3.0, '',
                            'the most by which speed changes the length of strides')},
     memory={
-        'speed_integral': Variable('of the missing forward speed [m]')})
+        'speed_integral': StateVariable('of the missing forward speed [m]')})
 
 
 @jit

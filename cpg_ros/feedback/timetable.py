@@ -17,7 +17,7 @@
 import itertools
 
 from cpg_ros.feedback.kinematics import forward, Geometry
-from cpg_ros.motion.plan import Program
+from cpg_ros.motion.plan import GaitPlan
 from cpg_ros.robots.robot import Robot
 import numpy as np
 
@@ -39,7 +39,7 @@ class Timetable:
 
     """
 
-    def __init__(self, program: Program, geometry: Geometry) -> None:
+    def __init__(self, program: GaitPlan, geometry: Geometry) -> None:
         """Look at a gait: a leg swings while its foot goes forward, seen from the body."""
         robot, theta = program.robot, np.arange(POINTS) / POINTS
         phases = theta[:, None] - program.readout.start + program.orbit.phases[robot.cells]

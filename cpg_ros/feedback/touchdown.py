@@ -19,7 +19,7 @@ Robots 19 (2005) 219-232, set the phase to that of touchdown. Here legs whose ph
 share the change, and the stride frequency makes it gradually, so that joints do not jump.
 """
 
-from cpg_ros.feedback.law import Gain, Law, Variable
+from cpg_ros.feedback.law import Gain, Law, StateVariable
 from cpg_ros.integration.jit import jit
 
 LAW = Law(
@@ -28,7 +28,7 @@ LAW = Law(
         'touchdown_gain': Gain(0.5, 5.0, '',
                                "share of a landing's phase error that is corrected")},
     memory={
-        'phase_correction': Variable('still to be made after landings [cycles]')})
+        'phase_correction': StateVariable('still to be made after landings [cycles]')})
 
 #: Time constant with which a change of the phase is made, s; largest relative change of the
 #: stride frequency.

@@ -92,7 +92,7 @@ def shown(value: Any) -> str:
         return 'a huge number'
 
 
-class Reader:
+class YamlReader:
     """Takes checked values out of one file's tree, and says where a bad one stands."""
 
     def __init__(self, path: Path, what: str, error: type[CpgError], largest: float) -> None:

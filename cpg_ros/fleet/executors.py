@@ -51,7 +51,7 @@ class NoCluster(CpgError):
     """Nothing answers at the address, or it is of no use; the message says which."""
 
 
-class NotInstalled(CpgError):
+class DaskMissing(CpgError):
     """The optional dependency is missing; the message says how to get it."""
 
 
@@ -135,7 +135,7 @@ def cluster(address: str, say: Callable[[str], None] = lambda line: None,
 
     Raises:
         InputError: the address is none, or the certificates cannot be used.
-        NotInstalled: dask is missing.
+        DaskMissing: dask is missing.
         NoCluster: nothing answers, there are no workers, or they do not
             have the package.
 
@@ -143,8 +143,8 @@ def cluster(address: str, say: Callable[[str], None] = lambda line: None,
     try:
         from distributed import Client
     except ImportError as error:
-        raise NotInstalled("--dask needs dask and distributed: pip install 'cpg-ros[fleet]'"
-                           ) from error
+        raise DaskMissing("--dask needs dask and distributed: pip install 'cpg-ros[fleet]'"
+                          ) from error
     if '://' not in address:
         raise InputError(f"'{address}' is not the address of a scheduler, such as tcp://host:8786")
     # What happens is said here, in a line.

@@ -23,8 +23,8 @@ import time
 from typing import Any
 
 from cpg_ros.errors import InputError
-from cpg_ros.fleet.outcomes import Outcome, outcomes
-from cpg_ros.fleet.recording_job import invert_recording, Settings, Task
+from cpg_ros.fleet.outcomes import JobOutcome, outcomes
+from cpg_ros.fleet.recording_job import FitSettings, invert_recording, Task
 from cpg_ros.fleet.recordings_found import found, outline
 from cpg_ros.fleet.results import FITTED, Results
 from cpg_ros.fleet.results_page import write_page
@@ -46,7 +46,7 @@ class Summary:
     written: tuple[Path, ...]
 
 
-def settings_digest(settings: Settings) -> str:
+def settings_digest(settings: FitSettings) -> str:
     """What tells one way of fitting from another."""
     values = {field.name: getattr(settings, field.name) for field in fields(settings)}
     values |= values.pop('reading')
@@ -57,13 +57,13 @@ def settings_digest(settings: Settings) -> str:
 class Folders:
     """Recordings of some folders, inverted into a folder of results."""
 
-    def __init__(self, folders: Sequence[Path], out: Path, settings: Settings,
+    def __init__(self, folders: Sequence[Path], out: Path, settings: FitSettings,
                  progress: bool = True) -> None:
         """Look for the recordings.
 
         Raises:
             InputError: a folder is not there or has no recordings, or out holds something else.
-            NotInstalled: pyarrow is missing.
+            DaskMissing: pyarrow is missing.
 
         """
         library()
@@ -80,14 +80,15 @@ class Folders:
             yield Task(one.absolute(), self.settings, row['digest'] if row else '',
                        (self.results.folder / FITTED).absolute(), self.results.name(one))
 
-    def keep(self, told: Outcome[Task], shown: Path, tally: Tally) -> None:
+    def keep(self, outcome: JobOutcome[Task], shown: Path, tally: Tally) -> None:
         """Keep what came of a job, unless nothing new did."""
-        if told.error is None and 'reason' not in told.value:
+        if outcome.error is None and 'reason' not in outcome.value:
             before = self.results.get(shown) or {'reason': ''}
             tally.add(failed=bool(before['reason']), kept=True)
             return
-        row: dict[str, Any] = told.value if told.error is None else {
-            'digest': '', 'reason': f'{type(told.error).__name__}: {told.error}', 'seconds': None}
+        row: dict[str, Any] = outcome.value if outcome.error is None else {
+            'digest': '', 'reason': f'{type(outcome.error).__name__}: {outcome.error}',
+            'seconds': None}
         tally.add(failed=bool(row['reason']))
         self.results.put(shown, row)
 
@@ -115,8 +116,8 @@ class Folders:
 
     def _through(self, executor: Executor, recordings: Sequence[Path], tally: Tally) -> None:
         shown = {one.absolute(): one for one in recordings}
-        for told in outcomes(executor, invert_recording, self.tasks(recordings), tally.tick):
-            self.keep(told, shown[told.job.recording], tally)
+        for outcome in outcomes(executor, invert_recording, self.tasks(recordings), tally.tick):
+            self.keep(outcome, shown[outcome.job.recording], tally)
 
     def watch(self, executor: Executor, say: Callable[[str], None],
               goes_on: Callable[[], bool] = lambda: True) -> Summary:

@@ -42,7 +42,7 @@ class WorkerDied(CpgError):
 
 
 @dataclass(frozen=True)
-class Outcome(Generic[Job]):
+class JobOutcome(Generic[Job]):
     """What came of a job.
 
     Attributes:
@@ -97,7 +97,7 @@ class _Stream(Generic[Job]):
             else:
                 return
 
-    def ended(self) -> Iterator[Outcome[Job]]:
+    def ended(self) -> Iterator[JobOutcome[Job]]:
         """Yield what has come of jobs, after a while at most."""
         done, _ = wait(self.flying, TICK, FIRST_COMPLETED)
         broken: BaseException | None = None
@@ -110,7 +110,7 @@ class _Stream(Generic[Job]):
                 back.append(job)
                 continue
             self.alone = None
-            yield Outcome(job, None if error else future.result(), error)
+            yield JobOutcome(job, None if error else future.result(), error)
         if broken is None:
             return
         # All that were with it are lost, too, done or not.
@@ -121,7 +121,7 @@ class _Stream(Generic[Job]):
             job, deaths = self.alone
             self.alone = None
             if died and deaths + 1 >= DEATHS:
-                yield Outcome(job, None, WorkerDied('the process that worked on this job died'))
+                yield JobOutcome(job, None, WorkerDied('the process that worked on this job died'))
             else:
                 self.suspects.appendleft((job, deaths + died))
         elif died:
@@ -132,7 +132,7 @@ class _Stream(Generic[Job]):
 
 
 def outcomes(executor: Executor, function: Callable[[Job], Any], jobs: Iterable[Job],
-             tick: Callable[[], None] = lambda: None) -> Iterator[Outcome[Job]]:
+             tick: Callable[[], None] = lambda: None) -> Iterator[JobOutcome[Job]]:
     """Yield what comes of jobs, in the order in which they end.
 
     A job whose worker dies is done again; one that its worker died of twice, when it was alone

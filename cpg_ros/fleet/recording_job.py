@@ -35,7 +35,7 @@ DRAWN, POINTS, WIDTH, HEIGHT = 4, 32, 120, 36
 
 
 @dataclass(frozen=True)
-class Settings:
+class FitSettings:
     """How recordings are read and fitted: as the options of the executable ``inversion``."""
 
     robot: Robot | None = None
@@ -63,13 +63,13 @@ class Task:
     """
 
     recording: Path
-    settings: Settings
+    settings: FitSettings
     known: str
     folder: Path
     name: str
 
 
-def read(path: Path, settings: Settings) -> Recording:
+def read(path: Path, settings: FitSettings) -> Recording:
     """Read a recording of any format, by those of the options that it has."""
     chosen, robot = format_of(path), settings.robot
     return read_recording(
@@ -109,15 +109,15 @@ def invert_recording(task: Task) -> dict[str, Any]:
 
 
 def _facts(found: RecordingFit) -> dict[str, Any]:
-    told = found.as_dict()
-    return {'gait': told['gait'], 'recognised': told['recognised'] or '',
-            'frequency': told['frequency'], 'frequency_error': told['frequency_error'],
-            'confidence': told['confidence'], 'cycles': told['cycles'],
-            'begin': told['begin'], 'end': told['end'], 'network': told['network'],
-            'parameters': told['parameters'], 'phases': told['phases'],
-            'rms_share': told['rms_share'],
-            'joints': {name: one['rms'] for name, one in told['joints'].items()},
-            'warnings': told['warnings']}
+    results = found.as_dict()
+    return {'gait': results['gait'], 'recognised': results['recognised'] or '',
+            'frequency': results['frequency'], 'frequency_error': results['frequency_error'],
+            'confidence': results['confidence'], 'cycles': results['cycles'],
+            'begin': results['begin'], 'end': results['end'], 'network': results['network'],
+            'parameters': results['parameters'], 'phases': results['phases'],
+            'rms_share': results['rms_share'],
+            'joints': {name: one['rms'] for name, one in results['joints'].items()},
+            'warnings': results['warnings']}
 
 
 def _files(task: Task, found: RecordingFit) -> dict[str, str]:

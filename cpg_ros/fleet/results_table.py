@@ -20,7 +20,7 @@ import json
 from pathlib import Path
 from typing import Any
 
-from cpg_ros.fleet.executors import NotInstalled
+from cpg_ros.fleet.executors import DaskMissing
 
 #: Rows that are held at once.
 BATCH = 256
@@ -41,13 +41,13 @@ def library() -> Any:
     """Return pyarrow.
 
     Raises:
-        NotInstalled: it is not installed.
+        DaskMissing: it is not installed.
 
     """
     try:
         import pyarrow.parquet
     except ImportError as error:
-        raise NotInstalled("tables need pyarrow: pip install 'cpg-ros[fleet]'") from error
+        raise DaskMissing("tables need pyarrow: pip install 'cpg-ros[fleet]'") from error
     return pyarrow
 
 
@@ -60,15 +60,15 @@ def parameter_columns(rows: Iterable[dict[str, Any]]) -> list[str]:
 
 def flat(row: dict[str, Any], columns: list[str]) -> dict[str, Any]:
     """A row with a field for every column."""
-    told: dict[str, Any] = {name: row.get(name, '' if name in TEXT else None) for name in FIRST}
-    told |= dict.fromkeys(columns)
+    cells: dict[str, Any] = {name: row.get(name, '' if name in TEXT else None) for name in FIRST}
+    cells |= dict.fromkeys(columns)
     for name, one in row.get('parameters', {}).items():
         for part in PARTS:
             column = f'{row["network"]}.{name}{"" if part == "value" else f".{part}"}'
-            told[column] = one[part]
-    return told | {'phases': row.get('phases', {}), 'joints': row.get('joints', {}),
-                   'warnings': row.get('warnings', []), 'fitted': row.get('fitted', ''),
-                   'seconds': row.get('seconds')}
+            cells[column] = one[part]
+    return cells | {'phases': row.get('phases', {}), 'joints': row.get('joints', {}),
+                    'warnings': row.get('warnings', []), 'fitted': row.get('fitted', ''),
+                    'seconds': row.get('seconds')}
 
 
 def _batches(rows: Iterable[dict[str, Any]], columns: list[str]
@@ -116,7 +116,7 @@ def write_tables(folder: Path, rows: Rows) -> list[Path]:
                 out.write_table(arrow.Table.from_pylist(
                     [{**row, 'phases': list(row['phases'].items()),
                       'joints': list(row['joints'].items())} for row in batch], schema))
-                writer.writerows(_told(row) for row in batch)
+                writer.writerows(_cells_of(row) for row in batch)
         for part, path in zip(beside, (parquet, table), strict=True):
             part.replace(path)
     finally:
@@ -125,7 +125,7 @@ def write_tables(folder: Path, rows: Rows) -> list[Path]:
     return [parquet, table]
 
 
-def _told(row: dict[str, Any]) -> dict[str, Any]:
+def _cells_of(row: dict[str, Any]) -> dict[str, Any]:
     """A row as text: maps as JSON, lists with bars between."""
     return {**row, 'phases': json.dumps(row['phases']) if row['phases'] else '',
             'joints': json.dumps(row['joints']) if row['joints'] else '',

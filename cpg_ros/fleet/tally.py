@@ -56,7 +56,7 @@ class Tally:
         self._stream = stream or sys.stderr
         self._enabled, self._clock = enabled, clock
         self._live = self._stream.isatty()
-        self._began = self._said = clock()
+        self._began = self._reported = clock()
         self._drawn = False
 
     def add(self, failed: bool = False, kept: bool = False) -> None:
@@ -84,11 +84,11 @@ class Tally:
     def tick(self) -> None:
         """Say where it stands if it is time to."""
         now = self._clock()
-        if not self._enabled or now - self._said < (REDRAWN if self._live else MINUTE):
+        if not self._enabled or now - self._reported < (REDRAWN if self._live else MINUTE):
             return
         if self._live and now - self._began < PATIENCE:
             return
-        self._said, self._drawn = now, True
+        self._reported, self._drawn = now, True
         self._write()
 
     def _write(self) -> None:

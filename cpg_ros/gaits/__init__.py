@@ -17,6 +17,20 @@
 Imports ``networks`` and ``files``; knows nothing of ROS.
 """
 
-__all__ = ['doubts', 'insect_legs', 'leg_motion', 'leg_names', 'leg_phases', 'mean_cycle',
-           'period', 'phase_average', 'phase_estimation', 'phase_scatter', 'recognition',
-           'recorded', 'steady_stretch', 'stride', 'waveform_comparison']
+__all__ = [
+           'insect_legs',
+           'leg_motion',
+           'leg_names',
+           'leg_phases',
+           'mean_cycle',
+           'period',
+           'phase_average',
+           'phase_estimation',
+           'phase_scatter',
+           'quality_checks',
+           'recognition',
+           'recording_like',
+           'steady_stretch',
+           'stride',
+           'waveform_comparison',
+]

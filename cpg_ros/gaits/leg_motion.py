@@ -25,8 +25,8 @@ below the hip, and how far it bends in between.
 
 from collections.abc import Collection, Mapping, Sequence
 
-from cpg_ros.gaits.doubts import Doubt
 from cpg_ros.gaits.leg_names import role_of, words_of
+from cpg_ros.gaits.quality_checks import QualityIssue
 import numpy as np
 
 #: Area of a loop over that of an ellipse of the same amplitudes, a quarter of a cycle apart: below
@@ -70,8 +70,8 @@ def _loops(legs: Mapping[str, Sequence[str]], c: Mapping[str, np.ndarray]
             {own[role] for own in roles for role in most})
 
 
-def doubts_of_travel(legs: Mapping[str, Sequence[str]], c: Mapping[str, np.ndarray],
-                     girdles: Mapping[str, str], opposite: Collection[str]) -> list[Doubt]:
+def check_travel(legs: Mapping[str, Sequence[str]], c: Mapping[str, np.ndarray],
+                 girdles: Mapping[str, str], opposite: Collection[str]) -> list[QualityIssue]:
     """Doubt a gait that goes nowhere, or round.
 
     Args:
@@ -85,20 +85,21 @@ def doubts_of_travel(legs: Mapping[str, Sequence[str]], c: Mapping[str, np.ndarr
     if not loops:
         return []
     if max(map(abs, loops.values())) < PATH:
-        return [Doubt('the joints of each leg go to and fro on one path: the legs step, or hop, '
-                      'on the spot', 0.5)]
+        return [QualityIssue('the joints of each leg go to and fro on one path: the legs step, '
+                             'or hop, on the spot', 0.5)]
     # Fore and hind knees may bend in opposite senses: legs are compared across the body.
     across: dict[str, list[float]] = {}
     for leg, area in loops.items():
         across.setdefault(girdles.get(leg, ''), []).append(area)
     if not joints & set(opposite) and all(
             min(own) < -SURE and max(own) > SURE for own in across.values()):
-        return [Doubt('the legs of one side step forward and those of the other back: it turns on '
-                      'the spot', 0.3)]
+        return [QualityIssue('the legs of one side step forward and those of the other back: it '
+                             'turns on the spot', 0.3)]
     return []
 
 
-def running(legs: Mapping[str, Sequence[str]], c: Mapping[str, np.ndarray]) -> float | None:
+def running_probability(legs: Mapping[str, Sequence[str]],
+                        c: Mapping[str, np.ndarray]) -> float | None:
     """Return the probability that two legs run rather than walk; None where nothing tells.
 
     Args:

@@ -66,13 +66,13 @@ class Legs:
     Attributes:
         joints: leg -> its joints' names, in the order in which they were given; legs in the
             order of the networks.
-        says: how they were read, one line.
+        explanation: how they were read, one line.
         unassigned: joints of no leg.
 
     """
 
     joints: Mapping[str, tuple[str, ...]]
-    says: str = ''
+    explanation: str = ''
     unassigned: tuple[str, ...] = ()
 
     def __getitem__(self, leg: str) -> tuple[str, ...]:
@@ -104,11 +104,11 @@ def _read(words: Sequence[str]) -> tuple[str, str, frozenset[str]]:
         return codes.pop(), '', frozenset(word for word in words if word in CODES)
     if codes or len(sides) != 1:
         return '', '', frozenset()
-    side, told = sides.pop(), frozenset(word for word in words if word in SIDES)
+    side, words_used = sides.pop(), frozenset(word for word in words if word in SIDES)
     two = BIPED[side == 'r']
     if len(ends) == 1:
-        return side + ends.pop(), two, told | {word for word in words if word in ENDS}
-    return '', two, told
+        return side + ends.pop(), two, words_used | {word for word in words if word in ENDS}
+    return '', two, words_used
 
 
 def role_of(name: str) -> str:
@@ -117,8 +117,8 @@ def role_of(name: str) -> str:
     if len(counted) == 1 and any(sign.isalpha() for sign in rest):
         return ' '.join(words_of(rest))
     words = words_of(name)
-    told = _read(words)[2]
-    return ' '.join(word for word in words if word not in told)
+    words_used = _read(words)[2]
+    return ' '.join(word for word in words if word not in words_used)
 
 
 def legs_of(joints: Sequence[str], whole: bool = False) -> Legs:
@@ -135,9 +135,10 @@ def legs_of(joints: Sequence[str], whole: bool = False) -> Legs:
     """
     counted = _counted(joints)
     if counted:
-        told = {name: ('', '', frozenset(_COUNTED.findall(name)[0])) for names in counted.values()
-                for name in names}
-        return Legs(counted, _says(counted, told, joints), _rest(counted, joints))
+        words_used = {name: ('', '',
+                             frozenset(_COUNTED.findall(name)[0])) for names in counted.values()
+                      for name in names}
+        return Legs(counted, _explanation(counted, words_used, joints), _rest(counted, joints))
     _refuse_two(joints)
     words = {name: words_of(name) for name in joints}
     read = {name: _read(words[name]) for name in joints}
@@ -160,7 +161,7 @@ def legs_of(joints: Sequence[str], whole: bool = False) -> Legs:
             raise LegsError(_missing(there, known, read, joints))
         raise LegsError(f'cannot identify legs from the joint names {_listed(list(joints))}; they '
                         'usually contain LF, RF, LH, RH, front_left ... or left, right')
-    return Legs(found, _says(found, read, joints), _rest(found, joints))
+    return Legs(found, _explanation(found, read, joints), _rest(found, joints))
 
 
 def _counted(joints: Sequence[str]) -> dict[str, tuple[str, ...]]:
@@ -170,9 +171,9 @@ def _counted(joints: Sequence[str]) -> dict[str, tuple[str, ...]]:
     """
     found: dict[tuple[str, int], list[str]] = {}
     for name in joints:
-        told = _COUNTED.findall(name)
-        if len(told) == 1:
-            found.setdefault((told[0][0].lower(), int(told[0][1])), []).append(name)
+        words_used = _COUNTED.findall(name)
+        if len(words_used) == 1:
+            found.setdefault((words_used[0][0].lower(), int(words_used[0][1])), []).append(name)
     pairs = len(found) // 2
     roles = {tuple(sorted(_COUNTED.sub('', name) for name in names)) for names in found.values()}
     wanted = {(side, k + 1) for side in 'lr' for k in range(pairs)}
@@ -187,8 +188,8 @@ def _refuse_two(joints: Sequence[str]) -> None:
     robots: dict[tuple[str, ...], dict[tuple[str, ...], str]] = {}
     for name in joints:
         words = words_of(name)
-        told = _read(words)[2]
-        place = next((k for k, word in enumerate(words) if word in told), 0)
+        words_used = _read(words)[2]
+        place = next((k for k, word in enumerate(words) if word in words_used), 0)
         if place and not set(words[:place]) & set(JOINTS):
             robots.setdefault(tuple(words[:place]), {})[tuple(words[place:])] = name
     for first, own in robots.items():
@@ -220,13 +221,14 @@ def _missing(there: list[str], known: tuple[str, ...], read: Mapping, joints: Se
             f'{lacking}')
 
 
-def _says(found: Mapping[str, tuple[str, ...]], read: Mapping, joints: Sequence[str]) -> str:
+def _explanation(found: Mapping[str, tuple[str, ...]], read: Mapping,
+                 joints: Sequence[str]) -> str:
     parts = []
     for leg, names in found.items():
-        told = sorted({'_'.join(word for word in words_of(name) if word in read[name][2])
-                       for name in names})
+        words_used = sorted({'_'.join(word for word in words_of(name) if word in read[name][2])
+                             for name in names})
         shown = f'{names[0]} ... {names[-1]}' if len(names) > 2 else ', '.join(names)
-        parts.append(f"{leg} by '{' or '.join(told)}' ({len(names)} joint"
+        parts.append(f"{leg} by '{' or '.join(words_used)}' ({len(names)} joint"
                      f"{'s' if len(names) > 1 else ''}: {shown})")
     rest = _rest(found, joints)
     return ('legs read from the names: ' + '; '.join(parts)

@@ -44,13 +44,13 @@ TELLING = 0.05
 #: By how much legs in a gait are off its phases, RMS, cycles: what the odds of gaits rest on.
 SCATTER = 0.06
 #: From here on one of two gaits is told.
-TOLD = 0.95
+DISTINCT = 0.95
 #: Largest violation of a symmetry, over the cells' RMS, and samples a cycle for it.
 BY_CELLS, SAMPLES = 0.2, 128
 
 
 @dataclass(frozen=True)
-class Named:
+class GaitMatch:
     """Which gait it is.
 
     Attributes:
@@ -148,9 +148,9 @@ def leg_phases(legs: Mapping[str, Sequence[str]], c: Mapping[str, np.ndarray]
         base, pairs = next(((known, found) for known in phases
                             if (found := _pairs(legs[known], joints))), ('', []))
         if pairs:
-            ahead, mirrored, told = _shift(pairs, c)
+            ahead, mirrored, sense_known = _shift(pairs, c)
             opposite += mirrored
-            vague += [] if told else [leg]
+            vague += [] if sense_known else [leg]
         else:
             base = next(iter(phases))
             most = [max(names, key=lambda name: np.abs(c[name][1]))
@@ -179,7 +179,7 @@ def _shift(pairs: list[tuple[str, str]], c: Mapping[str, np.ndarray]
     # Those whose sense is told come first: the others have to agree with them.
     pairs = sorted(pairs, key=lambda pair: (not (senses[pair] and power[pair] >= least),
                                             -power[pair]))
-    told = bool(senses[pairs[0]])
+    sense_known = bool(senses[pairs[0]])
     total: np.ndarray | None = None
     mirrored = []
     for first, other in pairs:
@@ -196,7 +196,7 @@ def _shift(pairs: list[tuple[str, str]], c: Mapping[str, np.ndarray]
             mirrored.append(other)
         total = total + sense * terms
     assert total is not None
-    return _peak(total)[0], mirrored, told
+    return _peak(total)[0], mirrored, sense_known
 
 
 def _symmetry(network: type[Network], gait: str) -> Any:
@@ -224,7 +224,7 @@ def _odds(nearest: float, other: float, legs: int) -> float:
     return float(np.exp(-0.5 * legs * (other**2 - nearest**2) / SCATTER**2))
 
 
-def named(phases: Mapping[str, float], network: type[Network]) -> Named:
+def match_gait(phases: Mapping[str, float], network: type[Network]) -> GaitMatch:
     """Name the gait of leg phases.
 
     Of several gaits within the tolerance the most symmetric is meant: every walk is a skip, too.
@@ -268,11 +268,11 @@ def named(phases: Mapping[str, float], network: type[Network]) -> Named:
         beside = network.sides[order[1]] == network.sides[order[0]]
         kind = 'lateral' if beside == (network.girdles[order[0]] == 'hind') else 'diagonal'
         notes.append(f'{kind} sequence: {", ".join(order).upper()}')
-    return Named(nearest if apart[nearest] <= TOLERANCE else None, nearest, apart[nearest],
-                 margin, tuple(same), 1.0 / (1.0 + sum(odds)), tuple(notes))
+    return GaitMatch(nearest if apart[nearest] <= TOLERANCE else None, nearest, apart[nearest],
+                     margin, tuple(same), 1.0 / (1.0 + sum(odds)), tuple(notes))
 
 
-def told_apart(found: Named, gait: str, share: float) -> Named:
+def match_by_probability(found: GaitMatch, gait: str, share: float) -> GaitMatch:
     """Name one of two gaits that move the legs alike, by the probability that it is this one.
 
     Its rival is not mentioned any more where it is nineteen times as likely.
@@ -282,13 +282,13 @@ def told_apart(found: Named, gait: str, share: float) -> Named:
     more = max(share, 1.0 - share)
     notes = tuple(note for note in found.notes if 'move alike' not in note)
     return replace(found, gait=None if found.gait is None else nearest, nearest=nearest,
-                   alike=(nearest,) if more >= TOLD else found.alike,
+                   alike=(nearest,) if more >= DISTINCT else found.alike,
                    sure=min(2.0 * found.sure, 1.0) * more,
                    notes=(*notes, f'{nearest}, not {loser}, by how the legs are bent and for how '
                           f'long they go with the ground: {more:.0%} sure'))
 
 
-def named_by_cells(c: np.ndarray, network: type[Network]) -> Named:
+def match_gait_by_cells(c: np.ndarray, network: type[Network]) -> GaitMatch:
     """Name the gait of the signals of all cells, by their symmetry.
 
     Args:
@@ -305,5 +305,5 @@ def named_by_cells(c: np.ndarray, network: type[Network]) -> Named:
     # What a wave is off from itself that is early by the distance.
     distance, second = (float(np.arcsin(min(0.5 * size, 1.0)) / np.pi)
                         for size in (found.distance, found.distance + found.margin))
-    return Named(found.name, found.nearest, distance, second - distance, (found.nearest,),
-                 1.0 / (1.0 + _odds(distance, second, network.cells)), ())
+    return GaitMatch(found.name, found.nearest, distance, second - distance, (found.nearest,),
+                     1.0 / (1.0 + _odds(distance, second, network.cells)), ())

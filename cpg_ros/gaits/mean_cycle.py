@@ -33,7 +33,7 @@ BINS = 4096
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Cycle(ShortRepr):
+class HarmonicCycle(ShortRepr):
     """The mean cycle of a recording.
 
     Attributes:
@@ -54,7 +54,7 @@ class Cycle(ShortRepr):
         """Return the signals at phases in cycles, shape (m,), as an array (m, channels)."""
         c = self.coefficients
         weights = np.vstack([c.real[:1], 2.0 * c.real[1:], -2.0 * c.imag[1:]])
-        return series(weights, rows_of(np.asarray(phases, dtype=float), len(c) - 1)).T
+        return evaluate_series(weights, rows_of(np.asarray(phases, dtype=float), len(c) - 1)).T
 
 
 def rows_of(phases: np.ndarray, harmonics: int) -> np.ndarray:
@@ -67,7 +67,7 @@ def rows_of(phases: np.ndarray, harmonics: int) -> np.ndarray:
     return rows
 
 
-def determined(t: np.ndarray, period: float) -> int:
+def resolvable_harmonics(t: np.ndarray, period: float) -> int:
     """Return how many harmonics the times determine once folded onto one cycle; 0 if none.
 
     As many as a least-squares fit bears without magnifying noise: the smallest eigenvalue of
@@ -86,12 +86,12 @@ def determined(t: np.ndarray, period: float) -> int:
     return low
 
 
-def series(weights: np.ndarray, rows: np.ndarray) -> np.ndarray:
+def evaluate_series(weights: np.ndarray, rows: np.ndarray) -> np.ndarray:
     """Return the channels, shape (channels, m), that weights (2 n + 1, channels) give."""
     return np.einsum('nc,nm->cm', weights, rows)
 
 
-def weights_for(values: np.ndarray, rows: np.ndarray) -> np.ndarray:
+def fit_series(values: np.ndarray, rows: np.ndarray) -> np.ndarray:
     """Return the least-squares weights (2 n + 1, channels) of rows for values (channels, m).
 
     The normal matrix of exp(2 pi i n phase), n = -N..N, is Toeplitz. No BLAS here: on a busy
@@ -111,7 +111,7 @@ def weights_for(values: np.ndarray, rows: np.ndarray) -> np.ndarray:
     return np.vstack([c[:1].real, 2.0 * c[1:].real, -2.0 * c[1:].imag])
 
 
-def mean_cycle(t: np.ndarray, signals: np.ndarray, period: float) -> Cycle:
+def mean_cycle(t: np.ndarray, signals: np.ndarray, period: float) -> HarmonicCycle:
     """Fold a recording onto one cycle of the period given.
 
     Args:
@@ -123,14 +123,14 @@ def mean_cycle(t: np.ndarray, signals: np.ndarray, period: float) -> Cycle:
         InputError: the samples do not even determine the first harmonic.
 
     """
-    harmonics = determined(t, period)
+    harmonics = resolvable_harmonics(t, period)
     if harmonics < 1:
         raise InputError(f'the samples, folded onto one period of {period:g}, leave too much of '
                          f'it empty')
     rows = rows_of((t - t[0]) / period, harmonics)
-    weights = weights_for(signals.T, rows)
-    left = signals.T - series(weights, rows)
+    weights = fit_series(signals.T, rows)
+    left = signals.T - evaluate_series(weights, rows)
     coefficients = np.vstack([weights[:1], 0.5 * (weights[1:1 + harmonics]
                                                   - 1j * weights[1 + harmonics:])])
-    return Cycle(period, coefficients, float(t[0]),
-                 float(np.sqrt(np.mean(left * left) / signals.var(axis=0).mean())))
+    return HarmonicCycle(period, coefficients, float(t[0]),
+                         float(np.sqrt(np.mean(left * left) / signals.var(axis=0).mean())))

@@ -21,7 +21,7 @@ them, so that it never slips by one.
 """
 
 from cpg_ros.errors import InputError
-from cpg_ros.gaits.mean_cycle import determined, rows_of, series, weights_for
+from cpg_ros.gaits.mean_cycle import evaluate_series, fit_series, resolvable_harmonics, rows_of
 import numpy as np
 from scipy.interpolate import PchipInterpolator
 
@@ -51,13 +51,13 @@ def _refined(t: np.ndarray, x: np.ndarray, period: float) -> tuple[float, np.nda
     span = t[-1] - t[0]
     # Well below the sampling rate: at a period of whole samples higher ones are aliases.
     usual = int(0.4 * period / np.median(np.diff(t)))
-    harmonics = min(usual, determined(t, period))
+    harmonics = min(usual, resolvable_harmonics(t, period))
     n = np.arange(1, harmonics + 1)[:, None]
 
     def fit(rate: float) -> tuple[float, np.ndarray, np.ndarray, np.ndarray]:
         rows = rows_of(centred * rate, harmonics)
-        weights = weights_for(x, rows)
-        left = x - series(weights, rows)
+        weights = fit_series(x, rows)
+        left = x - evaluate_series(weights, rows)
         return float(np.mean(left * left)), rows, weights, left
 
     rate = 1.0 / period
@@ -65,8 +65,8 @@ def _refined(t: np.ndarray, x: np.ndarray, period: float) -> tuple[float, np.nda
     for _ in range(20):
         turned = np.vstack([0.0 * weights[:1], n * weights[1 + harmonics:],
                             -n * weights[1:1 + harmonics]])
-        by_rate = 2.0 * np.pi * centred * series(turned, rows)
-        by_rate -= series(weights_for(by_rate, rows), rows)
+        by_rate = 2.0 * np.pi * centred * evaluate_series(turned, rows)
+        by_rate -= evaluate_series(fit_series(by_rate, rows), rows)
         step = float(np.sum(by_rate * left) / max(np.sum(by_rate * by_rate), 1e-300))
         step = float(np.clip(step, -0.1 / span, 0.1 / span))
         while abs(step) * span > 1e-8:

@@ -24,7 +24,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 from cpg_ros.errors import InputError
-from cpg_ros.gaits.mean_cycle import determined, rows_of, series, weights_for
+from cpg_ros.gaits.mean_cycle import evaluate_series, fit_series, resolvable_harmonics, rows_of
 from cpg_ros.short_repr import ShortRepr
 import numpy as np
 
@@ -41,7 +41,7 @@ ENOUGH, POOLED = 4, 4
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Warped(ShortRepr):
+class PhaseAverage(ShortRepr):
     """Mean cycles.
 
     Attributes:
@@ -68,7 +68,7 @@ class Warped(ShortRepr):
         """Return the mean cycles at theta in cycles, shape (joints, m)."""
         c = self.coefficients
         weights = np.vstack([c.real[:1], 2.0 * c.real[1:], -2.0 * c.imag[1:]])
-        return series(weights, rows_of(theta, len(c) - 1))
+        return evaluate_series(weights, rows_of(theta, len(c) - 1))
 
 
 def blocks(phases: np.ndarray) -> list[slice]:
@@ -84,12 +84,13 @@ def mean_weights(x: np.ndarray, phases: np.ndarray, harmonics: int) -> np.ndarra
     Of a long recording the mean of those of its blocks.
     """
     parts = blocks(phases)
-    return np.mean([weights_for(x[:, part], rows_of(phases[part], harmonics))
+    return np.mean([fit_series(x[:, part], rows_of(phases[part], harmonics))
                     for part in parts], axis=0)
 
 
-def warped(phases: np.ndarray, positions: np.ndarray, theta: np.ndarray, first: Sequence[int]
-           ) -> Warped:
+def average_cycles(phases: np.ndarray, positions: np.ndarray, theta: np.ndarray,
+                   first: Sequence[int]
+                   ) -> PhaseAverage:
     """Average cycles.
 
     Args:
@@ -132,7 +133,7 @@ def warped(phases: np.ndarray, positions: np.ndarray, theta: np.ndarray, first: 
     turned = c * np.exp(2j * np.pi * zero * np.arange(len(c)))[:, None]
     scatter = [_scatter(at - zero, rest, bins, theta) for at, rest, bins in rests]
     spread, error = (np.array(one) for one in zip(*scatter, strict=True))
-    return Warped(zero, turned, spread, error, there.sum(axis=0) - spikes, spikes, left)
+    return PhaseAverage(zero, turned, spread, error, there.sum(axis=0) - spikes, spikes, left)
 
 
 def _coefficients(weights: np.ndarray) -> np.ndarray:
@@ -142,13 +143,13 @@ def _coefficients(weights: np.ndarray) -> np.ndarray:
 
 def _fitted(phases: np.ndarray, x: np.ndarray) -> tuple[np.ndarray, np.ndarray, int]:
     """Fit the series of joints with the same samples; return weights, rest and its bins."""
-    n = min(determined(phases - phases[0], 1.0), HARMONICS) if phases.size > 4 else 0
+    n = min(resolvable_harmonics(phases - phases[0], 1.0), HARMONICS) if phases.size > 4 else 0
     if n < 1:
         raise InputError(f'{phases.size} samples leave too much of the cycle empty')
     some = mean_weights(x, phases, n)
     rest = np.empty_like(x)
     for part in blocks(phases):
-        rest[:, part] = x[:, part] - series(some, rows_of(phases[part], n))
+        rest[:, part] = x[:, part] - evaluate_series(some, rows_of(phases[part], n))
     weights = np.zeros((2 * HARMONICS + 1, len(x)))
     weights[:1 + n], weights[1 + HARMONICS:1 + HARMONICS + n] = some[:1 + n], some[1 + n:]
     return weights, rest, 2 * n + 1

@@ -22,9 +22,9 @@ fitted with the mean cycle in turn (Gauss-Newton). With few cycles it is linear 
 
 from dataclasses import dataclass
 
-from cpg_ros.gaits.mean_cycle import rows_of, series, weights_for
+from cpg_ros.gaits.mean_cycle import evaluate_series, fit_series, rows_of
 from cpg_ros.gaits.phase_average import blocks, mean_weights
-from cpg_ros.gaits.steady_stretch import even, longest, Stretch
+from cpg_ros.gaits.steady_stretch import longest_run, resample_evenly, Stretch
 from cpg_ros.short_repr import ShortRepr
 import numpy as np
 from scipy.linalg import solveh_banded
@@ -58,7 +58,7 @@ STIFFNESS = 1e-3
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Warp(ShortRepr):
+class PhaseEstimate(ShortRepr):
     """The phase of a motion, linear between knots.
 
     Attributes:
@@ -85,7 +85,7 @@ class Warp(ShortRepr):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Rough(ShortRepr):
+class RoughPhase(ShortRepr):
     """The rough phase of a stretch: at times (c,), s, in cycles (c,)."""
 
     begin: float
@@ -94,7 +94,7 @@ class Rough(ShortRepr):
     phases: np.ndarray
 
 
-def grown(times: np.ndarray, positions: np.ndarray, seed: Stretch) -> Rough:
+def grow_stretch(times: np.ndarray, positions: np.ndarray, seed: Stretch) -> RoughPhase:
     """Follow the phase from a stretch onwards, both ways, as long as the motion stays alike.
 
     Args:
@@ -104,7 +104,7 @@ def grown(times: np.ndarray, positions: np.ndarray, seed: Stretch) -> Rough:
 
     """
     step = seed.period / (BLOCKS * POINTS)
-    grid, y = even(times, positions, 1.0 / step)
+    grid, y = resample_evenly(times, positions, 1.0 / step)
     step = grid[1] - grid[0]
     period = BLOCKS * POINTS * step
     blocks = len(y) // POINTS
@@ -133,11 +133,11 @@ def grown(times: np.ndarray, positions: np.ndarray, seed: Stretch) -> Rough:
               & (sizes**2 >= ALIKE * np.einsum('bj,bj->b', z, z.conj()).real))
     if len(z) > BLOCKS:
         steady &= np.abs(rates / rate - 1.0) <= TOLERANCE
-    first, last = longest(steady & _joined(steady, inside)) or (0, len(z) - 1)
+    first, last = longest_run(steady & _joined(steady, inside)) or (0, len(z) - 1)
     # What is left of a block at the end of the recording is no reason to stop there.
     end = times[-1] if last == len(z) - 1 else middles[last] + 0.5 * period
-    return Rough(max(middles[first] - 0.5 * period, times[0]), min(end, times[-1]),
-                 middles[first:last + 1], phases[first:last + 1])
+    return RoughPhase(max(middles[first] - 0.5 * period, times[0]), min(end, times[-1]),
+                      middles[first:last + 1], phases[first:last + 1])
 
 
 def _joined(steady: np.ndarray, inside: np.ndarray) -> np.ndarray:
@@ -146,7 +146,7 @@ def _joined(steady: np.ndarray, inside: np.ndarray) -> np.ndarray:
     return np.isin(number, number[steady & inside])
 
 
-def followed(times: np.ndarray, positions: np.ndarray, rough: Rough) -> Warp:
+def estimate_phase(times: np.ndarray, positions: np.ndarray, rough: RoughPhase) -> PhaseEstimate:
     """Fit the phase to all harmonics of a stretch.
 
     Args:
@@ -159,14 +159,14 @@ def followed(times: np.ndarray, positions: np.ndarray, rough: Rough) -> Warp:
                     if rough.times.size > 1 else (1.0, 0.0))
     # Plain numbers: what is fitted is written to files that know no others.
     span = float(rough.end - rough.begin)
-    within = between(times, rough.begin - 1.0 / slope, rough.end + 1.0 / slope)
-    grid, y = even(times[within], positions[within], BLOCKS * POINTS * slope)
-    inside = between(grid, rough.begin, rough.end)
+    within = index_range(times, rough.begin - 1.0 / slope, rough.end + 1.0 / slope)
+    grid, y = resample_evenly(times[within], positions[within], BLOCKS * POINTS * slope)
+    inside = index_range(grid, rough.begin, rough.end)
     grid, x = grid[inside] - rough.begin, y.T[:, inside]
     if span * slope < FEW:
         phases, error = _straight(grid, x, np.array([level, level + slope * span]), span)
-        return Warp(np.array([rough.begin, rough.end]), phases,
-                    float(phases[1] - phases[0]) / span, error)
+        return PhaseEstimate(np.array([rough.begin, rough.end]), phases,
+                             float(phases[1] - phases[0]) / span, error)
     knots = np.linspace(0.0, span, round(span * slope) + 1)
     phases = _extended(knots + rough.begin, rough.times, rough.phases, slope)
     while True:
@@ -175,13 +175,13 @@ def followed(times: np.ndarray, positions: np.ndarray, rough: Rough) -> Warp:
         if last - first == knots.size - 2 or phases[last + 1] - phases[first] < FEW:
             break
         knots, phases = knots[first:last + 2], phases[first:last + 2]
-        inside = between(grid, knots[0], knots[-1])
+        inside = index_range(grid, knots[0], knots[-1])
         grid, x = grid[inside], x[:, inside]
     frequency, error = _mean_rate(knots, phases)
-    return Warp(knots + rough.begin, phases, frequency, error)
+    return PhaseEstimate(knots + rough.begin, phases, frequency, error)
 
 
-def between(times: np.ndarray, begin: float, end: float) -> slice:
+def index_range(times: np.ndarray, begin: float, end: float) -> slice:
     """Return where rising times are from one to another, both included."""
     return slice(int(np.searchsorted(times, begin)),
                  int(np.searchsorted(times, end, side='right')))
@@ -237,8 +237,8 @@ def _model(x: np.ndarray, phases: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     left, slope = np.empty_like(x), np.empty_like(x)
     for part in blocks(phases):
         rows = rows_of(phases[part], HARMONICS)
-        left[:, part] = x[:, part] - series(weights, rows)
-        slope[:, part] = series(turned, rows)
+        left[:, part] = x[:, part] - evaluate_series(weights, rows)
+        slope[:, part] = evaluate_series(turned, rows)
     return left, slope
 
 
@@ -250,7 +250,7 @@ def _straight(grid: np.ndarray, x: np.ndarray, phases: np.ndarray, span: float
         at = np.interp(grid, [0.0, span], phases)
         left, slope = _model(x, at)
         by_rate, rows = centred * slope, rows_of(at, HARMONICS)
-        by_rate -= series(weights_for(by_rate, rows), rows)
+        by_rate -= evaluate_series(fit_series(by_rate, rows), rows)
         power = float(np.sum(by_rate * by_rate))
         step = float(np.sum(by_rate * left)) / max(power, 1e-300)
         step = float(np.clip(step, -FARTHEST / span, FARTHEST / span))
@@ -290,10 +290,10 @@ def _steady(grid: np.ndarray, x: np.ndarray, knots: np.ndarray, phases: np.ndarr
     mean = x - left
     alike, power, typical = products(x, mean), products(x, x), products(mean, mean)
     rates = np.diff(phases) / np.diff(knots)
-    first, last = longest((np.abs(rates / np.median(rates) - 1.0) <= TOLERANCE)
-                          & (alike >= WEAKEST * typical) & (alike <= STRONGEST * typical)
-                          & (alike * np.abs(alike) >= ALIKE * power * typical)
-                          ) or (0, rates.size - 1)
+    first, last = longest_run((np.abs(rates / np.median(rates) - 1.0) <= TOLERANCE)
+                              & (alike >= WEAKEST * typical) & (alike <= STRONGEST * typical)
+                              & (alike * np.abs(alike) >= ALIKE * power * typical)
+                              ) or (0, rates.size - 1)
     apart = products(left, left)
     off = np.abs(rates - np.median(rates))
     odd = ((apart > np.maximum(ODD**2 * np.median(apart), MARKED**2 * typical))

@@ -22,7 +22,7 @@ the leg together, as the cross-correlation that leg phases come from weighs them
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from cpg_ros.gaits.phase_average import blocks, Warped
+from cpg_ros.gaits.phase_average import blocks, PhaseAverage
 import numpy as np
 from scipy.special import stdtrit
 
@@ -50,7 +50,7 @@ class PhaseScatter:
     strides: int
 
 
-def phase_scatter(phases: np.ndarray, x: np.ndarray, found: Warped,
+def phase_scatter(phases: np.ndarray, x: np.ndarray, found: PhaseAverage,
                   legs: Mapping[str, Sequence[str]], names: Sequence[str]
                   ) -> dict[str, PhaseScatter]:
     """Find how the phases of the legs against the first one scatter from stride to stride.
@@ -81,17 +81,17 @@ def phase_scatter(phases: np.ndarray, x: np.ndarray, found: Warped,
             for sums, one in ((along, left), (power, slopes)):
                 sums[row] += np.bincount(
                     stride[part], np.sum(one[:, columns] * slopes[:, columns], axis=1), count)
-    told = power > ENOUGH * np.median(power, axis=1, keepdims=True)
+    reliable = power > ENOUGH * np.median(power, axis=1, keepdims=True)
     early = np.full_like(along, np.nan)
-    early[told] = along[told] / power[told]
+    early[reliable] = along[reliable] / power[reliable]
     return {leg: _scatter(row - early[0]) for leg, row in zip(legs, early, strict=True)}
 
 
 def _scatter(early: np.ndarray) -> PhaseScatter:
-    told = early[np.isfinite(early)]
-    if told.size < STRIDES:
-        return PhaseScatter(np.nan, np.nan, np.nan, told.size)
-    spread = float(told.std(ddof=1))
-    error = spread / np.sqrt(told.size)
-    return PhaseScatter(spread, error, float(stdtrit(told.size - 1, 0.975)) * error,
-                        told.size)
+    reliable = early[np.isfinite(early)]
+    if reliable.size < STRIDES:
+        return PhaseScatter(np.nan, np.nan, np.nan, reliable.size)
+    spread = float(reliable.std(ddof=1))
+    error = spread / np.sqrt(reliable.size)
+    return PhaseScatter(spread, error, float(stdtrit(reliable.size - 1, 0.975)) * error,
+                        reliable.size)

@@ -24,7 +24,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 
 from cpg_ros.errors import InputError
-from cpg_ros.gaits.mean_cycle import Cycle, mean_cycle
+from cpg_ros.gaits.mean_cycle import HarmonicCycle, mean_cycle
 from cpg_ros.gaits.period import find_period, holds_two
 from cpg_ros.networks.hk_theorem import symmetries
 from cpg_ros.networks.symmetry import Group, Permutation, Symmetry
@@ -42,7 +42,7 @@ MOST, NONE, LARGER = 0.3, 3.0, 1.25
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Recognised(ShortRepr):
+class Recognition(ShortRepr):
     """What a rhythm is.
 
     Distances are the RMS violation of a symmetry over cells and cycle, in units of the
@@ -163,7 +163,7 @@ def _checked(t: np.ndarray, signals: np.ndarray, group: Group, gaits: Mapping[st
 
 
 def recognise(t: np.ndarray, signals: np.ndarray, group: Group, gaits: Mapping[str, Symmetry],
-              period: float | None = None, tolerance: float = 0.05) -> Recognised:
+              period: float | None = None, tolerance: float = 0.05) -> Recognition:
     """Find the symmetry of a rhythm, and the named gait that has it.
 
     Of several gaits within the tolerance the one with the largest H is meant, and among those
@@ -211,14 +211,14 @@ def recognise(t: np.ndarray, signals: np.ndarray, group: Group, gaits: Mapping[s
     second = min(others, key=apart.__getitem__, default=None)
     phases = [_best_shift(cycle[:, [cell]], cycle[:, :1]) for cell in range(group.cells)]
     sure = _sure(apart[nearest], [apart[name] for name in others], float(np.hypot(alone, noise)))
-    return Recognised(nearest if known else None, nearest, apart[nearest],
-                      apart[second] - apart[nearest] if second is not None else np.inf, second,
-                      noise, sure, period, np.array(phases), found.h, found.k,
-                      {name: violations.best(element)
-                       for name, element in group.elements.items()})
+    return Recognition(nearest if known else None, nearest, apart[nearest],
+                       apart[second] - apart[nearest] if second is not None else np.inf, second,
+                       noise, sure, period, np.array(phases), found.h, found.k,
+                       {name: violations.best(element)
+                        for name, element in group.elements.items()})
 
 
-def _noise(cycle: Cycle, samples: int) -> float:
+def _noise(cycle: HarmonicCycle, samples: int) -> float:
     """Distance that noise makes where a symmetry holds: two cells have it, in every term."""
     terms, left = 2 * len(cycle.coefficients) - 1, min(cycle.residual, 0.999)**2
     return float(np.sqrt(2.0 * terms / samples * left / (1.0 - left)))

@@ -77,8 +77,8 @@ class Stretch:
         return min(self.end, end) - max(self.begin, begin) < 0.5 * (self.end - self.begin)
 
 
-def even(times: np.ndarray, positions: np.ndarray, rate: float
-         ) -> tuple[np.ndarray, np.ndarray]:
+def resample_evenly(times: np.ndarray, positions: np.ndarray, rate: float
+                    ) -> tuple[np.ndarray, np.ndarray]:
     """Put signals on an even grid, linearly, each over its own finite samples.
 
     Args:
@@ -149,7 +149,7 @@ def true_runs(mask: np.ndarray) -> np.ndarray:
     return np.stack([np.flatnonzero(edges > 0), np.flatnonzero(edges < 0) - 1], axis=1)
 
 
-def longest(mask: np.ndarray) -> tuple[int, int] | None:
+def longest_run(mask: np.ndarray) -> tuple[int, int] | None:
     """Return first and last index of the longest run of true values, None without any."""
     runs = true_runs(mask)
     if not runs.size:
@@ -180,7 +180,7 @@ def _best_lag(lags: np.ndarray, differences: np.ndarray, near: np.ndarray
             max(here - 0.125 * (before - after)**2 / bend, 0.0))
 
 
-def stretches(times: np.ndarray, y: np.ndarray) -> list[Stretch]:
+def find_stretches(times: np.ndarray, y: np.ndarray) -> list[Stretch]:
     """Find all stretches that repeat, for all lags; those of near lags overlap.
 
     Args:
@@ -208,7 +208,7 @@ def stretches(times: np.ndarray, y: np.ndarray) -> list[Stretch]:
     return found
 
 
-def best(found: list[Stretch]) -> Stretch:
+def best_stretch(found: list[Stretch]) -> Stretch:
     """Choose the stretch with most cycles of most motion, at its true period.
 
     Of half a period cycles are more, but they differ; the multiple is then taken.

@@ -22,22 +22,41 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from cpg_ros.errors import CpgError, InputError
-from cpg_ros.gaits.doubts import (
-    Doubt,
-    doubts_of_angles,
-    doubts_of_change,
-    doubts_of_legs,
-    doubts_of_rhythm,
+from cpg_ros.gaits.issues import (
+    check_angles,
+    check_change,
+    check_legs,
+    check_rhythm,
     limping,
+    QualityIssue,
 )
-from cpg_ros.gaits.leg_motion import doubts_of_travel, running
+from cpg_ros.gaits.leg_motion import check_travel, running_probability
 from cpg_ros.gaits.leg_names import Legs
-from cpg_ros.gaits.leg_phases import leg_phases, named, named_by_cells, told_apart
-from cpg_ros.gaits.phase_average import Warped, warped
-from cpg_ros.gaits.phase_estimation import between, followed, grown, Rough, Warp
+from cpg_ros.gaits.leg_phases import (
+    leg_phases,
+    match_by_probability,
+    match_gait,
+    match_gait_by_cells,
+)
+from cpg_ros.gaits.phase_average import average_cycles, PhaseAverage
+from cpg_ros.gaits.phase_estimation import (
+    estimate_phase,
+    grow_stretch,
+    index_range,
+    PhaseEstimate,
+    RoughPhase,
+)
 from cpg_ros.gaits.phase_scatter import phase_scatter, PhaseScatter
-from cpg_ros.gaits.recorded import Recorded
-from cpg_ros.gaits.steady_stretch import best, CYCLES, even, FASTEST, FEWEST, FINER, stretches
+from cpg_ros.gaits.recording_like import RecordingLike
+from cpg_ros.gaits.steady_stretch import (
+    best_stretch,
+    CYCLES,
+    FASTEST,
+    FEWEST,
+    find_stretches,
+    FINER,
+    resample_evenly,
+)
 from cpg_ros.networks.network import Network
 from cpg_ros.short_repr import ShortRepr
 import numpy as np
@@ -98,7 +117,7 @@ class Stride(ShortRepr):
         margin: how much further the next gait is, cycles.
         confidence: probability that gait and frequency are those named, as far as the recording
             tells.
-        doubts: what speaks against them, one line each.
+        issues: what speaks against them, one line each.
         notes: one line each.
         warp: stride phase of the recording's times within the stretch.
 
@@ -122,9 +141,9 @@ class Stride(ShortRepr):
     distance: float
     margin: float
     confidence: float
-    doubts: tuple[str, ...]
+    issues: tuple[str, ...]
     notes: tuple[str, ...]
-    warp: Warp
+    warp: PhaseEstimate
 
     def _summary(self) -> str:
         return (f'{self.gait or f"no gait, nearest {self.nearest}"}: {self.cycles} cycles of '
@@ -132,7 +151,7 @@ class Stride(ShortRepr):
                 f'{self.end:.6g} s, {len(self.joints)} joints')
 
 
-def find_stride(recording: Recorded, legs: Legs | Mapping[str, Sequence[str]],
+def find_stride(recording: RecordingLike, legs: Legs | Mapping[str, Sequence[str]],
                 network: type[Network] | Network, cells: Mapping[str, int] | None = None,
                 gains: Mapping[str, complex] | None = None) -> Stride:
     """Find the steady gait of a recording.
@@ -163,11 +182,11 @@ def find_stride(recording: Recorded, legs: Legs | Mapping[str, Sequence[str]],
     names = [name for name in recording.joints if any(name in one for one in chosen.values())]
     rough, others = _regions(times, positions, source)
     notes += others
-    warp = followed(times, positions, rough)
+    warp = estimate_phase(times, positions, rough)
     if warp.cycles < CYCLES:
         raise NoSteadyGait(f'{source}: no steady gait: only {warp.cycles:.1f} cycles of '
                            f'{1.0 / warp.frequency:.3g} s are alike, {CYCLES:g} are needed')
-    inside = between(times, warp.knots[0], warp.knots[-1])
+    inside = index_range(times, warp.knots[0], warp.knots[-1])
     phases, x = warp(times[inside]), positions[inside]
     theta = np.arange(POINTS) / POINTS
     full = np.isfinite(x).sum(axis=0) >= SAMPLES
@@ -178,7 +197,8 @@ def find_stride(recording: Recorded, legs: Legs | Mapping[str, Sequence[str]],
         chosen = _kept(chosen, names, source)
         x = x[:, full]
     try:
-        found = warped(phases, x, theta, [names.index(name) for name in chosen[next(iter(own))]])
+        found = average_cycles(phases, x, theta,
+                               [names.index(name) for name in chosen[next(iter(own))]])
     except InputError as error:
         raise NoSteadyGait(f'{source}: {error}') from error
     power = np.array([np.nanvar(column) for column in x.T])
@@ -187,37 +207,39 @@ def find_stride(recording: Recorded, legs: Legs | Mapping[str, Sequence[str]],
         raise NoSteadyGait(f'{source}: no steady gait: the mean cycle, of '
                            f'{1.0 / warp.frequency:.3g} s, leaves {100.0 * left:.0f} % of the '
                            'variance')
-    notes += _told(warp, found, names)
+    notes += _quality_notes(warp, found, names)
     c = dict(zip(names, found.coefficients.T, strict=True))
     # A leg's phase is that of its first cell.
     leading = {leg: tuple(name for name in listed
                           if cells is None or cells.get(name) == own[leg][0]) or listed
                for leg, listed in chosen.items()}
     ahead, by_legs, vague, opposite = leg_phases(leading, c)
-    gait = named(ahead, kind)
-    doubts = [*doubts_of_rhythm(warp.frequency, phases, x, found.coefficients),
-              *doubts_of_angles(names, found.mean(theta)), *doubts_of_legs(vague),
-              *doubts_of_change(phases, x, leading, names),
-              *doubts_of_travel(chosen, c, kind.girdles, opposite)]
+    gait = match_gait(ahead, kind)
+    issues = [*check_rhythm(warp.frequency, phases, x, found.coefficients),
+              *check_angles(names, found.mean(theta)), *check_legs(vague),
+              *check_change(phases, x, leading, names),
+              *check_travel(chosen, c, kind.girdles, opposite)]
     if warp.cycles < SURE:
-        doubts.append(Doubt('', FEW_CYCLES))
+        issues.append(QualityIssue('', FEW_CYCLES))
     if cells is not None and gains is not None and len(gait.alike) > 1:
         by_cells = _cell_signals(c, cells, gains, kind)
         if by_cells is not None:
-            gait = named_by_cells(by_cells, kind)
-    if set(gait.alike) == {'walk', 'run'} and (share := running(chosen, c)) is not None:
-        gait = told_apart(gait, 'run', share)
+            gait = match_gait_by_cells(by_cells, kind)
+    if set(gait.alike) == {'walk',
+                           'run'} and (share := running_probability(chosen, c)) is not None:
+        gait = match_by_probability(gait, 'run', share)
     if len(gait.alike) > 1:
         rivals = ' or '.join(other for other in gait.alike if other != gait.nearest)
         # The odds of the gait have this already.
-        doubts.append(Doubt(f'it may as well be a {rivals}: name the gait it is (--gait)', 1.0))
+        issues.append(QualityIssue(f'it may as well be a {rivals}: name the gait it is (--gait)',
+                                   1.0))
     return Stride(float(warp.knots[0]), float(warp.knots[-1]), warp.frequency,
                   warp.frequency_error, int(warp.cycles + 1e-6), tuple(names), theta,
                   found.mean(theta), found.spread, found.error, found.counts, ahead,
                   phase_scatter(phases, x, found, leading, names), gait.gait,
                   gait.nearest, gait.distance, gait.margin,
-                  gait.sure * float(np.prod([one.left for one in doubts])),
-                  tuple(one.said for one in doubts if one.said),
+                  gait.sure * float(np.prod([one.left for one in issues])),
+                  tuple(one.message for one in issues if one.message),
                   (*notes, *by_legs, *limping(chosen, c), *gait.notes),
                   replace(warp, phases=warp.phases - found.zero))
 
@@ -233,7 +255,7 @@ def _kept(legs: Mapping[str, Sequence[str]], names: Sequence[str], source: str
     return kept
 
 
-def _usable(recording: Recorded, legs: Mapping[str, Sequence[str]]
+def _usable(recording: RecordingLike, legs: Mapping[str, Sequence[str]]
             ) -> tuple[dict[str, tuple[str, ...]], np.ndarray, list[str]]:
     """Return the legs' joints that have angles, their positions without spikes, and notes."""
     listed = [name for name in recording.joints if any(name in one for one in legs.values())]
@@ -264,27 +286,27 @@ def _usable(recording: Recorded, legs: Mapping[str, Sequence[str]]
     return kept, x, notes
 
 
-def _regions(times: np.ndarray, x: np.ndarray, source: str) -> tuple[Rough, list[str]]:
+def _regions(times: np.ndarray, x: np.ndarray, source: str) -> tuple[RoughPhase, list[str]]:
     """Find the longest stretch of steady motion, and say which others there are."""
     reach = np.nanmax(x, axis=0) - np.nanmin(x, axis=0)
     if reach.max() < STILL:
         raise NoSteadyGait(f'{source}: no steady gait: the joints stand, none moves by more than '
                            f'{reach.max():.2g} rad')
     rate = min(FEWEST * FASTEST, FINER / float(np.median(np.diff(times))))
-    found = stretches(*even(times, x, rate))
+    found = find_stretches(*resample_evenly(times, x, rate))
     if not found:
         raise NoSteadyGait(f'{source}: no steady gait: the joints move, by up to '
                            f'{reach.max():.2g} rad, but nowhere do they repeat that over '
                            f'{CYCLES:g} cycles, of at most {times[-1] / CYCLES:.3g} s')
-    regions: list[tuple[Rough, float]] = []
+    regions: list[tuple[RoughPhase, float]] = []
     largest = max(one.size for one in found)
     for _ in range(SEEDS):
         if not found:
             break
-        seed = best(found)
+        seed = best_stretch(found)
         # Two strides may be alike by chance, if not in all joints.
         if seed.cycles >= SURE or seed.difference <= ALIKE:
-            regions.append((grown(times, x, seed), seed.period))
+            regions.append((grow_stretch(times, x, seed), seed.period))
             found = [one for one in found if one.outside(regions[-1][0].begin,
                                                          regions[-1][0].end)]
         found = [one for one in found if one.outside(seed.begin, seed.end)
@@ -302,7 +324,7 @@ def _regions(times: np.ndarray, x: np.ndarray, source: str) -> tuple[Rough, list
     return rough, notes
 
 
-def _told(warp: Warp, found: Warped, names: Sequence[str]) -> list[str]:
+def _quality_notes(warp: PhaseEstimate, found: PhaseAverage, names: Sequence[str]) -> list[str]:
     """Say what the errors rest on, whether the frequency drifts, and which samples were wild."""
     notes = []
     if warp.cycles < SURE:

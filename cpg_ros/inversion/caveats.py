@@ -18,7 +18,7 @@ from collections.abc import Mapping, Sequence
 
 from cpg_ros.inversion.free_parameters import Free
 from cpg_ros.inversion.identifiability import Estimate, SHARE, Spread
-from cpg_ros.inversion.trust_region import Trial
+from cpg_ros.inversion.trust_region import Minimisation
 import numpy as np
 
 #: A 95 % interval wider than this share of the value on either side is named.
@@ -27,7 +27,8 @@ WIDE = 0.1
 TOGETHER, AT_BOUND = 0.95, 1e-5
 
 
-def findings(free: Sequence[Free], estimates: Mapping[str, Estimate], known: Spread, best: Trial
+def findings(free: Sequence[Free], estimates: Mapping[str, Estimate], known: Spread,
+             best: Minimisation
              ) -> list[str]:
     """List what the user of a fit must know.
 

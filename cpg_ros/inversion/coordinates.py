@@ -26,7 +26,7 @@ from dataclasses import replace
 from cpg_ros.dynamics.hopf import first_hopf, HopfPoint
 from cpg_ros.dynamics.periodic import NoOrbit
 from cpg_ros.inversion.free_parameters import Free, with_values, within_hopf_set
-from cpg_ros.inversion.trust_region import descend, Evaluate, Trial
+from cpg_ros.inversion.trust_region import Evaluate, Minimisation, minimise
 from cpg_ros.networks.network import Network
 import numpy as np
 
@@ -60,8 +60,8 @@ class Coordinates:
         point = first_hopf(there, self._gait) if np.isfinite(values).all() else None
         if point is None:
             known = there.as_dict()
-            said = ', '.join(f'{name} {known[name]:g}' for name in there.needed)
-            raise NoOrbit(f'{said} gives no {self._gait} at any delay')
+            values_text = ', '.join(f'{name} {known[name]:g}' for name in there.needed)
+            raise NoOrbit(f'{values_text} gives no {self._gait} at any delay')
         return point
 
     def of(self, values: np.ndarray) -> np.ndarray:
@@ -131,7 +131,7 @@ class Coordinates:
         return low, high
 
     def descend(self, evaluate: Evaluate, start: np.ndarray, tolerance: float, most: int = 100
-                ) -> Trial:
+                ) -> Minimisation:
         """Go down from values that have an orbit; as trials.descend, but in coordinates.
 
         Args:
@@ -147,7 +147,7 @@ class Coordinates:
 
         low, high = self._bounds(start)
         begin = np.clip(self.of(start), low, high)
-        trial = descend(moved, begin, low, high, tolerance, most)
+        trial = minimise(moved, begin, low, high, tolerance, most)
         if self.straight or trial.why:
             return replace(trial, start=start)
         path = np.array([[row[0], *self.values(row[1:])] for row in trial.path])

@@ -26,7 +26,7 @@ from cpg_ros.dynamics.orbit import Orbit, solve_orbit
 from cpg_ros.dynamics.periodic import NoOrbit
 from cpg_ros.errors import InputError
 from cpg_ros.inversion.free_parameters import free_numbers, with_values
-from cpg_ros.inversion.trust_region import descend, Trial
+from cpg_ros.inversion.trust_region import Minimisation, minimise
 from cpg_ros.networks.delayed import Delayed
 from cpg_ros.short_repr import ShortRepr
 import numpy as np
@@ -54,7 +54,7 @@ class CycleFit(ShortRepr):
     cost: float
     gradient: np.ndarray
     errors: np.ndarray
-    trial: Trial
+    trial: Minimisation
 
     @property
     def evaluations(self) -> int:
@@ -129,8 +129,8 @@ def fit_cycle(samples: np.ndarray, theta: np.ndarray, start: Delayed, gait: str,
         states, slopes = cycle_samples(orbit_at(values), theta)
         return (states - samples).ravel(), slopes[..., columns].reshape(-1, len(columns))
 
-    trial = descend(evaluate, begin, np.array([one.low for one in free]),
-                    np.array([one.high for one in free]), TOLERANCE)
+    trial = minimise(evaluate, begin, np.array([one.low for one in free]),
+                     np.array([one.high for one in free]), TOLERANCE)
     if trial.why:
         raise NoOrbit(trial.why)
     left, slopes = evaluate(trial.values)

@@ -83,19 +83,19 @@ def starts(found: RecordingFit) -> list[tuple[str, ...]]:
 
 def _judged(found: RecordingFit) -> list[str]:
     fit = found.fit
-    said = []
+    lines = []
     if fit.hopf is not None:
-        said.append(f'The {fit.gait} is born at the critical delay {fit.hopf.value:.4f}; '
-                    f'{fit.network.delay_parameter} is {fit.network.delay:.4f}.')
+        lines.append(f'The {fit.gait} is born at the critical delay {fit.hopf.value:.4f}; '
+                     f'{fit.network.delay_parameter} is {fit.network.delay:.4f}.')
     verdict = fit.verdict
-    said.append(
+    lines.append(
         f'It attracts by itself (largest multiplier {verdict.multipliers.leading:.3g} a stride).'
         if verdict.stable else
         f'It attracts with the symmetry lock (gain above {verdict.smallest_gain:.3g} per model '
         f'time; the generator takes {verdict.default_gain:.3g}).'
         if verdict.stable_with_default_gain else
         'It does not attract, with or without the symmetry lock.')
-    return said
+    return lines
 
 
 def _shares(found: RecordingFit) -> str:

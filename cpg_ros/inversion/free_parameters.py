@@ -76,9 +76,9 @@ def free_numbers(network: Network, gait: str, names: Sequence[str],
         if name not in known:
             raise InputError(f"'{name}' is not one of the parameters of {network.name}: "
                              f'{", ".join(known)}')
-        asked = network.groups.get(name, (name,))
+        members = network.groups.get(name, (name,))
         members = tuple(dict.fromkeys(
-            member for family in families if set(family) & set(asked) for member in family))
+            member for family in families if set(family) & set(members) for member in family))
         taken = [other.name for other in found if set(other.members) & set(members)]
         if taken:
             raise InputError(f'{name} is the same as {taken[0]}, which is free already')

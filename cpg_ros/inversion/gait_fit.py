@@ -21,7 +21,7 @@ from cpg_ros.dynamics.gait_assessment import GaitAssessment
 from cpg_ros.dynamics.hopf import first_hopf, HopfPoint
 from cpg_ros.dynamics.periodic import Orbit
 from cpg_ros.inversion.identifiability import Estimate
-from cpg_ros.inversion.trust_region import Trial
+from cpg_ros.inversion.trust_region import Minimisation
 from cpg_ros.inversion.variable_projection import basis
 from cpg_ros.inversion.waveform_harmonics import signals
 from cpg_ros.networks.network import Network
@@ -80,7 +80,7 @@ class Fit(ShortRepr):
     sizes: dict[str, float]
     misfit: dict[str, float]
     sharing: float
-    starts: tuple[Trial, ...]
+    starts: tuple[Minimisation, ...]
     warnings: tuple[str, ...]
 
     def _summary(self) -> str:

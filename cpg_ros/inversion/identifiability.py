@@ -26,7 +26,7 @@ from dataclasses import dataclass
 
 from cpg_ros.dynamics.periodic import NoOrbit
 from cpg_ros.inversion.free_parameters import Free
-from cpg_ros.inversion.trust_region import Evaluate, Trial
+from cpg_ros.inversion.trust_region import Evaluate, Minimisation
 from cpg_ros.short_repr import ShortRepr
 import numpy as np
 
@@ -46,7 +46,7 @@ NEGLIGIBLE = 1e-6
 TOLERANCE, MOST, DRAWN = 1e-4, 30, 0.3
 
 #: Goes down: problem, start, tolerance, evaluations at most.
-Descend = Callable[[Evaluate, np.ndarray, float, int], Trial]
+Descend = Callable[[Evaluate, np.ndarray, float, int], Minimisation]
 
 
 @dataclass(frozen=True)

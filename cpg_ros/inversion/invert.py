@@ -30,8 +30,8 @@ from cpg_ros.inversion.fit_data import joints_of, MeanCycle
 from cpg_ros.inversion.free_parameters import Free, free_numbers
 from cpg_ros.inversion.gait_fit import Fit
 from cpg_ros.inversion.identifiability import correlation_length, Optimum, spread
-from cpg_ros.inversion.least_squares import Period, Problem
-from cpg_ros.inversion.trust_region import Trial
+from cpg_ros.inversion.least_squares import CycleProblem, Period
+from cpg_ros.inversion.trust_region import Minimisation
 from cpg_ros.inversion.variable_projection import WEIGHTS
 from cpg_ros.motion.plan import refusal
 from cpg_ros.networks.network import Network
@@ -95,8 +95,8 @@ def invert(cycle: MeanCycle, cells: Mapping[str, int], network: Network, gait: s
         period = Period(value, value * share)
     begins = [_begin(network, numbers, start) for start in starts]
 
-    problem = Problem(joints, joints.stated, network, gait, numbers, order, harmonics, period)
-    trials: list[Trial] = []
+    problem = CycleProblem(joints, joints.stated, network, gait, numbers, order, harmonics, period)
+    trials: list[Minimisation] = []
     for begin in begins:
         done(0.5 * len(trials) / len(begins))
         trials.append(_trial(problem, begin, weigh=all(other.why for other in trials)))
@@ -135,27 +135,27 @@ def _begin(network: Network, numbers: Sequence[Free], start: Mapping[str, float]
     return np.array(list(known.values()))
 
 
-def _left(problem: Problem, values: np.ndarray) -> np.ndarray:
+def _left(problem: CycleProblem, values: np.ndarray) -> np.ndarray:
     """Size of what the readout of each joint leaves, rad, its freedom allowed for."""
-    residual = problem.placed(values).residual
+    residual = problem.best_readouts(values).residual
     return np.sqrt(np.sum(residual**2, axis=0) / (len(residual) - problem.weights))
 
 
-def _trial(problem: Problem, begin: np.ndarray, weigh: bool) -> Trial:
+def _trial(problem: CycleProblem, begin: np.ndarray, weigh: bool) -> Minimisation:
     """Go down from one start; the first one that has an orbit sets the joints' weights."""
     values = np.append(begin, 0.0)
     try:
         problem.begin(values)
         values[-1] = problem.first_phase(values)
     except NoOrbit as error:
-        return Trial(values, values, float('inf'), np.empty((0, 1 + values.size)), 1, False,
-                     str(error))
+        return Minimisation(values, values, float('inf'), np.empty((0, 1 + values.size)), 1, False,
+                            str(error))
     if weigh:
         problem.sizes = np.maximum(problem.joints.stated, _left(problem, values))
     return problem.coordinates.descend(problem, values, TOLERANCE)
 
 
-def _weighed(problem: Problem, values: np.ndarray) -> np.ndarray:
+def _weighed(problem: CycleProblem, values: np.ndarray) -> np.ndarray:
     """Weigh the joints by what is left of each, and fit again."""
     for last in range(WEIGHINGS):
         sizes = np.maximum(problem.joints.stated, _left(problem, values))
@@ -166,7 +166,7 @@ def _weighed(problem: Problem, values: np.ndarray) -> np.ndarray:
     return values
 
 
-def _that_runs(problem: Problem, by_cost: Sequence[np.ndarray], way: np.ndarray
+def _that_runs(problem: CycleProblem, by_cost: Sequence[np.ndarray], way: np.ndarray
                ) -> tuple[np.ndarray | None, str]:
     """Return the best values that the generator runs, and why it refuses the very best, or ''.
 
@@ -181,7 +181,7 @@ def _that_runs(problem: Problem, by_cost: Sequence[np.ndarray], way: np.ndarray
     """
     def flaw_at(values: np.ndarray) -> str:
         try:
-            return refusal(problem.placed(values).orbit, problem.gait, problem.harmonics)
+            return refusal(problem.best_readouts(values).orbit, problem.gait, problem.harmonics)
         except NoOrbit as error:
             return str(error)
 
@@ -207,16 +207,16 @@ def _that_runs(problem: Problem, by_cost: Sequence[np.ndarray], way: np.ndarray
     return here, first
 
 
-def _optimum(problem: Problem, values: np.ndarray, elsewhere: Sequence[np.ndarray] = ()
+def _optimum(problem: CycleProblem, values: np.ndarray, elsewhere: Sequence[np.ndarray] = ()
              ) -> Optimum:
     left, slopes = problem(values)
-    sharing = correlation_length(problem.placed(values).residual / problem.sizes)
+    sharing = correlation_length(problem.best_readouts(values).residual / problem.sizes)
     return Optimum(problem, values, problem.free, 0.5 * float(left @ left), sharing,
                    spread(slopes, sharing), problem.coordinates.descend,
                    problem.coordinates.moved, problem.rephased, elsewhere)
 
 
-def _along_the_valley(problem: Problem, values: np.ndarray) -> list[Trial]:
+def _along_the_valley(problem: CycleProblem, values: np.ndarray) -> list[Minimisation]:
     """Look for other least costs, if that at the values is not the whole story."""
     optimum = _optimum(problem, values)
     if all(optimum.regular(k) for k in range(len(problem.free))):
@@ -230,12 +230,12 @@ def _along_the_valley(problem: Problem, values: np.ndarray) -> list[Trial]:
     return found
 
 
-def _judged(problem: Problem, trials: Sequence[Trial], elsewhere: Sequence[np.ndarray],
+def _judged(problem: CycleProblem, trials: Sequence[Minimisation], elsewhere: Sequence[np.ndarray],
             values: np.ndarray, profiles: bool, warnings: Sequence[str],
             done: Callable[[float], None]) -> Fit:
     """Say what was found, and how sure it is."""
     joints, best = problem.joints, min(trials, key=lambda trial: trial.cost)
-    placed = problem.placed(values)
+    placed = problem.best_readouts(values)
     optimum = _optimum(problem, values, elsewhere)
     known = optimum.spread
     estimates = {}

@@ -43,7 +43,7 @@ class Period:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Placed(ShortRepr):
+class ReadoutFit(ShortRepr):
     """The best readouts for some values.
 
     Attributes:
@@ -60,7 +60,7 @@ class Placed(ShortRepr):
     jacobian: np.ndarray
 
 
-class Problem:
+class CycleProblem:
     """Values are those of the free numbers, then the phase of the orbit where theta is 0.
 
     Attributes:
@@ -87,7 +87,7 @@ class Problem:
                         for key in dict.fromkeys(keys)}
         self._solved: dict[bytes, tuple[Orbit, Signals]] = {}
         self._held: dict[bytes, tuple[Orbit, Signals]] = {}
-        self._placed: tuple[bytes, Placed] | None = None
+        self._placed: tuple[bytes, ReadoutFit] | None = None
 
     @property
     def weights(self) -> int:
@@ -148,12 +148,12 @@ class Problem:
         gaps = np.sum(((known - values[:len(self.free)]) / size)**2, axis=1)
         return list(self._solved.values())[int(gaps.argmin())][0]
 
-    def placed(self, values: np.ndarray) -> Placed:
+    def best_readouts(self, values: np.ndarray) -> ReadoutFit:
         """Return the best readouts; NoOrbit as in orbit."""
         key = np.asarray(values).tobytes()
         if self._placed is None or self._placed[0] != key:
             orbit, seen = self._solve(values)
-            self._placed = key, Placed(orbit, *self._read(orbit, seen, float(values[-1])))
+            self._placed = key, ReadoutFit(orbit, *self._read(orbit, seen, float(values[-1])))
         return self._placed[1]
 
     def _placed_by(self, orbit: Orbit) -> Iterator[tuple[int, float, list[int]]]:
@@ -184,7 +184,7 @@ class Problem:
 
         The last entry is that of the period, where it is data.
         """
-        placed = self.placed(values)
+        placed = self.best_readouts(values)
         left = (placed.residual / self.sizes).ravel()
         slopes = (placed.jacobian / self.sizes[:, None]).reshape(left.size, -1)
         if self._period is None:

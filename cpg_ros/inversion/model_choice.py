@@ -24,9 +24,9 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
 from cpg_ros.errors import CpgError, InputError
-from cpg_ros.gaits.phase_average import warped
+from cpg_ros.gaits.phase_average import average_cycles
 from cpg_ros.gaits.stride import Stride
-from cpg_ros.inversion.given_up import fit_at_all
+from cpg_ros.inversion.fallback_fits import fit_with_fallbacks
 from cpg_ros.inversion.recording_fit import leg_joints, networks_of, preset_of, stride_of
 from cpg_ros.inversion.variable_projection import WEIGHTS
 from cpg_ros.recordings.recording import Recording
@@ -34,13 +34,13 @@ from cpg_ros.robots.robot import Robot
 import numpy as np
 
 #: Networks are told apart where their errors differ by so many standard errors of the difference.
-TOLD = 2.0
+DISTINCT = 2.0
 #: A joint whose mean cycle has a smaller range stands (rad).
 STANDS = 0.01
 
 
 @dataclass(frozen=True)
-class Explained:
+class NetworkComparison:
     """How well a network explains a recording.
 
     Attributes:
@@ -67,8 +67,9 @@ class Explained:
     alike: bool = False
 
 
-def explained(recording: Recording, robot: Robot | None = None, order: int = 3,
-              done: Callable[[float], None] = lambda share: None) -> list[Explained]:
+def compare_networks(recording: Recording, robot: Robot | None = None, order: int = 3,
+                     done: Callable[[float],
+                                    None] = lambda share: None) -> list[NetworkComparison]:
     """Fit every network that has the recording's legs; the best on other strides come first.
 
     Of several that the recording does not tell apart the one with the fewest numbers is first.
@@ -91,30 +92,31 @@ def explained(recording: Recording, robot: Robot | None = None, order: int = 3,
         cells, stride = stride_of(recording, legs, kind, robot)
         gait = stride.gait or kind.unnamed
         if not gait:
-            found.append(Explained(kind.name, '', why=(
+            found.append(NetworkComparison(kind.name, '', why=(
                 f'its nearest gait, {stride.nearest}, is {stride.distance:.3f} of a cycle off')))
             continue
-        half, others = halves(recording, stride)
+        half, others = split_strides(recording, stride)
         parameters = preset_of(kind.name, gait).network.with_phases(stride.phases)
         done(count / len(kinds))
         try:
-            fit, _ = fit_at_all(half, cells, parameters, gait, (), order, ({},), _unsaid)
+            fit, _ = fit_with_fallbacks(half, cells, parameters, gait, (), order, ({},),
+                                        _no_progress)
         except CpgError as error:
-            found.append(Explained(kind.name, gait, why=str(error)))
+            found.append(NetworkComparison(kind.name, gait, why=str(error)))
             continue
         free = len(fit.parameters) + len(kind.offsets) - bool(kind.offsets)
         rows = [half.joints.index(name) for name in fit.joints]
         shares = _shares(fit.joints, fit.fitted - others[rows], others[rows])
-        found.append(Explained(
+        found.append(NetworkComparison(
             kind.name, gait, float(np.mean(list(shares.values()) or [0.0])), fit.mean_rms_share,
             free, free + len(fit.joints) * (1 + WEIGHTS[fit.order]), by_joint=shares))
     done(1.0)
     least = min(found, key=lambda one: (one.error, one.numbers))
-    found = [replace(one, alike=not one.why and not _told_apart(one, least)) for one in found]
+    found = [replace(one, alike=not one.why and not _distinct(one, least)) for one in found]
     return sorted(found, key=lambda one: (not one.alike, one.numbers if one.alike else one.error))
 
 
-def _told_apart(one: Explained, least: Explained) -> bool:
+def _distinct(one: NetworkComparison, least: NetworkComparison) -> bool:
     """Whether a network's errors are larger than the least ones, beyond their own scatter."""
     if one is least:
         return False
@@ -122,14 +124,14 @@ def _told_apart(one: Explained, least: Explained) -> bool:
                      if name in least.by_joint])
     if more.size < 2:
         return one.error > least.error
-    return bool(more.mean() > TOLD * more.std(ddof=1) / np.sqrt(more.size))
+    return bool(more.mean() > DISTINCT * more.std(ddof=1) / np.sqrt(more.size))
 
 
-def _unsaid(share: float) -> None:
+def _no_progress(share: float) -> None:
     """Tell nobody how far a single fit is."""
 
 
-def halves(recording: Recording, stride: Stride) -> tuple[Stride, np.ndarray]:
+def split_strides(recording: Recording, stride: Stride) -> tuple[Stride, np.ndarray]:
     """Return the stride of every other cycle, and the mean of those between, (joints, m), rad.
 
     Raises:
@@ -146,7 +148,8 @@ def halves(recording: Recording, stride: Stride) -> tuple[Stride, np.ndarray]:
     even = np.floor(phases - phases[0]).astype(int) % 2 == 0
     means = []
     for mask in (even, ~even):
-        part = warped(phases[mask], x[inside][mask], stride.theta, range(len(stride.joints)))
+        part = average_cycles(phases[mask], x[inside][mask], stride.theta,
+                              range(len(stride.joints)))
         means.append((part.mean(stride.theta - part.zero), part.error))
     return replace(stride, mean=means[0][0], error=means[0][1]), means[1][0]
 
@@ -159,17 +162,17 @@ def _shares(joints: Sequence[str], errors: np.ndarray, recorded: np.ndarray
             zip(joints, sizes, spans, strict=True) if span > STANDS}
 
 
-def undecided(found: Sequence[Explained], order: int) -> str:
+def indistinguishable(found: Sequence[NetworkComparison], order: int) -> str:
     """Say which networks a recording does not tell apart by readouts of an order, if any."""
     alike = [one.network for one in found if one.alike]
     if len(alike) < 2:
         return ''
-    said = (f'the recording does not tell {", ".join(alike[:-1])} and {alike[-1]} apart; the one '
+    text = (f'the recording does not tell {", ".join(alike[:-1])} and {alike[-1]} apart; the one '
             'with the fewest numbers is fitted')
-    return said if order == 1 else f'{said}; readouts of a lower order (--order 1) tell more apart'
+    return text if order == 1 else f'{text}; readouts of a lower order (--order 1) tell more apart'
 
 
-def as_rows(found: Sequence[Explained]) -> list[tuple[str, ...]]:
+def as_rows(found: Sequence[NetworkComparison]) -> list[tuple[str, ...]]:
     """Rows of a table, with a head."""
     rows: list[tuple[str, ...]] = [('network', 'gait', 'held-out error', 'fitted', 'parameters',
                                     'all numbers', 'told from the least')]

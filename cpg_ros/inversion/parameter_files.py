@@ -21,7 +21,7 @@ from typing import Any
 from cpg_ros.errors import InputError
 from cpg_ros.files.atomic_write import write_atomically
 from cpg_ros.inversion.recording_fit import RecordingFit
-from cpg_ros.motion.plan import plan, Refused
+from cpg_ros.motion.plan import plan, PlanError
 from cpg_ros.networks.registry import find_network, reference
 from cpg_ros.robots.robot import Joint, Motion, Robot
 from cpg_ros.robots.robot_file import read_robot, write_robot
@@ -139,19 +139,20 @@ def write_fitted(path: str | Path, found: RecordingFit, robot: Robot | None = No
     """
     path = Path(path)
     beside = robot_file_of(path)
-    said = (f'{found.fit.gait} at {found.stride.frequency:.4f} Hz, fitted to '
-            f'{found.recording.source}\nmean RMS error {100 * found.fit.mean_rms_share:.1f} % of '
-            f"the joints' range, readout of order {found.fit.order}")
+    summary = (f'{found.fit.gait} at {found.stride.frequency:.4f} Hz, fitted to '
+               f'{found.recording.source}\nmean RMS error {100 * found.fit.mean_rms_share:.1f} % '
+               f'of '
+               f"the joints' range, readout of order {found.fit.order}")
     moved, tree = fitted_robot(found, robot), parameter_tree(
         found, (named or beside).resolve())
-    comment = ''.join(f'# {line}\n' for line in said.splitlines())
+    comment = ''.join(f'# {line}\n' for line in summary.splitlines())
     with TemporaryDirectory(prefix='.', dir=path.absolute().parent) as folder:
         parameters, joints = Path(folder, path.name), Path(folder, beside.name)
-        write_robot(joints, moved, said)
+        write_robot(joints, moved, summary)
         write_atomically(parameters, comment + yaml.safe_dump(tree, sort_keys=False))
         try:
             _planned(parameters, joints)
-        except Refused as error:
+        except PlanError as error:
             raise InputError(f'{found.recording.source}: robot {moved.name} cannot do this: '
                              f'{error}') from error
         joints.replace(beside)

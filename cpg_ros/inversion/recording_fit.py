@@ -21,9 +21,9 @@ from typing import Any
 from cpg_ros.errors import InputError
 from cpg_ros.gaits.leg_names import legs_of
 from cpg_ros.gaits.stride import find_stride, Stride
+from cpg_ros.inversion.fallback_fits import fit_with_fallbacks
 from cpg_ros.inversion.fit_data import cells_of
 from cpg_ros.inversion.gait_fit import Fit
-from cpg_ros.inversion.given_up import fit_at_all
 from cpg_ros.inversion.identifiability import Estimate
 from cpg_ros.networks.network import Network, Preset
 from cpg_ros.networks.registry import (
@@ -144,7 +144,7 @@ def leg_joints(recording: Recording, robot: Robot | None
     """Return which joints each leg has, and how that was read."""
     if robot is None:
         found = legs_of(recording.joints)
-        return dict(found.joints), found.says
+        return dict(found.joints), found.explanation
     legs = {leg: tuple(joint.name for joint in joints if joint.name in recording.joints)
             for leg, joints in robot.legs.items()}
     missing = [joint.name for joint in robot.joints if joint.name not in recording.joints]
@@ -177,12 +177,12 @@ def stride_of(recording: Recording, legs: Mapping[str, Sequence[str]], kind: typ
 
 def _none_of(kind: type[Network], stride: Stride) -> str:
     """Say that the phases are those of no gait, what they are and how far they scatter."""
-    said = ', '.join(f'{leg} {phase:.3f}' + (
+    phases = ', '.join(f'{leg} {phase:.3f}' + (
         f' +- {stride.scatter[leg].spread:.3f}' if stride.scatter[leg].spread > 0.0 else '')
         for leg, phase in stride.phases.items())
     return (f'the recorded phases are none of the gaits of the network {kind.name}: the nearest '
             f'is {stride.nearest}, {stride.distance:.3f} of a cycle off; phases at '
-            f'{stride.frequency:.4g} Hz, and how far single strides are off them: {said}')
+            f'{stride.frequency:.4g} Hz, and how far single strides are off them: {phases}')
 
 
 def _phases_as_estimates(fit: Fit, stride: Stride) -> dict[str, Estimate]:
@@ -191,10 +191,10 @@ def _phases_as_estimates(fit: Fit, stride: Stride) -> dict[str, Estimate]:
     for leg, one in list(stride.scatter.items())[1:]:
         name = fit.network.offsets.get(leg)
         if name is not None and name not in fit.parameters:
-            told = one.error == one.error
-            half = one.half_width if told else np.inf
-            found[name] = Estimate(known[name], one.error if told else np.inf,
-                                   known[name] - half, known[name] + half, told)
+            known_error = one.error == one.error
+            half = one.half_width if known_error else np.inf
+            found[name] = Estimate(known[name], one.error if known_error else np.inf,
+                                   known[name] - half, known[name] + half, known_error)
     return found
 
 
@@ -221,7 +221,7 @@ def fit_recording(recording: Recording, robot: Robot | None = None, network: str
 
     """
     legs, read = leg_joints(recording, robot)
-    asked = bool(network)
+    network_given = bool(network)
     if not network:
         network = robot.networks[0] if robot is not None else network_of(legs)
     try:
@@ -230,20 +230,20 @@ def fit_recording(recording: Recording, robot: Robot | None = None, network: str
         raise InputError(f'network {error}') from error
     cells, stride = stride_of(recording, legs, kind, robot)
     between = ''
-    if not (gait or stride.gait or asked or kind.offsets):
+    if not (gait or stride.gait or network_given or kind.offsets):
         between = _none_of(kind, stride)
         as_they_are = next((one for one in networks_of(robot, legs) if one.offsets), None)
         if as_they_are is not None:
             kind = as_they_are
             cells, stride = stride_of(recording, legs, kind, robot)
             between += f'; they are fitted as they are, by the network {kind.name}'
-    warnings = [*([between] if between else []), *stride.doubts]
+    warnings = [*([between] if between else []), *stride.issues]
     if not gait:
         gait = stride.gait or kind.unnamed
         if not gait:
             raise InputError('; '.join((
                 f'{recording.source}: {_none_of(kind, stride)}; name the gait to fit it all the '
-                'same', *recording.notes, *stride.notes, *stride.doubts)))
+                'same', *recording.notes, *stride.notes, *stride.issues)))
         if not stride.gait and not between:
             warnings.append(_none_of(kind, stride))
     elif (stride.gait or kind.unnamed) != gait:
@@ -253,11 +253,11 @@ def fit_recording(recording: Recording, robot: Robot | None = None, network: str
     as_recorded = parameters.with_phases(stride.phases)
     if not other_gait(as_recorded, gait):
         parameters = as_recorded
-    fit, given_up = fit_at_all(stride, cells, parameters, gait, free, order, starts, done)
+    fit, fallbacks = fit_with_fallbacks(stride, cells, parameters, gait, free, order, starts, done)
     fit = replace(fit, parameters={**_phases_as_estimates(fit, stride), **fit.parameters})
     found = RecordingFit(recording, read, legs, stride, fit,
                          {order: fit.share_at(order) for order in ORDERS},
-                         (*warnings, *given_up, *fit.warnings))
+                         (*warnings, *fallbacks, *fit.warnings))
     if not found.poor:
         return found
     return replace(found, warnings=(

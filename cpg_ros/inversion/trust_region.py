@@ -30,7 +30,7 @@ Evaluate = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Trial(ShortRepr):
+class Minimisation(ShortRepr):
     """What came of one start.
 
     Attributes:
@@ -59,8 +59,8 @@ class Trial(ShortRepr):
         return max(0, len(self.path) - 1)
 
 
-def descend(evaluate: Evaluate, start: np.ndarray, low: np.ndarray, high: np.ndarray,
-            tolerance: float, most: int = 100) -> Trial:
+def minimise(evaluate: Evaluate, start: np.ndarray, low: np.ndarray, high: np.ndarray,
+             tolerance: float, most: int = 100) -> Minimisation:
     """Minimise half the sum of squares within bounds, by scipy's 'trf' and exact derivatives.
 
     Args:
@@ -74,16 +74,16 @@ def descend(evaluate: Evaluate, start: np.ndarray, low: np.ndarray, high: np.nda
     """
     start = np.asarray(start, dtype=float)
     path: list[np.ndarray] = []
-    asked = 0
+    evaluations = 0
     try:
         size = evaluate(start)[0].size
     except NoOrbit as error:
-        return Trial(start, start, float('inf'), np.empty((0, 1 + start.size)), 1, False,
-                     str(error))
+        return Minimisation(start, start, float('inf'), np.empty((0, 1 + start.size)), 1, False,
+                            str(error))
 
     def residual(values: np.ndarray) -> np.ndarray:
-        nonlocal asked
-        asked += 1
+        nonlocal evaluations
+        evaluations += 1
         try:
             return evaluate(values)[0]
         except NoOrbit:
@@ -97,5 +97,5 @@ def descend(evaluate: Evaluate, start: np.ndarray, low: np.ndarray, high: np.nda
 
     found = least_squares(residual, start, jacobian, (low, high), 'trf', x_scale='jac',
                           ftol=tolerance, xtol=tolerance, gtol=1e-15, max_nfev=most)
-    return Trial(start, found.x, float(found.cost), np.array(path), asked,
-                 found.status > 0)
+    return Minimisation(start, found.x, float(found.cost), np.array(path), evaluations,
+                        found.status > 0)

@@ -22,6 +22,21 @@ from cpg_ros.errors import needed
 # Before any of its modules: one line where numba is missing, not a traceback.
 needed('numba')
 
-__all__ = ['absorption', 'duty', 'joint_readout', 'pattern', 'phase_readout', 'plan', 'precompile',
-           'ramp', 'readout', 'resumption', 'runnable', 'smoothstep', 'steering', 'strides',
-           'told_waveform', 'track']
+__all__ = [
+           'absorption',
+           'duty',
+           'joint_readout',
+           'pattern',
+           'phase_readout',
+           'plan',
+           'precompile',
+           'ramp',
+           'readout',
+           'resumption',
+           'retimed_waveform',
+           'runnable',
+           'smoothstep',
+           'steering',
+           'strides',
+           'track',
+]

@@ -39,7 +39,7 @@ LEAST, MOST = 0.3, 0.9
 
 
 @jit
-def told(phase, k, centre, own):
+def retimed_phase(phase, k, centre, own):
     """Return the phase that joints are told, its derivative by the phase, and the second one.
 
     All in cycles; with k = 1 nothing changes.
@@ -53,7 +53,7 @@ def told(phase, k, centre, own):
 
 def at_even_phases(one: np.ndarray, points: int) -> tuple[np.ndarray, np.ndarray]:
     """Return what a map (k, centre, own) makes of even phases of a cycle, and its slope there."""
-    rows = [told(n / points, *one)[:2] for n in range(points)]
+    rows = [retimed_phase(n / points, *one)[:2] for n in range(points)]
     phase, steep = np.array(rows).T
     return phase, steep
 
@@ -77,12 +77,12 @@ class Duty:
     """The shares of a stride that legs stand, and what has to be told to the joints for it.
 
     Attributes:
-        asked: shares asked for, shape (legs,).
+        shares: shares asked for, shape (legs,).
 
     """
 
     def __init__(self, orbit: Orbit, leg_cells: np.ndarray, begin: np.ndarray, own: np.ndarray,
-                 asked: np.ndarray) -> None:
+                 shares: np.ndarray) -> None:
         """Work out the map of each leg.
 
         Args:
@@ -90,19 +90,19 @@ class Duty:
             leg_cells: the cell that gives each leg's phase, from 0, shape (legs,).
             begin: phase of that cell at which each leg begins to stand, cycles, shape (legs,).
             own: shares that legs stand by themselves, shape (legs,).
-            asked: shares that they are to stand, shape (legs,).
+            shares: shares that they are to stand, shape (legs,).
 
         Raises:
             InputError: a share is not from LEAST to MOST, or not one of a cycle.
 
         """
-        for share in asked[asked != own]:
+        for share in shares[shares != own]:
             if not LEAST <= share <= MOST:
                 raise InputError(f'duty {share:g} is not from {LEAST:g} to {MOST:g}')
-        self.asked = asked
+        self.shares = shares
         self._phases, self._leg_cells = orbit.phases, leg_cells
-        k = np.tan(0.5 * math.pi * own) / np.tan(0.5 * math.pi * asked)
-        self._maps = np.stack([np.where(asked == own, 1.0, k), begin + 0.5 * asked,
+        k = np.tan(0.5 * math.pi * own) / np.tan(0.5 * math.pi * shares)
+        self._maps = np.stack([np.where(shares == own, 1.0, k), begin + 0.5 * shares,
                                begin + 0.5 * own], axis=1)
 
     def of_cells(self, legs: np.ndarray, cells: np.ndarray) -> np.ndarray:

@@ -25,7 +25,7 @@ from collections.abc import Callable
 import math
 
 from cpg_ros.motion.absorption import Absorption
-from cpg_ros.motion.plan import Program
+from cpg_ros.motion.plan import GaitPlan
 from cpg_ros.motion.ramp import Ramp
 from cpg_ros.motion.readout import confine
 from cpg_ros.motion.resumption import Resumption
@@ -58,11 +58,11 @@ class Pattern:
         faults: times the watchdog had to put the network back on its orbit.
         held: ticks in which a limit held a joint back.
         correct: takes and returns angles before limits hold them; None for the gait as it is.
-        hurry: factor of the pattern's clock.
+        frequency_scale: factor of the pattern's clock.
 
     """
 
-    def __init__(self, program: Program, ramp: float = 1.0, enabled: bool = True,
+    def __init__(self, program: GaitPlan, ramp: float = 1.0, enabled: bool = True,
                  drive: Drive | None = None) -> None:
         """Stand, then go into the gait within ``ramp`` s if enabled; a drive steers it."""
         robot = program.robot
@@ -70,7 +70,7 @@ class Pattern:
         self._leg = robot.leg_of_joint
         self.faults = self.held = 0
         self.correct: Callable[[np.ndarray], np.ndarray] | None = None
-        self.hurry = 1.0
+        self.frequency_scale = 1.0
         self._offset, self._lower = robot.column('offset'), robot.column('lower')
         self._upper, self._limit = robot.column('upper'), robot.column('velocity')
         self._requests: deque = deque()
@@ -116,7 +116,7 @@ class Pattern:
 
     # -- asked from other threads ---------------------------------------------------------
 
-    def apply(self, program: Program, transition: float) -> None:
+    def apply(self, program: GaitPlan, transition: float) -> None:
         """Change to a program over a transition in s; 0 leaves it to the network's dynamics."""
         # Seeding an orbit takes its time: here, in the caller's thread, not in that of the ticks.
         prepared = Track(program, max(transition, SHORTEST), self.drive)
@@ -135,7 +135,7 @@ class Pattern:
         """
         if self.drive is None:
             raise ValueError('this pattern has no drive')
-        self.drive.ask(stride, pace, at_once=self._ramp.level == 0.0)
+        self.drive.set_target(stride, pace, at_once=self._ramp.level == 0.0)
 
     def attach(self, drive: Drive) -> None:
         """Take a drive from now on; one that has not been asked for anything changes nothing."""
@@ -144,12 +144,12 @@ class Pattern:
             track.drive = drive
 
     @property
-    def program(self) -> Program:
+    def program(self) -> GaitPlan:
         """The newest program in force."""
         return self._tracks[-1].program
 
     @property
-    def fading(self) -> tuple[Program, Program, float]:
+    def fading(self) -> tuple[GaitPlan, GaitPlan, float]:
         """The program that fades out, the newest in force, and the share of that."""
         if len(self._tracks) == 1:
             return self._tracks[0].program, self._tracks[0].program, 0.0
@@ -194,7 +194,7 @@ class Pattern:
             self._take_requests()
         slow = self._resumption
         clock, share = slow.advance(dt) if slow.active else (dt, 1.0)
-        clock, share = self.hurry * clock, self.hurry * share
+        clock, share = self.frequency_scale * clock, self.frequency_scale * share
         calm = (len(self._tracks) == 1 and not (self._ramp.active or self._lead.active)
                 and not self._absorption.active)
         if not (calm and self._cruise(clock)):

@@ -34,7 +34,7 @@ import math
 
 from cpg_ros.dynamics.periodic import Orbit
 from cpg_ros.integration.jit import entry
-from cpg_ros.motion.duty import at_even_phases, maps_of_cells, told
+from cpg_ros.motion.duty import at_even_phases, maps_of_cells, retimed_phase
 from cpg_ros.motion.readout import monomials, NoPhase, TURN
 import numpy as np
 
@@ -130,7 +130,7 @@ def observe_phases(now, strides, waves, phases, shape, circles, tables, harmonic
             clocks[5, cell] += share * (pull * along - clocks[5, cell])
         steep = 1.0
         if maps[cell, 0] != 1.0:
-            phase, steep, _ = told(phase, maps[cell, 0], maps[cell, 1], maps[cell, 2])
+            phase, steep, _ = retimed_phase(phase, maps[cell, 0], maps[cell, 1], maps[cell, 2])
             c1, s1 = math.cos(TURN * phase), math.sin(TURN * phase)
         terms = harmonics[wave]
         x, y, z = terms[0, 0], 0.0, 0.0

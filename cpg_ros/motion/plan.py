@@ -28,7 +28,7 @@ from cpg_ros.motion.phase_readout import PhaseReadout
 from cpg_ros.motion.readout import extremes, WaveReadout
 from cpg_ros.motion.runnable import obstacle
 from cpg_ros.networks.network import Network, Preset
-from cpg_ros.robots.robot import Joint, Motion, Robot, Steering
+from cpg_ros.robots.robot import Joint, Motion, Robot, SteeringTable
 from cpg_ros.short_repr import ShortRepr
 import numpy as np
 
@@ -38,28 +38,28 @@ SLOWEST = 0.01
 SAME = 1e-6
 
 
-class Refused(CpgError):
+class PlanError(CpgError):
     """The request cannot be run; the message says why, with the figures."""
 
     exit_code = 1
 
 
-class OutOfLimits(Refused):
+class OutOfLimits(PlanError):
     """A joint would leave its limits.
 
     Attributes:
-        said: the joint and the figure, as 'knee at 11.46 rad/s, above its limit 10'.
+        message: the joint and the figure, as 'knee at 11.46 rad/s, above its limit 10'.
         excess: how far beyond, in rad, or as a share of the limit of speed.
 
     """
 
-    def __init__(self, cause: str, said: str, excess: float) -> None:
-        super().__init__(f'{cause} {said}')
-        self.said, self.excess = said, excess
+    def __init__(self, cause: str, message: str, excess: float) -> None:
+        super().__init__(f'{cause} {message}')
+        self.message, self.excess = message, excess
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Program(ShortRepr):
+class GaitPlan(ShortRepr):
     """One gait on one robot, ready to run.
 
     Attributes:
@@ -137,10 +137,10 @@ class Program(ShortRepr):
         return strides, frequency / (self.motion.frequency or frequency)
 
     @property
-    def _steering(self) -> Steering:
+    def _steering(self) -> SteeringTable:
         if self.motion.steering is None:
-            raise Refused(f"robot file '{self.robot.name}' does not say how to steer the gait "
-                          f"'{self.name}' (gaits.{self.gait}.steering)")
+            raise PlanError(f"robot file '{self.robot.name}' does not say how to steer the gait "
+                            f"'{self.name}' (gaits.{self.gait}.steering)")
         return self.motion.steering
 
     @property
@@ -195,7 +195,7 @@ def refusal(orbit: Orbit, gait: str, harmonics: int) -> str:
 
 
 def plan(robot: Robot, name: str, preset: Preset, network: Network, frequency: float = 0.0,
-         amplitude: float = 1.0, gain: float = -1.0, duty: float = 0.0) -> Program:
+         amplitude: float = 1.0, gain: float = -1.0, duty: float = 0.0) -> GaitPlan:
     """Work out a gait on a robot and check it against the robot's limits.
 
     Args:
@@ -215,16 +215,16 @@ def plan(robot: Robot, name: str, preset: Preset, network: Network, frequency: f
     """
     gait = preset.gait
     if 0.0 < frequency < SLOWEST:
-        raise Refused(f'frequency {frequency:g} is neither 0 nor at least {SLOWEST:g} Hz')
+        raise PlanError(f'frequency {frequency:g} is neither 0 nor at least {SLOWEST:g} Hz')
     if network.longest_delay and not network.step <= network.delay <= network.longest_delay:
-        raise Refused(f'{network.delay_parameter} {network.delay:g} must be from {network.step} '
-                      f'to {network.longest_delay:g}')
+        raise PlanError(f'{network.delay_parameter} {network.delay:g} must be from {network.step} '
+                        f'to {network.longest_delay:g}')
     try:
         orbit, judged = gait_of(preset, network)
     except CpgError as error:
-        raise Refused(str(error)) from error
+        raise PlanError(str(error)) from error
     if (found := obstacle(orbit, judged, robot.harmonics)) is not None:
-        raise Refused(f'the {gait} {found.said}')
+        raise PlanError(f'the {gait} {found.message}')
 
     motion = robot.motion(name, gait)
     shift = robot.shift(motion)
@@ -244,15 +244,15 @@ def plan(robot: Robot, name: str, preset: Preset, network: Network, frequency: f
     speed = strides * np.max([np.abs(extremes(rises)) for _, rises in swings], axis=(0, 1))
     beyond = [one for joint, *reach in zip(robot.joints, *span, speed, strict=True)
               for one in _beyond(joint, *reach)]
-    excess, key, said = max(beyond, key=lambda one: round(one[0], 9))
+    excess, key, message = max(beyond, key=lambda one: round(one[0], 9))
     if excess > 1e-9:
         cause = f'amplitude {amplitude:g} takes'
         if key == 'velocity':
             cause = f'frequency {strides:.3g} Hz at amplitude {amplitude:g} moves'
-        raise OutOfLimits(cause, said, excess)
+        raise OutOfLimits(cause, message, excess)
     gain = judged.chosen if gain < 0.0 else gain
-    return Program(name, robot, gait, orbit, judged, gain, strides, motion, shift, readout,
-                   in_place, span, speed, stands.asked)
+    return GaitPlan(name, robot, gait, orbit, judged, gain, strides, motion, shift, readout,
+                    in_place, span, speed, stands.shares)
 
 
 def _stands(robot: Robot, motion: Motion, orbit: Orbit, duty: float) -> Duty:
@@ -265,7 +265,7 @@ def _stands(robot: Robot, motion: Motion, orbit: Orbit, duty: float) -> Duty:
         return Duty(orbit, robot.leg_cells, begin, own,
                     np.full(own.size, wanted) if wanted else own)
     except InputError as error:
-        raise Refused(str(error)) from error
+        raise PlanError(str(error)) from error
 
 
 def _beyond(joint: Joint, low: float, high: float, fastest: float

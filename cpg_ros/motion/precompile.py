@@ -20,8 +20,8 @@ from cpg_ros.integration.simulate import simulate
 from cpg_ros.integration.stepper import Stepper
 from cpg_ros.motion.phase_readout import observe_phases
 from cpg_ros.motion.readout import confine, observe
+from cpg_ros.motion.retimed_waveform import read_retimed
 from cpg_ros.motion.strides import approach, lengthen, scale
-from cpg_ros.motion.told_waveform import tell
 from cpg_ros.networks.registry import find_network
 from numba.core import event
 import numpy as np
@@ -63,8 +63,8 @@ def _run_all(name: str) -> None:
     if network.readout == 'waveform':
         observe(stepper.now, 1.0, 1.0, cells, weights, np.zeros(8), cells, table, table, joints,
                 joints, joints)
-        tell(stepper.now, 1.0, 1.0, cells, weights, np.zeros((4, 2)), np.ones((4, 4)), one, joints,
-             joints)
+        read_retimed(stepper.now, 1.0, 1.0, cells, weights, np.zeros((4, 2)), np.ones((4, 4)), one,
+                     joints, joints)
     else:
         simulate(network, np.zeros(network.components), network.step, network.step)
         observe_phases(stepper.now, 1.0, cells, np.zeros(1), np.ones((1, 4)), np.ones((1, 4)),

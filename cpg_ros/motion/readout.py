@@ -24,7 +24,7 @@ from cpg_ros.dynamics.periodic import Orbit
 from cpg_ros.errors import CpgError
 from cpg_ros.integration.jit import entry, jit
 from cpg_ros.motion.duty import at_even_phases
-from cpg_ros.motion.told_waveform import tables, tell
+from cpg_ros.motion.retimed_waveform import read_retimed, tables
 import numpy as np
 
 #: Entries of the tables over one cycle.
@@ -196,12 +196,12 @@ class WaveReadout:
         self._view = (orbit.peak, orbit.period, cells, weights, orbit.phases, leg_cells, x,
                       lead_table(x, y))
         self.start = float(orbit.phases[leg_cells[0]])
-        self._told = None
+        self._retiming = None
         if maps is None or (maps[:, 0] == 1.0).all():
             values, slopes = monomials(x, y, z)
             self.angles, self.rises = weights @ values, weights @ slopes
             return
-        self._told = (orbit.peak, orbit.period, cells, weights, *tables(orbit), maps)
+        self._retiming = (orbit.peak, orbit.period, cells, weights, *tables(orbit), maps)
         self.angles, self.rises = np.empty((2, len(cells), TABLE))
         for joint, one in enumerate(maps):
             phase, steep = at_even_phases(one, TABLE)
@@ -218,8 +218,8 @@ class WaveReadout:
              rise: np.ndarray, legs: np.ndarray) -> float:
         """Read joints and legs off a state, however many strides after the last; see observe."""
         distance: float = observe(now, *self._view, angle, rise, legs)
-        if self._told is not None:
-            tell(now, *self._told, angle, rise)
+        if self._retiming is not None:
+            read_retimed(now, *self._retiming, angle, rise)
         return distance
 
 

@@ -31,12 +31,12 @@ class Obstacle:
     """Why the generator cannot run a gait.
 
     Attributes:
-        said: of a gait that is named, such as 'has a period of ...'.
+        message: of a gait that is named, such as 'has a period of ...'.
         aside: the same of one that has been named, in fewer words, such as 'its period of ...'.
 
     """
 
-    said: str
+    message: str
     aside: str
 
 

@@ -38,7 +38,7 @@ class Drive:
     def __init__(self, legs: int) -> None:
         # One row: the legs' strides and the pace.
         self._now, self._rate = np.ones(legs + 1), np.zeros(legs + 1)
-        self._asked = (np.ones(legs + 1), False)
+        self._target = (np.ones(legs + 1), False)
         self.stride, self.rate = self._now[:legs], self._rate[:legs]
         self.trim: np.ndarray | None = None
 
@@ -47,16 +47,16 @@ class Drive:
         """Factor of the stride frequency."""
         return float(self._now[-1])
 
-    def ask(self, stride: np.ndarray, pace: float, at_once: bool = False) -> None:
+    def set_target(self, stride: np.ndarray, pace: float, at_once: bool = False) -> None:
         """Set the targets, to be reached at once where nothing moves yet.
 
         May be called from another thread than advance.
         """
-        self._asked = np.append(stride, pace), at_once
+        self._target = np.append(stride, pace), at_once
 
     def advance(self, dt: float) -> None:
         """Advance by dt in s."""
-        target, at_once = self._asked
+        target, at_once = self._target
         if at_once:
             self._now[:], self._rate[:] = target, 0.0
             return

@@ -23,11 +23,11 @@ TIME_CONSTANT = 0.2
 
 
 @entry
-def approach(asked, trim, dt, now, rate):
+def approach(targets, trim, dt, now, rate):
     """Let strides and pace go on for dt in s towards what is asked for.
 
     Args:
-        asked: targets, shape (legs + 1,).
+        targets: targets, shape (legs + 1,).
         trim: added to those of the strides, shape (legs,) or (0,).
         dt: s.
         now: the strides and the pace, shape (legs + 1,); overwritten.
@@ -37,7 +37,7 @@ def approach(asked, trim, dt, now, rate):
     # e(t) = (e + (v + e / T) t) exp(-t / T), e the distance from the target.
     decay = math.exp(-dt / TIME_CONSTANT)
     for k in range(len(now)):
-        target = asked[k]
+        target = targets[k]
         if k < len(trim):
             target = min(max(target + trim[k], -1.0), 1.0)
         gap = now[k] - target

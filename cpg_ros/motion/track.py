@@ -16,7 +16,7 @@
 
 import math
 
-from cpg_ros.motion.plan import Program
+from cpg_ros.motion.plan import GaitPlan
 from cpg_ros.motion.steering import Drive
 from cpg_ros.motion.strides import lengthen
 import numpy as np
@@ -43,7 +43,7 @@ class Track:
 
     """
 
-    def __init__(self, program: Program, transition: float, drive: Drive | None = None) -> None:
+    def __init__(self, program: GaitPlan, transition: float, drive: Drive | None = None) -> None:
         """Run a program, its strides as long as a drive has them, if there is one."""
         self.transition = transition
         self.progress = 0.0
@@ -56,7 +56,7 @@ class Track:
         self.settling = self._calm = self._still = 0.0
         self.follow(program)
 
-    def follow(self, program: Program) -> None:
+    def follow(self, program: GaitPlan) -> None:
         """Read joints and judge health by this program from now on."""
         self.program = program
         self._least = AT_REST * float(program.orbit.levels[0, 0, 1])
@@ -118,7 +118,7 @@ class Track:
         self.settling = 0.0
         self.align(self.phase)
 
-    def drift_to(self, program: Program) -> None:
+    def drift_to(self, program: GaitPlan) -> None:
         """Take a program's parameters and leave the change to the network's own dynamics.
 
         A gait in whose class the state has nothing, as between any two gaits on their exact

@@ -61,12 +61,12 @@ class Equations:
         if len(self.texts) != network.variables:
             raise TypeError(f'{network.__name__}.equations returns {len(self.texts)} rates for '
                             f'{network.variables} variables')
-        said = ' '.join(self.texts)
+        text = ' '.join(self.texts)
         self._numbers = tuple(k for k in range(len(cell.arguments))
-                              if re.search(rf'\bx{k}\b', said))
+                              if re.search(rf'\bx{k}\b', text))
         self.arguments = tuple(cell.arguments[k] for k in self._numbers)
         self.by_cell = network.by_cell()
-        self.rows = tuple(dict.fromkeys(re.findall(r'\bp_(\w+)', said)))
+        self.rows = tuple(dict.fromkeys(re.findall(r'\bp_(\w+)', text)))
         words = repr((self.texts, cell.arguments, network.cells))
         self.key = f'{network.name}_{hashlib.sha256(words.encode()).hexdigest()[:16]}'
 

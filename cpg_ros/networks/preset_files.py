@@ -23,7 +23,7 @@ from typing import Any, Generic
 from cpg_ros.errors import CpgError
 from cpg_ros.files.atomic_write import write_atomically
 from cpg_ros.files.shared_resources import share
-from cpg_ros.files.yaml_reader import Reader
+from cpg_ros.files.yaml_reader import YamlReader
 from cpg_ros.networks.network_definition import AnyDefinition
 from cpg_ros.short_repr import ShortRepr
 import yaml
@@ -67,7 +67,7 @@ def read_presets(path: str | Path, network: type[AnyDefinition]
         PresetError: the file cannot be read, is for another network, or has a bad value.
 
     """
-    reader = Reader(Path(path), 'preset file', PresetError, LARGEST)
+    reader = YamlReader(Path(path), 'preset file', PresetError, LARGEST)
     tree = reader.keys(reader.tree(), 'file', {'network', 'presets'})
     if tree['network'] != network.name:
         raise reader.fail('network', f"is '{tree['network']}', not '{network.name}'")

@@ -14,7 +14,7 @@
 
 """ROS 2 nodes: parameters, topics, services and clocks; the mathematics is below.
 
-Imports every room but ``tools``.
+Imports every subpackage but ``tools``.
 """
 
 __all__ = ['bag_recorder', 'bounded_request', 'bridge_base', 'bridge_health', 'bridge_interface',
@@ -25,5 +25,5 @@ __all__ = ['bag_recorder', 'bounded_request', 'bridge_base', 'bridge_health', 'b
            'launch_arguments', 'local_socket', 'lockstep', 'log_queue', 'measured_pose',
            'message_block', 'message_types', 'node_base', 'node_client', 'other_publishers',
            'parameter_services', 'parameter_spec', 'polled_group', 'qos_profiles', 'raw_messages',
-           'real_time', 'robot_sim', 'senses_input', 'sensor_publishers', 'shutdown', 'unitree',
+           'real_time', 'robot_sim', 'sensor_input', 'sensor_publishers', 'shutdown', 'unitree',
            'watchdog', 'watchdog_link']

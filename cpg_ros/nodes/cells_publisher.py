@@ -24,7 +24,7 @@ from std_msgs.msg import Float64MultiArray, MultiArrayDimension
 FASTEST = 50.0
 
 
-class Cells:
+class CellsPublisher:
     """Publishes the network on ``~/cells``: a row for each variable of a cell, one for each rate.
 
     Rates are in model time.

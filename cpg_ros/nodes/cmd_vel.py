@@ -20,7 +20,7 @@ import threading
 from typing import Any
 
 from cpg_ros.motion.pattern import Pattern
-from cpg_ros.motion.plan import Program
+from cpg_ros.motion.plan import GaitPlan
 from geometry_msgs.msg import Twist
 from rclpy.clock import Clock
 from rclpy.clock_type import ClockType
@@ -39,7 +39,7 @@ ASIDE = 0.2
 class CmdVel:
     """Steers a pattern by the newest command; other threads may change the gait meanwhile."""
 
-    def __init__(self, node: Node, pattern: Pattern, program: Program, enabled: bool,
+    def __init__(self, node: Node, pattern: Pattern, program: GaitPlan, enabled: bool,
                  timeout: Callable[[], float], ramp: Callable[[], float],
                  closed: Callable[[], bool]) -> None:
         self._program, self._enabled = program, enabled
@@ -47,7 +47,7 @@ class CmdVel:
         self._node, self._pattern, self._timeout, self._ramp = node, pattern, timeout, ramp
         self._closed = closed
         # Speeds forward and to the left, m/s, and yaw rate, rad/s.
-        self._asked, self._when, self._stale = (0.0, 0.0, 0.0), -math.inf, True
+        self._target, self._when, self._stale = (0.0, 0.0, 0.0), -math.inf, True
         self._up = False
         self._log = node.get_logger()
         node.create_subscription(
@@ -61,14 +61,14 @@ class CmdVel:
     @property
     def walking(self) -> bool:
         """Tell whether a fresh command asks for motion."""
-        return self._enabled and not self._stale and self._asked != (0.0, 0.0, 0.0)
+        return self._enabled and not self._stale and self._target != (0.0, 0.0, 0.0)
 
     @property
     def motion(self) -> tuple[float, float, float]:
         """Speeds forward and to the left, m/s, and yaw rate, rad/s, that are walked now."""
         if not self.walking:
             return 0.0, 0.0, 0.0
-        speed, aside, turn = self._asked
+        speed, aside, turn = self._target
         slowest, fastest = self._program.speeds
         return min(max(speed, slowest), fastest), aside, turn
 
@@ -77,7 +77,7 @@ class CmdVel:
         """What is asked for, for diagnostics."""
         if self._stale:
             return 'none'
-        speed, aside, turn = self._asked
+        speed, aside, turn = self._target
         return f'{speed:.3g} m/s, {turn:.3g} rad/s' + (f', {aside:.3g} m/s to the left'
                                                        if aside else '')
 
@@ -102,7 +102,7 @@ class CmdVel:
                               f'{-ASIDE:g} to {ASIDE:g} m/s', throttle_duration_sec=QUIET)
             aside = math.copysign(ASIDE, aside)
         with self._deciding:
-            self._asked, self._when, self._stale = (speed, aside, turn), self._now(), False
+            self._target, self._when, self._stale = (speed, aside, turn), self._now(), False
             self._act()
 
     def _look(self) -> None:
@@ -116,7 +116,7 @@ class CmdVel:
             self._stale = stale
             self._act()
 
-    def follow(self, program: Program) -> None:
+    def follow(self, program: GaitPlan) -> None:
         """Steer this gait from now on."""
         with self._deciding:
             self._program = program
@@ -131,7 +131,7 @@ class CmdVel:
     def _act(self) -> None:
         walking = self.walking
         if walking:
-            speed, _, turn = self._asked
+            speed, _, turn = self._target
             slowest, fastest = self._program.speeds
             if not slowest <= speed <= fastest:
                 self._log.warning(f"cmd_vel asks for {speed:g} m/s: the {self._program.name}'s "

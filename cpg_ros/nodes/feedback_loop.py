@@ -27,8 +27,8 @@ from cpg_ros.feedback.plausibility import agreement
 from cpg_ros.feedback.tick import PlannedMotion
 from cpg_ros.feedback.timetable import POINTS, Timetable
 from cpg_ros.motion.pattern import Pattern
-from cpg_ros.motion.plan import Program
-from cpg_ros.nodes.senses_input import SensesInput
+from cpg_ros.motion.plan import GaitPlan
+from cpg_ros.nodes.sensor_input import SensorInput
 import numpy as np
 
 #: A heading that is asked for is no further ahead of the robot's than this, rad.
@@ -66,8 +66,8 @@ class FeedbackLoop:
         """
         self._pattern, self._geometry, self._motion = pattern, geometry, motion
         self._feedback = Feedback(geometry, joints=len(pattern.robot.joints))
-        self._known: list[tuple[Program, Timetable]] = []
-        self._inputs: SensesInput | None = None
+        self._known: list[tuple[GaitPlan, Timetable]] = []
+        self._inputs: SensorInput | None = None
         self._least = TOUCH * geometry.weight
         self._planned = PlannedMotion(np.zeros((1, len(pattern.robot.joints))), np.zeros(1),
                                       np.zeros((1, 2), dtype=np.int64), np.zeros(1),
@@ -95,13 +95,13 @@ class FeedbackLoop:
             self._inputs.restart()
         self._release()
 
-    def learn(self, program: Program) -> None:
+    def learn(self, program: GaitPlan) -> None:
         """Get to know a gait before it is met."""
         if not any(known is program for known, _ in self._known):
             self._feedback.learn(program)
             self._known = [*self._known, (program, Timetable(program, self._geometry))][-SLOTS:]
 
-    def listen(self, inputs: SensesInput) -> None:
+    def listen(self, inputs: SensorInput) -> None:
         """Take what the robot feels from these topics."""
         self._inputs = inputs
 
@@ -135,7 +135,7 @@ class FeedbackLoop:
         else:
             pattern.correct = self._correct
 
-    def _judge(self, inputs: SensesInput, now: float) -> None:
+    def _judge(self, inputs: SensorInput, now: float) -> None:
         """Find out what keeps the feedback out."""
         found, self.waiting = [], False
         for monitor in inputs.monitors:
@@ -151,7 +151,7 @@ class FeedbackLoop:
             self._agrees = 1.0
         else:
             row = int(pattern.phases[0] * POINTS) % POINTS
-            self._agrees = agreement(inputs.senses.foot_forces[0], self._least,
+            self._agrees = agreement(inputs.sensor_data.foot_forces[0], self._least,
                                      times.swinging[row],
                                      min(self._dt * program.frequency, 1.0), self._agrees)
             if self._agrees < AGREES:
@@ -168,7 +168,7 @@ class FeedbackLoop:
         planned.phase[0] = pattern.phases[0]
         forward, left, turn = self._motion()
         planned.velocity[0] = forward, left
-        yaw = float(inputs.senses.rpy[0, 2])
+        yaw = float(inputs.sensor_data.rpy[0, 2])
         if self.share and pattern.level:
             # The heading is kept where no turn is asked for, and otherwise turns on.
             ahead = (heading[0] + turn * self._dt - yaw + math.pi) % (2.0 * math.pi) - math.pi
@@ -176,8 +176,8 @@ class FeedbackLoop:
         else:
             heading[0] = yaw
         memory = feedback.memory
-        found = feedback.advance(inputs.senses, planned, self._dt, self.share, pattern.level)
-        pattern.hurry = float(memory.frequency_scale[0])
+        found = feedback.advance(inputs.sensor_data, planned, self._dt, self.share, pattern.level)
+        pattern.frequency_scale = float(memory.frequency_scale[0])
         if pattern.drive is not None:
             self._trim[:] = memory.stride[0]
             pattern.drive.trim = self._trim
@@ -185,6 +185,6 @@ class FeedbackLoop:
 
     def _release(self) -> None:
         """Leave the pattern to itself."""
-        self._pattern.correct, self._pattern.hurry = None, 1.0
+        self._pattern.correct, self._pattern.frequency_scale = None, 1.0
         if self._pattern.drive is not None:
             self._pattern.drive.trim = None

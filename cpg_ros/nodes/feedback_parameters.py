@@ -20,7 +20,7 @@ from typing import Any
 from cpg_ros.feedback.gains import GAINS as GAIN_OF
 from cpg_ros.feedback.gains import Gains, LAWS
 from cpg_ros.nodes.parameter_spec import one_of, Spec
-from cpg_ros.nodes.senses_input import CONTACTS
+from cpg_ros.nodes.sensor_input import CONTACTS
 
 PREFIX = 'feedback.'
 #: The switch, which has been PREFIX without its dot: no name is the beginning of another, or

@@ -22,13 +22,13 @@ from typing import Any
 from cpg_ros.feedback.kinematics import geometry_of
 from cpg_ros.feedback.precompile import precompile
 from cpg_ros.motion.pattern import Pattern
-from cpg_ros.motion.plan import Program
+from cpg_ros.motion.plan import GaitPlan
 from cpg_ros.motion.steering import Drive
 from cpg_ros.nodes import feedback_parameters
 from cpg_ros.nodes.feedback_loop import FeedbackLoop, Motion
 from cpg_ros.nodes.feedback_parameters import ENABLED, PREFIX
 from cpg_ros.nodes.parameter_spec import Spec
-from cpg_ros.nodes.senses_input import SensesInput
+from cpg_ros.nodes.sensor_input import SensorInput
 from cpg_ros.robots.robot import Robot
 from rclpy.parameter import Parameter
 
@@ -116,7 +116,7 @@ class FeedbackSwitch:
                 self._node.get_logger().info('the feedback was compiled in '
                                              f'{time.monotonic() - began:.1f} s')
             loop = FeedbackLoop(pattern, geometry, self._motion)
-            loop.listen(SensesInput(
+            loop.listen(SensorInput(
                 self._node, robot, geometry, self._value('imu_topic'),
                 self._value('joint_states_topic'), self._value('contacts'),
                 self._value('contacts_topic')))
@@ -131,7 +131,7 @@ class FeedbackSwitch:
                 lambda name: self._node.get_parameter(name).value)
             self.loop.wanted = wanted
 
-    def learn(self, program: Program) -> None:
+    def learn(self, program: GaitPlan) -> None:
         """Get to know a gait before it is met."""
         if self.loop is not None:
             self.loop.learn(program)

@@ -19,12 +19,12 @@ import sys
 import time
 
 from cpg_ros.motion.pattern import Pattern
-from cpg_ros.motion.plan import Refused
+from cpg_ros.motion.plan import PlanError
 from cpg_ros.motion.steering import Drive
 from cpg_ros.networks.preset_files import PresetError
 from cpg_ros.networks.registry import find_network, NetworkError
 from cpg_ros.nodes import feedback_parameters
-from cpg_ros.nodes.cells_publisher import Cells
+from cpg_ros.nodes.cells_publisher import CellsPublisher
 from cpg_ros.nodes.cmd_vel import CmdVel
 from cpg_ros.nodes.deadline_thread import Ticker
 from cpg_ros.nodes.diagnostics import Diagnostics
@@ -43,11 +43,11 @@ from cpg_ros.nodes.generator_parameters import (
 from cpg_ros.nodes.joint_publishers import Outputs
 from cpg_ros.nodes.kernels import compile_kernels
 from cpg_ros.nodes.measured_pose import MeasuredPose
-from cpg_ros.nodes.node_base import asked_for_help, run, StartedNode, StartError
+from cpg_ros.nodes.node_base import help_or_error, run, StartedNode, StartError
 from cpg_ros.nodes.other_publishers import OtherPublishers
 from cpg_ros.nodes.qos_profiles import latched
 from cpg_ros.nodes.real_time import NoSuchCore, RealTime, SPECS
-from cpg_ros.nodes.senses_input import CONTACTS
+from cpg_ros.nodes.sensor_input import CONTACTS
 from cpg_ros.robots.robot import Robot
 from cpg_ros.robots.robot_file import load_robot, RobotError
 from rcl_interfaces.msg import ParameterType, SetParametersResult
@@ -118,7 +118,7 @@ class Generator(StartedNode):
             self._declare(name, spec)
         try:
             program = self._planner.plan(self._values())
-        except Refused as error:
+        except PlanError as error:
             raise StartError(str(error)) from error
         self._planner.prepare()
 
@@ -135,7 +135,7 @@ class Generator(StartedNode):
         except ValueError as error:
             raise StartError(str(error)) from error
         self._feedback = self._switched()
-        self._cells = Cells(self, network)
+        self._cells = CellsPublisher(self, network)
         self._measured = self._measured_pose(robot)
         self._gait = self.create_publisher(
             String, '~/gait', latched(),
@@ -172,7 +172,7 @@ class Generator(StartedNode):
         if any(p.name in self._planner.names for p in parameters):
             try:
                 self._planner.plan(self._values(parameters))
-            except Refused as error:
+            except PlanError as error:
                 return SetParametersResult(successful=False, reason=str(error))
         reason = self._feedback.judge(parameters)
         return SetParametersResult(successful=not reason, reason=reason)
@@ -316,9 +316,9 @@ def main(args: list[str] | None = None) -> int:
     """Run the node until a signal ends it; return the exit code."""
     known = {'network': NETWORK, **specs(find_network(NETWORK.default)),
              ENABLED: feedback_parameters.SWITCH, **feedback_parameters.TOPICS}
-    code = asked_for_help('generator', 'Publishes the joint states of a gait; the parameters of '
-                          "the networks and the feedback's gains are listed by ros2 param "
-                          'describe.', known, args)
+    code = help_or_error('generator', 'Publishes the joint states of a gait; the parameters of '
+                         "the networks and the feedback's gains are listed by ros2 param "
+                         'describe.', known, args)
     return run(Generator, NAME, args) if code is None else code
 
 

@@ -23,7 +23,7 @@ from pathlib import Path
 from typing import Any
 
 from cpg_ros.errors import CpgError
-from cpg_ros.motion.plan import gait_of, plan, Program, Refused
+from cpg_ros.motion.plan import gait_of, GaitPlan, plan, PlanError
 from cpg_ros.networks.network import Network, Preset
 from cpg_ros.networks.preset_files import read_presets
 from cpg_ros.networks.registry import find_network, NETWORKS, with_legs_of
@@ -112,7 +112,7 @@ def exclusive(command: str) -> Spec:
 
 
 @dataclass(frozen=True)
-class Settings:
+class GaitSettings:
     """What a program is planned from; hashable, so that a plan is made once."""
 
     gait: str
@@ -184,7 +184,7 @@ class Planner:
         return {**values, **{group: math.fsum(values[key] for key in members) / len(members)
                              for group, members in network.groups.items()}}
 
-    def settings(self, values: dict[str, Any]) -> Settings:
+    def settings(self, values: dict[str, Any]) -> GaitSettings:
         """Build settings from all parameters by name.
 
         Raises:
@@ -194,18 +194,18 @@ class Planner:
         for name in self.names:
             value = values[name]
             if name != 'gait' and not (isinstance(value, float) and math.isfinite(value)):
-                raise Refused(f'{name} must be a finite number, not {value!r}')
+                raise PlanError(f'{name} must be a finite number, not {value!r}')
         if values['gait'] not in self.presets:
-            raise Refused(f"gait '{values['gait']}' is not one of {', '.join(self.presets)}")
+            raise PlanError(f"gait '{values['gait']}' is not one of {', '.join(self.presets)}")
         gain = values['symmetry_gain']
         if -1.0 < gain < 0.0:
-            raise Refused(f'symmetry_gain {gain:g} is neither -1 (chosen) nor at least 0')
+            raise PlanError(f'symmetry_gain {gain:g} is neither -1 (chosen) nor at least 0')
         network = self.network(*(values[f'{self.network.name}.{key}']
                                  for key in self.network.parameters()))
-        return Settings(values['gait'], network, values['frequency'], values['amplitude'], gain,
-                        values['duty'])
+        return GaitSettings(values['gait'], network, values['frequency'], values['amplitude'],
+                            gain, values['duty'])
 
-    def plan(self, values: dict[str, Any]) -> Program:
+    def plan(self, values: dict[str, Any]) -> GaitPlan:
         """Work out the program that all parameters, by name, ask for.
 
         Raises:
@@ -216,11 +216,11 @@ class Planner:
         if self.steered:
             try:
                 program.steer(0.0, 0.0)
-            except Refused as error:
-                raise Refused(f'{error}, which cmd_vel needs') from error
+            except PlanError as error:
+                raise PlanError(f'{error}, which cmd_vel needs') from error
         return program
 
-    def _program(self, settings: Settings) -> Program:
+    def _program(self, settings: GaitSettings) -> GaitPlan:
         return plan(self.robot, settings.gait, self.presets[settings.gait], settings.network,
                     settings.frequency, settings.amplitude, settings.symmetry_gain,
                     settings.duty)

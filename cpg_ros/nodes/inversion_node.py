@@ -160,15 +160,15 @@ class Inversion(StartedNode):
             work.add_done_callback(lambda _: None)
             self.thread = threading.Thread(target=self._work, args=(heard, work), daemon=True)
             self.thread.start()
-            well, said = await work
+            well, message = await work
         finally:
             self._busy = False
         # The logger tells its callers by their lines, and wants one severity of each.
         if well:
-            self.get_logger().info(said)
+            self.get_logger().info(message)
         else:
-            self.get_logger().warning(said)
-        return well, said
+            self.get_logger().warning(message)
+        return well, message
 
     def _work(self, heard: Live, work: Future) -> None:
         """Fit, write, publish and apply; the outcome is whether it went well, and what to say."""
@@ -180,10 +180,10 @@ class Inversion(StartedNode):
             recording = heard.recording(names, True, Servo(kp, kd) if kp else None)
             found = fit_recording(recording, robot, self._value('network'), self._value('gait'),
                                   free, self._value('order'), self._value('preset'))
-            said = '; '.join([_summary(found), *self._written(found)])
+            message = '; '.join([_summary(found), *self._written(found)])
             self._result.publish(String(data=json.dumps(finite(found.as_dict()))))
             well, applied = self._applied(self._value('apply_to'), found)
-            work.set_result((well, said + applied))
+            work.set_result((well, message + applied))
         except (CpgError, OSError) as error:
             work.set_result((False, str(error)))
         except Exception as error:
@@ -236,6 +236,6 @@ def _started() -> Inversion:
 
 def run(args: list[str] | None = None) -> int:
     """Run the node until a signal ends it; return the exit code."""
-    code = starting.asked_for_help('inversion', 'Fits the joint states that it hears.', SPECS,
-                                   args)
+    code = starting.help_or_error('inversion', 'Fits the joint states that it hears.', SPECS,
+                                  args)
     return starting.run(_started, NAME, args) if code is None else code

@@ -23,14 +23,14 @@ from rclpy.impl.rcutils_logger import RcutilsLogger
 def compile_kernels(network: str, logger: RcutilsLogger) -> None:
     """Compile or load the kernels of a network, as find_network takes it; say so if compiling."""
     began = time.monotonic()
-    said: list[str] = []
+    announced: list[str] = []
 
     def compiling() -> None:
-        if not said:
-            said.append('compiling the numerical kernels; only the very first start needs this '
-                        '(10 to 20 s)')
-            logger.info(said[0])
+        if not announced:
+            announced.append('compiling the numerical kernels; only the very first start needs '
+                             'this (10 to 20 s)')
+            logger.info(announced[0])
 
     precompile(network, compiling)
-    if said:
+    if announced:
         logger.info(f'compiled in {time.monotonic() - began:.1f} s')

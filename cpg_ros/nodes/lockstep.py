@@ -80,12 +80,12 @@ class Lockstep(threading.Thread):
 
     def _run(self) -> None:
         logger = self._node.get_logger()
-        told = False
+        announced = False
         while not (self._ready() and self._commands.connected):
             if self._ending.wait(0.02):
                 return
-            if not told:
-                told = True
+            if not announced:
+                announced = True
                 logger.info('waiting for a node that listens to /clock and publishes '
                             + ', '.join(self._commands.topics))
         period = round(1e9 / self.rate)

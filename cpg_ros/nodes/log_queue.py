@@ -62,8 +62,9 @@ INNER = __file__, rcutils_logger.__file__
 
 def _wanted(kind: str, args: list[str]) -> bool:
     """Tell whether the arguments of ROS leave a kind of logs on: the last word of them counts."""
-    said = [word for word in args if word in (f'--disable-{kind}-logs', f'--enable-{kind}-logs')]
-    return not said or said[-1].startswith('--enable')
+    switches = [word for word in args if word in (f'--disable-{kind}-logs',
+                                                  f'--enable-{kind}-logs')]
+    return not switches or switches[-1].startswith('--enable')
 
 
 class Record(NamedTuple):

@@ -167,8 +167,8 @@ def _spin(executor: SingleThreadedExecutor, node: StartedNode) -> None:
             node.get_logger().error('a request failed:\n' + traceback.format_exc())
 
 
-def asked_for_help(executable: str, text: str, known: Mapping[str, Spec],
-                   args: list[str] | None) -> int | None:
+def help_or_error(executable: str, text: str, known: Mapping[str, Spec],
+                  args: list[str] | None) -> int | None:
     """Look at the words that are not for ROS; return the exit code if the node is not to start.
 
     Args:

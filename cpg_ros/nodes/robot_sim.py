@@ -23,7 +23,7 @@ import time
 from cpg_ros.nodes.command_topics import Commands, KINDS
 from cpg_ros.nodes.deadline_thread import Ticker
 from cpg_ros.nodes.lockstep import Lockstep
-from cpg_ros.nodes.node_base import asked_for_help, run, StartedNode, StartError
+from cpg_ros.nodes.node_base import help_or_error, run, StartedNode, StartError
 from cpg_ros.nodes.parameter_spec import one_of, Spec
 from cpg_ros.nodes.qos_profiles import latched
 from cpg_ros.nodes.sensor_publishers import Measurements
@@ -34,7 +34,7 @@ from cpg_ros.simulation.body import Body
 from cpg_ros.simulation.camera import without_opengl
 from cpg_ros.simulation.inertial_unit import InertialUnit
 from cpg_ros.simulation.robot_model import SimulationError
-from cpg_ros.simulation.run_recorder import Diary, summary
+from cpg_ros.simulation.run_recorder import RunLog, summary
 from cpg_ros.simulation.scenario import SensorNoise
 from cpg_ros.simulation.soft_start import Approach
 from cpg_ros.simulation.terrain import add_ground, lay, set_friction, Terrain
@@ -142,7 +142,7 @@ class RobotSim(StartedNode):
             if film is not None and (missing := without_opengl()):
                 self.get_logger().warning(f'no film this time: {missing}')
                 film = None
-            self._diary = Diary(self._body, self._rate, film, footfalls, terrain)
+            self._diary = RunLog(self._body, self._rate, film, footfalls, terrain)
         except (RobotError, SimulationError) as error:
             raise StartError(str(error)) from error
 
@@ -336,7 +336,7 @@ class RobotSim(StartedNode):
 
 def main(args: list[str] | None = None) -> int:
     """Run the node until a signal ends it, or its duration is over; return the exit code."""
-    code = asked_for_help(NAME, 'Simulates a robot that a generator moves.', SPECS, args)
+    code = help_or_error(NAME, 'Simulates a robot that a generator moves.', SPECS, args)
     return run(RobotSim, NAME, args) if code is None else code
 
 

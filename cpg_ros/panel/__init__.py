@@ -23,6 +23,24 @@ from cpg_ros.errors import needed
 # Before any of its modules: one line where the extra is missing, not a traceback.
 needed('websockets', part='websockets.asyncio')
 
-__all__ = ['body_shape', 'controls', 'door', 'graph', 'lease', 'model_shape', 'orders', 'pages',
-           'panel_node', 'recorder', 'requests', 'robot_view', 'shape_facts', 'shape_source',
-           'steering', 'stick_figure', 'teleop', 'urdf_shape', 'web_server']
+__all__ = [
+           'access_control',
+           'body_shape',
+           'controls',
+           'graph',
+           'lease',
+           'model_shape',
+           'pages',
+           'panel_node',
+           'recorder',
+           'request_handler',
+           'requests',
+           'robot_view',
+           'shape_facts',
+           'shape_source',
+           'steering',
+           'stick_figure',
+           'teleop',
+           'urdf_shape',
+           'web_server',
+]

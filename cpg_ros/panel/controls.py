@@ -48,7 +48,7 @@ class Controls:
 
     def __init__(self, node: NodeClient, told: Callable[[str], None]) -> None:
         """Be those of a node; what it refuses is told."""
-        self._node, self._told = node, told
+        self._node, self._sent = node, told
         self.known: dict[str, dict[str, Any]] = {}
         self._waiting: dict[str, Any] = {}
         self._work: asyncio.Task | None = None
@@ -112,9 +112,9 @@ class Controls:
             try:
                 await self._node.set_parameters({name: value})
             except RequestRefused as error:
-                self._told(f'{name} {value}: {error}')
+                self._sent(f'{name} {value}: {error}')
             except CallError as error:
-                self._told(str(error))
+                self._sent(str(error))
 
 
 def _fitting(about: dict[str, Any], value: Any) -> Any:

@@ -160,6 +160,6 @@ class Pages:
         message = {'type': 'frame', **frame} if frame else {'type': 'stamp'}
         self.send(ready, {**message, 'stamp': stamp})
 
-    def say(self, pages: Iterable[Page], text: str, kind: str = 'refused') -> None:
+    def notify(self, pages: Iterable[Page], text: str, kind: str = 'refused') -> None:
         """Show a line of text: kind is refused, or told."""
         self.send(pages, {'type': 'said', 'text': text[:1000], 'kind': kind})

@@ -25,15 +25,15 @@ from typing import Any
 
 from cpg_ros.errors import CpgError
 from cpg_ros.files.loopback import is_loopback
-from cpg_ros.nodes.node_base import asked_for_help, run, StartedNode, StartError
+from cpg_ros.nodes.node_base import help_or_error, run, StartedNode, StartError
 from cpg_ros.nodes.node_client import ServiceClients
 from cpg_ros.nodes.parameter_spec import Spec
 from cpg_ros.panel import requests, shape_source
-from cpg_ros.panel.door import Door, DoorError, token_for
+from cpg_ros.panel.access_control import AccessControl, AccessError, token_for
 from cpg_ros.panel.graph import Graph, look
-from cpg_ros.panel.orders import Orders
 from cpg_ros.panel.pages import Page, Pages, SLOW
 from cpg_ros.panel.recorder import Recorder
+from cpg_ros.panel.request_handler import RequestHandler
 from cpg_ros.panel.requests import RequestError
 from cpg_ros.panel.robot_view import RobotView
 from cpg_ros.panel.web_server import WebServer
@@ -76,7 +76,7 @@ class Panel(StartedNode):
                                     sys.stderr.isatty())
             shape_source.check(self._value('urdf'))
         except CpgError as error:
-            kind = '' if isinstance(error, DoorError) else 'urdf: '
+            kind = '' if isinstance(error, AccessError) else 'urdf: '
             raise StartError(f'{kind}{error}') from error
         self._free()
         # Its subscriptions are fetched from, not called back: it is never spun.
@@ -91,9 +91,9 @@ class Panel(StartedNode):
             self._watch, Path(self._value('recordings')).expanduser(),
             round(1e6 * self._value('recording_limit')),
             lambda why: self._pages.later(self._recorded, why))
-        self._orders = Orders(self._pages, self._calls, self._recorder, self._recorded)
-        self._server = WebServer(Door(self._token), self._pages, self._recorder.packed, self._come,
-                                 self._asked, self._gone)
+        self._orders = RequestHandler(self._pages, self._calls, self._recorder, self._recorded)
+        self._server = WebServer(AccessControl(self._token), self._pages, self._recorder.packed,
+                                 self._come, self._on_request, self._gone)
         self.thread = threading.Thread(target=self._run, name='pages', daemon=True)
         self._warn_of_unknown()
 
@@ -186,7 +186,7 @@ class Panel(StartedNode):
         return RobotView(
             self, self._watch, self._calls, name,
             (self._value('max_speed'), self._value('max_turn')),
-            lambda text: self._pages.say(self._pages.of(name), text),
+            lambda text: self._pages.notify(self._pages.of(name), text),
             lambda message: self._pages.send(self._pages.of(name), message))
 
     def finish(self) -> None:
@@ -229,7 +229,7 @@ class Panel(StartedNode):
             self._pages.send([page], message)
         view.listen(self._graph, wanted=True)
 
-    async def _asked(self, page: Page, text: str | bytes) -> None:
+    async def _on_request(self, page: Page, text: str | bytes) -> None:
         try:
             request = requests.read(text)
             if request.action == 'choose':
@@ -239,7 +239,7 @@ class Panel(StartedNode):
             else:
                 await self._orders.carry_out(page, self._views[page.node], request)
         except CpgError as error:
-            self._pages.say([page], str(error))
+            self._pages.notify([page], str(error))
         except Exception:
             # One request must not end a node that others look through.
             self.get_logger().error('a request failed:\n' + traceback.format_exc())
@@ -247,14 +247,14 @@ class Panel(StartedNode):
     def _recorded(self, why: str = '') -> None:
         """Tell of a recording that began or ended, by itself if that has a reason."""
         if why:
-            self._pages.say(self._pages.open, why)
+            self._pages.notify(self._pages.open, why)
         self._pages.send(self._pages.everyone, self._state())
 
 
 def main(args: list[str] | None = None) -> int:
     """Run the node until a signal ends it; return the exit code."""
-    code = asked_for_help('panel', 'Shows, drives and records what is on the graph in a browser.',
-                          SPECS, args)
+    code = help_or_error('panel', 'Shows, drives and records what is on the graph in a browser.',
+                         SPECS, args)
     return run(Panel, NAME, args) if code is None else code
 
 

@@ -50,8 +50,8 @@ class RobotView:
     """
 
     def __init__(self, node: Node, watch: Node, services: ServiceClients, name: str,
-                 fastest: tuple[float, float], said: Callable[[str], None],
-                 tell: Callable[[dict[str, Any]], None]) -> None:
+                 fastest: tuple[float, float], report: Callable[[str], None],
+                 send: Callable[[dict[str, Any]], None]) -> None:
         """View a generator.
 
         Args:
@@ -60,14 +60,14 @@ class RobotView:
             services: of others.
             name: the generator's full name.
             fastest: speed in m/s and turn in rad/s of a whole deflection.
-            said: shows the pages a line.
-            tell: sends them a message.
+            report: shows the pages a line.
+            send: sends them a message.
 
         """
         self.name, self._space = name, namespace(name)
         self._node, self._watch, self._services = node, watch, services
-        self._said, self._tell = said, tell
-        self.controls = Controls(NodeClient(services, name), said)
+        self._report, self._send = report, send
+        self.controls = Controls(NodeClient(services, name), report)
         self._pushes: Any = None
         self.teleop = Teleop(node, f'{self._space}/cmd_vel', fastest)
         self.graph = Graph()
@@ -107,7 +107,7 @@ class RobotView:
                 self._node.get_logger().warning(doubt)
             self._keep({**shape.message(), 'doubts': doubts[:5]})
         except CallError as error:
-            self._said(str(error))
+            self._report(str(error))
             self._stale = True
 
     def messages(self) -> list[dict[str, Any]]:
@@ -116,7 +116,7 @@ class RobotView:
 
     def _keep(self, message: dict[str, Any]) -> None:
         self._kept[message['type']] = message
-        self._tell(message)
+        self._send(message)
 
     # -- what goes on -----------------------------------------------------------------------
 
@@ -162,28 +162,28 @@ class RobotView:
                 found['time'] = joints.header.stamp.sec + 1e-9 * joints.header.stamp.nanosec
                 fresh = True
         if fresh:
-            self._told_names('joints', list(self._joints))
+            self._names_message('joints', list(self._joints))
             found['angles'] = _short(self._joints.values())
         for key, name in (('phases', f'{self.name}/phase'), ('cells', f'{self.name}/cells'),
                           ('forces', f'{self._space}/foot_contacts')):
             if (message := self._newest(name)) is not None:
                 dimensions = message.layout.dim
                 if dimensions:
-                    self._told_names(key, dimensions[0].label.split(',')
-                                     if key != 'cells' else
-                                     [f'{dimension.label}:{dimension.size}'
-                                      for dimension in dimensions])
+                    self._names_message(key, dimensions[0].label.split(',')
+                                        if key != 'cells' else
+                                        [f'{dimension.label}:{dimension.size}'
+                                         for dimension in dimensions])
                 found[key] = _short(message.data)
         if (moved := self._newest(f'{self._space}/odom')) is not None:
             place, turn = moved.pose.pose.position, moved.pose.pose.orientation
             speed = moved.twist.twist
             found['base'] = _short((place.x, place.y, place.z, turn.w, turn.x, turn.y, turn.z))
             found['speed'] = _short((speed.linear.x, speed.linear.y, speed.angular.z))
-        if self.teleop.steering.asked != (0.0, 0.0):
-            found['steered'] = _short(self.teleop.steering.asked)
+        if self.teleop.steering.target != (0.0, 0.0):
+            found['steered'] = _short(self.teleop.steering.target)
         return found
 
-    def _told_names(self, key: str, names: list[str]) -> None:
+    def _names_message(self, key: str, names: list[str]) -> None:
         """Tell the pages what the numbers under a key are, if that is new."""
         if self._names.get(key) != names:
             self._names[key] = names
@@ -198,7 +198,7 @@ class RobotView:
                 # One of the same name has started anew.
                 self._stale |= event.node == self.name and bool(event.new_parameters)
                 if values := self.controls.hear(event):
-                    self._tell({'type': 'values', 'values': values})
+                    self._send({'type': 'values', 'values': values})
         if health := self._topics.get('/diagnostics'):
             owners = (f'{self.name}: ',
                       f'{self.graph.beside(self.name, self.graph.simulations) or "-"}: ')

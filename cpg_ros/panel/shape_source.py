@@ -64,58 +64,59 @@ def shipped_robot(name: str) -> Robot | None:
         return None
 
 
-def find(known: Known, said: Callable[[str], None]) -> Shape:
+def find(known: Known, report: Callable[[str], None]) -> Shape:
     """Return the first of: the user's URDF, the description, the model, a stick figure.
 
     Args:
         known: of the robot.
-        said: is told why a better one could not be had.
+        report: is told why a better one could not be had.
 
     """
     robot = shipped_robot(known.robot)
     for make in (_from_urdf, _from_description, _from_model):
         try:
-            shape = make(known, robot, said)
+            shape = make(known, robot, report)
         except (CpgError, OSError) as error:
-            said(str(error))
+            report(str(error))
             continue
         if shape is not None:
             _with_limits(shape, robot)
             _with_feet(shape, known, robot)
             return shape
     if robot is None and known.robot:
-        said(one_line(f"drawn as a stick figure: '{known.robot[:200]}' is not one of the shipped "
-                      'robots, and the panel opens no file that a node names; publish '
-                      'robot_description, or start the panel with -p urdf:=FILE'))
+        report(one_line(f"drawn as a stick figure: '{known.robot[:200]}' is not one of the "
+                        f"shipped "
+                        'robots, and the panel opens no file that a node names; publish '
+                        'robot_description, or start the panel with -p urdf:=FILE'))
     return _sticks(known, robot)
 
 
-def _from_urdf(known: Known, _: Robot | None, said: Callable[[str], None]) -> Shape | None:
-    return urdf_shape.from_file(Path(known.urdf).expanduser(), said) if known.urdf else None
+def _from_urdf(known: Known, _: Robot | None, report: Callable[[str], None]) -> Shape | None:
+    return urdf_shape.from_file(Path(known.urdf).expanduser(), report) if known.urdf else None
 
 
-def _from_description(known: Known, _: Robot | None, said: Callable[[str], None]
+def _from_description(known: Known, _: Robot | None, report: Callable[[str], None]
                       ) -> Shape | None:
     if not known.description:
         return None
-    return urdf_shape.from_text(known.description, 'robot_description', said)
+    return urdf_shape.from_text(known.description, 'robot_description', report)
 
 
-def _from_model(known: Known, robot: Robot | None, said: Callable[[str], None]) -> Shape | None:
+def _from_model(known: Known, robot: Robot | None, report: Callable[[str], None]) -> Shape | None:
     if robot is None:
         return None
     model = known.model
     if '/' in model or model.endswith(('.xml', '.urdf')):
-        said(one_line(f"the model '{model[:200]}' is not drawn: the panel opens no file that a "
-                      'node names; publish robot_description, or start the panel with '
-                      '-p urdf:=FILE'))
+        report(one_line(f"the model '{model[:200]}' is not drawn: the panel opens no file that a "
+                        'node names; publish robot_description, or start the panel with '
+                        '-p urdf:=FILE'))
         model = ''
     shipped = not model
     model = model or SHIPPED.get(known.robot, '')
     if not model:
         return None
     if shipped and model.endswith('.urdf'):
-        return urdf_shape.from_file(share() / 'urdf' / model, said)
+        return urdf_shape.from_file(share() / 'urdf' / model, report)
     from cpg_ros.panel.model_shape import from_model
     return from_model(model, robot)
 

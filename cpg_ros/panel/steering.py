@@ -26,11 +26,11 @@ HOLD = 0.3
 STOPS = 5
 
 
-class Steering:
+class SteeringPublisher:
     """Turns the newest command of a page into ``cmd_vel``, as long as it is fresh.
 
     Attributes:
-        asked: forward speed in m/s and turn in rad/s, (0, 0) where nobody steers.
+        target: forward speed in m/s and turn in rad/s, (0, 0) where nobody steers.
 
     """
 
@@ -38,7 +38,7 @@ class Steering:
         """Publish through this; a whole deflection is this speed in m/s and turn in rad/s."""
         self._publish, self._fastest = publish, fastest
         self._until, self._stops = -math.inf, 0
-        self.asked = (0.0, 0.0)
+        self.target = (0.0, 0.0)
 
     @property
     def idle(self) -> bool:
@@ -48,7 +48,7 @@ class Steering:
     def hold(self, stamp: float, speed: float, turn: float) -> None:
         """Steer by shares of the fastest, with a command that was given after a time, s."""
         self._until, self._stops = stamp + HOLD, STOPS
-        self.asked = speed * self._fastest[0], turn * self._fastest[1]
+        self.target = speed * self._fastest[0], turn * self._fastest[1]
 
     def stop(self) -> None:
         """Stop, whoever steers."""
@@ -58,12 +58,12 @@ class Steering:
         """Send what is to be sent at a time, s; nothing if nobody has steered."""
         if now > self._until:
             self.stop()
-            self.asked = 0.0, 0.0
+            self.target = 0.0, 0.0
             if not self._stops:
                 return
             self._stops -= 1
         message = Twist()
-        message.linear.x, message.angular.z = self.asked
+        message.linear.x, message.angular.z = self.target
         self._publish(message)
 
 

@@ -24,7 +24,7 @@ from typing import Any
 from cpg_ros.nodes.other_publishers import node_of
 from cpg_ros.panel.lease import Lease, LeaseError
 from cpg_ros.panel.pages import Page
-from cpg_ros.panel.steering import HOLD, Steering
+from cpg_ros.panel.steering import HOLD, SteeringPublisher
 from geometry_msgs.msg import Twist
 from rclpy.node import Node
 
@@ -47,7 +47,7 @@ class Teleop:
         self._own: set[bytes] = set()
         self._before: set[bytes] = set()
         self.lease = Lease()
-        self.steering = Steering(self._publish, fastest)
+        self.steering = SteeringPublisher(self._publish, fastest)
         self.others: dict[bytes, str] = {}
 
     # -- the lease --------------------------------------------------------------------------

@@ -35,13 +35,13 @@ LARGEST, TRIANGLES, MESHES = 4_000_000, 1_000_000, 500_000_000
 FURTHEST = 1e4
 
 
-def from_text(text: str, source: str, said: Callable[[str], None]) -> Shape:
+def from_text(text: str, source: str, report: Callable[[str], None]) -> Shape:
     """Return the shape that a URDF's text on the graph describes.
 
     Args:
         text: of anybody on the graph: no file is opened that is not of an installed package.
         source: what to call it.
-        said: is told of each part that cannot be drawn.
+        report: is told of each part that cannot be drawn.
 
     Raises:
         DescriptionError: it is no URDF, is too large, or its links are not one tree.
@@ -51,24 +51,24 @@ def from_text(text: str, source: str, said: Callable[[str], None]) -> Shape:
     if len(data) > LARGEST:
         raise DescriptionError(f'URDF {source}: has {len(data) / 1e6:.4g} MB, more than the '
                         f'{LARGEST / 1e6:g} MB that are read')
-    return _shape(parse_tree(data, source), source, None, said)
+    return _shape(parse_tree(data, source), source, None, report)
 
 
-def from_file(path: Path, said: Callable[[str], None]) -> Shape:
+def from_file(path: Path, report: Callable[[str], None]) -> Shape:
     """Return the shape that a user's URDF file describes.
 
     Args:
         path: of the file; meshes are found as ``find_mesh`` says.
-        said: is told of each part that cannot be drawn.
+        report: is told of each part that cannot be drawn.
 
     Raises:
         DescriptionError: it is no URDF, or its links are not one tree.
 
     """
-    return _shape(read_tree(path), path.name, path, said)
+    return _shape(read_tree(path), path.name, path, report)
 
 
-def _shape(tree: Xml.Element, source: str, path: Path | None, said: Callable[[str], None]
+def _shape(tree: Xml.Element, source: str, path: Path | None, report: Callable[[str], None]
            ) -> Shape:
     description = describe(tree, source)
     joints = description.joints
@@ -89,7 +89,7 @@ def _shape(tree: Xml.Element, source: str, path: Path | None, said: Callable[[st
             try:
                 drawing.add(link, visual)
             except MeshError as error:
-                said(f'not drawn: {error}')
+                report(f'not drawn: {error}')
     return shape
 
 

@@ -21,7 +21,7 @@ import logging
 from pathlib import Path
 from urllib.parse import urlsplit
 
-from cpg_ros.panel.door import Delays, Door, WRONG
+from cpg_ros.panel.access_control import AccessControl, Delays, WRONG
 from cpg_ros.panel.pages import Page, Pages
 from websockets.asyncio.server import serve, Server, ServerConnection
 from websockets.datastructures import Headers
@@ -48,13 +48,13 @@ _LOG.propagate = False
 class WebServer:
     """Serves files to whom the door lets in, and tells of pages that come, ask and go."""
 
-    def __init__(self, door: Door, pages: Pages, bag: Callable[[str], bytes],
+    def __init__(self, door: AccessControl, pages: Pages, bag: Callable[[str], bytes],
                  come: Callable[[Page], None],
-                 asked: Callable[[Page, str | bytes], Awaitable[None]],
+                 on_request: Callable[[Page, str | bytes], Awaitable[None]],
                  gone: Callable[[Page], None]) -> None:
         self._door, self._pages, self._bag = door, pages, bag
         self._delays = Delays()
-        self._come, self._asked, self._gone = come, asked, gone
+        self._come, self._on_request, self._gone = come, on_request, gone
         self._files = {'/' if file.name == 'index.html' else f'/{file.name}':
                        (file.read_bytes(), TYPES[file.suffix])
                        for file in FILES.iterdir() if file.suffix in TYPES}
@@ -112,7 +112,7 @@ class WebServer:
                 if not page.may_ask():
                     await connection.close(1008, 'too many requests')
                     break
-                task = asyncio.ensure_future(self._asked(page, message))
+                task = asyncio.ensure_future(self._on_request(page, message))
                 under_way.add(task)
                 task.add_done_callback(under_way.discard)
         except ConnectionClosed:

@@ -27,7 +27,7 @@ from cpg_ros.dynamics.isotypic import Block, blocks
 from cpg_ros.networks.quadruped import Quadruped
 from cpg_ros.papers.buono_gaits import AUTHORS
 from cpg_ros.papers.buono_tables import square_root, Tables
-from cpg_ros.papers.row import Citation, Picture, Row
+from cpg_ros.papers.row import Citation, Picture, ReproducedRow
 import numpy as np
 
 #: Table 5: phases of cells 1 to 8, upper and lower signs, by (j, k).
@@ -91,7 +91,7 @@ def drawn(equal: bool = False) -> Sample:
     return Sample(network, STAND + rng.uniform(-0.05, 0.05, 2))
 
 
-def phases() -> Iterator[Row | Picture]:
+def phases() -> Iterator[ReproducedRow | Picture]:
     """Table 5: eigenvectors of the whole linearisation."""
     sample = drawn()
     whole = sample.network.jacobian(everywhere(sample.network, sample.state))
@@ -117,7 +117,7 @@ def _signed(signs: str, operator: str) -> str:
                                                                            strict=True))
 
 
-def tables() -> Iterator[Row | Picture]:
+def tables() -> Iterator[ReproducedRow | Picture]:
     """Tables 6 to 10, and what is said of eigenvalues with them."""
     sample = drawn()
     printed, parts = sample.tables, sample.blocks
@@ -159,7 +159,7 @@ def tables() -> Iterator[Row | Picture]:
             f'in U_1{k} one pair lies to the right of the other', real[0] > real[1])
 
 
-def coupled_variable() -> Iterator[Row | Picture]:
+def coupled_variable() -> Iterator[ReproducedRow | Picture]:
     """Equation 4.4: what delta multiplies."""
     sample = drawn()
     network, at = sample.network, Citation(AUTHORS, 'eq. 4.4')
@@ -172,7 +172,7 @@ def coupled_variable() -> Iterator[Row | Picture]:
                      float(np.trace(printed).real), erratum=(19, theirs - network.delta))
 
 
-def equal_couplings() -> Iterator[Row | Picture]:
+def equal_couplings() -> Iterator[ReproducedRow | Picture]:
     """Table 11 and Lemma 5.8: alpha = beta, gamma = delta, xi = eta."""
     sample = drawn(equal=True)
     printed, parts = sample.tables, sample.blocks

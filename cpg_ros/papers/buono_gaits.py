@@ -30,7 +30,7 @@ from cpg_ros.networks.symmetry import Z4_Z2
 from cpg_ros.papers.cell_constants import cell_constants
 from cpg_ros.papers.figures import trajectories
 from cpg_ros.papers.rhythm import primary_gaits, Rhythm, rhythm
-from cpg_ros.papers.row import Citation, Picture, Row
+from cpg_ros.papers.row import Citation, Picture, ReproducedRow
 import numpy as np
 
 AUTHORS = 'Buono & Golubitsky 2001'
@@ -67,7 +67,7 @@ CURRENT = '1'
 
 
 @dataclass(frozen=True)
-class Gait:
+class SolvedGait:
     """A gait of Table 13 in the network: as it was found by simulation."""
 
     name: str
@@ -80,17 +80,18 @@ class Gait:
         return self.seen.found.phases
 
 
-def settled(name: str) -> Gait:
+def settled(name: str) -> SolvedGait:
     """Simulate a gait of Table 13 from near its orbit, with every cell disturbed."""
     network = Quadruped(*(float(value) for value in TABLE_13[name]))
     preset = Quadruped.presets()[name]
     start = np.array(preset.start)
     start = start + DISTURBANCE * np.random.default_rng(0).standard_normal(start.size)
     span = SETTLING.get(name, USUALLY) * preset.period
-    return Gait(name, network, rhythm(network, start, span, Z4_Z2, primary_gaits(variables=2)))
+    return SolvedGait(name, network,
+                      rhythm(network, start, span, Z4_Z2, primary_gaits(variables=2)))
 
 
-def _table_13(gait: Gait) -> Iterator[Row]:
+def _table_13(gait: SolvedGait) -> Iterator[ReproducedRow]:
     at, name = Citation(AUTHORS, 'Table 13'), gait.name
     yield at.word('gait that is found with the couplings ' + ', '.join(TABLE_13[name]), name,
                   gait.seen.kind, note=f'period {gait.seen.found.period:.4f}; phases measured')
@@ -100,7 +101,7 @@ def _table_13(gait: Gait) -> Iterator[Row]:
                   note=f'leading Floquet multiplier {found.leading:.3g} a cycle')
 
 
-def _table_1(gait: Gait) -> Iterator[Row]:
+def _table_1(gait: SolvedGait) -> Iterator[ReproducedRow]:
     at, name = Citation(AUTHORS, 'Table 1'), gait.name
     printed = [Fraction(part) for part in TABLE_1[name].split()]
     for cell in range(1, 4):
@@ -110,7 +111,7 @@ def _table_1(gait: Gait) -> Iterator[Row]:
                         erratum=(10, ('3/4', '1/4')[cell - 2]) if wrong else None)
 
 
-def _reversed(gait: Gait) -> Row:
+def _reversed(gait: SolvedGait) -> ReproducedRow:
     """Start the walk as Table 1 has it, with the wave run the other way, and see what lasts."""
     preset = Quadruped.presets()[gait.name]
     start = np.array(preset.start).reshape(2, -1)[:, [0, 1, 6, 7, 4, 5, 2, 3]]
@@ -121,7 +122,7 @@ def _reversed(gait: Gait) -> Row:
         [seen.found.phases[2]], erratum=(10, '3/4'))
 
 
-def _table_2(gait: Gait) -> Iterator[Row]:
+def _table_2(gait: SolvedGait) -> Iterator[ReproducedRow]:
     at, name = Citation(AUTHORS, 'Table 2'), gait.name
     how = 'with gamma U(t) = U(t - theta) as in eqs. 2.1 and 3.1'
     for symbol, cell, printed in zip(('omega', 'kappa'), (2, 1), TABLE_2[name], strict=True):
@@ -129,7 +130,7 @@ def _table_2(gait: Gait) -> Iterator[Row]:
                         note=f'u_{cell + 1}(t) = u_1(t - theta), {how}')
 
 
-def _section_7(gait: Gait) -> Iterator[Row]:
+def _section_7(gait: SolvedGait) -> Iterator[ReproducedRow]:
     at, name = Citation(AUTHORS, 'section 7'), gait.name
     for assignment, (first, second) in LEFT_HIND.items():
         wrong = assignment == 'criss-cross' and name in NOT_REVERSED
@@ -140,7 +141,7 @@ def _section_7(gait: Gait) -> Iterator[Row]:
                         note=f'cells {first} and {second}')
 
 
-def _figure_2(gait: Gait) -> Iterator[Row | Picture]:
+def _figure_2(gait: SolvedGait) -> Iterator[ReproducedRow | Picture]:
     order = ' '.join(f'u_{cell + 1}' for cell in np.argsort(-gait.phases[:4] % 1.0,
                                                             kind='stable'))
     where = 'top' if gait.name == 'walk' else 'bottom'
@@ -157,7 +158,7 @@ def _figure_2(gait: Gait) -> Iterator[Row | Picture]:
                                variable='v'))
 
 
-def _gaits(*names: str) -> Iterator[Row | Picture]:
+def _gaits(*names: str) -> Iterator[ReproducedRow | Picture]:
     for name in names:
         gait = settled(name)
         for part in (_table_1, _table_2, _table_13, _section_7):
@@ -175,17 +176,17 @@ def _gaits(*names: str) -> Iterator[Row | Picture]:
                             erratum=(14, '4'))
 
 
-def fast_gaits() -> Iterator[Row | Picture]:
+def fast_gaits() -> Iterator[ReproducedRow | Picture]:
     """Pronk, pace, bound and jump."""
     return _gaits('pronk', 'pace', 'bound', 'jump')
 
 
-def slow_gaits() -> Iterator[Row | Picture]:
+def slow_gaits() -> Iterator[ReproducedRow | Picture]:
     """Walk and trot."""
     return _gaits('walk', 'trot')
 
 
-def constants() -> Iterator[Row | Picture]:
+def constants() -> Iterator[ReproducedRow | Picture]:
     """Yield the cell of section 6, read off the compiled rates."""
     at = Citation(AUTHORS, 'section 6')
     found = cell_constants(Quadruped(0.0, 0.0, 0.0, 0.0), float(CURRENT))

@@ -23,7 +23,7 @@ from itertools import permutations
 
 from cpg_ros.networks.symmetry import Permutation, Z4_Z2
 from cpg_ros.papers.buono_gaits import AUTHORS, LEGS
-from cpg_ros.papers.row import Citation, Picture, Row
+from cpg_ros.papers.row import Citation, Picture, ReproducedRow
 
 Subgroup = frozenset[Permutation]
 
@@ -102,7 +102,7 @@ def solutions() -> list[tuple[Subgroup, Subgroup]]:
     return [(k, h) for h in every for k in every if k < h and cyclic(h, k)]
 
 
-def dihedral() -> Iterator[Row | Picture]:
+def dihedral() -> Iterator[ReproducedRow | Picture]:
     """Section 2.3, and what the proof of Theorem 3.2 takes from it."""
     at = Citation(AUTHORS, 'section 2.3')
     classes = {frozenset(conjugate(g, one) for g in D4) for one in all_subgroups(D4)}
@@ -132,7 +132,7 @@ def dihedral() -> Iterator[Row | Picture]:
                         note='H/K is Z2: what is in H but not in K shifts by half a period')
 
 
-def four_cells() -> Iterator[Row | Picture]:
+def four_cells() -> Iterator[ReproducedRow | Picture]:
     """Theorem 3.1: conjugation by the walk's four-cycle."""
     at = Citation(AUTHORS, 'Theorem 3.1')
     turn = cycles('(1 3 2 4)', 4)
@@ -190,7 +190,7 @@ TABLE_4 = {'zig-zag': 'LH RH LF RF LH RH LF RF', 'criss-cross': 'LH RH LF RF RH 
 TABLE_3 = 'LH RH LF RF LF RF LH RH'
 
 
-def legs() -> Iterator[Row | Picture]:
+def legs() -> Iterator[ReproducedRow | Picture]:
     """Theorem 3.3, Tables 3 and 4."""
     at = Citation(AUTHORS, 'Theorem 3.3')
     allowed = assignments()

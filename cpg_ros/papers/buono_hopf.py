@@ -26,7 +26,7 @@ from cpg_ros.networks.quadruped import Quadruped
 from cpg_ros.networks.symmetry import GAITS
 from cpg_ros.papers.buono_blocks import Sample, UNCOUPLED
 from cpg_ros.papers.buono_gaits import AUTHORS
-from cpg_ros.papers.row import Citation, Picture, Row
+from cpg_ros.papers.row import Citation, Picture, ReproducedRow
 import numpy as np
 from scipy.optimize import brentq
 
@@ -82,7 +82,7 @@ def hopf(network: Quadruped, line: str, gait: str, low: float, high: float) -> H
     return hopf_at(there, along, mode, root.imag)
 
 
-def the_stand() -> Iterator[Row | Picture]:
+def the_stand() -> Iterator[ReproducedRow | Picture]:
     """Section 6: the stand of the uncoupled cells, and hypothesis 4.6."""
     at = Citation(AUTHORS, 'section 6')
     sample = _sample(UNCOUPLED)
@@ -94,7 +94,7 @@ def the_stand() -> Iterator[Row | Picture]:
                    bool((roots.real < 0.0).all() and (roots.imag != 0.0).all()))
 
 
-def existence() -> Iterator[Row | Picture]:
+def existence() -> Iterator[ReproducedRow | Picture]:
     """Theorems 4.1 and 4.3: the points of the proofs, where the stand stays in place."""
     nu = _sample(UNCOUPLED).trace('L_00').real
     for place, gait, line, text, value, speed in (
@@ -129,7 +129,7 @@ def existence() -> Iterator[Row | Picture]:
     yield at.holds('an eigenvalue has a positive real part there', walk.unstable_roots > 0)
 
 
-def table_12() -> Iterator[Row | Picture]:
+def table_12() -> Iterator[ReproducedRow | Picture]:
     """Table 12: Hopf points to pace, bound and trot, and what branches off."""
     at = Citation(AUTHORS, 'Table 12')
     points = {}
@@ -166,7 +166,7 @@ def table_12() -> Iterator[Row | Picture]:
             note=f'first Lyapunov coefficient {point.lyapunov:.3f}')
 
 
-def theorem_4_2() -> Iterator[Row | Picture]:
+def theorem_4_2() -> Iterator[ReproducedRow | Picture]:
     """Theorem 4.2 at computed Hopf points, and the numbers of its proofs."""
     found: dict[str, HopfPoint] = {}
     for clause, gait, alpha, sign, (low, high), stable in THEOREM:

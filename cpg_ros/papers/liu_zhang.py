@@ -27,7 +27,7 @@ from cpg_ros.networks.symmetry import Z4_Z2
 from cpg_ros.papers.figures import trajectories
 from cpg_ros.papers.published_normal_form import published_normal_form
 from cpg_ros.papers.rhythm import primary_gaits, rhythm
-from cpg_ros.papers.row import Citation, Paper, Picture, Row
+from cpg_ros.papers.row import Citation, Paper, Picture, ReproducedRow
 import numpy as np
 
 AUTHORS = 'Liu & Zhang 2024'
@@ -104,7 +104,7 @@ SAMPLES, MISFIT = 20, 0.35
 ONE_MINIMUM = 1e-4
 
 
-def _coefficients(example: Example, point: HopfPoint) -> Iterator[Row]:
+def _coefficients(example: Example, point: HopfPoint) -> Iterator[ReproducedRow]:
     """Yield the normal form: by the formula that is printed, and by the right one."""
     at = Citation(AUTHORS, example.place)
     printed, right = published_normal_form(point), point.in_delays
@@ -121,7 +121,7 @@ def _coefficients(example: Example, point: HopfPoint) -> Iterator[Row]:
                         note='with q = 1 + tau B exp(-i omega tau) and the mode of the gait')
 
 
-def _example(example: Example) -> Iterator[Row | Picture]:
+def _example(example: Example) -> Iterator[ReproducedRow | Picture]:
     network, gait = example.network, example.gait
     at = Citation(AUTHORS, example.place)
     point = first_hopf(network, gait)
@@ -160,7 +160,7 @@ def _example(example: Example) -> Iterator[Row | Picture]:
     yield from _simulated(example)
 
 
-def _simulated(example: Example) -> Iterator[Row | Picture]:
+def _simulated(example: Example) -> Iterator[ReproducedRow | Picture]:
     """Yield the gait that the printed start values lead to."""
     gait, place = example.gait, f'Figure {example.figure}'
     at = Citation(AUTHORS, place)
@@ -187,7 +187,7 @@ def _simulated(example: Example) -> Iterator[Row | Picture]:
         seen.run.x[drawn, :4], ('$x_1$ (LH)', '$x_2$ (RH)', '$x_3$ (LF)', '$x_4$ (RF)')))
 
 
-def conditions() -> Iterator[Row | Picture]:
+def conditions() -> Iterator[ReproducedRow | Picture]:
     """(H1) and (H2), under which the bifurcations are there."""
     for place, name, key, sign in (('Example 1', 'H1', 'walk', 1.0),
                                    ('Example 2', 'H2', 'pace', -1.0)):
@@ -197,27 +197,27 @@ def conditions() -> Iterator[Row | Picture]:
             sign * (a + b) * d > 0.0 and abs(c) > abs(a + b + sign * d))
 
 
-def walk() -> Iterator[Row | Picture]:
+def walk() -> Iterator[ReproducedRow | Picture]:
     """Return what is said of Example 1, the walk."""
     return _example(EXAMPLES['walk'])
 
 
-def trot() -> Iterator[Row | Picture]:
+def trot() -> Iterator[ReproducedRow | Picture]:
     """Return what is said of Example 1, the trot."""
     return _example(EXAMPLES['trot'])
 
 
-def pace() -> Iterator[Row | Picture]:
+def pace() -> Iterator[ReproducedRow | Picture]:
     """Return what is said of Example 2."""
     return _example(EXAMPLES['pace'])
 
 
-def goat_trot() -> Iterator[Row | Picture]:
+def goat_trot() -> Iterator[ReproducedRow | Picture]:
     """Section 4.1 without its table."""
     return _example(EXAMPLES['goat_trot'])
 
 
-def goat_walk() -> Iterator[Row | Picture]:
+def goat_walk() -> Iterator[ReproducedRow | Picture]:
     """Section 4.2 without its table."""
     return _example(EXAMPLES['goat_walk'])
 
@@ -241,7 +241,7 @@ def recording(example: Example, name: str) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _inversion(place: str, example: Example, name: str, starts: dict[str, str]
-               ) -> Iterator[Row | Picture]:
+               ) -> Iterator[ReproducedRow | Picture]:
     at = Citation(AUTHORS, place)
     samples, theta = recording(example, name)
 
@@ -264,12 +264,12 @@ def _inversion(place: str, example: Example, name: str, starts: dict[str, str]
                    bool(np.ptp([fit.cost for fit in fits.values()]) <= ONE_MINIMUM))
 
 
-def table_1() -> Iterator[Row | Picture]:
+def table_1() -> Iterator[ReproducedRow | Picture]:
     """Table 1: c of the trot."""
     return _inversion('Table 1', EXAMPLES['goat_trot'], 'c', TABLE_1)
 
 
-def table_2() -> Iterator[Row | Picture]:
+def table_2() -> Iterator[ReproducedRow | Picture]:
     """Table 2: tau of the walk."""
     return _inversion('Table 2', EXAMPLES['goat_walk'], 'tau', TABLE_2)
 

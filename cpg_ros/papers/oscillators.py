@@ -28,7 +28,7 @@ from cpg_ros.integration.simulate import simulate
 from cpg_ros.networks.oscillators.hopf import Hopf
 from cpg_ros.networks.oscillators.matsuoka import Matsuoka
 from cpg_ros.networks.oscillators.phase import Phase
-from cpg_ros.papers.row import Citation, Paper, Row
+from cpg_ros.papers.row import Citation, Paper, ReproducedRow
 import numpy as np
 from scipy.integrate import quad
 
@@ -36,7 +36,7 @@ IJSPEERT, RIGHETTI, MATSUOKA = 'Ijspeert et al. 2007', 'Righetti & Ijspeert 2008
 TURN = 2.0 * np.pi
 
 
-def synchronisation() -> Iterator[Row]:
+def synchronisation() -> Iterator[ReproducedRow]:
     """Phases, frequency and amplitudes of coupled phase oscillators."""
     cite = Citation(IJSPEERT, 'phases')
     for gait, preset in Phase.presets().items():
@@ -55,7 +55,7 @@ def synchronisation() -> Iterator[Row]:
                        'exp(-n w R T)', np.exp(-4.0 * network.w * network.r / network.nu), slowest)
 
 
-def amplitudes() -> Iterator[Row]:
+def amplitudes() -> Iterator[ReproducedRow]:
     """Amplitudes are critically damped."""
     cite = Citation(IJSPEERT, 'amplitudes')
     network: Any = Phase.presets()['trot'].network
@@ -69,7 +69,7 @@ def amplitudes() -> Iterator[Row]:
                           found - 1.0 + 0.5 * (1.0 + half) * np.exp(-half)).max()), within=1e-9)
 
 
-def stance_and_swing() -> Iterator[Row]:
+def stance_and_swing() -> Iterator[ReproducedRow]:
     """Durations of stance and swing of a Hopf oscillator alone."""
     cite = Citation(RIGHETTI, 'oscillator')
     for duty in (0.5, 0.6, 0.75):
@@ -93,7 +93,7 @@ def stance_and_swing() -> Iterator[Row]:
                           within=0.01)
 
 
-def neurons() -> Iterator[Row]:
+def neurons() -> Iterator[ReproducedRow]:
     """When two neurons with fatigue oscillate, how large and how fast."""
     cite = Citation(MATSUOKA, 'two neurons')
     known = _alone(Matsuoka.presets()['trot'].network)
@@ -110,7 +110,7 @@ def neurons() -> Iterator[Row]:
                        slow.period / orbit.period)
 
 
-def frequency() -> Iterator[Row]:
+def frequency() -> Iterator[ReproducedRow]:
     """The frequency formula by harmonic balance, where it is exact and where it is not."""
     cite = Citation(MATSUOKA, 'frequency (2011)')
     known = _alone(Matsuoka.presets()['trot'].network)

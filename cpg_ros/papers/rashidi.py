@@ -27,7 +27,7 @@ from cpg_ros.networks.symmetry import D2, Symmetry
 from cpg_ros.papers.cell_constants import cell_constants
 from cpg_ros.papers.figures import trajectories
 from cpg_ros.papers.rhythm import Rhythm, rhythm
-from cpg_ros.papers.row import Citation, Paper, PHASE, Picture, Row
+from cpg_ros.papers.row import Citation, Paper, PHASE, Picture, ReproducedRow
 import numpy as np
 from scipy.integrate import solve_ivp
 
@@ -147,7 +147,7 @@ def _written(elements: tuple[str, ...]) -> str:
     return 'D' if len(others) == 3 else others[0].replace(' ', '-') if others else 'I'
 
 
-def cell() -> Iterator[Row | Picture]:
+def cell() -> Iterator[ReproducedRow | Picture]:
     """Table 1, and equations 1 and 2."""
     network = printed('walk')
     found = cell_constants(network, network.current)
@@ -181,7 +181,7 @@ def _oscillates(sign: float) -> bool:
     return bool(run.t[-1] >= 300.0 and np.ptp(run.y[0, run.t > 250.0]) > 0.1)
 
 
-def primary() -> Iterator[Row | Picture]:
+def primary() -> Iterator[ReproducedRow | Picture]:
     """Tables 2, 3 and 5, Figures 2 to 6, equations 6 to 9: the four primary gaits."""
     for gait in PRIMARY:
         seen = settled(gait)
@@ -215,7 +215,7 @@ def primary() -> Iterator[Row | Picture]:
         yield _drawn(f'Figure {FIGURES[gait]}', name, start, 'From the initial values of Table 3.')
 
 
-def _table_5(gait: str, seen: Rhythm) -> Iterator[Row]:
+def _table_5(gait: str, seen: Rhythm) -> Iterator[ReproducedRow]:
     at, name = Citation(AUTHORS, 'Table 5'), named(gait)
     h, k, response = TABLE_5[gait]
     yield at.word(f'H of the {name}', h, _written(seen.found.h))
@@ -233,7 +233,7 @@ def _drawn(place: str, name: str, seen: Rhythm, caption: str) -> Picture:
         shapes, variable='v'))
 
 
-def secondary() -> Iterator[Row | Picture]:
+def secondary() -> Iterator[ReproducedRow | Picture]:
     """Tables 4 and 5, Figures 8 to 11: the secondary gaits. Their weights are not printed."""
     for gait in TABLE_4:
         seen, name = settled(gait), named(gait)
@@ -261,7 +261,7 @@ def secondary() -> Iterator[Row | Picture]:
                      'With weights of ours, as the paper prints none; settled.')
 
 
-def kinds() -> Iterator[Row | Picture]:
+def kinds() -> Iterator[ReproducedRow | Picture]:
     """Section 5: the eleven kinds of rhythm, and what Table 5 calls H and K."""
     at = Citation(AUTHORS, 'section 5')
     waveforms = [pair.waveforms for pair in admissible_pairs(D2)]

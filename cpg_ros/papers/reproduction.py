@@ -24,7 +24,7 @@ import signal
 from cpg_ros.errors import CpgError
 from cpg_ros.papers.catalogue import PAPERS
 from cpg_ros.papers.errata import ERRATA
-from cpg_ros.papers.row import Paper, Picture, Row
+from cpg_ros.papers.row import Paper, Picture, ReproducedRow
 
 #: Dots per inch of a figure.
 RESOLUTION = 100
@@ -52,16 +52,16 @@ class Reproduction:
     """
 
     papers: tuple[Paper, ...]
-    rows: tuple[Row, ...]
+    rows: tuple[ReproducedRow, ...]
     figures: tuple[Drawn, ...]
 
     @property
-    def failed(self) -> tuple[Row, ...]:
+    def failed(self) -> tuple[ReproducedRow, ...]:
         """Rows that differ, but not as an erratum says."""
         return tuple(row for row in self.rows if not row.agrees and not row.explained)
 
     @property
-    def explained(self) -> tuple[Row, ...]:
+    def explained(self) -> tuple[ReproducedRow, ...]:
         """Rows that differ as an erratum says."""
         return tuple(row for row in self.rows if not row.agrees and row.explained)
 
@@ -79,20 +79,21 @@ class Reproduction:
                 f'explained by errata, {len(self.failed)} fail')
 
 
-def _section(paper: Paper, number: int, draw: bool) -> tuple[list[Row], list[Drawn]]:
+def _section(paper: Paper, number: int, draw: bool) -> tuple[list[ReproducedRow], list[Drawn]]:
     """Compute a part of a paper; one that breaks off leaves a row that fails."""
-    rows: list[Row] = []
+    rows: list[ReproducedRow] = []
     figures: list[Drawn] = []
     section = paper.sections[number]
     try:
         for one in section():
-            if isinstance(one, Row):
+            if isinstance(one, ReproducedRow):
                 rows.append(one)
             elif draw:
                 figures.append(_drawn(one))
     except (CpgError, ArithmeticError) as error:
-        rows.append(Row(paper.authors, section.__name__.replace('_', ' '), 'what is printed here',
-                        'a result', f'no result: {error}', False, 'computed at all'))
+        rows.append(ReproducedRow(paper.authors, section.__name__.replace('_', ' '),
+                                  'what is printed here',
+                                  'a result', f'no result: {error}', False, 'computed at all'))
     return rows, figures
 
 
@@ -115,7 +116,7 @@ def reproduce(names: Sequence[str], jobs: int = 1, draw: bool = True,
     """
     papers = tuple(PAPERS[name] for name in names)
     tasks = [(paper, number, draw) for paper in papers for number in range(len(paper.sections))]
-    done: dict[int, tuple[list[Row], list[Drawn]]] = {}
+    done: dict[int, tuple[list[ReproducedRow], list[Drawn]]] = {}
     if jobs == 1:
         for place, task in enumerate(tasks):
             done[place] = _section(*task)

@@ -18,7 +18,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 
-from cpg_ros.gaits.recognition import recognise, Recognised
+from cpg_ros.gaits.recognition import recognise, Recognition
 from cpg_ros.integration.simulate import simulate, Trajectory
 from cpg_ros.networks.network import Network
 from cpg_ros.networks.symmetry import Group, Symmetry, Z4_Z2
@@ -54,7 +54,7 @@ class Rhythm:
     """
 
     run: Trajectory
-    found: Recognised
+    found: Recognition
 
     @property
     def gait(self) -> str:

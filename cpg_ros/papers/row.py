@@ -29,7 +29,7 @@ MORE = 2
 
 
 @dataclass(frozen=True)
-class Row:
+class ReproducedRow:
     """A published quantity and the computed one.
 
     Attributes:
@@ -90,7 +90,7 @@ class Picture:
 #: What a formula gives.
 Value = float | complex | np.ndarray
 #: A part of a paper: computes some of its rows and pictures.
-Section = Callable[[], Iterable[Row | Picture]]
+Section = Callable[[], Iterable[ReproducedRow | Picture]]
 
 
 @dataclass(frozen=True)
@@ -115,14 +115,16 @@ class Citation:
     place: str
 
     def _row(self, quantity: str, published: str, shown: str, same: Callable[[str], bool],
-             how: str, value: float | None, erratum: tuple[int, str] | None, note: str) -> Row:
+             how: str, value: float | None, erratum: tuple[int, str] | None,
+             note: str) -> ReproducedRow:
         number, corrected = (None, '') if erratum is None else erratum
-        return Row(self.paper, self.place, quantity, published, shown, same(published), how, value,
-                   number, corrected, erratum is not None and same(corrected), note)
+        return ReproducedRow(self.paper, self.place, quantity, published, shown, same(published),
+                             how, value,
+                             number, corrected, erratum is not None and same(corrected), note)
 
     def number(self, quantity: str, published: str, computed: float, *,
                within: float | None = None, erratum: tuple[int, str] | None = None,
-               note: str = '') -> Row:
+               note: str = '') -> ReproducedRow:
         """Quote a number with the digits printed.
 
         Args:
@@ -149,7 +151,7 @@ class Citation:
 
     def phases(self, quantity: str, published: str, computed: Sequence[float] | np.ndarray, *,
                within: float = PHASE, erratum: tuple[int, str] | None = None,
-               note: str = '') -> Row:
+               note: str = '') -> ReproducedRow:
         """Quote phases in cycles, printed as fractions with blanks between; compared modulo 1."""
         ours = np.asarray(computed, dtype=float)
 
@@ -163,19 +165,19 @@ class Citation:
                          float(ours[0] % 1.0) if ours.size == 1 else None, erratum, note)
 
     def word(self, quantity: str, published: str, computed: str, *,
-             erratum: tuple[int, str] | None = None, note: str = '') -> Row:
+             erratum: tuple[int, str] | None = None, note: str = '') -> ReproducedRow:
         """Quote a name or a list of names."""
         return self._row(quantity, published, computed, lambda text: text == computed, 'equal',
                          None, erratum, note)
 
     def holds(self, quantity: str, computed: bool, *, erratum: int | None = None,
-              note: str = '') -> Row:
+              note: str = '') -> ReproducedRow:
         """Quote a statement that the paper makes; an erratum says that it is false."""
         return self.word(quantity, 'true', str(bool(computed)).lower(), note=note,
                          erratum=None if erratum is None else (erratum, 'false'))
 
     def formula(self, quantity: str, published: str, value: Value, computed: Value, *,
-                erratum: tuple[int, Value] | None = None, note: str = '') -> Row:
+                erratum: tuple[int, Value] | None = None, note: str = '') -> ReproducedRow:
         """Quote a formula by its value at some arguments, compared with ours at the same."""
         ours = np.ravel(computed)
         limit = FORMULA * max(1.0, float(np.abs(ours).max()))
@@ -186,9 +188,10 @@ class Citation:
 
         single = float(ours[0].real) if ours.size == 1 and not np.iscomplexobj(ours) else None
         number, corrected = (None, '') if erratum is None else (erratum[0], _shown(erratum[1]))
-        return Row(self.paper, self.place, quantity, f'{published} = {_shown(value)}',
-                   _shown(ours), same(value), f'at one set of couplings, to {FORMULA:g}', single,
-                   number, corrected, erratum is not None and same(erratum[1]), note)
+        return ReproducedRow(self.paper, self.place, quantity, f'{published} = {_shown(value)}',
+                             _shown(ours), same(value), f'at one set of couplings, to {FORMULA:g}',
+                             single,
+                             number, corrected, erratum is not None and same(erratum[1]), note)
 
 
 def _exponent(text: str) -> int:

@@ -48,7 +48,7 @@ class UndecodableError(CpgError):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class MessageBlock(ShortRepr):
+class SerializedBlock(ShortRepr):
     """Messages that have the same names.
 
     Attributes:
@@ -68,7 +68,7 @@ class MessageBlock(ShortRepr):
     efforts: np.ndarray
 
 
-def decode(messages: Sequence[bytes], efforts: bool = False) -> Iterator[MessageBlock]:
+def decode(messages: Sequence[bytes], efforts: bool = False) -> Iterator[SerializedBlock]:
     """Decode a batch of serialised JointState messages.
 
     Args:
@@ -97,22 +97,22 @@ def decode(messages: Sequence[bytes], efforts: bool = False) -> Iterator[Message
         else:
             same, stamps, numbers = same[fits], stamps[fits], [one[fits] for one in numbers]
             left = np.setdiff1d(left, same, assume_unique=True)
-        yield MessageBlock(same, stamps, layout.names, *numbers)
+        yield SerializedBlock(same, stamps, layout.names, *numbers)
     for k in left.tolist():
         message = _decoded(messages, k)
         stamp = message.header.stamp
-        yield MessageBlock(np.array([k]), np.array([stamp.sec * 10**9 + stamp.nanosec]),
-                           tuple(message.name), *(
+        yield SerializedBlock(np.array([k]), np.array([stamp.sec * 10**9 + stamp.nanosec]),
+                              tuple(message.name), *(
                         np.array(getattr(message, which) if which in fields else (), float)[None]
                         for which in FIELDS))
 
 
-def in_order(blocks: Iterable[MessageBlock]) -> Iterator[MessageBlock]:
+def in_order(blocks: Iterable[SerializedBlock]) -> Iterator[SerializedBlock]:
     """Join blocks of equal names and widths, their messages in the order of the batch again.
 
     They can differ in what is no number: byte order, or the frame's name.
     """
-    alike: dict[tuple, list[MessageBlock]] = {}
+    alike: dict[tuple, list[SerializedBlock]] = {}
     for block in blocks:
         widths = (one.shape[1] for one in (block.positions, block.velocities, block.efforts))
         alike.setdefault((block.names, *widths), []).append(block)
@@ -124,7 +124,7 @@ def in_order(blocks: Iterable[MessageBlock]) -> Iterator[MessageBlock]:
         rows, stamps, *numbers = (np.concatenate([getattr(block, name) for block in same])[order]
                                   for name in ('rows', 'stamps', 'positions', 'velocities',
                                                'efforts'))
-        yield MessageBlock(rows, stamps, same[0].names, *numbers)
+        yield SerializedBlock(rows, stamps, same[0].names, *numbers)
 
 
 def _decoded(messages: Sequence[bytes], index: int) -> Any:

@@ -19,7 +19,7 @@ from dataclasses import replace
 from itertools import compress
 
 from cpg_ros.recordings.bag_storage import line
-from cpg_ros.recordings.cdr import decode, in_order, JOINT_STATE, MessageBlock, UndecodableError
+from cpg_ros.recordings.cdr import decode, in_order, JOINT_STATE, SerializedBlock, UndecodableError
 from cpg_ros.recordings.recording import (
     Chunk,
     few,
@@ -109,7 +109,7 @@ class Stream:
         self.count += len(self.messages)
         self.messages, self.received = [], []
 
-    def _keep(self, block: MessageBlock, received: np.ndarray) -> None:
+    def _keep(self, block: SerializedBlock, received: np.ndarray) -> None:
         stamps, names, positions = block.stamps, block.names, block.positions
         if not positions.shape[1]:
             self.mute += len(stamps)

@@ -22,7 +22,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
-from cpg_ros.files.yaml_reader import Reader, shown
+from cpg_ros.files.yaml_reader import shown, YamlReader
 from cpg_ros.short_repr import ShortRepr
 import numpy as np
 
@@ -106,7 +106,8 @@ def leg_of(joints: Sequence[str], axes: np.ndarray, anchors: np.ndarray, foot: n
         tuple(one.tolist()) for one in links))
 
 
-def read_geometry(reader: Reader, tree: Any, legs: Mapping[str, Iterable[str]]) -> BodyGeometry:
+def read_geometry(reader: YamlReader, tree: Any,
+                  legs: Mapping[str, Iterable[str]]) -> BodyGeometry:
     """Take the part ``geometry``; legs are those of the file with the names of their joints."""
     tree = reader.keys(tree, 'geometry', {'mass', 'foot_radius', 'legs'})
     mass, radius = (reader.number(tree[key], f'geometry.{key}') for key in ('mass', 'foot_radius'))
@@ -119,7 +120,7 @@ def read_geometry(reader: Reader, tree: Any, legs: Mapping[str, Iterable[str]]) 
                                                  set(legs[leg])) for leg in listed})
 
 
-def _leg(reader: Reader, tree: Any, where: str, known: set[str]) -> LegGeometry:
+def _leg(reader: YamlReader, tree: Any, where: str, known: set[str]) -> LegGeometry:
     places = ('hip', 'thigh', 'calf', 'foot')
     tree = reader.keys(tree, where, {'joints', 'turns', *places})
     joints = tuple(reader.text(name, f'{where}.joints[{k}]') for k, name
@@ -141,14 +142,14 @@ def _leg(reader: Reader, tree: Any, where: str, known: set[str]) -> LegGeometry:
     return LegGeometry(joints, turns, *found)
 
 
-def _numbers(reader: Reader, value: Any, where: str, count: int) -> tuple[float, ...]:
+def _numbers(reader: YamlReader, value: Any, where: str, count: int) -> tuple[float, ...]:
     listed = reader.items(value, where)
     if len(listed) != count:
         raise reader.fail(where, f'takes {count} numbers, not {len(listed)}')
     return tuple(reader.number(entry, f'{where}[{k}]') for k, entry in enumerate(listed))
 
 
-def read_efference(reader: Reader, tree: Any, where: str) -> EfferenceTable:
+def read_efference(reader: YamlReader, tree: Any, where: str) -> EfferenceTable:
     """Take the part ``efference`` of a gait, rows of numbers with spaces between them."""
     tree = reader.keys(tree, where, {'speeds', *SIGNALS})
     speeds = tuple(reader.number(entry, f'{where}.speeds[{k}]') for k, entry
@@ -170,7 +171,7 @@ def read_efference(reader: Reader, tree: Any, where: str) -> EfferenceTable:
     return EfferenceTable(speeds, rows)
 
 
-def _row(reader: Reader, value: Any, where: str) -> tuple[float, ...]:
+def _row(reader: YamlReader, value: Any, where: str) -> tuple[float, ...]:
     if not isinstance(value, str):
         raise reader.fail(where, f'must be {BINS} numbers with spaces between them, not '
                           f'{shown(value)}')

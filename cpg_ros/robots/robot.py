@@ -56,7 +56,7 @@ class Joint:
 
 
 @dataclass(frozen=True)
-class Steering:
+class SteeringTable:
     """How fast a robot goes and turns, measured: what to ask of its legs for a wanted speed.
 
     Four columns of one table, its rows by rising speed.
@@ -116,7 +116,7 @@ class Motion(ShortRepr):
 
     frequency: float | None = None
     joints: dict[str, JointMotion] = field(default_factory=dict)
-    steering: Steering | None = None
+    steering: SteeringTable | None = None
     efference: EfferenceTable | None = None
     duty: float | None = None
     stance: tuple[float, float] | None = None

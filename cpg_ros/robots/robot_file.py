@@ -26,7 +26,7 @@ from typing import Any
 from cpg_ros.errors import CpgError
 from cpg_ros.files.atomic_write import write_atomically
 from cpg_ros.files.shared_resources import share
-from cpg_ros.files.yaml_reader import Reader, shown
+from cpg_ros.files.yaml_reader import shown, YamlReader
 from cpg_ros.networks.leg_numbers import GIRDLES
 from cpg_ros.networks.registry import find_network, NetworkError, NETWORKS, reference
 from cpg_ros.robots.body_keys import (
@@ -41,7 +41,7 @@ from cpg_ros.robots.robot import (
     JointMotion,
     Motion,
     Robot,
-    Steering,
+    SteeringTable,
     WEIGHTS,
 )
 import yaml
@@ -56,7 +56,7 @@ class RobotError(CpgError):
     """A robot file cannot be used; the message names the file, the key and the reason."""
 
 
-class _Reader(Reader):
+class _Reader(YamlReader):
     """Reads networks and joints, too."""
 
     def networks(self, value: Any) -> tuple[str, ...]:
@@ -179,7 +179,7 @@ class _Reader(Reader):
             stance = found[0], found[1]
         return Motion(frequency, moved, steering, efference, duty, stance)
 
-    def steering(self, tree: Any, where: str, fastest: float | None) -> Steering:
+    def steering(self, tree: Any, where: str, fastest: float | None) -> SteeringTable:
         if fastest is None:
             raise self.fail(where, "needs the gait's 'frequency', too")
         columns = ('speed', 'stride', 'frequency', 'turn')
@@ -198,7 +198,7 @@ class _Reader(Reader):
         for k, (before, after) in enumerate(pairwise(rows['speed'])):
             if not before < after:
                 raise self.fail(f'{where}.speed[{k + 1}]', f'{after:g} is not above {before:g}')
-        return Steering(**rows)
+        return SteeringTable(**rows)
 
 
 def read_robot(path: str | Path) -> Robot:
@@ -317,10 +317,10 @@ def write_robot(path: str | Path, robot: Robot, comment: str = '') -> None:
              'velocity': joint.velocity}
             | ({'invented': list(joint.invented)} if joint.invented else {})
             for joint in joints]}
-        for key, said in (('side', robot.sides), ('girdle', robot.girdles)):
-            if leg in said and not any(leg in getattr(NETWORKS[name], f'{key}s')
-                                       for name in robot.networks):
-                tree['legs'][leg][key] = said[leg]
+        for key, places in (('side', robot.sides), ('girdle', robot.girdles)):
+            if leg in places and not any(leg in getattr(NETWORKS[name], f'{key}s')
+                                         for name in robot.networks):
+                tree['legs'][leg][key] = places[leg]
     if robot.geometry is not None:
         tree['geometry'] = geometry_tree(robot.geometry)
     if robot.motions:

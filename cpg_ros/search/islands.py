@@ -33,12 +33,12 @@ import numpy as np
 EPOCH, MIGRANTS = 3, 0.1
 
 
-class NotInstalled(CpgError):
+class PymooMissing(CpgError):
     """The optional dependency is missing; the message says how to get it."""
 
 
 @dataclass(frozen=True)
-class Ground:
+class SearchSetup:
     """Where all islands look, in words that travel: as the arguments of search_space."""
 
     network: str
@@ -53,11 +53,11 @@ class Ground:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Stay(ShortRepr):
+class Epoch(ShortRepr):
     """An island for some generations.
 
     Attributes:
-        ground: where it looks.
+        setup: where it looks.
         population: sets in a generation.
         generations: how many.
         random: seed of the island's random numbers.
@@ -67,7 +67,7 @@ class Stay(ShortRepr):
 
     """
 
-    ground: Ground
+    setup: SearchSetup
     population: int
     generations: int
     random: int
@@ -77,7 +77,7 @@ class Stay(ShortRepr):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Evolved(ShortRepr):
+class EpochResult(ShortRepr):
     """What came of a stay: the last generation, best first, and all sets that were judged."""
 
     values: np.ndarray
@@ -85,11 +85,12 @@ class Evolved(ShortRepr):
     tried: tuple[Score, ...]
 
 
-def evolve(stay: Stay, told: Callable[[int], None] = lambda generation: None) -> Evolved:
+def evolve(epoch_of_island: Epoch,
+           progress: Callable[[int], None] = lambda generation: None) -> EpochResult:
     """Let NSGA-II run on an island.
 
     Raises:
-        NotInstalled: pymoo is missing.
+        DaskMissing: pymoo is missing.
 
     """
     try:
@@ -98,34 +99,35 @@ def evolve(stay: Stay, told: Callable[[int], None] = lambda generation: None) ->
         from pymoo.core.problem import Problem
         from pymoo.problems.static import StaticProblem
     except ImportError as error:
-        raise NotInstalled('optimize needs pymoo: pip install cpg-ros[optimize]') from error
-    space = stay.ground.space
+        raise PymooMissing('optimize needs pymoo: pip install cpg-ros[optimize]') from error
+    space = epoch_of_island.setup.space
     problem = Problem(n_var=len(space.free), n_obj=objective_count(space), n_ieq_constr=1,
                       xl=np.array([variable.low for variable in space.free]),
                       xu=np.array([variable.high for variable in space.free]))
-    algorithm = (NSGA2(pop_size=stay.population) if stay.start is None
-                 else NSGA2(pop_size=stay.population, sampling=stay.start))
-    algorithm.setup(problem, termination=('n_gen', stay.generations), seed=stay.random)
-    tried: dict[Network, Score] = {one.network: one for one in stay.known}
-    for generation in range(stay.generations):
-        asked = algorithm.ask()
-        networks = [space.build(values) for values in asked.get('X')]
+    algorithm = (NSGA2(pop_size=epoch_of_island.population) if epoch_of_island.start is None
+                 else NSGA2(pop_size=epoch_of_island.population, sampling=epoch_of_island.start))
+    algorithm.setup(problem, termination=('n_gen', epoch_of_island.generations),
+                    seed=epoch_of_island.random)
+    tried: dict[Network, Score] = {one.network: one for one in epoch_of_island.known}
+    for generation in range(epoch_of_island.generations):
+        population = algorithm.ask()
+        networks = [space.build(values) for values in population.get('X')]
         new = list(dict.fromkeys(one for one in networks if one not in tried))
         if new:
-            tried.update(zip(new, evaluate(new, space.gait, stay.seed), strict=True))
+            tried.update(zip(new, evaluate(new, space.gait, epoch_of_island.seed), strict=True))
         scores = [tried[one] for one in networks]
         # Bounds as the algorithm has them; waveforms that miss what is asked of them come
         # after all others, whatever their phases.
         static = StaticProblem(problem, F=np.array([one.objectives for one in scores]),
                                G=np.array([[one.shortfall] for one in scores]))
-        Evaluator().eval(static, asked)
-        algorithm.tell(infills=asked)
-        told(generation + 1)
+        Evaluator().eval(static, population)
+        algorithm.tell(infills=population)
+        progress(generation + 1)
     values = algorithm.pop.get('X')
     last = [tried[space.build(one)] for one in values]
     best = sorted(range(len(last)), key=lambda k: (
         last[k].shortfall, float(last[k].errors.max()), last[k].stability, tuple(values[k])))
-    return Evolved(values[best], tuple(last[k] for k in best), tuple(tried.values()))
+    return EpochResult(values[best], tuple(last[k] for k in best), tuple(tried.values()))
 
 
 def objective_count(space: Space) -> int:
@@ -138,19 +140,20 @@ def _random(seed: int, island: int, epoch: int) -> int:
     return int(np.random.SeedSequence([seed, island, epoch]).generate_state(1)[0])
 
 
-def archipelago(ground: Ground, population: int, generations: int, seed: int, islands: int,
-                executor: Executor | None, told: Callable[[int], None] = lambda generation: None
+def archipelago(setup: SearchSetup, population: int, generations: int, seed: int, islands: int,
+                executor: Executor | None,
+                progress: Callable[[int], None] = lambda generation: None
                 ) -> tuple[Score, ...]:
     """Return all sets that some islands have judged, in an order that is always the same.
 
     Args:
-        ground: where they look.
+        setup: where they look.
         population: sets in a generation of each.
         generations: of each.
         seed: of everything random.
         islands: how many, in a ring; each sends its best to the next one.
         executor: any; None for this process.
-        told: takes the number of generations done.
+        progress: takes the number of generations done.
 
     """
     tried: dict[Network, Score] = {}
@@ -159,20 +162,20 @@ def archipelago(ground: Ground, population: int, generations: int, seed: int, is
     for epoch, begun in enumerate(range(0, generations, EPOCH)):
         count = min(EPOCH, generations - begun)
         # The generation that an epoch begins with is the last one of that before.
-        stays = [Stay(ground, population, count + (epoch > 0), _random(seed, island, epoch), seed,
-                      starts[island], known[island]) for island in range(islands)]
+        stays = [Epoch(setup, population, count + (epoch > 0), _random(seed, island, epoch), seed,
+                       starts[island], known[island]) for island in range(islands)]
         found = list(map(evolve, stays) if executor is None else executor.map(evolve, stays))
         for one in found:
             for score in one.tried:
                 if score.network not in tried or score.exact > tried[score.network].exact:
                     tried[score.network] = score
-        starts, known = migrated(found)
-        told(begun + count)
+        starts, known = migrate(found)
+        progress(begun + count)
     return tuple(tried.values())
 
 
-def migrated(found: Sequence[Evolved]
-             ) -> tuple[list[np.ndarray | None], list[tuple[Score, ...]]]:
+def migrate(found: Sequence[EpochResult]
+            ) -> tuple[list[np.ndarray | None], list[tuple[Score, ...]]]:
     """The best of each island in the place of the worst of the next one."""
     many = max(1, round(MIGRANTS * len(found[0].values)))
     starts: list[np.ndarray | None] = []

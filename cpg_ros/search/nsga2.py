@@ -25,10 +25,10 @@ from dataclasses import dataclass
 
 from cpg_ros.errors import CpgError, InputError
 from cpg_ros.files.progress_bar import progress_bar
-from cpg_ros.search.islands import archipelago, evolve, Ground, Stay
+from cpg_ros.search.islands import archipelago, Epoch, evolve, SearchSetup
 from cpg_ros.search.objectives import pairs, Score
 from cpg_ros.search.search_space import search_space, Space
-from cpg_ros.search.verification import Chosen, NotGood, polish
+from cpg_ros.search.verification import Chosen, NotVerified, polish
 import numpy as np
 
 #: Sets of the front that are tried before the search is given up.
@@ -37,7 +37,7 @@ TRIALS = 20
 SAME, LARGEST = 0.1, 1.0
 
 
-class NothingFound(CpgError):
+class NoGaitFound(CpgError):
     """No set passed; the message says how close the search came."""
 
     exit_code = 1
@@ -94,8 +94,8 @@ def optimise(network_name: str, gait: str, population: int = 60, generations: in
 
     Raises:
         InputError: an unknown network, gait or variable, or a bound that cannot be used.
-        NotInstalled: pymoo is missing.
-        NothingFound: no set passed.
+        DaskMissing: pymoo is missing.
+        NoGaitFound: no set passed.
 
     """
     space = search_space(network_name, gait, bounds or {}, fixed or {})
@@ -106,14 +106,14 @@ def optimise(network_name: str, gait: str, population: int = 60, generations: in
         raise InputError(f'seed {seed} must not be negative')
     if islands < 1:
         raise InputError(f'islands {islands} must be at least 1')
-    ground = Ground(network_name, gait, dict(bounds or {}), dict(fixed or {}))
+    setup = SearchSetup(network_name, gait, dict(bounds or {}), dict(fixed or {}))
     with progress_bar(f'optimising the {gait}', generations, enabled=progress) as bar:
         if islands == 1:
-            stay = Stay(ground, population, generations, seed, seed)
+            stay = Epoch(setup, population, generations, seed, seed)
             tried = (evolve(stay, bar) if executor is None
                      else executor.submit(evolve, stay).result()).tried
         else:
-            tried = archipelago(ground, population, generations, seed, islands, executor, bar)
+            tried = archipelago(setup, population, generations, seed, islands, executor, bar)
     return _front(space, tried, seed)
 
 
@@ -127,7 +127,7 @@ def _front(space: Space, tried: tuple[Score, ...], seed: int) -> Front:
         front = sorted(_non_dominated(left), key=_order)
         try:
             chosen = polish(front[0], space.gait, seed)
-        except NotGood as error:
+        except NotVerified as error:
             why = f'the best has the phases, but {error}'
             left.remove(front[0])
             if not left:
@@ -147,9 +147,9 @@ def _closeness(best: Score) -> str:
     return 'the best has the phases, but is not on an orbit of this gait'
 
 
-def _nothing(space: Space, tried: tuple[Score, ...], why: str) -> NothingFound:
-    return NothingFound(f'no {space.gait} among {len(tried)} sets of weights: {why}; more '
-                        'generations, a larger population or another seed may find one')
+def _nothing(space: Space, tried: tuple[Score, ...], why: str) -> NoGaitFound:
+    return NoGaitFound(f'no {space.gait} among {len(tried)} sets of weights: {why}; more '
+                       'generations, a larger population or another seed may find one')
 
 
 def _order(score: Score) -> tuple[float, float]:

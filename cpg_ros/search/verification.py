@@ -41,7 +41,7 @@ LOST, CYCLES = 60.0, 4
 POINTS, DIGITS = 1024, 10
 
 
-class NotGood(CpgError):
+class NotVerified(CpgError):
     """A parameter set does not stand up to scrutiny; the message says why."""
 
 
@@ -133,26 +133,26 @@ def polish(score: Score, gait: str, seed: int = 0) -> Chosen:
         seed: of the noise.
 
     Raises:
-        NotGood: it has no stable orbit of the gait, its waveforms are not what is asked, or it
+        NotVerified: it has no stable orbit of the gait, its waveforms are not what is asked, or it
             does not outlast noise.
 
     """
     if not score.exact:
-        raise NotGood('its orbit was not found')
+        raise NotVerified('its orbit was not found')
     try:
         preset, orbit = exact_preset(Preset(gait, score.network, score.state, score.period))
     except NoOrbit as error:
-        raise NotGood(str(error)) from error
+        raise NotVerified(str(error)) from error
     leading = multipliers(orbit).leading
     if leading >= 1.0:
-        raise NotGood(f'its orbit is not stable, with a leading multiplier of {leading:.3f}')
+        raise NotVerified(f'its orbit is not stable, with a leading multiplier of {leading:.3f}')
     signals = orbit_signals(orbit)
     if waveform_shortfall(signals, orbit.symmetry) > 0.0:
-        raise NotGood('a waveform is too small, turns too unsteadily or is too like the other')
+        raise NotVerified('a waveform is too small, turns too unsteadily or is too like the other')
     first, differences = orbit.symmetry.first, (0.0, 0.0)
     if len(first) == 2:
         a, b = (signals[:, cell] for cell in first)
         differences = shape_difference(a, b), shape_difference(a, b, plain=True)
     if not survives(orbit, seed):
-        raise NotGood(f'noise of {NOISE} drives it off its gait')
+        raise NotVerified(f'noise of {NOISE} drives it off its gait')
     return Chosen(preset, orbit, score.errors, leading, differences)

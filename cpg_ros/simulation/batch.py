@@ -21,7 +21,7 @@ from collections.abc import Callable, Sequence
 
 from cpg_ros.feedback.timetable import periodic
 from cpg_ros.motion.pattern import Pattern
-from cpg_ros.motion.plan import Program
+from cpg_ros.motion.plan import GaitPlan
 from cpg_ros.motion.steering import Drive
 from cpg_ros.robots.robot import Robot
 from cpg_ros.simulation.bodies import Bodies
@@ -34,7 +34,7 @@ import numpy as np
 TOGETHER = 12
 
 
-def targets(program: Program, duration: float, timestep: float,
+def targets(program: GaitPlan, duration: float, timestep: float,
             strides: Sequence[float] = (), pace: float = 1.0, ramp: float = 1.0) -> np.ndarray:
     """Work out the angles that a generator publishes from the stand on.
 
@@ -56,7 +56,7 @@ def targets(program: Program, duration: float, timestep: float,
     drive, stride = None, np.ones(len(robot.legs))
     if len(strides) or pace != 1.0:
         drive, stride = Drive(stride.size), np.array(strides or stride, dtype=float)
-        drive.ask(stride, pace, at_once=True)
+        drive.set_target(stride, pace, at_once=True)
     pattern = Pattern(program, ramp, drive=drive)
     steps = round(duration / timestep)
     found = np.empty((steps, len(robot.order)))

@@ -28,12 +28,12 @@ from cpg_ros.feedback.gains import Gains
 from cpg_ros.feedback.kinematics import geometry_of
 from cpg_ros.feedback.tick import PlannedMotion
 from cpg_ros.feedback.timetable import Timetable
-from cpg_ros.motion.plan import Program
+from cpg_ros.motion.plan import GaitPlan
 from cpg_ros.simulation.bodies import Bodies
 from cpg_ros.simulation.body import Body, FALLEN
 from cpg_ros.simulation.leg_geometry import read_geometry
 from cpg_ros.simulation.pattern_batch import PatternBatch
-from cpg_ros.simulation.proprioception import felt, NoisySenses
+from cpg_ros.simulation.proprioception import fill_sensor_data, NoisySenses
 from cpg_ros.simulation.run_metrics import BEGINNING, torques
 from cpg_ros.simulation.scenario import Outcome, Scenario, SensorNoise
 from cpg_ros.simulation.terrain import add_ground
@@ -49,7 +49,7 @@ class ClosedLoop(Bodies):
 
     """
 
-    def __init__(self, name: str, *programs: Program, timestep: float = 0.002,
+    def __init__(self, name: str, *programs: GaitPlan, timestep: float = 0.002,
                  threads: int = 1) -> None:
         """Load the model of the programs' robot; the name as of ``model.load``.
 
@@ -65,7 +65,7 @@ class ClosedLoop(Bodies):
         self._tables = [Timetable(program, self.geometry) for program in programs]
 
     @property
-    def program(self) -> Program:
+    def program(self) -> GaitPlan:
         """The gait that runs begin with."""
         return next(iter(self.programs.values()))
 
@@ -120,7 +120,8 @@ class ClosedLoop(Bodies):
             senses.joint_positions[:] = state[:, angle_at]
             senses.joint_velocities[:] = state[:, rate_at]
             np.negative(sensors[:, 2:3 * legs:3], out=senses.foot_forces)
-            felt(senses, state[:, 1 + parts.pose[3:]], state[:, base], earlier, dt, velocity)
+            fill_sensor_data(senses, state[:, 1 + parts.pose[3:]], state[:, base], earlier, dt,
+                             velocity)
             noticed = senses if noisy is None else noisy(senses)
             if gains is not None:
                 planned = PlannedMotion(pattern.planned, pattern.phase, pattern.gaits, pattern.mix,

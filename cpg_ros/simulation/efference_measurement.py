@@ -39,10 +39,10 @@ def measure_efference(loop: ClosedLoop, speeds: Sequence[float] | None = None) -
             gait that cannot be steered has but its own.
 
     """
-    asked: Sequence[float] | np.ndarray = [0.0]
+    commanded: Sequence[float] | np.ndarray = [0.0]
     if loop.program.motion.steering is not None:
-        asked = np.linspace(0.0, loop.program.speeds[1], SPEEDS) if speeds is None else speeds
-    ran = loop.run([Scenario(speed=speed) for speed in asked], DURATION)
+        commanded = np.linspace(0.0, loop.program.speeds[1], SPEEDS) if speeds is None else speeds
+    ran = loop.run([Scenario(speed=speed) for speed in commanded], DURATION)
     first = round(BEGINNING / loop.timestep)
     # The velocity is what the robot makes of what it feels: an estimate that is a little wrong at
     # every stride is no disturbance.

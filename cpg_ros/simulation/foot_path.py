@@ -83,7 +83,7 @@ class Path:
         return x, z - self.height
 
 
-class Leg:
+class LegPath:
     """Two links in a vertical plane, read off a model.
 
     Attributes:
@@ -182,8 +182,8 @@ class Feet:
     def __init__(self, body: Body, parts: Anatomy) -> None:
         """Look at all legs; errors as of Leg."""
         self.robot = body.robot
-        self.legs: dict[str, Leg | SprawledLeg] = {
-            leg: (SprawledLeg if sprawls(body, leg) else Leg)(body, parts, leg)
+        self.legs: dict[str, LegPath | SprawledLeg] = {
+            leg: (SprawledLeg if sprawls(body, leg) else LegPath)(body, parts, leg)
             for leg in legs(body.robot)}
 
     @property

@@ -18,7 +18,7 @@ from collections.abc import Mapping, Sequence
 
 from cpg_ros.feedback.timetable import POINTS, Timetable
 from cpg_ros.integration.jit import entry
-from cpg_ros.motion.plan import Program
+from cpg_ros.motion.plan import GaitPlan
 from cpg_ros.motion.smoothstep import smoothstep
 from cpg_ros.motion.strides import approach
 from cpg_ros.simulation.scenario import Scenario
@@ -42,7 +42,7 @@ class PatternBatch:
 
     """
 
-    def __init__(self, programs: Mapping[str, Program], tables: Sequence[Timetable],
+    def __init__(self, programs: Mapping[str, GaitPlan], tables: Sequence[Timetable],
                  scenarios: Sequence[Scenario], dt: float) -> None:
         """Stand; the first program is the one that all runs begin with."""
         self._programs, self._names, self._dt = list(programs.values()), list(programs), dt
@@ -60,10 +60,10 @@ class PatternBatch:
         self.wanted, self._turning = np.zeros((runs, 2)), np.zeros(runs)
         self.wanted[:, 0] = [one.speed for one in scenarios]
         # The strides of the legs and the pace, as of motion.steering.Drive.
-        self._asked = np.ones((runs, legs + 1))
+        self._target = np.ones((runs, legs + 1))
         for run in range(runs):
             self._ask(run)
-        self._drive, self._rate = self._asked.copy(), np.zeros((runs, legs + 1))
+        self._drive, self._rate = self._target.copy(), np.zeros((runs, legs + 1))
         self._last = np.tile(self._offset, (runs, 1))
         self.planned = self._last.copy()
         self._time = self.level = 0.0
@@ -75,12 +75,12 @@ class PatternBatch:
 
     def _ask(self, run: int) -> None:
         program = self._programs[self.gaits[run, 1]]
-        self._asked[run] = 1.0
+        self._target[run] = 1.0
         if program.motion.steering is not None:
-            self._asked[run, :-1], self._asked[run, -1] = program.steer(
+            self._target[run, :-1], self._target[run, -1] = program.steer(
                 self.wanted[run, 0], self._turning[run])
 
-    def advance(self, stride: np.ndarray, hurry: np.ndarray) -> None:
+    def advance(self, stride: np.ndarray, frequency_scale: np.ndarray) -> None:
         """Advance, with strides changed, shape (runs, legs), and clocks hurried, shape (runs,)."""
         self._time += self._dt
         while self._events and self._events[-1][0] <= self._time:
@@ -92,8 +92,8 @@ class PatternBatch:
                 self.wanted[run], self._turning[run] = wish[:2], wish[2]
             self._ask(run)
         self.level = smoothstep(min(1.0, self._time / RAMP))[0]
-        _advance(self._angles, self._still, self._frequency, self._leg, self._offset, self._asked,
-                 self._drive, self._rate, stride, hurry, self.phase, self.gaits, self._faded,
+        _advance(self._angles, self._still, self._frequency, self._leg, self._offset, self._target,
+                 self._drive, self._rate, stride, frequency_scale, self.phase, self.gaits, self._faded,
                  self.mix, self._turning, self.course, self.level, self._dt, self.planned)
 
     def confine(self, angles: np.ndarray) -> np.ndarray:
@@ -103,17 +103,17 @@ class PatternBatch:
 
 
 @entry
-def _advance(angles, still, frequencies, legs, offset, asked, drive, rates, strides, hurries,
+def _advance(angles, still, frequencies, legs, offset, targets, drive, rates, strides, frequency_scales,
              phases, gaits, faded, mix, turning, course, level, dt, planned):
     """Advance each run; arguments as of PatternBatch."""
     for run in range(len(phases)):
-        old, new, clock = gaits[run, 0], gaits[run, 1], hurries[run] * dt
+        old, new, clock = gaits[run, 0], gaits[run, 1], frequency_scales[run] * dt
         faded[run] = min(1.0, faded[run] + clock / TRANSITION)
         s = faded[run]
         mix[run] = s * s * (3.0 - 2.0 * s)
         if s == 1.0:
             old = gaits[run, 0] = new
-        approach(asked[run], strides[run], clock, drive[run], rates[run])
+        approach(targets[run], strides[run], clock, drive[run], rates[run])
         frequency = frequencies[old] + mix[run] * (frequencies[new] - frequencies[old])
         phases[run] = (phases[run] + frequency * drive[run, -1] * clock) % 1.0
         course[run] += turning[run] * dt

@@ -44,8 +44,8 @@ def _feel(quaternions, moving, before, dt, lean, turning, push, velocity):
                 velocity[k, axis] += axes[axis][world] * moving[k, world]
 
 
-def felt(senses: SensorData, quaternions: np.ndarray, moving: np.ndarray, before: np.ndarray,
-         dt: float, velocity: np.ndarray) -> None:
+def fill_sensor_data(senses: SensorData, quaternions: np.ndarray, moving: np.ndarray,
+                     before: np.ndarray, dt: float, velocity: np.ndarray) -> None:
     """Fill in what the base feels, and its true velocity in its own frame, m/s, (runs, 3).
 
     Args:

@@ -31,7 +31,7 @@ KEPT = 60.0
 FRAMES, SAMPLES = 12.5, 200.0
 
 
-class Diary:
+class RunLog:
     """Looks at a body after each of its periods."""
 
     def __init__(self, body: Body, rate: float, film: Path | None = None,

@@ -16,8 +16,8 @@
 
 from collections.abc import Callable
 
-from cpg_ros.motion.plan import Program
-from cpg_ros.robots.robot import Steering
+from cpg_ros.motion.plan import GaitPlan
+from cpg_ros.robots.robot import SteeringTable
 from cpg_ros.simulation.batch import Batch, targets
 from cpg_ros.simulation.scenario import Scenario
 import numpy as np
@@ -36,8 +36,8 @@ FLOORS = (Scenario(), Scenario(0.7))
 RISE, TURN = 0.01, 0.2
 
 
-def measure(batch: Batch, program: Program,
-            update: Callable[[int], None] = lambda done: None) -> Steering | None:
+def measure(batch: Batch, program: GaitPlan,
+            update: Callable[[int], None] = lambda done: None) -> SteeringTable | None:
     """Measure a gait at several strides; None if its speed does not rise with them.
 
     Rows are left out at the ends, where the robot falls or its speed does not rise any more.
@@ -54,11 +54,11 @@ def measure(batch: Batch, program: Program,
         pace = 1.0 - SLOWER * (1.0 - abs(stride))
         # Within strides of -1 to 1 on both sides.
         middle = min(stride, 1.0 - 0.5 * DIFFERENCE)
-        asked = [np.full(left.size, stride),
-                 *(middle + sign * 0.5 * DIFFERENCE * np.where(left, -1.0, 1.0)
-                   for sign in (1.0, -1.0))]
+        commands = [np.full(left.size, stride),
+                    *(middle + sign * 0.5 * DIFFERENCE * np.where(left, -1.0, 1.0)
+                      for sign in (1.0, -1.0))]
         trials = batch.run([(targets(program, DURATION, batch.timestep, one.tolist(), pace),
-                             floor) for one in asked for floor in FLOORS])
+                             floor) for one in commands for floor in FLOORS])
         speeds = [trial.speed for trial in trials]
         turns = [trial.turn for trial in trials]
         n = len(FLOORS)
@@ -69,7 +69,7 @@ def measure(batch: Batch, program: Program,
     return _rising(rows)
 
 
-def _rising(rows: list[tuple[float, float, float, float, bool]]) -> Steering | None:
+def _rising(rows: list[tuple[float, float, float, float, bool]]) -> SteeringTable | None:
     """Keep the rows about the stride of 0 as far as speeds rise."""
     zero = STRIDES.index(0.0)
     first = last = zero
@@ -81,5 +81,5 @@ def _rising(rows: list[tuple[float, float, float, float, bool]]) -> Steering | N
     if not rows[zero][4] or last == zero:
         return None
     speed, stride, frequency, turn = zip(*(row[:4] for row in rows[first:last + 1]), strict=True)
-    return Steering(*(tuple(round(value, 4) for value in column)
-                      for column in (speed, stride, frequency, turn)))
+    return SteeringTable(*(tuple(round(value, 4) for value in column)
+                           for column in (speed, stride, frequency, turn)))

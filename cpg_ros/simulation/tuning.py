@@ -27,9 +27,9 @@ from pathlib import Path
 from types import ModuleType
 
 from cpg_ros.files.progress_bar import progress_bar
-from cpg_ros.motion.plan import gait_of, OutOfLimits, plan, Program, Refused
+from cpg_ros.motion.plan import gait_of, GaitPlan, OutOfLimits, plan, PlanError
 from cpg_ros.networks.registry import NETWORKS
-from cpg_ros.robots.robot import Motion, Robot, Steering
+from cpg_ros.robots.robot import Motion, Robot, SteeringTable
 from cpg_ros.simulation.batch import Batch, targets
 from cpg_ros.simulation.efference_measurement import calibrated
 from cpg_ros.simulation.foot_path import Feet, OWN
@@ -143,13 +143,13 @@ class Tuner:
                       self.feet.joints(gait_of(preset, preset.network)[0], paths),
                       duty=design.duty, stance=(-design.lead, OWN))
 
-    def program(self, gait: str, motion: Motion, network: str = '') -> Program:
+    def program(self, gait: str, motion: Motion, network: str = '') -> GaitPlan:
         """Plan a gait on one of the robot's networks or the first; errors as of plan."""
         preset = NETWORKS[network or self.robot.networks[0]].presets()[gait]
         if motion.steering is None and not AIMS[gait].hops:
             # To be steered: the joints must be able to follow strides of -1, too.
             one = (1.0,)
-            motion = replace(motion, steering=Steering(one, one, one, one))
+            motion = replace(motion, steering=SteeringTable(one, one, one, one))
         robot = replace(self.robot, motions={gait: motion})
         return plan(robot, gait, preset, preset.network, motion.frequency or 0.0)
 
@@ -172,7 +172,7 @@ class Tuner:
                 if self._nearest is None or error.excess < self._nearest.excess:
                     self._nearest = error
                 continue
-            except Refused:
+            except PlanError:
                 continue
             runs += list(zip(cycle(angles), self.scenarios, strict=False))
             runnable.append(k)
@@ -218,7 +218,7 @@ class Tuner:
                 break
         if cheapest >= REFUSED:
             raise NoDesign(f"{gait}: none of {tried} designs keeps to the joints' limits"
-                           + (f'; the nearest moves {self._nearest.said}'
+                           + (f'; the nearest moves {self._nearest.message}'
                               if self._nearest else ''))
         motion = self.motion(gait, best)
         angles = targets(self.program(gait, motion), LONG, self.batch.timestep)
@@ -227,7 +227,7 @@ class Tuner:
 
 
 @dataclass(frozen=True)
-class Trial:
+class DesignTrial:
     """A gait of a robot that is to be tuned from a seed: as the arguments of tune."""
 
     robot: Robot
@@ -252,13 +252,13 @@ class Trial:
         return replace(found, motion=replace(found.motion, steering=steering))
 
 
-def search(trial: Trial) -> Tuned | NoDesign:
+def search(trial: DesignTrial) -> Tuned | NoDesign:
     """Run a search by itself, as a job."""
     tuner = Tuner(trial.robot, trial.model, trial.kp, trial.kd, trial.threads)
     return trial.search(tuner, lambda done: None)
 
 
-def _here(tuner: Tuner, trials: Sequence[Trial]) -> Iterator[Tuned | NoDesign]:
+def _here(tuner: Tuner, trials: Sequence[DesignTrial]) -> Iterator[Tuned | NoDesign]:
     """One after the other in this process, on the threads of one tuner."""
     each = trials[0].evaluations + len(STRIDES)
     with progress_bar('tuning', each * len(trials)) as bar:
@@ -307,7 +307,7 @@ def tune(robot: Robot, model: str, gaits: Sequence[str], evaluations: int, seed:
     file = Path(model)
     # Workers may have another folder for theirs.
     place = str(file.resolve()) if file.is_file() else model
-    trials = [Trial(robot, place, gait, evaluations, seed + k, kp, kd, threads or 1)
+    trials = [DesignTrial(robot, place, gait, evaluations, seed + k, kp, kd, threads or 1)
               for gait in gaits for k in range(seeds)]
     results = iter(_here(tuner, trials) if executor is None else executor.map(search, trials))
     motions, found, missing = dict(robot.motions), [], []

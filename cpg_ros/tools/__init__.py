@@ -14,7 +14,7 @@
 
 """Command-line tools: arguments, tables, figures.
 
-Imports every room; nothing imports it.
+Imports every subpackage; nothing imports it.
 """
 
 __all__ = ['analysis_plot', 'analysis_report', 'analyze', 'arguments', 'atlas', 'bag_playing',

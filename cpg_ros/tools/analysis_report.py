@@ -181,9 +181,9 @@ class Analysis(ShortRepr):
     @staticmethod
     def _reason(verdict: GaitAssessment) -> str:
         """Why there is no such gait, without the list of all parameters."""
-        said = verdict.why.removeprefix(f'no {verdict.gait} ')
-        head, way, _ = said.partition(' of the way, to ')
-        return f'{head} of the way, no further' if way else said
+        text = verdict.why.removeprefix(f'no {verdict.gait} ')
+        head, way, _ = text.partition(' of the way, to ')
+        return f'{head} of the way, no further' if way else text
 
     def _conclusion(self) -> str:
         """Return the whole in a sentence or two."""
@@ -195,15 +195,15 @@ class Analysis(ShortRepr):
                   if not verdict.stable and verdict.stable_with_default_gain]
         never = [verdict.gait for verdict in self.existing if not (
             verdict.stable or verdict.stable_with_default_gain)]
-        said = []
+        text = []
         if by_itself:
-            said.append(f'{", ".join(by_itself)}: stable.')
+            text.append(f'{", ".join(by_itself)}: stable.')
         if locked:
-            said.append(f'{", ".join(locked)}: stable with the symmetry lock only; without it a '
+            text.append(f'{", ".join(locked)}: stable with the symmetry lock only; without it a '
                         'small disturbance takes over.')
         if never:
-            said.append(f'{", ".join(never)}: does not attract, with or without the lock.')
-        return ' '.join(said)
+            text.append(f'{", ".join(never)}: does not attract, with or without the lock.')
+        return ' '.join(text)
 
     def text(self) -> str:
         """Tables for people."""
@@ -238,31 +238,31 @@ class Analysis(ShortRepr):
 
     def _points(self, where: str) -> list[str]:
         """Table of the Hopf points."""
-        said, heads = self._commentary, () if self.delay else ('l1',)
+        text, heads = self._commentary, () if self.delay else ('l1',)
         rows: list[tuple[str, ...]] = [(
-            'gait', 'wave', str(self.line), 'omega', 'period', 'k1', 'k2', *heads, *said.heads,
+            'gait', 'wave', str(self.line), 'omega', 'period', 'k1', 'k2', *heads, *text.heads,
             'type', 'orbits', 'others', 'transverse')]
         for point in self.hopf:
             numbers = {'omega': point.omega, 'period': math.tau / point.omega,
-                       **self._form(point), **said.numbers(point)}
+                       **self._form(point), **text.numbers(point)}
             rows.append((
                 point.gait, point.wave, f'{point.value:.4f}',
                 *('-' if number is None else f'{number:.4f}' for number in numbers.values()),
                 *_kind(point), str(point.unstable_roots), str(point.unstable_transverse_roots)))
         explained = (
             f'{self.delay} and period in model time; omega in rad per model time; '
-            f'{said.explained}others: further roots with positive real part, transverse: of them '
+            f'{text.explained}others: further roots with positive real part, transverse: of them '
             'outside the class' if self.delay else
-            f'omega in rad per model time; {said.explained}others: further eigenvalues with '
+            f'omega in rad per model time; {text.explained}others: further eigenvalues with '
             'positive\nreal part, transverse: of them outside the class')
         middle = len(rows[0]) - 6
         lines = [*f'Hopf points {where} ({explained}):'.split('\n'),
                  *(f'  {line}' for line in table(rows, '<<' + '>' * middle + '<<>>'))]
         remarks = [f'  {self.line} {point.value:.4f}: {remark}' for point in self.hopf
-                   if (remark := said.remark(point)[0])]
+                   if (remark := text.remark(point)[0])]
         if any(point.normal_form.degenerate for point in self.hopf):
             lines += [f'  {line}' for line in _degenerate(self.network)]
-        return [*lines, '', said.title, *remarks] if remarks else lines
+        return [*lines, '', text.title, *remarks] if remarks else lines
 
     def _form(self, point: HopfPoint) -> dict[str, float | None]:
         """Coefficients of the normal form; with a delay in time over the delay."""
@@ -276,10 +276,10 @@ class Analysis(ShortRepr):
     def as_dict(self) -> dict[str, Any]:
         """Everything in plain types."""
         _, parts, rest, why = self._found
-        said: dict[str, Any] = {
+        text: dict[str, Any] = {
             'network': self.network.name, 'params': self.network.as_dict(),
             'gaits': {gait: verdict.as_dict() for gait, verdict in self.gaits.items()}}
-        said['hopf'] = [{
+        text['hopf'] = [{
             'gait': point.gait, 'mode': list(point.mode), 'wave': point.wave,
             **({'n': point.n, 'omega': point.omega, self.delay: point.value} if self.delay else
                {'along': str(self.along), 'value': point.value, 'omega': point.omega}),
@@ -291,11 +291,11 @@ class Analysis(ShortRepr):
             'unstable_roots': point.unstable_roots,
             'unstable_transverse_roots': point.unstable_transverse_roots,
             **self._commentary.remark(point)[1]} for point in self.hopf]
-        said['rest'] = {'why': why} if why else {
+        text['rest'] = {'why': why} if why else {
             **({} if odd(self.network) else {'stand': named(self.network, rest)}),
             'leading_roots': [{
                 'mode': list(block.mode), **({} if self.delay else {'gait': block.gait}),
                 'real': block.leading.real, 'imag': block.leading.imag} for block in parts]}
         if self.delay and not self.existing:
-            said['nearest_threshold'] = nearest_threshold(self.network)
-        return said
+            text['nearest_threshold'] = nearest_threshold(self.network)
+        return text

@@ -28,12 +28,12 @@ from typing import Any
 
 from cpg_ros.atlas.chart import Chart, chart_of
 from cpg_ros.atlas.fold_curves import fold_curves, lost_edges
-from cpg_ros.atlas.hopf_curves import Curve, hopf_curves
+from cpg_ros.atlas.hopf_curves import Boundary, hopf_curves
 from cpg_ros.atlas.map_picture import draw_map
 from cpg_ros.atlas.orbit_curves import edges, orbit_curves
-from cpg_ros.atlas.refinement import refined, Sheet
-from cpg_ros.atlas.row_job import assess_row, Row
-from cpg_ros.atlas.stored import Stored
+from cpg_ros.atlas.refinement import refine, Sheet
+from cpg_ros.atlas.row_job import assess_row, AtlasRow
+from cpg_ros.atlas.stored import AtlasFolder
 from cpg_ros.fleet.executors import Fleet
 from cpg_ros.fleet.options import add_options, KEPT, working
 from cpg_ros.fleet.outcomes import outcomes
@@ -90,7 +90,7 @@ def _planned(chosen: argparse.Namespace) -> tuple[Chart, tuple[str, ...]]:
 
 
 def drawn(chart: Chart, gaits: tuple[str, ...], fleet: Fleet, folder: Path
-          ) -> tuple[dict[str, Sheet], list[Curve], list[Path]]:
+          ) -> tuple[dict[str, Sheet], list[Boundary], list[Path]]:
     """Compute an atlas on a fleet, and write its table and its map.
 
     Raises:
@@ -98,9 +98,10 @@ def drawn(chart: Chart, gaits: tuple[str, ...], fleet: Fleet, folder: Path
         OSError: a file cannot be written.
 
     """
-    stored = Stored(folder, chart, gaits)
+    stored = AtlasFolder(folder, chart, gaits)
 
-    def run(jobs: Iterable[Row], count: int) -> Iterator[tuple[Row, list[dict[str, Any]]]]:
+    def run(jobs: Iterable[AtlasRow],
+            count: int) -> Iterator[tuple[AtlasRow, list[dict[str, Any]]]]:
         with Tally('rows', count) as tally:
             left = []
             for row in jobs:
@@ -110,11 +111,11 @@ def drawn(chart: Chart, gaits: tuple[str, ...], fleet: Fleet, folder: Path
                 else:
                     tally.add(kept=True)
                     yield row, done
-            for told in outcomes(fleet, assess_row, left, tally.tick):
-                if told.error is not None:
-                    raise told.error
+            for outcome in outcomes(fleet, assess_row, left, tally.tick):
+                if outcome.error is not None:
+                    raise outcome.error
                 tally.add()
-                yield told.job, stored.put(told.job, told.value)
+                yield outcome.job, stored.put(outcome.job, outcome.value)
 
     curves = stored.curves()
     if curves is None:
@@ -122,7 +123,7 @@ def drawn(chart: Chart, gaits: tuple[str, ...], fleet: Fleet, folder: Path
         hopf = [*chain(*fleet.map(hopf_curves, [(chart, (gait,)) for gait in gaits]))]
     else:
         hopf = [curve for curve in curves if curve.kind == 'Hopf']
-    sheets = refined(chart, gaits, hopf, run)
+    sheets = refine(chart, gaits, hopf, run)
     if curves is None:
         fleet.what = 'boundaries'
         jobs: list[tuple[Any, ...]] = [
@@ -138,8 +139,8 @@ def drawn(chart: Chart, gaits: tuple[str, ...], fleet: Fleet, folder: Path
 
 
 def _called(job: tuple[Any, ...]) -> Any:
-    function, told = job
-    return function(told)
+    function, outcome = job
+    return function(outcome)
 
 
 def _map(chosen: argparse.Namespace) -> int:

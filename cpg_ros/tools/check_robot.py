@@ -26,9 +26,9 @@ from math import isfinite
 from pathlib import Path
 import sys
 
+from cpg_ros.checks.description_match import checked, RobotCheck
 from cpg_ros.checks.leg_shapes import geometry_from, usable
 from cpg_ros.checks.robot_template import robot_from
-from cpg_ros.checks.urdf_match import checked, RobotCheck
 from cpg_ros.errors import InputError
 from cpg_ros.files.plain_text import as_json
 from cpg_ros.networks.registry import NETWORKS
@@ -109,16 +109,16 @@ def _made(chosen: Namespace, known: RobotDescription) -> Robot:
         raise InputError(f'--make: {chosen.make} does not end in .yaml')
     if chosen.make.exists():
         raise InputError(f'--make: {chosen.make} already exists')
-    robot, says = robot_from(known, chosen.make.stem)
+    robot, notes = robot_from(known, chosen.make.stem)
     try:
         geometry, feet = usable(robot, _geometry(chosen, robot, known), known.format)
     except SimulationError as error:
         geometry, feet = None, f'feedback: {error}'
-    robot, says = replace(robot, geometry=geometry), f'{says}\n{feet}'
+    robot, notes = replace(robot, geometry=geometry), f'{notes}\n{feet}'
     source = find_model(chosen.mjcf) if chosen.urdf is None else chosen.urdf
     write_robot(chosen.make, robot, COMMENT.format(source=source.name, format=known.format,
-                                                   says=says))
-    note('check_robot', f'wrote {chosen.make}, check what it takes each joint for:\n{says}')
+                                                   notes=notes))
+    note('check_robot', f'wrote {chosen.make}, check what it takes each joint for:\n{notes}')
     return load_robot(str(chosen.make.absolute()))
 
 

@@ -236,12 +236,12 @@ def _do(chosen: Namespace) -> int:
         sys.argv = [chosen.executable, *chosen.arguments]
         return start(chosen.executable)
     if chosen.action == 'completion':
-        told = completion.shell_code()
+        answer = completion.shell_code()
     else:
         with _graph() as node:
-            told = _DOERS[chosen.action](chosen, node)
-    if told:
-        say(told)
+            answer = _DOERS[chosen.action](chosen, node)
+    if answer:
+        say(answer)
     return 0
 
 

@@ -33,7 +33,12 @@ from cpg_ros.files.progress_bar import progress_bar
 from cpg_ros.files.yaml_reader import shown
 from cpg_ros.fleet.options import add_options, KEPT, working
 from cpg_ros.gaits.leg_names import BIPED, QUADRUPED
-from cpg_ros.inversion.model_choice import as_rows, Explained, explained, undecided
+from cpg_ros.inversion.model_choice import (
+    as_rows,
+    compare_networks,
+    indistinguishable,
+    NetworkComparison,
+)
 from cpg_ros.inversion.paper_fit import paper_fits, PaperFit, refuse_others
 from cpg_ros.inversion.parameter_files import write_fitted
 from cpg_ros.inversion.recording_fit import fit_recording, network_of, preset_of, RecordingFit
@@ -154,9 +159,9 @@ def _invert_many(chosen: Namespace, robot: Robot | None, starts: list[dict[str, 
     """Invert what folders hold; 0 if any recording could be fitted."""
     # Their tables need a library that one recording does not.
     from cpg_ros.fleet.many_recordings import Folders
-    from cpg_ros.fleet.recording_job import Settings
+    from cpg_ros.fleet.recording_job import FitSettings
     report = partial(note, 'inversion')
-    work = Folders(chosen.bags, chosen.out, Settings(
+    work = Folders(chosen.bags, chosen.out, FitSettings(
         robot, chosen.network or '', chosen.gait or '', chosen.preset or '', tuple(chosen.free),
         chosen.order, tuple(starts), reading_arguments(chosen)))
     try:
@@ -197,21 +202,21 @@ def _invert(chosen: Namespace) -> int:
     else:
         from cpg_ros.inversion.fit_report import as_table, as_text
         judged = [*table(as_rows(compared), '<<>>>><'), '',
-                  *([one, ''] if (one := undecided(compared, chosen.order)) else [])
+                  *([one, ''] if (one := indistinguishable(compared, chosen.order)) else [])
                   ] if compared else []
-        said = '\n'.join([*judged, as_text(found), *as_table(fits)])
-        say(f'{said}\nwritten: {", ".join(map(str, written))}' if written else said)
+        text = '\n'.join([*judged, as_text(found), *as_table(fits)])
+        say(f'{text}\nwritten: {", ".join(map(str, written))}' if written else text)
     return 0
 
 
 def _explained(chosen: Namespace, recording: Recording, robot: Robot | None
-               ) -> tuple[str, list[Explained]]:
+               ) -> tuple[str, list[NetworkComparison]]:
     """Return the network to fit, and how well others explain the recording where that is asked."""
     if chosen.network != 'auto':
         return chosen.network or '', []
     with progress_bar('comparing networks', 100) as bar:
-        found = explained(recording, robot, chosen.order,
-                          done=lambda share: bar(round(100.0 * share)))
+        found = compare_networks(recording, robot, chosen.order,
+                                 done=lambda share: bar(round(100.0 * share)))
     if found[0].why:
         raise InputError(f'{recording.source}: no network has such a gait: ' + '; '.join(
             f'{one.network}: {one.why}' for one in found))

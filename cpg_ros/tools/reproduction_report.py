@@ -23,7 +23,7 @@ from typing import Any
 
 from cpg_ros.files.page_style import STYLE
 from cpg_ros.papers.reproduction import Reproduction
-from cpg_ros.papers.row import Row
+from cpg_ros.papers.row import ReproducedRow
 
 #: Widest columns of the table on a terminal: quantity, published, computed.
 WIDEST = (58, 30, 30)
@@ -59,7 +59,7 @@ def table(found: Reproduction) -> str:
 
 def as_json(found: Reproduction) -> str:
     """Write everything but the figures for machines."""
-    def plain(row: Row) -> dict[str, Any]:
+    def plain(row: ReproducedRow) -> dict[str, Any]:
         # JSON has no word for what is not finite.
         value = row.value if row.value is not None and math.isfinite(row.value) else None
         return {**asdict(row), 'value': value, 'verdict': row.verdict}
@@ -75,7 +75,7 @@ def as_json(found: Reproduction) -> str:
     return json.dumps(tree, indent=1, allow_nan=False) + '\n'
 
 
-def _line(row: Row) -> str:
+def _line(row: ReproducedRow) -> str:
     kind = 'agrees' if row.agrees else 'erratum' if row.explained else 'fails'
     verdict = (f'<a href="#erratum-{row.erratum}">{row.verdict}</a>' if kind == 'erratum'
                else row.verdict)

@@ -218,8 +218,8 @@ def door(_: str) -> str:
                for name, kind in kinds.items())
 
 
-def room(name: str) -> str:
-    """Return the modules of a room."""
+def subpackage(name: str) -> str:
+    """Return the modules of a subpackage."""
     place = importlib.import_module(f'cpg_ros.{name}')
     # What only ROS brings cannot be imported here.
     listed = [one for one in place.__all__ if one not in ('launch_arguments', 'rosbag2_library')]
@@ -260,7 +260,7 @@ def setup(app: Sphinx) -> dict[str, bool]:
     """Name the directives."""
     for name, directive in {'parameters': made_by(parameters), 'presets': made_by(presets),
                             'options': made_by(options), 'launch': made_by(arguments),
-                            'door': made_by(door), 'room': made_by(room), 'topics': Topics,
+                            'door': made_by(door), 'subpackage': made_by(subpackage), 'topics': Topics,
                             'robotfile': RobotFile}.items():
         app.add_directive(name, directive)
     app.connect('autodoc-process-docstring', escaped, priority=400)

@@ -18,7 +18,7 @@ import re
 from typing import Any
 from unittest.mock import patch
 
-from cpg_ros.files.yaml_reader import Reader
+from cpg_ros.files.yaml_reader import YamlReader
 from cpg_ros.networks.registry import SHIPPED
 from cpg_ros.robots.robot_file import load_robot
 
@@ -31,7 +31,7 @@ def asked_for() -> dict[str, bool]:
     found: dict[str, bool] = {}
     legs = {leg for kind in SHIPPED.values() for part in kind.legs.values() for leg in part}
     gaits = {name for kind in SHIPPED.values() for name in kind.presets()}
-    ask = Reader.keys
+    ask = YamlReader.keys
 
     def noted(self: Any, tree: Any, where: str, required: set[str],
               optional: set[str] = frozenset()) -> Any:  # type: ignore[assignment]
@@ -42,7 +42,7 @@ def asked_for() -> dict[str, bool]:
         return ask(self, tree, where, required, optional)
 
     names = {joint.name for joint in load_robot('unitree_go2').joints}
-    with patch.object(Reader, 'keys', noted):
+    with patch.object(YamlReader, 'keys', noted):
         load_robot('unitree_go2')
     return found
 

@@ -23,7 +23,7 @@ from cpg_ros.dynamics.fourier.newton import newton, NODES
 from cpg_ros.dynamics.fourier.orbit import FourierOrbit
 from cpg_ros.dynamics.hopf import first_hopf
 from cpg_ros.dynamics.periodic import check_values, NoOrbit
-from cpg_ros.dynamics.seek import sought
+from cpg_ros.dynamics.seek import find_orbit
 from cpg_ros.networks.equations import equations_of, values_of
 from cpg_ros.networks.network import Network, Preset
 from cpg_ros.networks.symmetry import Symmetry
@@ -202,7 +202,7 @@ def solve(network: Network, gait: str, near: FourierOrbit | None = None) -> Four
         if orbit is None and onset is not None and delay > onset:
             orbit = _continued(network, gait, onset)
         if orbit is None and not simple:
-            found = (from_path(network, symmetry, *one) for one in sought(network, gait))
+            found = (from_path(network, symmetry, *one) for one in find_orbit(network, gait))
             orbit = next((one for one in found if one is not None), None)
         if orbit is not None:
             return orbit

@@ -28,7 +28,7 @@ from cpg_ros.dynamics.mesh.orbit import MeshOrbit
 from cpg_ros.dynamics.mesh.refinement import collocate as from_path
 from cpg_ros.dynamics.mesh.refinement import predicted
 from cpg_ros.dynamics.periodic import check_values, NoOrbit, richer
-from cpg_ros.dynamics.seek import settled, sought
+from cpg_ros.dynamics.seek import find_orbit, settle
 from cpg_ros.integration.simulate import simulate
 from cpg_ros.networks.network import Network, Preset
 from cpg_ros.networks.symmetry import Symmetry
@@ -96,7 +96,8 @@ def _settled(network: Network, gait: str) -> MeshOrbit | None:
     """Return what the network settles on from many states of the gait's class."""
     symmetry = network.symmetry(gait)
     try:
-        found = (_accepted(from_path(network, symmetry, *one)) for one in sought(network, gait))
+        found = (_accepted(from_path(network, symmetry, *one)) for one in find_orbit(network,
+                                                                                     gait))
         return next((orbit for orbit in found if orbit is not None), None)
     except NoEquilibrium:
         return None
@@ -104,7 +105,7 @@ def _settled(network: Network, gait: str) -> MeshOrbit | None:
 
 def _by_itself(network: Network, symmetry: Symmetry, start: np.ndarray, period: float
                ) -> MeshOrbit | None:
-    found = settled(network, symmetry, start, period)
+    found = settle(network, symmetry, start, period)
     return None if found is None else _accepted(from_path(network, symmetry, *found))
 
 

@@ -19,7 +19,7 @@ from typing import Protocol
 import numpy as np
 
 
-class Recorded(Protocol):
+class RecordingLike(Protocol):
     """What is needed of a recording; see Recording."""
 
     @property

@@ -39,11 +39,11 @@ MOVING = ('set', 'enable', 'push', 'reset', 'take_over')
 EVERYWHERE = ('/diagnostics', '/tf', '/tf_static', '/clock')
 
 
-class OrderError(CpgError):
+class RequestRefused(CpgError):
     """It cannot be done, or was refused; one line for whoever asked."""
 
 
-class Orders:
+class RequestHandler:
     """Does to the robot of a page, or to the recording, what that page asks for."""
 
     def __init__(self, pages: Pages, services: ServiceClients, recorder: Recorder,
@@ -63,7 +63,7 @@ class Orders:
         now, teleop = asyncio.get_running_loop().time(), view.teleop
         if request.stamp is not None:
             if request.stamp > now:
-                raise OrderError(f'{action}: stamp is not one that the panel has sent')
+                raise RequestRefused(f'{action}: stamp is not one that the panel has sent')
             page.round_trip = now - request.stamp
         teleop.lease.renew(page, now)
         if action == 'stop' or (action == 'enable' and not values['on']):
@@ -71,7 +71,8 @@ class Orders:
             await self._command(page, view.name, SetBool, 'enable', data=False)
             return
         if page.stop_only and action != 'alive':
-            raise OrderError(f'{MOST} pages are open already: this one can only stop the robot')
+            raise RequestRefused(f'{MOST} pages are open already: this one can only stop the '
+                                 'robot')
         if action in MOVING:
             self._acquire(page, view, request, now)
         if action == 'set':
@@ -91,23 +92,25 @@ class Orders:
                            'fit': (view.graph.inversions, 'inversion node')}[action]
             node = view.graph.beside(view.name, nodes)
             if not node:
-                raise OrderError(f'there is no {what} for {view.name}')
+                raise RequestRefused(f'there is no {what} for {view.name}')
             await self._command(page, node, Trigger, action, FIT)
 
     def _acquire(self, page: Page, view: RobotView, request: Request, now: float) -> None:
         """Let a page do what moves the robot, if it is fresh and no other page may."""
         if (age := now - _stamp(request)) > LATE:
-            raise OrderError(f'{request.action} came up to {age:.1f} s late, and was ignored: the '
-                             f'limit is {LATE:g} s')
+            raise RequestRefused(f'{request.action} came up to {age:.1f} s late, and was '
+                                 f'ignored: the limit is {LATE:g} s')
         if request.action != 'take_over':
             view.teleop.acquire(page, now)
         elif lost := view.teleop.take_over(page, now):
-            self._pages.say([lost], f'{page} has taken over; this page no longer moves the robot')
+            self._pages.notify([lost],
+                               f'{page} has taken over; this page no longer moves the robot')
 
     def _steer(self, page: Page, view: RobotView, request: Request, now: float) -> None:
         """Steer; show once why that is refused, unless the loss of the lease has been shown."""
         if view.controls.value('cmd_vel') is not True:
-            raise OrderError(f'{view.name} ignores cmd_vel; start it with cmd_vel:=true to steer')
+            raise RequestRefused(f'{view.name} ignores cmd_vel; start it with cmd_vel:=true to '
+                                 f'steer')
         try:
             view.teleop.steer(page, _stamp(request), now, request.values['speed'],
                               request.values['turn'])
@@ -120,7 +123,7 @@ class Orders:
     async def _command(self, page: Page, node: str, kind: Any, service: str,
                        patience: float = PATIENCE, **fields: Any) -> None:
         other = NodeClient(self._services, node)
-        self._pages.say([page], await other.command(kind, service, patience, **fields), 'told')
+        self._pages.notify([page], await other.command(kind, service, patience, **fields), 'told')
 
     async def _record(self, view: RobotView, on: bool) -> None:
         if on:
@@ -128,7 +131,7 @@ class Orders:
             bag = self._recorder.start(
                 (topic, kind) for topic, kind in view.graph.topics
                 if topic in EVERYWHERE or topic.startswith(f'{space}/'))
-            self._pages.say(self._pages.open, f'recording to {bag}', 'told')
+            self._pages.notify(self._pages.open, f'recording to {bag}', 'told')
         else:
             await asyncio.to_thread(self._recorder.stop)
         self._recorded()
@@ -137,5 +140,5 @@ class Orders:
 def _stamp(request: Request) -> float:
     """Return the stamp of a request that must have one, s."""
     if request.stamp is None:
-        raise OrderError(f'{request.action}: the newest stamp from the panel is missing')
+        raise RequestRefused(f'{request.action}: the newest stamp from the panel is missing')
     return request.stamp

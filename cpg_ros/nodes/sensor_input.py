@@ -60,11 +60,11 @@ class _Input:
         self.stamped = hasattr(kind, 'header')
 
 
-class SensesInput:
+class SensorInput:
     """What a robot's topics say it feels.
 
     Attributes:
-        senses: of one run, filled in place with what could be believed last.
+        sensor_data: of one run, filled in place with what could be believed last.
         monitors: of the inputs.
         topics: of the inputs, resolved.
         feet: what tells of contacts.
@@ -90,12 +90,12 @@ class SensesInput:
         self._names = [joint.name for joint in robot.joints]
         self._limits = robot.column('lower'), robot.column('upper'), robot.column('velocity')
         count = len(self._names)
-        self.senses = SensorData.zeros(1, len(self._legs), count)
-        self.senses.joint_positions[0] = robot.column('offset')
-        self.senses.acceleration[0, 2] = 9.81
+        self.sensor_data = SensorData.zeros(1, len(self._legs), count)
+        self.sensor_data.joint_positions[0] = robot.column('offset')
+        self.sensor_data.acceleration[0, 2] = 9.81
         self._efforts = np.zeros(count)
         # Of the one run: rows, so that a tick need not look for them.
-        senses = self.senses
+        senses = self.sensor_data
         self._angles, self._rates = senses.joint_positions[0], senses.joint_velocities[0]
         self._felt, self._lean = senses.foot_forces[0], senses.rpy[0]
         self._turning, self._push = senses.angular_velocity[0], senses.acceleration[0]

@@ -24,7 +24,7 @@ import math
 
 from cpg_ros.dynamics.periodic import Orbit
 from cpg_ros.integration.jit import entry, jit
-from cpg_ros.motion.duty import told
+from cpg_ros.motion.duty import retimed_phase
 import numpy as np
 
 TURN = 2.0 * math.pi
@@ -52,7 +52,7 @@ def _hermite(table, column, cycles):
 
 
 @entry
-def tell(now, peak, period, cells, weights, lead, cycle, maps, angle, rise):
+def read_retimed(now, peak, period, cells, weights, lead, cycle, maps, angle, rise):
     """Read joints off a network's state as they are told.
 
     Args:
@@ -89,7 +89,7 @@ def tell(now, peak, period, cells, weights, lead, cycle, maps, angle, rise):
             whole = own_x * own_x + own_y * own_y
             size = math.sqrt(square / whole)
             growing = size * (growing - going * own_y * (own_x + own_z) / whole)
-            phase, steep, _ = told(theta, maps[joint, 0], maps[joint, 1], maps[joint, 2])
+            phase, steep, _ = retimed_phase(theta, maps[joint, 0], maps[joint, 1], maps[joint, 2])
             unit_x, unit_y = _hermite(cycle, 0, phase)[0], _hermite(cycle, 2, phase)[0]
             unit_z = _hermite(cycle, 2, phase)[1] / TURN
             speed = size * steep * going
@@ -104,7 +104,7 @@ def tell(now, peak, period, cells, weights, lead, cycle, maps, angle, rise):
 
 
 def tables(orbit: Orbit) -> tuple[np.ndarray, np.ndarray]:
-    """Return lead and cycle as ``tell`` takes them; the waveform must tell its phase."""
+    """Return lead and cycle as ``read_retimed`` takes them; the waveform must tell its phase."""
     grid = np.arange(POINTS) / POINTS
 
     def unit(theta: np.ndarray) -> tuple[np.ndarray, ...]:

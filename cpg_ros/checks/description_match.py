@@ -23,7 +23,7 @@ from typing import Any
 
 from cpg_ros.files.plain_text import table
 from cpg_ros.gaits.leg_names import legs_of, LegsError, role_of
-from cpg_ros.motion.plan import plan, Refused
+from cpg_ros.motion.plan import plan, PlanError
 from cpg_ros.networks.registry import NETWORKS
 from cpg_ros.robots.description import JointDescription, RobotDescription
 from cpg_ros.robots.robot import Joint, Motion, Robot
@@ -122,7 +122,7 @@ class RobotCheck:
                          _span(there) if there else '-', f'{joint.velocity:.4g}',
                          _limit(there.velocity) if there else '-',
                          'does not match' if one.faults else 'ok'))
-        said = table(rows, '<<<<<>><')
+        lines = table(rows, '<<<<<>><')
         rows = [('gait', 'network', 'stride [Hz]', 'nearest limit', 'fastest joint', '')]
         for gait in self.gaits:
             known = gait.frequency == gait.frequency
@@ -130,13 +130,13 @@ class RobotCheck:
                          f'{_room(gait.room)} ({gait.room_at})' if known else '-',
                          f'{100 * gait.share:.0f} % of its limit ({gait.share_at})'
                          if known else '-', 'does not fit' if gait.faults else 'fits'))
-        said += ['', *table(rows, '<<><<<'), '']
+        lines += ['', *table(rows, '<<><<<'), '']
         faults = self.faults
-        said += [f'- {fault}' for fault in faults] + [f'note: {note}' for note in self.notes]
-        said.append(f'{self.robot} matches {self.source}' if not faults else
-                    f'{self.robot} does not match {self.source}: {len(faults)} '
-                    f'thing{"s" if len(faults) > 1 else ""}, see above')
-        return '\n'.join(said)
+        lines += [f'- {fault}' for fault in faults] + [f'note: {note}' for note in self.notes]
+        lines.append(f'{self.robot} matches {self.source}' if not faults else
+                     f'{self.robot} does not match {self.source}: {len(faults)} '
+                     f'thing{"s" if len(faults) > 1 else ""}, see above')
+        return '\n'.join(lines)
 
 
 def checked(robot: Robot, known: RobotDescription, names: tuple[str, str],
@@ -207,7 +207,7 @@ def _gait(robot: Robot, known: RobotDescription, network: str, name: str,
         frequency = _fastest(robot.motion(name, preset.gait))
     try:
         program = plan(unlimited(robot), name, preset, preset.network, frequency, amplitude)
-    except Refused as error:
+    except PlanError as error:
         return GaitCheck(network, name, nan, nan, '', nan, '', (str(error),))
     faults, rooms, shares = [], [], []
     for joint, low, high, speed in zip(robot.joints, *program.span, program.speed, strict=True):
@@ -256,9 +256,10 @@ def _nearest(robot: Robot, described: RobotDescription) -> dict[str, str]:
     for joint in robot.joints:
         # The same joint of another leg is spelt like it, too: the robot file knows the leg.
         same = {role_of(name): name for name in legs.get(joint.leg, ()) if name in free}
-        asked, known = ((role_of(joint.name), same) if same else
-                        (joint.name.lower(), {name.lower(): name for name in free}))
-        likely = get_close_matches(asked, list(known), 1) or (list(same) if len(same) == 1 else [])
+        wanted, known = ((role_of(joint.name), same) if same else
+                         (joint.name.lower(), {name.lower(): name for name in free}))
+        likely = get_close_matches(wanted, list(known),
+                                   1) or (list(same) if len(same) == 1 else [])
         if likely:
             near[joint.name] = known[likely[0]]
     return near

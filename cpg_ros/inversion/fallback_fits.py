@@ -46,9 +46,9 @@ def _ways(names: tuple[str, ...], order: int, starts: Sequence[Mapping[str, floa
         yield (name,), order, ({},), f'fitted with {name} free alone'
 
 
-def fit_at_all(cycle: MeanCycle, cells: Mapping[str, int], network: Network, gait: str,
-               free: Sequence[str], order: int, starts: Sequence[Mapping[str, float]],
-               done: Callable[[float], None]) -> tuple[Fit, tuple[str, ...]]:
+def fit_with_fallbacks(cycle: MeanCycle, cells: Mapping[str, int], network: Network, gait: str,
+                       free: Sequence[str], order: int, starts: Sequence[Mapping[str, float]],
+                       done: Callable[[float], None]) -> tuple[Fit, tuple[str, ...]]:
     """Fit as asked for, or as near to it as leads to a gait that the generator runs.
 
     Args: as of invert.
@@ -65,7 +65,7 @@ def fit_at_all(cycle: MeanCycle, cells: Mapping[str, int], network: Network, gai
         # Phases are known beforehand, and no other parameter shows.
         return _as_it_is(cycle, cells, network, gait, order, done), ()
     first = ''
-    for names, lower, begins, said in _ways(tuple(free or network.free), order, starts):
+    for names, lower, begins, relaxation in _ways(tuple(free or network.free), order, starts):
         try:
             fit = invert(cycle, cells, network, gait, names, lower, begins, done=done)
         except NoOrbit as error:
@@ -73,7 +73,8 @@ def fit_at_all(cycle: MeanCycle, cells: Mapping[str, int], network: Network, gai
             continue
         flaw = refusal(fit.orbit, gait, fit.harmonics)
         if not flaw:
-            return fit, (f'not fitted as asked for: {first}; {said} instead',) if said else ()
+            return fit, (f'not fitted as asked for: {first}; {relaxation} instead',
+                         ) if relaxation else ()
         first = first or f'the generator would refuse the {gait} that fits best: {flaw}'
     fit = _as_it_is(cycle, cells, network, gait, order, done)
     if flaw := refusal(fit.orbit, gait, fit.harmonics):

@@ -20,7 +20,7 @@ from itertools import combinations, product
 
 from cpg_ros.errors import InputError
 from cpg_ros.gaits.leg_phases import leg_phases
-from cpg_ros.gaits.phase_average import warped
+from cpg_ros.gaits.phase_average import average_cycles
 import numpy as np
 
 #: Fewer samples a stride may be those of a gait several times as fast.
@@ -44,21 +44,21 @@ LIMPS = 0.6
 
 
 @dataclass(frozen=True)
-class Doubt:
+class QualityIssue:
     """Something that speaks against what was found.
 
     Attributes:
-        said: one line.
+        message: one line.
         left: the share of the confidence that it leaves.
 
     """
 
-    said: str
+    message: str
     left: float
 
 
-def doubts_of_rhythm(frequency: float, phases: np.ndarray, x: np.ndarray, c: np.ndarray
-                     ) -> list[Doubt]:
+def check_rhythm(frequency: float, phases: np.ndarray, x: np.ndarray, c: np.ndarray
+                 ) -> list[QualityIssue]:
     """Doubt a stride frequency that rests on few samples, or whose mean cycle is several.
 
     Args:
@@ -73,16 +73,17 @@ def doubts_of_rhythm(frequency: float, phases: np.ndarray, x: np.ndarray, c: np.
     order = np.arange(1, len(c))
     for times in (3, 2):
         if power[order % times > 0].sum() < ALIKE * power.sum():
-            found.append(Doubt(f'the mean cycle holds {times} that are alike: the gait may be '
-                               f'{times} times as fast, {times * frequency:.4g} Hz', 0.2))
+            found.append(QualityIssue(f'the mean cycle holds {times} that are alike: the gait '
+                                      f'may be '
+                                      f'{times} times as fast, {times * frequency:.4g} Hz', 0.2))
             break
     if samples < SAMPLES:
-        found.append(Doubt(f'only {samples:.1f} samples a stride: a gait several times as fast '
-                           'would look the same; record faster', 0.5))
+        found.append(QualityIssue(f'only {samples:.1f} samples a stride: a gait several times as '
+                                  f'fast would look the same; record faster', 0.5))
     if frequency < SLOW:
         unit = next((unit for unit, more in UNITS.items()
                      if USUAL[0] <= frequency * more <= USUAL[1]), '')
-        found.append(Doubt(f'a stride of {1.0 / frequency:.4g} s is slower than any leg' + (
+        found.append(QualityIssue(f'a stride of {1.0 / frequency:.4g} s is slower than any leg' + (
             f': if the times are in {unit}, it is {frequency * UNITS[unit]:.4g} Hz; declare it '
             f'(--time {unit})' if unit else ''), 0.02))
     return found
@@ -99,26 +100,26 @@ def _samples(phases: np.ndarray, x: np.ndarray) -> float:
     return min(own.size / float(phases[-1] - phases[0]), 1.0 / apart)
 
 
-def doubts_of_angles(joints: Sequence[str], mean: np.ndarray) -> list[Doubt]:
+def check_angles(joints: Sequence[str], mean: np.ndarray) -> list[QualityIssue]:
     """Doubt mean cycles of joints, rad, shape (joints, m), that swing too far."""
     swing = np.ptp(mean, axis=1)
     k = int(np.argmax(swing))
     if swing[k] <= SWING:
         return []
-    return [Doubt(f'{joints[k]} swings by {swing[k]:.3g} rad, more than a turn: if the angles are '
-                  'in degrees, declare it (--unit deg)', 0.5)]
+    return [QualityIssue(f'{joints[k]} swings by {swing[k]:.3g} rad, more than a turn: if the '
+                         f'angles are in degrees, declare it (--unit deg)', 0.5)]
 
 
-def doubts_of_legs(vague: Sequence[str]) -> list[Doubt]:
+def check_legs(vague: Sequence[str]) -> list[QualityIssue]:
     """Doubt the phases of legs that may be half a cycle off."""
     if not vague:
         return []
-    return [Doubt(f'nothing tells in which sense {", ".join(vague)} count angles: half a cycle '
-                  'is uncertain', 0.5)]
+    return [QualityIssue(f'nothing tells in which sense {", ".join(vague)} count angles: half a '
+                         f'cycle is uncertain', 0.5)]
 
 
-def doubts_of_change(phases: np.ndarray, x: np.ndarray, legs: Mapping[str, Sequence[str]],
-                     names: Sequence[str]) -> list[Doubt]:
+def check_change(phases: np.ndarray, x: np.ndarray, legs: Mapping[str, Sequence[str]],
+                 names: Sequence[str]) -> list[QualityIssue]:
     """Doubt one gait where the legs' phases differ between parts of the stretch.
 
     Args:
@@ -140,8 +141,8 @@ def doubts_of_change(phases: np.ndarray, x: np.ndarray, legs: Mapping[str, Seque
     if moved(leg, pair) <= CHANGE:
         return []
     at = [f'at {parts[k][leg]:.2f} {PARTS[k]}' for k in pair]
-    return [Doubt(f'the gait changes within the stretch: of a cycle, {leg} is {at[0]} and {at[1]}',
-                  0.2)]
+    return [QualityIssue(f'the gait changes within the stretch: of a cycle, {leg} is {at[0]} and '
+                         f'{at[1]}', 0.2)]
 
 
 def _by_parts(phases: np.ndarray, x: np.ndarray, legs: Mapping[str, Sequence[str]],
@@ -153,7 +154,7 @@ def _by_parts(phases: np.ndarray, x: np.ndarray, legs: Mapping[str, Sequence[str
         if span < len(PARTS) * STRIDES or (np.isfinite(x[place]).sum(axis=0) < FEWEST).any():
             return []
         try:
-            part = warped(phases[place], x[place], np.zeros(1), [0])
+            part = average_cycles(phases[place], x[place], np.zeros(1), [0])
         except InputError:
             return []
         c = dict(zip(names, part.coefficients.T, strict=True))

@@ -36,7 +36,7 @@ FIRST_WAIT, LONGEST_WAIT, FORGIVEN, PEERS, PREFIX = 0.25, 4.0, 60.0, 1024, 64
 WRONG = 'the token is wrong'
 
 
-class DoorError(CpgError):
+class AccessError(CpgError):
     """It would be open to everybody; one line for the user."""
 
 
@@ -49,26 +49,27 @@ def token_for(host: str, wish: str, terminal: bool) -> str:
         terminal: whether there is one to show a new token in.
 
     Raises:
-        DoorError: others than this machine could come in without a token, or with one that can
+        AccessError: others than this machine could come in without a token, or with one that can
             be guessed; or nobody would see a new one.
 
     """
     if wish == AUTO:
         if not terminal:
-            raise DoorError(f'token:={AUTO} shows the token in the terminal, and there is none: '
-                            f'make one ({RECIPE}) and set it in a parameter file')
+            raise AccessError(f'token:={AUTO} shows the token in the terminal, and there is none: '
+                              f'make one ({RECIPE}) and set it in a parameter file')
         return secrets.token_urlsafe(16)
     if not is_loopback(host):
         if not wish:
-            raise DoorError(f"host '{host}' can be reached from other machines: set the parameter "
-                            f'token to protect it; token:={AUTO} makes one')
+            raise AccessError(f"host '{host}' can be reached from other machines: set the "
+                              f"parameter "
+                              f'token to protect it; token:={AUTO} makes one')
         if len(wish) < SHORTEST:
-            raise DoorError(f'the token has {len(wish)} characters, and can be guessed: it needs '
-                            f'{SHORTEST}; token:={AUTO} makes one, or: {RECIPE}')
+            raise AccessError(f'the token has {len(wish)} characters, and can be guessed: it '
+                              f'needs {SHORTEST}; token:={AUTO} makes one, or: {RECIPE}')
     return wish
 
 
-class Door:
+class AccessControl:
     """Looks at each request before anything of it is read."""
 
     def __init__(self, token: str) -> None:
