@@ -20,9 +20,14 @@ from itertools import combinations, product
 
 from cpg_ros.errors import InputError
 from cpg_ros.gaits.leg_phases import leg_phases
-from cpg_ros.gaits.phase_average import average_cycles
+from cpg_ros.gaits.phase_average import average_cycles, PhaseAverage
+from cpg_ros.gaits.phase_estimation import PhaseEstimate
 import numpy as np
 
+#: Below so many cycles errors are rough.
+SURE = 3.0
+#: A change of frequency over the stretch that is worth a note.
+DRIFT = 0.04
 #: Fewer samples a stride may be those of a gait several times as fast.
 SAMPLES = 20.0
 #: A mean cycle is several strides if all but this share of its power is at multiples of their
@@ -172,3 +177,21 @@ def limping(legs: Mapping[str, Sequence[str]], c: Mapping[str, np.ndarray]) -> l
         if own < LIMPS * usual:
             said.append(f'{leg} moves by {own / usual:.2f} of what the other legs do')
     return said
+
+
+def quality_notes(warp: PhaseEstimate, found: PhaseAverage, names: Sequence[str]) -> list[str]:
+    """Say what the errors rest on, whether the frequency drifts, and which samples were wild."""
+    notes = []
+    if warp.cycles < SURE:
+        notes.append(f'only {warp.cycles:.1f} cycles: errors are rough, one figure for the whole '
+                     'cycle of a joint, from what is there twice')
+    elif warp.knots.size > 4:
+        middles = 0.5 * (warp.knots[1:] + warp.knots[:-1])
+        slope = np.polyfit(middles, np.diff(warp.phases) / np.diff(warp.knots), 1)
+        ends = np.polyval(slope, warp.knots[[0, -1]])
+        if abs(ends[1] - ends[0]) > DRIFT * warp.frequency:
+            notes.append(f'the frequency drifts from {ends[0]:.3g} to {ends[1]:.3g} Hz')
+    wild = [f'{name} ({count})' for name, count in zip(names, found.spikes, strict=True) if count]
+    if wild:
+        notes.append(f'samples far off the mean cycle, left out: {", ".join(wild)}')
+    return notes

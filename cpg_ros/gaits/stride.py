@@ -22,14 +22,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from cpg_ros.errors import CpgError, InputError
-from cpg_ros.gaits.issues import (
-    check_angles,
-    check_change,
-    check_legs,
-    check_rhythm,
-    limping,
-    QualityIssue,
-)
 from cpg_ros.gaits.leg_motion import check_travel, running_probability
 from cpg_ros.gaits.leg_names import Legs
 from cpg_ros.gaits.leg_phases import (
@@ -38,7 +30,7 @@ from cpg_ros.gaits.leg_phases import (
     match_gait,
     match_gait_by_cells,
 )
-from cpg_ros.gaits.phase_average import average_cycles, PhaseAverage
+from cpg_ros.gaits.phase_average import average_cycles
 from cpg_ros.gaits.phase_estimation import (
     estimate_phase,
     grow_stretch,
@@ -47,6 +39,16 @@ from cpg_ros.gaits.phase_estimation import (
     RoughPhase,
 )
 from cpg_ros.gaits.phase_scatter import phase_scatter, PhaseScatter
+from cpg_ros.gaits.quality_checks import (
+    check_angles,
+    check_change,
+    check_legs,
+    check_rhythm,
+    limping,
+    quality_notes,
+    QualityIssue,
+    SURE,
+)
 from cpg_ros.gaits.recording_like import RecordingLike
 from cpg_ros.gaits.steady_stretch import (
     best_stretch,
@@ -67,9 +69,9 @@ POINTS = 64
 STILL = 0.01
 #: Fewest samples of a joint.
 SAMPLES = 8
-#: Below so many cycles errors are rough, and strides must be more alike: the mean square
-#: difference over twice the variance.
-SURE, ALIKE = 3.0, 0.1
+#: In stretches of fewer cycles than SURE strides must be more alike: the mean square difference
+#: over twice the variance.
+ALIKE = 0.1
 #: Most of the variance that the mean cycle may leave of the joints together.
 LEFT = 0.5
 #: Stretches that are followed, and how much other motion, in cycles, is worth a note.
@@ -79,8 +81,6 @@ SEEDS, OTHERS = 4, 3.0
 SPIKE = 3.0
 #: What fewer cycles leave of the confidence.
 FEW_CYCLES = 0.9
-#: A change of frequency over the stretch that is worth a note.
-DRIFT = 0.04
 
 
 class NoSteadyGait(CpgError):
@@ -207,7 +207,7 @@ def find_stride(recording: RecordingLike, legs: Legs | Mapping[str, Sequence[str
         raise NoSteadyGait(f'{source}: no steady gait: the mean cycle, of '
                            f'{1.0 / warp.frequency:.3g} s, leaves {100.0 * left:.0f} % of the '
                            'variance')
-    notes += _quality_notes(warp, found, names)
+    notes += quality_notes(warp, found, names)
     c = dict(zip(names, found.coefficients.T, strict=True))
     # A leg's phase is that of its first cell.
     leading = {leg: tuple(name for name in listed
@@ -322,24 +322,6 @@ def _regions(times: np.ndarray, x: np.ndarray, source: str) -> tuple[RoughPhase,
              if min(one.end, rough.end) - max(one.begin, rough.begin) < 0.5 * (one.end - one.begin)
              and one.end - one.begin >= OTHERS * period]
     return rough, notes
-
-
-def _quality_notes(warp: PhaseEstimate, found: PhaseAverage, names: Sequence[str]) -> list[str]:
-    """Say what the errors rest on, whether the frequency drifts, and which samples were wild."""
-    notes = []
-    if warp.cycles < SURE:
-        notes.append(f'only {warp.cycles:.1f} cycles: errors are rough, one figure for the whole '
-                     'cycle of a joint, from what is there twice')
-    elif warp.knots.size > 4:
-        middles = 0.5 * (warp.knots[1:] + warp.knots[:-1])
-        slope = np.polyfit(middles, np.diff(warp.phases) / np.diff(warp.knots), 1)
-        ends = np.polyval(slope, warp.knots[[0, -1]])
-        if abs(ends[1] - ends[0]) > DRIFT * warp.frequency:
-            notes.append(f'the frequency drifts from {ends[0]:.3g} to {ends[1]:.3g} Hz')
-    wild = [f'{name} ({count})' for name, count in zip(names, found.spikes, strict=True) if count]
-    if wild:
-        notes.append(f'samples far off the mean cycle, left out: {", ".join(wild)}')
-    return notes
 
 
 def _cell_signals(c: Mapping[str, np.ndarray], cells: Mapping[str, int],

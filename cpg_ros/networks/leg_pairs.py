@@ -174,16 +174,16 @@ class LegPairs(Network):
         return tuple(found.values())
 
     @classmethod
-    def weights(cls, gait: str, size: float = 1.0, quarter_sign: float = -1.0) -> Mapping[str, float]:
-        """Return weights that choose a gait: cos + quarter_sign sin of how far the heard leg is ahead.
+    def weights(cls, gait: str, size: float = 1.0, quarter: float = -1.0) -> Mapping[str, float]:
+        """Return weights that choose a gait: cos + quarter * sin of the lead of the leg heard.
 
-        So 1 between legs in phase and -1 between legs half a cycle apart; on the walk quarter_sign from
-        the leg a quarter ahead, and -quarter_sign from that a quarter behind.
+        So 1 between legs in phase and -1 between legs half a cycle apart; on the walk quarter from
+        the leg a quarter ahead, and -quarter from that a quarter behind.
         """
         names, phases, found = leg_names(leg_count(cls)), cls.phases(gait), {}
         for sources in partners(leg_count(cls)).values():
             for i, j in enumerate(sources):
                 ahead = 2.0 * math.pi * float((phases[j] - phases[i]) % 1)
                 found[f'k_{names[j]}_{names[i]}'] = size * round(
-                    math.cos(ahead) + quarter_sign * math.sin(ahead), 12)
+                    math.cos(ahead) + quarter * math.sin(ahead), 12)
         return found

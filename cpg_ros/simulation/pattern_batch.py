@@ -93,8 +93,9 @@ class PatternBatch:
             self._ask(run)
         self.level = smoothstep(min(1.0, self._time / RAMP))[0]
         _advance(self._angles, self._still, self._frequency, self._leg, self._offset, self._target,
-                 self._drive, self._rate, stride, frequency_scale, self.phase, self.gaits, self._faded,
-                 self.mix, self._turning, self.course, self.level, self._dt, self.planned)
+                 self._drive, self._rate, stride, frequency_scale, self.phase, self.gaits,
+                 self._faded, self.mix, self._turning, self.course, self.level, self._dt,
+                 self.planned)
 
     def confine(self, angles: np.ndarray) -> np.ndarray:
         """Hold angles to the joints' limits and speeds."""
@@ -103,8 +104,8 @@ class PatternBatch:
 
 
 @entry
-def _advance(angles, still, frequencies, legs, offset, targets, drive, rates, strides, frequency_scales,
-             phases, gaits, faded, mix, turning, course, level, dt, planned):
+def _advance(angles, still, frequencies, legs, offset, targets, drive, rates, strides,
+             frequency_scales, phases, gaits, faded, mix, turning, course, level, dt, planned):
     """Advance each run; arguments as of PatternBatch."""
     for run in range(len(phases)):
         old, new, clock = gaits[run, 0], gaits[run, 1], frequency_scales[run] * dt

@@ -260,8 +260,8 @@ def setup(app: Sphinx) -> dict[str, bool]:
     """Name the directives."""
     for name, directive in {'parameters': made_by(parameters), 'presets': made_by(presets),
                             'options': made_by(options), 'launch': made_by(arguments),
-                            'door': made_by(door), 'subpackage': made_by(subpackage), 'topics': Topics,
-                            'robotfile': RobotFile}.items():
+                            'door': made_by(door), 'subpackage': made_by(subpackage),
+                            'topics': Topics, 'robotfile': RobotFile}.items():
         app.add_directive(name, directive)
     app.connect('autodoc-process-docstring', escaped, priority=400)
     app.connect('autodoc-process-docstring', restored, priority=600)
