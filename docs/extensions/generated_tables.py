@@ -224,8 +224,18 @@ def subpackage(name: str) -> str:
     # What only ROS brings cannot be imported here.
     listed = [one for one in place.__all__ if one not in ('launch_arguments', 'rosbag2_library')]
     return (place.__doc__ or '') + '\n\n' + '\n\n'.join(
-        f'## `{name}.{one}`\n\n' + rst([f'.. automodule:: cpg_ros.{name}.{one}\n   :members:\n'])
+        f'## `{name}.{one}`\n\n' + rst([
+            f'.. automodule:: cpg_ros.{name}.{one}\n   :members:\n'
+            f'   :exclude-members: {", ".join(reexported(name, one))}\n'])
         for one in listed)
+
+
+def reexported(subpackage: str, module: str) -> list[str]:
+    """Return what a module passes on from elsewhere, where it is described."""
+    place = importlib.import_module(f'cpg_ros.{subpackage}.{module}')
+    return [name for name in getattr(place, '__all__', ())
+            if getattr(getattr(place, name, None), '__module__', place.__name__)
+            != place.__name__ and not hasattr(place, '__path__')]
 
 
 def rst(blocks: Iterable[str]) -> str:
