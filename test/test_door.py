@@ -108,7 +108,7 @@ def results(orbit):
 
 
 def test_results_print_in_a_few_lines(results):
-    assert {'Branch', 'BranchPoint', 'FourierOrbit', 'MeshOrbit', 'Multipliers', 'Program',
+    assert {'Branch', 'BranchPoint', 'FourierOrbit', 'MeshOrbit', 'Multipliers', 'GaitPlan',
             'Recording', 'RecordingFit', 'Robot', 'Stride', 'Trajectory'} <= {
                 type(one).__name__ for one in results}
     for one in results:

@@ -136,7 +136,7 @@ def test_a_drive_approaches_as_a_critically_damped_oscillator():
 
 @given(speed=st.floats(-1.0, 1.0), turn=st.floats(-3.0, 3.0))
 def test_the_steering_table_is_inverted(speed, turn):
-    left, right, frequency = TABLE.set_target(speed, turn)
+    left, right, frequency = TABLE.ask(speed, turn)
     assert -1.0 <= min(left, right) <= max(left, right) <= 1.0 + 1e-12
     assert 1.0 <= frequency <= 2.0
     if abs(turn) > 1e-9:

@@ -110,9 +110,9 @@ def test_order_is_kept_and_what_is_of_no_leg_is_said():
     legs = legs_of(['neck', *joints, 'left_gripper', 'RL_wheel'])
     assert legs['rf'] == ('FR_hip', 'FR_thigh', 'FR_calf')
     assert legs.unassigned == ('neck', 'left_gripper', 'RL_wheel')
-    assert "lh by 'rl' (3 joints: RL_hip ... RL_calf)" in legs.says
-    assert 'of no leg: neck, left_gripper, RL_wheel' in legs.says
-    assert '\n' not in legs.says
+    assert "lh by 'rl' (3 joints: RL_hip ... RL_calf)" in legs.explanation
+    assert 'of no leg: neck, left_gripper, RL_wheel' in legs.explanation
+    assert '\n' not in legs.explanation
 
 
 def test_arms_of_a_humanoid_are_no_legs_but_shoulders_of_a_dog_are():

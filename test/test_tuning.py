@@ -69,7 +69,7 @@ def test_targets_are_what_the_generator_publishes(gait, ramp, strides, pace):
     drive = None
     if strides or pace != 1.0:
         drive = Drive(4)
-        drive.ask(np.array(strides or [1.0] * 4), pace, at_once=True)
+        drive.set_target(np.array(strides or [1.0] * 4), pace, at_once=True)
     pattern, published = Pattern(program(gait), ramp, drive=drive), np.empty_like(found)
     for row in published:
         pattern.advance(DT)

@@ -19,11 +19,12 @@ import math
 
 from cpg_ros.errors import InputError
 from cpg_ros.robots.robot import Robot
+from cpg_ros.short_repr import ShortRepr
 import numpy as np
 
 
-@dataclass(frozen=True)
-class BridgeSettings:
+@dataclass(frozen=True, eq=False, repr=False)
+class BridgeSettings(ShortRepr):
     """Joints, gains, poses, limits and times; arrays have shape (joints,), in motor order.
 
     Attributes:

@@ -61,7 +61,7 @@ file."""
 COMMENT = """\
 A first robot file, made from {source}: limits are those of the {format}, the stand and
 the small amplitudes are guesses to start from. Tune it in simulation before it moves a robot.
-{says}"""
+{notes}"""
 
 
 def _parser() -> Parser:
