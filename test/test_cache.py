@@ -239,7 +239,7 @@ def test_a_full_disk_under_the_cache_is_one_line(tmp_path):
                              capture_output=True, env=environment(NUMBA_CACHE_DIR=str(place)))
         assert run.returncode == 0, run.stderr
         (line,) = run.stderr.splitlines()
-        assert line.startswith(f'compiled code cannot be kept in {place}: File too large')
+        assert line.startswith(f'compiled code cannot be kept in {place}/cpg_ros: File too large')
         assert not list(place.rglob('*.tmp.*')) and not list(place.rglob('*.part'))
     # Once there is room, what was cut off is not taken for code.
     room = 10**9
@@ -270,7 +270,8 @@ def test_a_node_walks_with_a_full_disk_under_the_cache(tmp_path, monkeypatch):
         node.wait_for('publishing')
         assert 'No space left on device' in other.read_text()
         (line,) = [line for line in node.lines if 'cannot be kept' in line]
-        assert line.startswith(f'compiled code cannot be kept in {place}: No space left on device')
+        assert line.startswith(f'compiled code cannot be kept in {place}/cpg_ros: '
+                               'No space left on device')
         node.signal(signal.SIGINT)
         assert node.wait() == 0 and 'Traceback' not in node.log
     finally:

@@ -32,6 +32,7 @@ pytest.importorskip('websockets')
 from graph import free_domain, until, Watcher  # noqa: E402, I100
 from panel_client import Client, PANEL, start_panel  # noqa: E402
 from rcl_interfaces.msg import Log  # noqa: E402
+from rclpy.qos import DurabilityPolicy, QoSProfile  # noqa: E402
 from websockets.exceptions import InvalidStatus  # noqa: E402
 
 
@@ -69,7 +70,9 @@ def test_it_asks_for_its_token():
 def test_a_token_that_it_makes_is_shown_in_the_terminal_only(tmp_path):
     domain, rosout = free_domain(), []
     watcher = Watcher(domain)
-    watcher.node.create_subscription(Log, '/rosout', lambda m: rosout.append(m.msg), 100)
+    watcher.node.create_subscription(
+        Log, '/rosout', lambda m: rosout.append(m.msg),
+        QoSProfile(depth=100, durability=DurabilityPolicy.TRANSIENT_LOCAL))
     own, other = pty.openpty()
     panel = subprocess.Popen(
         [PANEL, '--ros-args', '-p', 'host:=0.0.0.0', '-p', 'port:=0', '-p', 'token:=auto'],

@@ -82,4 +82,4 @@ def test_blocks_that_need_ros_say_so_and_name_what_is_there(page):
         source = (ROOT / 'launch' / launch).read_text()
         known = {node.value for node in ast.walk(ast.parse(source))
                  if isinstance(node, ast.Constant)}
-        assert set(re.findall(r'(\w+):=', words)) <= known, launch
+        assert set(re.findall(r'([\w.]+):=', words)) <= known, launch

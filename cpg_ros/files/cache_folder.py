@@ -61,25 +61,24 @@ def cache_folder(name: str) -> Path | None:
         if new:
             _remove_unused(place)
     except OSError as error:
-        _LOGGER.warning('compiled code cannot be kept in %s (%s): it is compiled at every start',
-                        folder, error.strerror)
+        _warn(error.strerror or str(error))
         return None
     return folder
 
 
 @contextlib.contextmanager
-def writing(folder: Path) -> Iterator[None]:
+def writing() -> Iterator[None]:
     """Write into a folder of the cache; a disk that is full ends nothing, and is logged once."""
     try:
         yield
     except OSError as error:
-        _warn(folder, error.strerror or str(error))
+        _warn(error.strerror or str(error))
 
 
 @cache
-def _warn(folder: Path, reason: str) -> None:
+def _warn(reason: str) -> None:
     _LOGGER.warning('compiled code cannot be kept in %s: %s; it is compiled at every start until '
-                    'there is room', folder, reason)
+                    'there is room', _place(), reason)
 
 
 @cache

@@ -37,7 +37,7 @@ class _Disk(FunctionCache):
     """Machine code on disk, as far as there is room: numba would end with a full disk."""
 
     def save_overload(self, sig, data):
-        with writing(Path(self.cache_path)):
+        with writing():
             super().save_overload(sig, data)
 
 

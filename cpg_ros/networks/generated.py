@@ -72,8 +72,8 @@ def load(key: str, name: str, write: Callable[[], str]) -> ModuleType:
     path = None if place is None else place / f'{name}.py'
     if path is None or not path.exists():
         text = write()
-        if place is not None and path is not None:
-            with writing(place):
+        if path is not None:
+            with writing():
                 write_atomically(path, text)
         if path is None or not path.exists():
             module = sys.modules[known] = ModuleType(known)

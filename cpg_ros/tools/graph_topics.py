@@ -33,6 +33,8 @@ COUNT, EVERY, DEPTH = 3.0, 0.02, 1000
 class SilentTopic(CpgError):
     """Nobody publishes on a topic, or nothing came."""
 
+    exit_code = 1
+
 
 def topics(node: Node) -> dict[str, str]:
     """Return the topics that are published or listened to, and their types, sorted."""
