@@ -335,7 +335,8 @@ def demonstrate(chosen: Namespace) -> int:
     finally:
         try_shutdown()
     # One that was still starting, and was ended by our signal, did not fail.
-    return 1 if any(node.returncode not in (0, -signal.SIGTERM) for node in nodes) else 0
+    ended = 0, -signal.SIGTERM, 128 + signal.SIGTERM
+    return 1 if any(node.returncode not in ended for node in nodes) else 0
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
