@@ -281,7 +281,10 @@ class Generator(StartedNode):
 
     def _restart(self) -> None:
         """Begin anew where simulated time jumped back; diagnostics warn, not the ticks' thread."""
-        self.pattern.restart(self._value('ramp'), self.pattern.enabled)
+        ramp = self._value('ramp')
+        # At the end there is no time for a longer one.
+        self.pattern.restart(min(ramp, LAST_RAMP) if self.stop.is_set() else ramp,
+                             self.pattern.enabled)
         self._feedback.restart()
 
     def begin(self) -> None:
