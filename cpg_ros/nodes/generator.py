@@ -58,7 +58,7 @@ from std_srvs.srv import SetBool
 
 NAME = 'cpg_generator'
 #: When a signal ends the node, the ramp takes this long, and the node ends by the later time, s.
-LAST_RAMP, LAST_DEADLINE = 0.5, 0.8
+LAST_RAMP, LAST_DEADLINE = 0.5, 0.95
 #: Two nodes know of one another this long after the later one joined the graph, s: they are
 #: announced every 3 s, and the first announcements of a busy machine are lost at times.
 DISCOVERY = 3.5
