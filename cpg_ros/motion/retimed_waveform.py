@@ -12,11 +12,11 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Joints that follow a waveform at another time than their cells do: told by the phase.
+"""Joints that follow a waveform at another time than their cells do, by the phase.
 
 For a duty factor that is not the network's own. A state (x, y), a cell and its derivative by
 phase over the peak, has a phase theta, that of the orbit at its angle, and a size rho over the
-orbit there. Joints are told rho (X, Y)(phase'), phase' the one that the duty factor makes of
+orbit there. Joints follow rho (X, Y)(phase'), phase' the one that the duty factor makes of
 theta; rates follow by the chain rule from x, x' and x'': they are derivatives also off the orbit.
 """
 
@@ -53,7 +53,7 @@ def _hermite(table, column, cycles):
 
 @entry
 def read_retimed(now, peak, period, cells, weights, lead, cycle, maps, angle, rise):
-    """Read joints off a network's state as they are told.
+    """Read joints off a network's state at the retimed phase.
 
     Args:
         now: x, x', x'' of the cells, shape (3, cells).

@@ -101,8 +101,8 @@ class FeedbackSwitch:
 
     def judge(self, parameters: Sequence[Parameter]) -> str:
         """Say why a batch of changes cannot be, or ''."""
-        asked = any(one.name == ENABLED and one.value is True for one in parameters)
-        obstacle = self.obstacle() if asked else ''
+        switched_on = any(one.name == ENABLED and one.value is True for one in parameters)
+        obstacle = self.obstacle() if switched_on else ''
         return f'no feedback: {obstacle}' if obstacle else ''
 
     def apply(self) -> None:

@@ -46,9 +46,9 @@ class Controls:
 
     """
 
-    def __init__(self, node: NodeClient, told: Callable[[str], None]) -> None:
-        """Be those of a node; what it refuses is told."""
-        self._node, self._sent = node, told
+    def __init__(self, node: NodeClient, report: Callable[[str], None]) -> None:
+        """Control a node; ``report`` takes a line for each value that it refuses."""
+        self._node, self._report = node, report
         self.known: dict[str, dict[str, Any]] = {}
         self._waiting: dict[str, Any] = {}
         self._work: asyncio.Task | None = None
@@ -112,9 +112,9 @@ class Controls:
             try:
                 await self._node.set_parameters({name: value})
             except RequestRefused as error:
-                self._sent(f'{name} {value}: {error}')
+                self._report(f'{name} {value}: {error}')
             except CallError as error:
-                self._sent(str(error))
+                self._report(str(error))
 
 
 def _fitting(about: dict[str, Any], value: Any) -> Any:

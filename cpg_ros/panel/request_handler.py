@@ -39,8 +39,8 @@ MOVING = ('set', 'enable', 'push', 'reset', 'take_over')
 EVERYWHERE = ('/diagnostics', '/tf', '/tf_static', '/clock')
 
 
-class RequestRefused(CpgError):
-    """It cannot be done, or was refused; one line for whoever asked."""
+class PageRequestError(CpgError):
+    """A request of a page is refused, or cannot be carried out; one line for that page."""
 
 
 class RequestHandler:
@@ -63,7 +63,7 @@ class RequestHandler:
         now, teleop = asyncio.get_running_loop().time(), view.teleop
         if request.stamp is not None:
             if request.stamp > now:
-                raise RequestRefused(f'{action}: stamp is not one that the panel has sent')
+                raise PageRequestError(f'{action}: stamp is not one that the panel has sent')
             page.round_trip = now - request.stamp
         teleop.lease.renew(page, now)
         if action == 'stop' or (action == 'enable' and not values['on']):
@@ -71,7 +71,7 @@ class RequestHandler:
             await self._command(page, view.name, SetBool, 'enable', data=False)
             return
         if page.stop_only and action != 'alive':
-            raise RequestRefused(f'{MOST} pages are open already: this one can only stop the '
+            raise PageRequestError(f'{MOST} pages are open already: this one can only stop the '
                                  'robot')
         if action in MOVING:
             self._acquire(page, view, request, now)
@@ -92,13 +92,13 @@ class RequestHandler:
                            'fit': (view.graph.inversions, 'inversion node')}[action]
             node = view.graph.beside(view.name, nodes)
             if not node:
-                raise RequestRefused(f'there is no {what} for {view.name}')
+                raise PageRequestError(f'there is no {what} for {view.name}')
             await self._command(page, node, Trigger, action, FIT)
 
     def _acquire(self, page: Page, view: RobotView, request: Request, now: float) -> None:
         """Let a page do what moves the robot, if it is fresh and no other page may."""
         if (age := now - _stamp(request)) > LATE:
-            raise RequestRefused(f'{request.action} came up to {age:.1f} s late, and was '
+            raise PageRequestError(f'{request.action} came up to {age:.1f} s late, and was '
                                  f'ignored: the limit is {LATE:g} s')
         if request.action != 'take_over':
             view.teleop.acquire(page, now)
@@ -109,7 +109,7 @@ class RequestHandler:
     def _steer(self, page: Page, view: RobotView, request: Request, now: float) -> None:
         """Steer; show once why that is refused, unless the loss of the lease has been shown."""
         if view.controls.value('cmd_vel') is not True:
-            raise RequestRefused(f'{view.name} ignores cmd_vel; start it with cmd_vel:=true to '
+            raise PageRequestError(f'{view.name} ignores cmd_vel; start it with cmd_vel:=true to '
                                  f'steer')
         try:
             view.teleop.steer(page, _stamp(request), now, request.values['speed'],
@@ -140,5 +140,5 @@ class RequestHandler:
 def _stamp(request: Request) -> float:
     """Return the stamp of a request that must have one, s."""
     if request.stamp is None:
-        raise RequestRefused(f'{request.action}: the newest stamp from the panel is missing')
+        raise PageRequestError(f'{request.action}: the newest stamp from the panel is missing')
     return request.stamp
