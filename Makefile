@@ -1,5 +1,5 @@
-# make run | demo | shell | test | docs | figures | coverage | bench | build | unitree | clean; all is
-# set up in .venv and install/.
+# make run | demo | shell | test | test-deep | test-export | browser | mutants | docs | figures |
+# coverage | bench | build | wheel | unitree | clean; all is set up in .venv and install/.
 PYTHON ?= python3
 SHELL := /bin/bash
 comma := ,
@@ -25,15 +25,21 @@ ENTER := set -e; source install/setup.bash; \
 
 # Live tests wait for most of their time: one for each core runs at once.
 LIVE ?= $(shell nproc)
-# Tests of a file that need no graph run in one process: what they share is made, and compiled, once.
-# Live ones, without groups, are dealt out one by one.
-# What fails on a graph runs once more, and is listed, as colcon test --retest-until-pass does it:
-# a shared machine stands still now and then. What hangs ends.
-AGAIN := --reruns 1 -r aR --timeout 600
+# Tests of a file that need no graph run in one process: what they share is made once. Live ones,
+# without groups, are dealt out one by one. What hangs ends.
+PYTEST = $(VENV)/bin/pytest test --timeout 600
+OFFLINE := -n auto --dist loadfile
+ONLINE := -n $(LIVE) --dist loadgroup
+# A shared machine may stall for seconds: before a commit, a live test that fails runs once more, and
+# is listed. In depth, and without a graph, nothing does.
+AGAIN := --reruns 1 -r aR
+# What tests compile is kept here from run to run, whatever becomes of install/.
+test test-deep test-export browser coverage mutants: export NUMBA_CACHE_DIR ?= $(CURDIR)/.numba
 
-.PHONY: build run demo shell test docs figures coverage bench unitree clean
+.PHONY: build run demo shell test test-deep test-export browser mutants docs figures coverage \
+	bench wheel unitree clean
 
-build: install/.built
+build: install/.built install/.compiled
 
 run: install/.built
 	@$(ENTER); exec install/cpg_ros/lib/cpg_ros/generator $(ARGS)
@@ -41,10 +47,11 @@ run: install/.built
 demo: install/.built
 	@$(ENTER); exec install/cpg_ros/lib/cpg_ros/demo $(ARGS)
 
+# Whatever the last command in it returned, leaving it is no error of make.
 shell: install/.built
 	@$(ENTER); export PATH=$(CURDIR)/install/cpg_ros/lib/cpg_ros:$(CURDIR)/$(VENV)/bin:$$PATH; \
 		echo 'generator, cpg, analyze, inversion ... are on the path (--help); exit leaves this shell'; \
-		exec bash --rcfile <(cat ~/.bashrc 2>/dev/null; echo "PATH=$$PATH"; cpg completion) -i
+		bash --rcfile <(cat ~/.bashrc 2>/dev/null; echo "PATH=$$PATH"; cpg completion) -i || :
 
 # The tables of topics are read from running nodes, the bridge among them.
 docs: install/.built unitree
@@ -56,24 +63,53 @@ figures: install/.built
 
 # Of what needs no graph, branches included; compiled code is not seen by it. What is measured is
 # the installed copy, which is what the tests import.
-COVER = --cov=$$(echo install/cpg_ros/lib/python3*/*-packages/cpg_ros)
+COVER = --cov=$$(echo install/cpg_ros/lib/python3*/*-packages/cpg_ros) --cov-report=term:skip-covered \
+	--cov-report=html:out/coverage $(if $(ARGS),,--cov-fail-under=90)
 # Tools run in folders of their own: what they ran is gathered here.
 export COVERAGE_FILE := $(CURDIR)/.coverage
 
 coverage: install/.built
-	@$(ENTER); $(VENV)/bin/pytest test -n auto -m 'not live' $(COVER) --cov-report=term \
-		--cov-report=html:out/coverage $(ARGS)
+	@$(ENTER); $(PYTEST) $(OFFLINE) -m 'not (live or deep or browser)' $(COVER) $(ARGS)
 
-test: install/.built docs
-	@$(VENV)/bin/ruff check .
-	@$(VENV)/bin/mypy
-	@$(VENV)/bin/lint-imports --no-logo
-	@$(ENTER); for part in '-n auto --dist loadfile -m "not live" $(if $(ARGS),,$(COVER) --cov-report= --cov-fail-under=90)' \
-		'-n $(LIVE) --dist loadgroup -m "live and not alone" $(AGAIN)' '-m alone $(AGAIN)'; do \
-		eval $(VENV)/bin/pytest test $$part $(ARGS) || [ $$? = 5 ]; done  # 5: none selected
+# What is run before every commit; with COVERAGE=yes it measures that, too, and takes a minute
+# longer. The kernels of all networks are compiled while linters run.
+test: install/.built unitree
+	@$(ENTER); $(VENV)/bin/python test/support/compiled.py & \
+		$(VENV)/bin/ruff check . && $(VENV)/bin/mypy && $(VENV)/bin/lint-imports --no-logo && wait $$!
+	@$(ENTER); for part in '$(OFFLINE) -m "not (live or deep or browser)" $(if $(COVERAGE),$(COVER))' \
+		'$(ONLINE) $(AGAIN) -m "live and not (deep or alone or browser)"'; do \
+		eval $(PYTEST) $$part $(ARGS) || [ $$? = 5 ]; done  # 5: none selected
+
+# All tests, all examples of properties; and what measures the machine, by itself.
+test-deep: install/.built unitree
+	@$(ENTER); for part in '$(OFFLINE) -m "not (live or browser)" --hypothesis-profile=deep' \
+		'$(ONLINE) -m "live and not (alone or browser)"' '-m "alone and not browser"'; do \
+		eval $(PYTEST) $$part $(ARGS) || [ $$? = 5 ]; done
+
+# Exported gaits as compiled C, and on simulated microcontrollers with their cycles, flash and RAM:
+# gcc-avr, avr-libc, simavr, gcc-arm-none-eabi, libnewlib-arm-none-eabi, qemu-system-arm of Debian.
+test-export: install/.built
+	@$(ENTER); $(VENV)/bin/pytest test/export test/tools/test_export_tool.py --timeout 600 -s $(ARGS)
+
+# Small faults, one at a time in a copy of the tree, each of which some test has to notice.
+mutants: install/.built unitree
+	@$(ENTER); $(VENV)/bin/python test/mutants/run.py $(ARGS)
+
+# The panel's page in Chromium, by playwright; none of its own browsers is downloaded.
+browser: install/.built
+	@command -v chromium chromium-browser google-chrome >/dev/null || \
+		{ echo 'there is no Chromium: apt install chromium (on Ubuntu: snap install chromium)' >&2; exit 1; }
+	@$(VENV)/bin/python -m pip install --quiet --disable-pip-version-check -r requirements-browser.txt
+	@$(ENTER); $(PYTEST) -m browser $(ARGS)
 
 bench: install/.built
 	@$(ENTER); for file in benchmarks/bench_*.py; do $(VENV)/bin/python $$file; done
+
+# One file that pip installs without this tree and without colcon: cpg, cpg-demo, cpg-generator ...
+wheel: $(INSTALLED)
+	@rm -rf build/lib build/bdist* && $(VENV)/bin/python -m pip wheel --quiet --disable-pip-version-check --no-deps \
+		--no-build-isolation --wheel-dir out/wheel .
+	@ls out/wheel/cpg_ros-*.whl
 
 # Messages of Unitree's robots, for unitree_bridge on ROS 2 as pip installs it.
 unitree: $(VENV)/.unitree
@@ -101,5 +137,12 @@ install/.built: $(INSTALLED) $(SOURCES)
 		colcon --log-base log build --base-paths . --packages-select cpg_ros --event-handlers console_direct- 
 	@touch $@
 
+# Once for each installation, at most 90 s: later changes are compiled where they are first used.
+# -P: of the installed copy, which is what nodes run.
+install/.compiled: | install/.built
+	@$(ENTER); $(VENV)/bin/python -P -m cpg_ros.tools.precompile || \
+		echo 'the kernels were not compiled: that is done at the first start'
+	@touch $@
+
 clean:
-	rm -rf build install log out docs/_build $(VENV)
+	rm -rf build install log out .numba docs/_build $(VENV)

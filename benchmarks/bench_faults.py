@@ -31,39 +31,39 @@ from xml.etree import ElementTree
 from common import emit, log, ROOT
 from processes import enter_workspace
 
-#: Attack -> tests of it, as pytest selects them.
+#: Attack -> the file of its tests, and their names.
 FAULTS = {
-    'blocked log': ('test_blocked_log.py::test_a_generator_moves_on_and_ends_at_the_stand',
-                    'test_blocked_log.py::test_a_bridge_sits_down',
-                    'test_blocked_log.py::test_every_node_ends_though_its_terminal_is_paused'),
-    'ending signal': ('test_process.py::test_a_signal_ends_it_at_the_stand_with_code_0',
-                      'test_process.py::test_a_signal_while_it_imports_is_one_line'),
-    'stopped clock': ('test_clock.py::test_a_stop_does_not_wait_for_a_clock_that_stands_still',
-                      'test_clock.py::test_disabled_and_enabled_again_while_the_clock_stands_still'
-                      ),
-    'clock that jumps': ('test_clock.py::test_a_looped_clock',
-                         'test_clock.py::test_two_publishers_of_different_times',
-                         'test_clock.py::test_a_stop_between_two_clocks',
-                         'test_clock.py::test_jitter_of_the_clock_is_not_seen'),
-    'watchdog': ('test_unitree_live.py::'
+    'blocked log': ('nodes/test_blocked_log.py',
+                    'test_a_generator_moves_on_and_ends_at_the_stand', 'test_a_bridge_sits_down',
+                    'test_every_node_ends_though_its_terminal_is_paused'),
+    'ending signal': ('nodes/test_process.py', 'test_a_signal_ends_it_at_the_stand_with_code_0',
+                      'test_a_signal_while_it_imports_is_one_line'),
+    'stopped clock': ('nodes/test_clock.py',
+                      'test_a_stop_does_not_wait_for_a_clock_that_stands_still',
+                      'test_disabled_and_enabled_again_while_the_clock_stands_still'),
+    'clock that jumps': ('nodes/test_clock.py', 'test_a_looped_clock',
+                         'test_two_publishers_of_different_times',
+                         'test_a_stop_between_two_clocks',
+                         'test_jitter_of_the_clock_is_not_seen'),
+    'watchdog': ('nodes/test_unitree_live.py',
                  'test_bridge_and_watchdog_killed_together_leave_the_last_command',
-                 'test_unitree_live.py::test_another_users_watchdog_is_not_trusted',
-                 'test_unitree_live.py::test_what_happens_on_a_fault[fed_by_another_user]'),
-    'steering': ('test_panel_lease.py::test_two_pages_do_not_steer_at_once',
-                 'test_panel_lease.py::test_a_link_with_a_delay_does_not_steer',
-                 'test_panel_lease.py::test_a_page_that_was_frozen_does_not_steer',
-                 'test_panel_lease.py::test_a_panel_that_was_stopped_publishes_zero_first',
-                 'test_panel_lease.py::test_stop_works_from_any_page')}
+                 'test_another_users_watchdog_is_not_trusted',
+                 'test_what_happens_on_a_fault[fed_by_another_user]'),
+    'steering': ('panel/test_panel_lease.py', 'test_two_pages_do_not_steer_at_once',
+                 'test_a_link_with_a_delay_does_not_steer',
+                 'test_a_page_that_was_frozen_does_not_steer',
+                 'test_a_panel_that_was_stopped_publishes_zero_first',
+                 'test_stop_works_from_any_page')}
 TARGETS = {'failed': 0, 'skipped': 0}
 
 
-def repeat(tests: tuple[str, ...], times: int) -> dict[str, object]:
+def repeat(file: str, tests: list[str], times: int) -> dict[str, object]:
     """Run tests so often; return how many ended how, and the reasons of the first failures."""
     with tempfile.TemporaryDirectory() as folder:
         report = Path(folder) / 'report.xml'
         subprocess.run(
             [sys.executable, '-m', 'pytest', '--count', str(times), '-q', '--timeout', '600',
-             f'--junitxml={report}', *(f'test/{test}' for test in tests)],
+             f'--junitxml={report}', *(f'test/{file}::{test}' for test in tests)],
             cwd=ROOT, stdout=sys.stderr, check=False)
         cases = list(ElementTree.parse(report).iter('testcase'))
     outcomes: Counter[str] = Counter()
@@ -84,10 +84,10 @@ def main() -> None:
     given = parser.parse_args()
     enter_workspace()
     found = {}
-    for fault, tests in FAULTS.items():
+    for fault, (file, *tests) in FAULTS.items():
         if given.only in fault:
             log(f'{fault}: {len(tests)} tests, {given.times} times')
-            found[fault] = repeat(tests, given.times)
+            found[fault] = repeat(file, tests, given.times)
     emit(benchmark='faults', times=given.times, **found, targets=TARGETS, passed=all(
         one['runs'] and one[key] == target for one in found.values()
         for key, target in TARGETS.items()))

@@ -112,7 +112,13 @@ def measure(job: Job, run: Run) -> Any:
 
 
 def changed(changes: list[str]) -> Gains:
-    """Return gains of which some are changed, each a GAIN=VALUE; ValueError if it is none."""
+    """Return gains of which some are changed, each a GAIN=VALUE.
+
+    Raises:
+        ValueError: it is none.
+        InputError: it is outside its limits.
+
+    """
     gains = Gains()
     for change in changes:
         name, _, value = change.partition('=')
@@ -120,6 +126,7 @@ def changed(changes: list[str]) -> Gains:
             raise ValueError(f"argument --set: '{name}' is not one of {', '.join(Gains._fields)}")
         kind = type(getattr(gains, name))
         gains = gains._replace(**{name: kind(float(value))})
+    gains.check()
     return gains
 
 

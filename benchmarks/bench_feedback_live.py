@@ -56,11 +56,11 @@ class Probe:
     def __init__(self) -> None:
         self.node = rclpy.create_node('probe')
         self.sensed: list[int] = []
-        self.told: list[int] = []
+        self.commanded: list[int] = []
         self.upright, self.stamps = True, deque(maxlen=2)
         best = QoSProfile(depth=50, reliability=ReliabilityPolicy.BEST_EFFORT)
         for kind, topic, kept in ((Imu, 'imu', self.sensed), (JointState, 'lh/joint_states',
-                                                              self.told)):
+                                                              self.commanded)):
             self.node.create_subscription(
                 kind, topic, lambda _, info, kept=kept: kept.append(info['source_timestamp']),
                 best, raw=True)
@@ -77,11 +77,11 @@ class Probe:
             rclpy.spin_once(self.node, timeout_sec=0.01)
 
     def latency_ms(self) -> dict[str, float]:
-        told = np.sort(np.array(self.told))
+        commanded = np.sort(np.array(self.commanded))
         sensed = np.sort(np.array(self.sensed))
-        place = np.searchsorted(told, sensed + round(1e9 * SOONEST))
-        good = place < told.size
-        waited = 1e-6 * (told[place[good]] - sensed[good])
+        place = np.searchsorted(commanded, sensed + round(1e9 * SOONEST))
+        good = place < commanded.size
+        waited = 1e-6 * (commanded[place[good]] - sensed[good])
         return dict(zip(('p50', 'p95', 'p99'), np.percentile(waited, [50, 95, 99]).tolist(),
                         strict=True))
 
@@ -141,14 +141,14 @@ def walked(seconds: float, feedback: bool) -> dict[str, object]:
                 node(**{'feedback.enabled': str(feedback).lower()}) as rhythm:
             probe.spin(4.0)
             probe.sensed.clear()
-            probe.told.clear()
+            probe.commanded.clear()
             before, began = (rhythm.cpu_s(), sim.cpu_s()), time.monotonic()
             probe.spin(seconds)
             spent = time.monotonic() - began
             return {'cpu_generator_percent': 100.0 * (rhythm.cpu_s() - before[0]) / spent,
                     'cpu_robot_sim_percent': 100.0 * (sim.cpu_s() - before[1]) / spent,
                     'real_time_factor': len(probe.sensed) / spent / RATE,
-                    'commands_per_s': len(probe.told) / spent,
+                    'commands_per_s': len(probe.commanded) / spent,
                     'latency_ms': probe.latency_ms(), 'upright': probe.upright}
     finally:
         probe.node.destroy_node()

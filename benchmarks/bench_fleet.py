@@ -186,7 +186,8 @@ def searches(folder: Path) -> dict[str, object]:
     with (dask_cluster(folder, 2) as dask, cluster(dask.address) as far, processes(2) as two,
           processes(1) as one):
         for name, executor in (('one', one), ('two', two), ('dask', far)):
-            robot, tuned, _ = tune(GO2, 'go2', ['trot', 'jump'], 24, 0, executor, threads=1)
+            robot, tuned, _ = tune(GO2, 'go2', ['trot', 'jump'], 24, 0, executor=executor,
+                                   threads=1)
             found[name] = repr((robot.motions, [(each.design, each.price) for each in tuned]))
     return {'tune_the_same': len(set(found.values())) == 1}
 

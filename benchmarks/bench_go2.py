@@ -27,7 +27,7 @@ import time
 from common import emit, log, ROOT
 from cpg_ros.motion.pattern import Pattern
 from cpg_ros.motion.plan import GaitPlan, plan
-from cpg_ros.motion.steering import Drive
+from cpg_ros.motion.strides import Drive
 from cpg_ros.networks.registry import PRESETS
 from cpg_ros.robots.robot_file import read_robot
 from cpg_ros.simulation.batch import Batch, targets
@@ -36,7 +36,7 @@ from cpg_ros.simulation.run_metrics import RunMetrics
 from cpg_ros.simulation.scenario import Scenario
 import numpy as np
 
-sys.path.append(str(ROOT / 'test'))
+sys.path.append(str(ROOT / 'test' / 'support'))
 
 from pattern_follower import Fallen, Follow, speed  # noqa: E402
 
@@ -97,7 +97,7 @@ def tour(body: Body, made: dict[str, GaitPlan]) -> str:
 
 
 def steered(body: Body, made: GaitPlan, forward: float, turn: float) -> tuple[float, float]:
-    """Speed and yaw rate that are had of those asked for."""
+    """Return the speeds and yaw rates that are reached for those commanded."""
     pattern = Pattern(made, drive=Drive(4))
     pattern.steer(*made.steer(forward, turn))
     walk = Follow(body, pattern)

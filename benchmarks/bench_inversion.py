@@ -32,7 +32,7 @@ from scipy.interpolate import CubicHermiteSpline
 from scipy.optimize import least_squares
 import symengine
 
-sys.path.append(str(ROOT / 'test'))
+sys.path.append(str(ROOT / 'test' / 'support'))
 
 from cpg_ros.dynamics.orbit import solve_orbit  # noqa: E402, I100
 from cpg_ros.inversion.fit_data import joints_of  # noqa: E402
@@ -40,7 +40,7 @@ from cpg_ros.inversion.free_parameters import free_numbers  # noqa: E402
 from cpg_ros.inversion.invert import invert, TOLERANCE  # noqa: E402
 from cpg_ros.inversion.least_squares import CycleProblem  # noqa: E402
 from cpg_ros.inversion.trust_region import minimise  # noqa: E402
-from cpg_ros.motion.readout import monomials, TURN  # noqa: E402
+from cpg_ros.motion.joint_polynomial import monomials, TURN  # noqa: E402
 from cpg_ros.networks.delayed import Delayed, PRESETS  # noqa: E402
 from cpg_ros.robots.robot import HARMONICS  # noqa: E402
 from made_up import record, weights_of  # noqa: E402

@@ -24,7 +24,7 @@ of the delayed network).
 from functools import partial
 
 from common import by_turns, emit, log
-from cpg_ros.dynamics.hopf import first_hopf
+from cpg_ros.dynamics.hopf_point import first_hopf
 from cpg_ros.dynamics.orbit import Orbit, solve_orbit
 from cpg_ros.integration.simulate import simulate
 from cpg_ros.networks.delayed import PRESETS

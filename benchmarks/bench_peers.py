@@ -44,7 +44,7 @@ RUNS = {'pace': ((-1.0, 0.55), (0.3, 0.4, 0.5)), 'pronk': ((-1.0, 0.345), (0.1, 
 TARGETS = {'ratio_auto': 2.0, 'period_difference_auto': 1e-7, 'ratio_dde_biftool': 300.0}
 
 
-def said(command: list[str], folder: Path) -> list[list[str]]:
+def output_rows(command: list[str], folder: Path) -> list[list[str]]:
     """Words of the lines that begin with RESULT."""
     done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=True)
     return [line.split()[1:] for line in done.stdout.splitlines() if line.startswith('RESULT')]
@@ -80,7 +80,7 @@ def auto() -> dict[str, object]:
             theta = np.linspace(0.0, 1.0, 401)
             np.savetxt(folder / 'start.dat', np.column_stack([
                 theta * orbit.period, orbit(theta * orbit.period)]), fmt='%.15g')
-            found = said(['autox', 'branch.py', 'start', f'{low},{high}',
+            found = output_rows(['autox', 'branch.py', 'start', f'{low},{high}',
                           ','.join(map(str, values)),
                           ','.join(map(str, known.network.as_dict().values())),
                           str(known.network.alpha)], folder)
@@ -107,7 +107,7 @@ def dde_biftool() -> dict[str, object]:
     if not Path(place, 'ddebiftool').is_dir():
         return {'skipped': 'DDE_BIFTOOL names no folder with DDE-BIFTOOL in it'}
     rows: dict[str, object] = {}
-    for gait, count, peer, period in said(
+    for gait, count, peer, period in output_rows(
             ['octave-cli', '--norc', 'reduced.m'], ROOT / 'benchmarks' / 'dde_biftool'):
         orbit = solve_orbit(Delayed(-4.5, 1.0, 6.5, -2.0, 0.4), gait)
         line = ParameterLine.parse('tau', Delayed)

@@ -39,7 +39,7 @@ def measure(kind: str, seconds: float) -> tuple[np.ndarray, int]:
     """Return the errors of the periods of one start, us, and how many ticks were dropped."""
     with start_node('generator', rate=RATE, thread_priority=PRIORITIES[kind]) as node:
         if ('SCHED_FIFO' in node.output) != bool(PRIORITIES[kind]):
-            raise RuntimeError(f'the priority is not what was asked for:\n{node.output}')
+            raise RuntimeError(f'the priority is not the requested one:\n{node.output}')
         with Listener(seconds) as listener, contextlib.ExitStack() as load:
             for _ in range(2 * os.cpu_count()):
                 load.enter_context(Process([sys.executable, '-c', 'while True: pass']))

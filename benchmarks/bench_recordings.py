@@ -16,7 +16,7 @@
 
 Of 192 seeded tables each is either refused in one line, or the gait and frequency found are those
 that walked, or a warning says what speaks against them. And whether `confidence` is what it says:
-of what is said with 95 %, how much is right.
+how much of what is named with a confidence of 95 % is right.
 """
 
 import argparse
@@ -48,15 +48,15 @@ def outcome(number: int, folder: Path, seed: int = SEED) -> tuple[str, Stride | 
     except Exception:
         return 'traceback', None, f'{way}: {traceback.format_exc()}'
     right = found.nearest == made.gait and abs(found.frequency / made.frequency - 1.0) < 0.03
-    said = (f'{way}: {found.nearest} at {found.frequency:.4g} Hz, {found.confidence:.2f} sure, '
+    line = (f'{way}: {found.nearest} at {found.frequency:.4g} Hz, {found.confidence:.2f} sure, '
             f'where it was a {made.gait} at {made.frequency:.4g} Hz')
-    # Hopping, turning and other units are no mistake of the gait's name, but must be said.
+    # Hopping, turning and other units are no mistake of the gait's name, but must be reported.
     must_say = way in ('milliseconds', 'microseconds', 'degrees', 'on the spot', 'turn',
                        'slow change', 'another between')
     warned = bool(found.issues) and found.confidence < 0.95
     if right and not must_say:
-        return 'right', found, said
-    return ('warned' if warned else 'wrong'), found, said
+        return 'right', found, line
+    return ('warned' if warned else 'wrong'), found, line
 
 
 def main() -> None:
@@ -68,11 +68,11 @@ def main() -> None:
     sure, bad = [], []
     with tempfile.TemporaryDirectory() as folder:
         for number in range(given.files):
-            kind, found, said = outcome(number, Path(folder), given.seed)
+            kind, found, line = outcome(number, Path(folder), given.seed)
             tally[kind] += 1
             if kind in ('wrong', 'traceback'):
-                bad.append(said)
-                log(said)
+                bad.append(line)
+                log(line)
             if found is not None and found.confidence >= 0.95:
                 sure.append(kind == 'right')
     share = sum(sure) / max(len(sure), 1)

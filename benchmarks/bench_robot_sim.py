@@ -39,11 +39,11 @@ MEASURED = """
 import sys
 from cpg_ros.nodes import deadline_thread as ticker
 from cpg_ros.nodes.robot_sim import main
-delays, note = [], ticker.Ticker._note
+delays, stalled = [], ticker.Ticker._stalled
 def noted(self, behind, period):
     delays.append(behind)
-    return note(self, behind, period)
-ticker.Ticker._note = noted
+    return stalled(self, behind, period)
+ticker.Ticker._stalled = noted
 code = main(sys.argv[1:])
 import numpy
 print('late', *numpy.percentile(numpy.array(delays[500:]) * 1e-3, [50, 99, 99.9]), flush=True)

@@ -34,7 +34,6 @@ import numpy as np
 from processes import ends_with_us, enter_workspace, GENERATOR
 from rcl_interfaces.msg import Parameter, ParameterType, ParameterValue
 import rclpy
-from rclpy.executors import SingleThreadedExecutor
 from rclpy.qos import QoSProfile
 from sensor_msgs.msg import JointState
 from std_srvs.srv import SetBool
@@ -93,29 +92,27 @@ class Piped:
 
 
 class Checker:
-    """Listens to joint states in a thread of its own and holds each message against limits."""
+    """Listens to joint states and compares each message with the robot's limits."""
 
     def __init__(self, robot: str) -> None:
+        from cpg_ros.nodes.polled_group import PolledSubscription
         from cpg_ros.robots.robot_file import load_robot
         joints = load_robot(robot).joints
         self._limits = {joint.name: (joint.lower, joint.upper, joint.velocity)
                         for joint in joints}
         self.node = rclpy.create_node('checker')
-        self.node.create_subscription(JointState, 'joint_states', self._hear,
-                                      QoSProfile(depth=10000))
+        # At RATE, more than arrives while a request waits in vain for its answer.
+        self._topic = PolledSubscription(self.node, JointState, 'joint_states',
+                                         QoSProfile(depth=10000), overridable=False)
         self.messages, self.crossed, self.fastest, self.off = 0, [], 0.0, 0.0
         self._before: tuple[float, np.ndarray, np.ndarray] | None = None
-        self._executor = SingleThreadedExecutor()
-        self._executor.add_node(self.node)
-        self._ending = False
-        self._thread = threading.Thread(target=self._spin, daemon=True)
-        self._thread.start()
 
-    def _spin(self) -> None:
-        while not self._ending:
-            self._executor.spin_once(timeout_sec=0.1)
+    def take(self) -> None:
+        """Check what has arrived."""
+        for message, _ in self._topic.take():
+            self._check(message)
 
-    def _hear(self, message: JointState) -> None:
+    def _check(self, message: JointState) -> None:
         lower, upper, limit = np.array([self._limits[name] for name in message.name]).T
         stamp = message.header.stamp.sec + 1e-9 * message.header.stamp.nanosec
         position, velocity = np.array(message.position), np.array(message.velocity)
@@ -145,8 +142,7 @@ class Checker:
         self._before = stamp, position, velocity
 
     def end(self) -> None:
-        self._ending = True
-        self._thread.join()
+        self.take()
         self.node.destroy_node()
 
 
@@ -207,6 +203,7 @@ def storm(network: str, seconds: float, pipe: bool, seed: int) -> dict[str, obje
         except NoAnswer:
             counts['unanswered'] += 1
         counts['requests'] += 1
+        checker.take()
     code = node.end()
     time.sleep(0.5)
     checker.end()

@@ -25,7 +25,7 @@ import time
 from common import emit, log, ROOT
 import numpy as np
 
-sys.path.append(str(ROOT / 'test'))
+sys.path.append(str(ROOT / 'test' / 'support'))
 
 from cpg_ros.dynamics.orbit import solve_preset  # noqa: E402, I100
 from cpg_ros.gaits.stride import find_stride  # noqa: E402

@@ -32,7 +32,7 @@ from common import emit, log, ROOT
 import numpy as np
 from processes import enter_workspace, Process
 
-sys.path.append(str(ROOT / 'test'))
+sys.path.append(str(ROOT / 'test' / 'support'))
 BRIDGE = [str(ROOT / 'install/cpg_ros/lib/cpg_ros/unitree_bridge')]
 PERIOD = 0.002
 #: The first hip swings by so much a command, rad, there and back in so many of them.

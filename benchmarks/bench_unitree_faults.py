@@ -24,11 +24,11 @@ from common import emit, log, ROOT
 import numpy as np
 from processes import enter_workspace
 
-sys.path.append(str(ROOT / 'test'))
+sys.path.append(str(ROOT / 'test' / 'support'))
 
 
 def killed_together(walk, mend, kill, times: int) -> dict:
-    """Kill bridge and watchdog as often as asked; return what the robot has seen from then on."""
+    """Kill bridge and watchdog a number of times; return what the robot sees from then on."""
     left, held = [], []
     for _ in range(2 * times):
         if len(left) == times:
@@ -48,7 +48,7 @@ def killed_together(walk, mend, kill, times: int) -> dict:
 
 
 def main() -> None:
-    """Walk, break something, see what happens, mend it; as often as asked."""
+    """Walk, break something, see what happens, mend it; a number of times."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument('--times', type=int, default=20)
     parser.add_argument('--only', default='', help='faults with this in their names')

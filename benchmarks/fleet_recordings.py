@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 
 ROOT = Path(__file__).resolve().parent.parent
-sys.path += [str(Path(__file__).parent), str(ROOT / 'test')]
+sys.path += [str(Path(__file__).parent), str(ROOT / 'test' / 'support')]
 
 from bags import joint_state, write_bag  # noqa: E402
 from cpg_ros.fleet.recording_job import invert_recording, Task  # noqa: E402

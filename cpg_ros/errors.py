@@ -12,10 +12,10 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The errors of the package: what is wrong with what it was given, in words for whoever gave it.
+"""The errors of the package: what is wrong with its input, in words for the user.
 
-Whatever else is raised, a ValueError of numpy or one for arrays of a wrong shape, is a mistake in
-the program that calls: nothing here catches it, so that it is never reported as a user's.
+Any other exception, such as a ValueError of numpy for arrays of a wrong shape, is a bug in the
+calling program: the package does not catch it, so it is never reported as the user's mistake.
 """
 
 from importlib.util import find_spec
@@ -25,13 +25,13 @@ from typing import ClassVar
 
 
 class CpgError(ValueError):
-    """What was asked for cannot be done; the message says what and why, in one line.
+    """A request cannot be met; the message says what and why, in one line.
 
-    Its kinds are in the files whose functions raise them.
+    Subclasses are defined beside the functions that raise them.
 
     Attributes:
-        exit_code: of a tool that it ends: 2 for unusable input; kinds that are a negative result,
-            such as a recording without a gait, have 1.
+        exit_code: of a tool that it ends: 2 for unusable input; 1 for a negative result, such as
+            a recording without a gait.
 
     """
 
@@ -43,31 +43,31 @@ class InputError(CpgError):
 
 
 class MissingLibraryError(CpgError, ImportError):
-    """A library that no apt package of Ubuntu 24.04 brings is not there; says how to get it."""
+    """A library from PyPI is not installed; the message says how to install it."""
 
 
 def needed(library: str, part: str = '') -> None:
-    """See that a library can be imported, and a part of it that old versions lack.
+    """Check that a library can be imported, and a part of it that old versions lack.
 
     Raises:
-        MissingLibraryError: it is not there. Where nobody catches it, it is one line.
+        MissingLibraryError: it is not installed; uncaught, it prints one line.
 
     """
     try:
         if find_spec(part or library) is not None:
             return
     except ModuleNotFoundError:
-        pass  # of a part: the library itself is not there
+        pass  # of a part: the library itself is not installed
     usual = sys.excepthook
 
-    def told(kind: type[BaseException], error: BaseException, trace: TracebackType | None
+    def report(kind: type[BaseException], error: BaseException, trace: TracebackType | None
              ) -> None:
         if isinstance(error, MissingLibraryError):
             print(error, file=sys.stderr)
         else:
             usual(kind, error, trace)
 
-    sys.excepthook = told
+    sys.excepthook = report
     raise MissingLibraryError(
         f'cpg_ros needs {library}, which is not installed: python3 -m venv '
         f'--system-site-packages .venv && .venv/bin/pip install {library}, and run colcon from '

@@ -28,12 +28,12 @@ project_copyright = 'cpg_ros maintainers, Apache-2.0'
 version = release = cpg_ros.__version__
 
 extensions = ['myst_parser', 'sphinx_design', 'sphinx.ext.autodoc', 'sphinx.ext.napoleon',
-              'sphinx.ext.mathjax', 'generated_tables', 'dark_images']
+              'sphinx.ext.mathjax', 'generated_tables', 'dark_images', 'playground']
 html_theme = 'furo'
 html_static_path = ['static']
 html_css_files = ['site.css']
 html_title = f'cpg_ros {release}'
-exclude_patterns = ['_build']
+exclude_patterns = ['_build', 'playground']
 
 # theory.md writes formulas between dollars; headings are linked to as GitHub makes anchors.
 myst_enable_extensions = ['dollarmath', 'colon_fence', 'deflist']

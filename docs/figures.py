@@ -40,11 +40,13 @@ FIGURES = {
     'branches_quadruped': ('analyze', ['--network', 'quadruped', '--preset', 'pace', '--along',
                                        'alpha=beta', '--range=-0.1:0.6', '--plot',
                                        'FOLDER/it.png'], 'it.png'),
+    'phase_response': ('analyze', ['--network', 'quadruped', '--preset', 'trot', '--prc',
+                                   'FOLDER/it.png'], 'it.png'),
     'inversion': ('inversion', ['--csv', str(WALK), '--out', 'FOLDER/fitted.yaml', '--report',
                                 'FOLDER/report.html'], 'report.html'),
-    'tour': ('demo', ['--no-panel', '--no-film', '--out', 'FOLDER'], 'footfalls.png'),
-    'hexapod_footfalls': ('demo', ['--hexapod', '--gaits', 'tripod', 'ripple', 'wave', '--every',
-                                   '4', '--no-panel', '--no-film', '--out', 'FOLDER'],
+    'tour': ('demo', ['--tour', '--no-panel', '--out', 'FOLDER'], 'footfalls.png'),
+    'hexapod_footfalls': ('demo', ['--hexapod', '--tour', 'tripod', 'ripple', 'wave', '--every',
+                                   '4', '--no-panel', '--out', 'FOLDER'],
                           'footfalls.png')}
 #: Heading of the picture that is taken from a report.
 HEADING = '<h2>Recorded and fitted</h2>'

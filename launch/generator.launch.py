@@ -30,6 +30,7 @@ ARGUMENTS = {
     'command': ('none', str, 'none, joint_trajectory or forward_position'),
     'cmd_vel': ('false', bool, 'follow the commands on cmd_vel (geometry_msgs/Twist); the robot '
                 'file must have steering tables'),
+    'stamped_cmd_vel': ('false', bool, 'cmd_vel is a geometry_msgs/TwistStamped'),
     'autostart': ('true', bool, 'ramp into the gait at start'),
     'use_sim_time': ('false', bool, 'follow /clock'),
 }

@@ -12,25 +12,36 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
+from contextlib import ExitStack
 import os
+from pathlib import Path
+import shutil
 import signal
 
 # As nodes and tools run: before numpy loads.
 os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
+# As nodes do, before rclpy loads: shared memory makes whoever sends wait for 333 ms at times.
+os.environ.setdefault('FASTDDS_BUILTIN_TRANSPORTS', 'UDPv4')
 # Shells make what they start in the background ignore it, and its children would, too.
 if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
+import depth  # noqa: E402
 from graph import EXECUTABLE, Process, Watcher  # noqa: E402
 import pytest  # noqa: E402
+from stepped import SteppedGenerator  # noqa: E402
 
-#: Files whose tests measure against the clock on the wall: beside others they would fail.
-ALONE = ('test_clock', 'test_demo', 'test_lockstep', 'test_stalls', 'test_stop_paths',
-         'test_switching', 'test_topics', 'test_unitree_live')
+depth.register()
+
+#: What Chromium is called, and how it runs on a machine without a screen or a network.
+CHROMIUM = 'chromium', 'chromium-browser', 'google-chrome'
+FLAGS = ['--headless', '--no-sandbox', '--disable-gpu', '--use-angle=swiftshader',
+         '--enable-unsafe-swiftshader', '--disable-quic', '--no-first-run',
+         '--disable-background-networking', '--disable-component-update', '--disable-sync']
 
 
 def pytest_collection_modifyitems(items):
-    """Mark what runs on a graph in real time, and of that what must have the machine to itself."""
+    """Mark what runs on a graph."""
     seen = set()
     for item in items:
         # The lines that a test runs are those of its first parameters, but for what other tests
@@ -42,11 +53,19 @@ def pytest_collection_modifyitems(items):
         known = vars(item.module).values()
         given = set(getattr(item, 'callspec', item).__dict__.get('params', ()))
         fixtures = set(item.fixturenames) - given
-        if {'start', 'running'} & fixtures or any(
+        if {'start', 'running', 'stepped', 'generators'} & fixtures or any(
                 thing is one for thing in known for one in (EXECUTABLE, Process, Watcher)):
             item.add_marker('live')
-            if item.module.__name__ in ALONE:
-                item.add_marker('alone')
+
+
+def pytest_terminal_summary(terminalreporter, config):
+    """Add what was skipped, and why, to the file that SKIPS names, for .ci/run."""
+    if 'SKIPS' in os.environ:
+        skipped = {f'{Path(file).relative_to(config.rootpath)}: {why.removeprefix("Skipped: ")}'
+                   for file, _, why in (report.longrepr for report in
+                                        terminalreporter.getreports('skipped'))}
+        with Path(os.environ['SKIPS']).open('a') as lines:
+            lines.writelines(f'{line}\n' for line in sorted(skipped))
 
 
 @pytest.fixture(autouse=True)
@@ -77,12 +96,55 @@ def start():
         one.end()
 
 
+@pytest.fixture(scope='session')
+def generators():
+    """Return the session's generator of a network, on simulated time in this process."""
+    started = {}
+
+    def of(network: str) -> SteppedGenerator:
+        if network not in started:
+            started[network] = SteppedGenerator('-p', f'network:={network}', '-p', 'rate:=200.0',
+                                                '-p', 'frequency:=2.0', '-p', 'transition:=0.4')
+        return started[network]
+
+    yield of
+    for one in started.values():
+        one.end()
+
+
+@pytest.fixture
+def running(generators):
+    """Return the generator of the delayed network and its watcher; a test may change it."""
+    generator = generators('delayed')
+    with generator.lent():
+        yield generator, generator.watcher
+
+
+@pytest.fixture
+def stepped():
+    """Start generators on simulated time in this process, which are ended with the test.
+
+    Time goes on by itself, or as the test lets it run.
+    """
+    with ExitStack() as ending:
+        def start_one(*ros_args: str, running: bool = True, domain: int | None = None):
+            one = SteppedGenerator(*ros_args, domain=domain)
+            ending.callback(one.end)
+            if running:
+                one.run()
+            return one, one.watcher
+
+        yield start_one
+
+
 @pytest.fixture(scope='module')
-def running():
-    """One generator for all tests of a file that leave it as they found it."""
-    process = Process('-p', 'rate:=200.0', '-p', 'frequency:=2.0', '-p', 'transition:=0.4')
-    process.wait_for('publishing')
-    watcher = Watcher(process.domain)
-    yield process, watcher
-    watcher.end()
-    process.end()
+def browser():
+    """Yield Chromium without a screen, which looks at nothing but this machine."""
+    playwright = pytest.importorskip('playwright.sync_api', reason='playwright is not installed')
+    chromium = next(filter(None, map(shutil.which, CHROMIUM)), None)
+    if chromium is None:
+        pytest.skip('there is no Chromium on this machine')
+    with playwright.sync_playwright() as running:
+        started = running.chromium.launch(executable_path=chromium, args=FLAGS)
+        yield started
+        started.close()

@@ -17,5 +17,5 @@
 Imports ``fleet``, ``dynamics`` and what is below; knows nothing of ROS.
 """
 
-__all__ = ['chart', 'fold_curves', 'hopf_curves', 'map_page', 'map_picture', 'orbit_curves',
-           'refinement', 'row_job', 'stored']
+__all__ = ['chart', 'fold_curves', 'grid_refinement', 'hopf_curves', 'hopf_starts', 'map_page',
+           'map_picture', 'orbit_curves', 'row_job', 'stored']

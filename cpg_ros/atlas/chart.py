@@ -59,13 +59,32 @@ class Chart:
     first: Axis
     second: Axis
 
+    @property
+    def low(self) -> np.ndarray:
+        """Lower ends of both axes, shape (2,)."""
+        return np.array([self.first.low, self.second.low])
+
+    @property
+    def size(self) -> np.ndarray:
+        """Lengths of both axes, shape (2,)."""
+        return np.array([self.first.high, self.second.high]) - self.low
+
     def at(self, one: float, other: float) -> Network:
-        """The network with a value on each axis."""
+        """Return the network with a value on each axis."""
         whole = find_network(self.network)(**self.base)
         return self.second.line.at(self.first.line.at(whole, one), other)
 
+    def at_share(self, share: np.ndarray) -> Network:
+        """Return the network at a point given in shares of the ranges, shape (2,)."""
+        one, other = (self.low + share * self.size).tolist()
+        return self.at(one, other)
+
+    def share(self, point: tuple[int, int]) -> np.ndarray:
+        """Return a point of the grid, given by row and column, in shares of the ranges."""
+        return np.array(point) / (self.first.count - 1, self.second.count - 1)
+
     def as_dict(self) -> dict[str, Any]:
-        """Everything in plain types."""
+        """Return everything in plain types."""
         return {'network': self.network, 'base': self.base,
                 'axes': [{'line': str(axis.line), 'low': axis.low, 'high': axis.high,
                           'count': axis.count} for axis in (self.first, self.second)]}

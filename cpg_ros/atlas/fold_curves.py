@@ -24,13 +24,13 @@ from itertools import pairwise
 from typing import Any
 
 from cpg_ros.atlas.chart import Chart, COARSE
+from cpg_ros.atlas.grid_refinement import grid_indices, Sheet
 from cpg_ros.atlas.hopf_curves import Boundary
 from cpg_ros.atlas.orbit_curves import Edge
-from cpg_ros.atlas.refinement import grid_indices, Sheet
-from cpg_ros.atlas.row_job import NONE, path_of
+from cpg_ros.atlas.row_job import NONE, solve_from_wave
 from cpg_ros.dynamics.arclength import CurvePoint, predict_and_correct, resolve_point
 from cpg_ros.dynamics.continuation import continue_orbit
-from cpg_ros.dynamics.orbit import NoOrbit, solve_from_path
+from cpg_ros.dynamics.orbit import NoOrbit
 from cpg_ros.errors import CpgError
 import numpy as np
 from scipy.optimize import brentq
@@ -43,16 +43,14 @@ TRIED, MOST, SAME = 8, 80, 0.02
 
 
 def lost_edges(chart: Chart, sheet: Sheet) -> list[Edge]:
-    """Neighbours on the coarse grid, along the second axis, of which one has no orbit."""
+    """Return neighbours on the coarse grid, along the second axis, one of which has no orbit."""
     columns = grid_indices(chart.second.count, COARSE)
-    size = np.array([chart.first.count - 1, chart.second.count - 1])
     found = []
     for row in grid_indices(chart.first.count, COARSE):
         for one, other in pairwise(columns):
             for at, there in (((row, one), (row, other)), ((row, other), (row, one))):
                 if at in sheet.waves and sheet.label[there] == NONE:
-                    here, away = np.array(at) / size, np.array(there) / size
-                    found.append(Edge((here[0], here[1]), (away[0], away[1]), *sheet.waves[at]))
+                    found.append(Edge(chart.share(at), chart.share(there), *sheet.waves[at]))
     return found
 
 
@@ -60,48 +58,42 @@ def fold_curves(job: tuple[Chart, str, list[Edge]]) -> list[Boundary]:
     """Follow the folds at which a gait is lost over some edges; most are lost at Hopf points."""
     chart, gait, edges = job
     found: list[Boundary] = []
-    size = np.array([chart.first.high - chart.first.low, chart.second.high - chart.second.low])
     for edge in edges[::max(1, len(edges) // TRIED)]:
         try:
             folds = _folds(chart, gait, edge)
         except (CpgError, np.linalg.LinAlgError):
             continue
-        one = chart.first.low + edge.here[0] * size[0]
+        one = chart.first.low + edge.here[0] * chart.size[0]
         for fold in folds:
-            if any((np.abs(curve.points - (one, fold.value)) / size).max(axis=1).min() < SAME
+            if any((np.abs(curve.points - (one, fold.value)) / chart.size).max(axis=1).min() < SAME
                    for curve in found):
                 continue
             back, ahead = (followed(chart, fold, one, way) for way in (-1.0, 1.0))
-            found.append(Boundary('fold', gait, np.array(
+            found.append(Boundary('fold', (gait,), np.array(
                 [*back[::-1], (one, fold.value), *ahead])))
     return found
 
 
 def _folds(chart: Chart, gait: str, edge: Edge) -> list[CurvePoint]:
-    """Folds of the branch in the row of an edge."""
-    one, other = (float(axis.low + part * (axis.high - axis.low)) for axis, part in zip(
-        (chart.first, chart.second), edge.here, strict=True))
-    network = chart.at(one, other)
-    orbit = solve_from_path(network, network.symmetry(gait), path_of(edge.wave), edge.period)
-    if orbit is None:
-        raise NoOrbit('the orbit cannot be had')
+    """Return the folds of the branch in the row of an edge."""
+    orbit = solve_from_wave(chart.at_share(edge.here), gait, edge.wave, edge.period)
     branch = continue_orbit(orbit, chart.second.line, chart.second.low, chart.second.high,
                             most=MOST)
     return [point.place for point in branch.folds]
 
 
 def followed(chart: Chart, fold: CurvePoint, one: float, way: float) -> list[tuple[float, float]]:
-    """Folds from one on while the first parameter moves a way, as values on both axes.
+    """Follow folds from one on in a direction of the first parameter; return their values.
 
     Args:
         chart: the plane.
         fold: a fold along the second axis.
         one: value on the first axis there.
-        way: 1 or -1.
+        way: 1 or -1, the direction.
 
     """
     found: list[tuple[float, float]] = []
-    size, step = chart.first.high - chart.first.low, STEP
+    size, step = chart.size[0], STEP
     before: tuple[Any, float] | None = None
     while step >= SHORTEST:
         new = one + way * step * size
@@ -125,7 +117,7 @@ def followed(chart: Chart, fold: CurvePoint, one: float, way: float) -> list[tup
 
 
 def _next(chart: Chart, fold: CurvePoint, new: float, guess: np.ndarray) -> CurvePoint | None:
-    """The fold at a value of the first parameter, from one nearby; None if it is not found."""
+    """Return the fold at a value of the first parameter, from one nearby, or None."""
     curve: Any = fold.curve
     moved = replace(curve, network=chart.at(new, fold.value))
     try:

@@ -19,23 +19,27 @@ real equations in three unknowns, whose curve is followed by pseudo-arclength (K
 AUTO-07p and DDE-BIFTOOL do). For the delayed network Delta = i omega - A - B exp(-i omega tau).
 """
 
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from itertools import chain
+from typing import Any
 
 from cpg_ros.atlas.chart import Chart
+from cpg_ros.atlas.hopf_starts import hopf_starts, HopfStart, lines_across
 from cpg_ros.dynamics.characteristic import characteristic_matrix
 from cpg_ros.dynamics.equilibrium import equilibrium
-from cpg_ros.dynamics.hopf_search import hopf_points
 from cpg_ros.dynamics.isotypic import blocks
 from cpg_ros.errors import CpgError
 from cpg_ros.short_repr import ShortRepr
 import numpy as np
 
-#: Lines on which curves begin, steps in shares of the ranges, and points of a curve at most.
-BEGINNINGS, FIRST, LONGEST, SHORTEST, MOST = 41, 0.01, 0.04, 1e-5, 400
+#: Steps in shares of the ranges, and points of a curve at most.
+FIRST, LONGEST, SHORTEST, MOST = 0.01, 0.04, 1e-5, 400
 #: Newton's method: steps, and where it ends; differences for its matrix, in shares.
 NEWTON, EXACT, DIFFERENCE = 12, 1e-12, 1e-6
-#: A beginning this close to a curve, in shares of the ranges, lies on it.
-SAME = 5e-3
+#: A beginning this close to a curve, in shares of the ranges, lies on it. Two classes share a
+#: curve if a few points on it, so many, are solutions of both.
+SAME, SHARED, CHECKED = 5e-3, 1e-8, 8
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -44,14 +48,17 @@ class Boundary(ShortRepr):
 
     Attributes:
         kind: 'Hopf', 'torus', 'period doubling', 'branch point' or 'fold'.
-        gait: whose.
+        gaits: whose: several, where classes with the same eigenvalues share it.
         points: values on both axes, and of a Hopf point omega, shape (n, 2 or 3).
 
     """
 
     kind: str
-    gait: str
+    gaits: tuple[str, ...]
     points: np.ndarray
+
+    def __str__(self) -> str:
+        return f'{self.kind} of {" and ".join(self.gaits)}'
 
 
 class _Condition:
@@ -59,9 +66,7 @@ class _Condition:
 
     def __init__(self, chart: Chart, mode: tuple[int, ...], omega: float) -> None:
         self.chart, self.mode = chart, mode
-        self.low = np.array([chart.first.low, chart.second.low, 0.0])
-        self.size = np.array([chart.first.high - chart.first.low,
-                              chart.second.high - chart.second.low, omega])
+        self.low, self.size = np.append(chart.low, 0.0), np.append(chart.size, omega)
 
     def values(self, share: np.ndarray) -> np.ndarray:
         one, other, omega = self.low + share * self.size
@@ -73,9 +78,24 @@ class _Condition:
         return np.array([found.real, found.imag])
 
     def slopes(self, share: np.ndarray) -> np.ndarray:
-        steps = DIFFERENCE * np.eye(3)
-        return np.array([(self.values(share + step) - self.values(share - step))
-                         / (2.0 * DIFFERENCE) for step in steps]).T
+        return slopes(self.values, share, DIFFERENCE)
+
+
+def slopes(values: Callable[[np.ndarray], Any], share: np.ndarray, difference: float
+           ) -> np.ndarray:
+    """Return the derivatives of a function by its arguments, from central differences.
+
+    Args:
+        values: of m numbers, or of one.
+        share: its argument, shape (n,).
+        difference: of the argument.
+
+    Returns:
+        Shape (m, n), or (n,) if the function has one number.
+
+    """
+    return np.array([(values(share + step) - values(share - step)) / (2.0 * difference)
+                     for step in difference * np.eye(share.size)]).T
 
 
 def _corrected(condition: _Condition, share: np.ndarray, tangent: np.ndarray
@@ -107,19 +127,12 @@ def _followed(condition: _Condition, start: np.ndarray, way: float) -> list[np.n
     here, step = start, FIRST
     tangent = way * _tangent(condition, start)
     found: list[np.ndarray] = []
-    while len(found) < MOST:
+    while len(found) < MOST and step >= SHORTEST:
         ahead = _corrected(condition, here + step * tangent, tangent)
-        new = None if ahead is None else _tangent(condition, ahead[0])
-        if ahead is None or new is None or abs(new @ tangent) < 0.95:
+        new = tangent if ahead is None else _tangent(condition, ahead[0])
+        if ahead is None or abs(new @ tangent) < 0.95 or not _inside(ahead[0]):
+            # Beyond the edge, too: up to it by ever shorter steps.
             step *= 0.5
-            if step < SHORTEST:
-                break
-            continue
-        if not _inside(ahead[0]):
-            # Up to the edge, by ever shorter steps.
-            step *= 0.5
-            if step < SHORTEST:
-                break
             continue
         here, tangent = ahead[0], new * np.sign(new @ tangent)
         found.append(here)
@@ -130,35 +143,68 @@ def _followed(condition: _Condition, start: np.ndarray, way: float) -> list[np.n
     return found
 
 
-def hopf_curves(job: tuple[Chart, tuple[str, ...]]) -> list[Boundary]:
-    """All curves of Hopf points of some gaits in a plane that a few lines across it meet."""
-    chart, gaits = job
-    found: list[Boundary] = []
-    seen: dict[tuple[int, ...], list[np.ndarray]] = {}
-    for value in np.linspace(chart.first.low, chart.first.high, BEGINNINGS):
-        network = chart.at(float(value), chart.second.low)
-        shifts = {frozenset(network.symmetry(gait).shifts): gait for gait in gaits}
-        try:
-            points = hopf_points(network, chart.second.line, chart.second.low, chart.second.high)
-        except CpgError:
+@dataclass(eq=False)
+class _Followed:
+    gaits: list[str]
+    modes: set[tuple[int, ...]]
+    shares: np.ndarray
+
+    def holds(self, chart: Chart, start: HopfStart) -> bool:
+        """Whether a point lies on the curve, as one of a class that has all of the curve."""
+        if not _on(self.shares, start.share):
+            return False
+        if start.mode not in self.modes:
+            condition = _Condition(chart, start.mode, 1.0)
+            for share in self.shares[::max(1, len(self.shares) // CHECKED)]:
+                exact = _corrected(condition, share, _tangent(condition, share))
+                if exact is None or np.abs(exact[0] - share).max() > SHARED:
+                    return False
+            self.modes.add(start.mode)
+        if start.gait not in self.gaits:
+            self.gaits.append(start.gait)
+        return True
+
+
+def curves_from(chart: Chart, starts: Iterable[HopfStart]) -> list[Boundary]:
+    """Follow the curves of Hopf points through some; each is listed once, with all its gaits."""
+    curves: list[_Followed] = []
+    for start in starts:
+        if any(curve.holds(chart, start) for curve in curves):
             continue
-        for point in points:
-            gait = shifts.get(frozenset(point.block.symmetry.shifts))
-            if gait is None:
-                continue
-            condition = _Condition(chart, point.mode, 1.0)
-            start = (np.array([value, point.value, point.omega]) - condition.low
-                     ) / condition.size
-            if any(_on(curve, start) for curve in seen.get(point.mode, [])):
-                continue
-            exact = _corrected(condition, start, _tangent(condition, start))
-            if exact is None:
-                continue
-            back = _followed(condition, exact[0], -1.0)
-            shares = np.array([*back[::-1], exact[0], *_followed(condition, exact[0], 1.0)])
-            seen.setdefault(point.mode, []).append(shares)
-            found.append(Boundary('Hopf', gait, condition.low + shares * condition.size))
-    return found
+        condition = _Condition(chart, start.mode, 1.0)
+        exact = _corrected(condition, start.share, _tangent(condition, start.share))
+        if exact is None:
+            continue
+        back, ahead = (_followed(condition, exact[0], way) for way in (-1.0, 1.0))
+        curves.append(_Followed([start.gait], {start.mode},
+                                np.array([*back[::-1], exact[0], *ahead])))
+    low, size = np.append(chart.low, 0.0), np.append(chart.size, 1.0)
+    return [Boundary('Hopf', tuple(curve.gaits), low + curve.shares * size) for curve in curves]
+
+
+def hopf_curves(chart: Chart, gaits: tuple[str, ...],
+                run: Callable[..., Iterable[list[HopfStart]]] = map) -> list[Boundary]:
+    """Follow all curves of Hopf points of some gaits that a few lines across the plane meet.
+
+    Args:
+        chart: the plane.
+        gaits: of its network.
+        run: applies a function to jobs, as ``map`` does, or ``Fleet.map``.
+
+    """
+    return curves_from(chart, chain(*run(hopf_starts, [*lines_across(chart, gaits)])))
+
+
+def crossed(curve: Boundary, chart: Chart, here: np.ndarray, there: np.ndarray) -> bool:
+    """Whether a curve crosses between two neighbours, given in shares, or close to them."""
+    points = (curve.points[:, :2] - chart.low) / chart.size
+    middle, reach = 0.5 * (here + there), np.abs(here - there).max()
+    one, ahead = points[:-1], np.diff(points, axis=0)
+    if not len(ahead):
+        return bool(np.abs(points - middle).max() < reach)
+    share = np.clip(((middle - one) * ahead).sum(axis=1) / np.maximum(
+        (ahead**2).sum(axis=1), 1e-30), 0.0, 1.0)
+    return bool((np.abs(one + share[:, None] * ahead - middle).max(axis=1) < reach).any())
 
 
 def _on(curve: np.ndarray, start: np.ndarray) -> bool:

@@ -20,9 +20,9 @@ from pathlib import Path
 from typing import Any
 
 from cpg_ros.atlas.chart import Chart
+from cpg_ros.atlas.grid_refinement import Sheet
 from cpg_ros.atlas.hopf_curves import Boundary
-from cpg_ros.atlas.map_picture import COLOURS, LINES
-from cpg_ros.atlas.refinement import Sheet
+from cpg_ros.atlas.map_picture import LINES, STATES
 from cpg_ros.files.atomic_write import write_atomically
 from cpg_ros.files.page_style import STYLE
 from cpg_ros.networks.registry import find_network
@@ -65,7 +65,7 @@ function draw() {
   }
   pen.clearRect(0, 0, L, map.height); pen.clearRect(0, 8 + H, map.width, B);
   pen.clearRect(0, 0, map.width, 8); pen.clearRect(L + W, 0, 8, map.height);
-  for (const c of A.curves) if (c.gait === pick.value) {
+  for (const c of A.curves) if (c.gaits.includes(pick.value)) {
     pen.strokeStyle = A.lines[c.kind]; pen.lineWidth = 1.5; pen.beginPath();
     c.points.forEach((p, k) => pen[k ? 'lineTo' : 'moveTo'](X(p[0]), Y(p[1])));
     pen.stroke();
@@ -90,13 +90,13 @@ function wave(g, i, j) {
   return best;
 }
 function show(i, j) {
-  const g = A.gaits[pick.value], k = i * M + j, told = document.getElementById('told');
+  const g = A.gaits[pick.value], k = i * M + j;
   const value = a => A.low[a] + (A.high[a] - A.low[a]) * [i / (N - 1), j / (M - 1)][a];
   at = [value(0), value(1)];
-  const name = ['no orbit', 'unstable in its class', 'attracts with a lock', 'attracts by itself'];
-  const rows = [[A.names[0], at[0]], [A.names[1], at[1]], ['state', name[g.label[k]]]];
+  const rows = [[A.names[0], at[0]], [A.names[1], at[1]], ['state', A.states[g.label[k]]]];
   if (g.label[k]) for (const n of A.shown) rows.push([n, g[n][k]]);
-  told.innerHTML = rows.map(([n, v]) => `<tr><td>${n}</td><td class="value">${
+  document.getElementById('values').innerHTML = rows.map(
+    ([n, v]) => `<tr><td>${n}</td><td class="value">${
     typeof v !== 'number' ? v : isNaN(v) ? 'not computed' : +v.toPrecision(5)}</td></tr>`
   ).join('');
   const c = document.getElementById('waves'), p = c.getContext('2d');
@@ -167,27 +167,27 @@ def write_page(path: Path, chart: Chart, sheets: dict[str, Sheet], curves: list[
     kind = find_network(chart.network)
     legs = next(iter(kind.legs.values()))
     axes = (chart.first, chart.second)
-    told = {
+    atlas = {
         'network': chart.network,
         'names': [str(axis.line) for axis in axes], 'low': [axis.low for axis in axes],
         'high': [axis.high for axis in axes], 'counts': [axis.count for axis in axes],
         'lines_of': [list(zip(axis.line.names, axis.line.signs, strict=True)) for axis in axes],
-        'base': chart.base, 'colours': COLOURS, 'shown': SHOWN,
+        'base': chart.base, 'shown': SHOWN,
+        'states': list(STATES), 'colours': list(STATES.values()),
         'lines': {name: line[0] for name, line in LINES.items()},
         'legs': [[leg, cells[0] - 1] for leg, cells in legs.items()],
-        'curves': [{'kind': one.kind, 'gait': one.gait,
+        'curves': [{'kind': one.kind, 'gaits': one.gaits,
                     'points': np.round(one.points[:, :2], 5).tolist()} for one in curves],
         'gaits': {gait: {
             'label': _packed(sheet.label.astype(np.uint8)),
             **{name: _packed(sheet.numbers[name].astype(np.float32)) for name in SHOWN},
             'waves': _waves(sheet, max(max(cells) for cells in legs.values()))}
             for gait, sheet in sheets.items()}}
-    data = json.dumps(told).replace('<', '\\u003c')
-    key = ''.join(f'<span style="background:{colour}"></span>{text}' for colour, text in (
-        *zip(COLOURS, ('no orbit', 'unstable in its class', 'attracts with a lock',
-                       'attracts by itself'), strict=True),
-        *((LINES[kind][0], kind) for kind in LINES
-          if any(curve.kind == kind for curve in curves))))
+    data = json.dumps(atlas).replace('<', '\\u003c')
+    kinds = {curve.kind for curve in curves}
+    met = {kind: colour for kind, (colour, _) in LINES.items() if kind in kinds}
+    key = ''.join(f'<span style="background:{colour}"></span>{text}'
+                  for text, colour in (STATES | met).items())
     title = f'Gaits of the {kind.name} network over {axes[0].line} and {axes[1].line}'
     write_atomically(path, f"""<!DOCTYPE html>
 <html lang="en"><head><meta charset="utf-8"><title>{title}</title>
@@ -196,7 +196,7 @@ def write_page(path: Path, chart: Chart, sheets: dict[str, Sheet], curves: list[
 does there: the waveform of each leg's first cell over two cycles, with bars where it is below its
 mean, and the parameters.</p><p class="key">{key}</p>
 <main><canvas id="map" width="760" height="600"></canvas>
-<aside><table id="told"></table><canvas id="waves" width="480" height="280"></canvas>
+<aside><table id="values"></table><canvas id="waves" width="480" height="280"></canvas>
 <p><button id="copy">Copy the preset</button></p><pre id="preset"></pre></aside></main>
 <script type="application/json" id="atlas">{data}</script><script>{SCRIPT}</script></body></html>
 """)

@@ -18,13 +18,14 @@ import io
 from pathlib import Path
 
 from cpg_ros.atlas.chart import Chart
+from cpg_ros.atlas.grid_refinement import Sheet
 from cpg_ros.atlas.hopf_curves import Boundary
-from cpg_ros.atlas.refinement import Sheet
 from cpg_ros.files.atomic_write import write_atomically
 import numpy as np
 
 #: Colours of the labels, and of the kinds of curves.
-COLOURS = ('#f1f3f5', '#f4c7a1', '#b9d6f2', '#2b6cb0')
+STATES = {'no orbit': '#f1f3f5', 'unstable in its class': '#f4c7a1',
+          'attracts with a lock': '#b9d6f2', 'attracts by itself': '#2b6cb0'}
 LINES = {'Hopf': ('#1a202c', '-'), 'torus': ('#c53030', '-'), 'branch point': ('#b7791f', '-'),
          'period doubling': ('#276749', '-'), 'fold': ('#6b46c1', '--')}
 
@@ -51,9 +52,9 @@ def draw_map(path: Path, chart: Chart, sheets: dict[str, Sheet], curves: list[Bo
               chart.second.low - half[1], chart.second.high + half[1])
     for panel, (gait, sheet) in zip(panels, sheets.items(), strict=False):
         panel.imshow(sheet.label.T, origin='lower', extent=extent, aspect='auto', vmin=-0.5,
-                     vmax=3.5, cmap=ListedColormap(COLOURS), interpolation='nearest')
+                     vmax=3.5, cmap=ListedColormap(list(STATES.values())), interpolation='nearest')
         for curve in curves:
-            if curve.gait == gait:
+            if gait in curve.gaits:
                 colour, style = LINES[curve.kind]
                 panel.plot(curve.points[:, 0], curve.points[:, 1], style, color=colour, lw=1.1)
         panel.set_title(gait)
@@ -68,9 +69,7 @@ def draw_map(path: Path, chart: Chart, sheets: dict[str, Sheet], curves: list[Bo
     figure.supylabel(str(chart.second.line))
     kinds = [kind for kind in LINES if any(curve.kind == kind for curve in curves)]
     figure.legend(handles=[
-        *(Patch(color=colour, label=text) for colour, text in zip(COLOURS, (
-            'no orbit', 'unstable in its class', 'attracts with a lock', 'attracts by itself'),
-            strict=True)),
+        *(Patch(color=colour, label=text) for text, colour in STATES.items()),
         *(Line2D([], [], color=LINES[kind][0], ls=LINES[kind][1], label=kind)
           for kind in kinds)], loc='outside lower center', ncols=4 + len(kinds), frameon=False,
         fontsize=9)

@@ -19,18 +19,17 @@ parameters, and so is its logarithm g: the curve g = 0 is followed by steps alon
 Newton's method normal to it.
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 from cpg_ros.atlas.chart import Chart, COARSE
-from cpg_ros.atlas.hopf_curves import Boundary
-from cpg_ros.atlas.refinement import grid_indices, Sheet
-from cpg_ros.atlas.row_job import largest_of, NONE, path_of
+from cpg_ros.atlas.grid_refinement import grid_indices, Sheet
+from cpg_ros.atlas.hopf_curves import Boundary, slopes
+from cpg_ros.atlas.row_job import NONE, solve_from_wave, subspace_multipliers
 from cpg_ros.dynamics.bifurcation import REAL
-from cpg_ros.dynamics.floquet import ATTRACTS, multipliers
-from cpg_ros.dynamics.fourier.floquet import SPAN, Variation
-from cpg_ros.dynamics.fourier.orbit import FourierOrbit
-from cpg_ros.dynamics.orbit import NoOrbit, Orbit, solve_beside, solve_from_path
+from cpg_ros.dynamics.floquet import ATTRACTS
+from cpg_ros.dynamics.orbit import NoOrbit, Orbit, solve_beside
+from cpg_ros.short_repr import ShortRepr
 import numpy as np
 from scipy.optimize import brentq
 
@@ -38,27 +37,26 @@ from scipy.optimize import brentq
 CURVES, MOST, STEP, SHORTEST = 6, 120, 0.03, 2e-3
 #: How well g is zero, differences for its slope, and Newton's steps.
 EXACT, DIFFERENCE, NEWTON = 1e-8, 1e-5, 8
-#: The trivial multiplier's error, and halvings of the elements.
-TRIVIAL, HALVINGS = 1e-8, 5
+#: Tolerances of multipliers, and halvings of the elements.
+ARNOLDI, TRIVIAL, HALVINGS = 1e-12, 1e-8, 5
 
-Share = tuple[float, float]
+Distance = Callable[[np.ndarray], float]
 
 
-@dataclass(frozen=True)
-class Edge:
-    """Two neighbours on the grid between which multipliers cross, as shares of the ranges."""
+@dataclass(frozen=True, eq=False, repr=False)
+class Edge(ShortRepr):
+    """Two neighbours on the grid between which multipliers cross, in shares of the ranges."""
 
-    here: Share
-    there: Share
+    here: np.ndarray
+    there: np.ndarray
     wave: list[list[float]]
     period: float
 
 
 def edges(chart: Chart, sheet: Sheet) -> list[Edge]:
-    """Neighbours on the coarse grid whose orbits differ in how many multipliers are outside."""
+    """Return neighbours on the coarse grid that differ in the number of unstable multipliers."""
     rows, columns = grid_indices(chart.first.count, COARSE), grid_indices(chart.second.count,
                                                                           COARSE)
-    size = np.array([chart.first.count - 1, chart.second.count - 1])
     found = []
     for k, row in enumerate(rows):
         for m, column in enumerate(columns):
@@ -68,26 +66,14 @@ def edges(chart: Chart, sheet: Sheet) -> list[Edge]:
                 if other is None or at not in sheet.waves or sheet.label[other] == NONE:
                     continue
                 if sheet.numbers['unstable'][at] != sheet.numbers['unstable'][other]:
-                    one, two = np.array(at) / size, np.array(other) / size
-                    found.append(Edge((one[0], one[1]), (two[0], two[1]), *sheet.waves[at]))
+                    found.append(Edge(chart.share(at), chart.share(other), *sheet.waves[at]))
     return found
 
 
 def spectrum(orbit: Orbit) -> list[np.ndarray]:
     """Multipliers of each subspace, largest first; that of the class first, without 1."""
-    if isinstance(orbit, FourierOrbit):
-        n = max(1, int(np.ceil(orbit.network.delay / (SPAN * orbit.period))))
-        for halving in range(HALVINGS):
-            equation = Variation(orbit, n * 2**halving)
-            inside = largest_of(equation, equation.inside, exact=1e-12)
-            if np.abs(inside - 1.0).min() <= TRIVIAL:
-                break
-        parts = [np.delete(inside, np.abs(inside - 1.0).argmin()),
-                 *(largest_of(equation, part, exact=1e-12) for part in equation.outside)]
-    else:
-        spectrum_of_orbit = multipliers(orbit)
-        parts = [spectrum_of_orbit.within, *spectrum_of_orbit.parts]
-    return [part[np.argsort(-np.abs(part), kind='stable')] for part in parts]
+    return [part[np.argsort(-np.abs(part), kind='stable')]
+            for part in subspace_multipliers(orbit, ARNOLDI, TRIVIAL, HALVINGS)]
 
 
 class _Plane:
@@ -98,27 +84,21 @@ class _Plane:
         self.last: Orbit | None = None
 
     def orbit(self, share: np.ndarray) -> Orbit:
-        axes = (self.chart.first, self.chart.second)
-        one, other = (axis.low + part * (axis.high - axis.low)
-                      for axis, part in zip(axes, share, strict=True))
-        network = self.chart.at(float(one), float(other))
         assert self.last is not None
-        found = solve_beside(network, self.last)
+        found = solve_beside(self.chart.at_share(share), self.last)
         if found.levels[0, 0, 1] < 0.3 * self.last.levels[0, 0, 1]:
             raise NoOrbit('the orbit has shrunk')
         return found
 
 
 def orbit_curves(job: tuple[Chart, str, list[Edge]]) -> list[Boundary]:
-    """Follow the curves that some edges cross; those that cannot be had are left out."""
+    """Follow the curves that some edges cross; those that cannot be followed are left out."""
     chart, gait, crossed = job
     found: list[Boundary] = []
-    size = np.array([chart.first.high - chart.first.low, chart.second.high - chart.second.low])
-    low = np.array([chart.first.low, chart.second.low])
     for edge in crossed:
-        middle = 0.5 * (np.array(edge.here) + edge.there)
-        reach = np.abs(np.array(edge.here) - edge.there).max()
-        known = [(one.points[:, :2] - low) / size for one in found]
+        middle = 0.5 * (edge.here + edge.there)
+        reach = np.abs(edge.here - edge.there).max()
+        known = [(one.points[:, :2] - chart.low) / chart.size for one in found]
         if any(np.abs(points - middle).max(axis=1).min() < 1.5 * reach for points in known):
             continue
         try:
@@ -132,12 +112,8 @@ def orbit_curves(job: tuple[Chart, str, list[Edge]]) -> list[Boundary]:
 
 def _through(chart: Chart, gait: str, edge: Edge) -> Iterator[Boundary]:
     plane = _Plane(chart, gait)
-    one, other = np.array(edge.here), np.array(edge.there)
-    network = chart.at(*(float(axis.low + part * (axis.high - axis.low)) for axis, part in zip(
-        (chart.first, chart.second), one, strict=True)))
-    plane.last = solve_from_path(network, network.symmetry(gait), path_of(edge.wave), edge.period)
-    if plane.last is None:
-        return
+    one, other = edge.here, edge.there
+    plane.last = solve_from_wave(chart.at_share(one), gait, edge.wave, edge.period)
     before, after = spectrum(plane.last), spectrum(plane.orbit(other))
     for part, (left, right) in enumerate(zip(before, after, strict=True)):
         counts = [int((np.abs(some) >= ATTRACTS).sum()) for some in (left, right)]
@@ -163,24 +139,15 @@ def _through(chart: Chart, gait: str, edge: Edge) -> Iterator[Boundary]:
             plane.last = at_share
             ways.append(_followed(g, share, way))
         shares = np.array([*ways[0][::-1], share, *ways[1]])
-        low = np.array([chart.first.low, chart.second.low])
-        size = np.array([chart.first.high, chart.second.high]) - low
-        yield Boundary(kind, gait, low + shares * size)
+        yield Boundary(kind, (gait,), chart.low + shares * chart.size)
         plane.last = start
 
 
-def _slope(g: object, share: np.ndarray) -> np.ndarray:
-    assert callable(g)
-    steps = DIFFERENCE * np.eye(2)
-    return np.array([(g(share + step) - g(share - step)) / (2.0 * DIFFERENCE) for step in steps])
-
-
-def _followed(g: object, start: np.ndarray, way: float) -> list[np.ndarray]:
-    """Points of g = 0 from one on, until the plane ends or the orbit is lost."""
-    assert callable(g)
+def _followed(g: Distance, start: np.ndarray, way: float) -> list[np.ndarray]:
+    """Return points of g = 0 from one on, until the plane ends or the orbit is lost."""
     found: list[np.ndarray] = []
     here, step = start, STEP
-    normal = _slope(g, here)
+    normal = slopes(g, here, DIFFERENCE)
     tangent = way * np.array([-normal[1], normal[0]]) / np.linalg.norm(normal)
     while len(found) < MOST and step > SHORTEST:
         try:
@@ -190,11 +157,9 @@ def _followed(g: object, start: np.ndarray, way: float) -> list[np.ndarray]:
             continue
         ahead = np.array([-across[1], across[0]]) / np.linalg.norm(across)
         ahead *= np.sign(ahead @ tangent) or 1.0
-        if ahead @ tangent < 0.8 or np.linalg.norm(new - here) > 2.0 * step:
-            step *= 0.5
-            continue
-        if (new < 0.0).any() or (new > 1.0).any():
-            # Up to the edge, by shorter steps.
+        if (ahead @ tangent < 0.8 or np.linalg.norm(new - here) > 2.0 * step
+                or (new < 0.0).any() or (new > 1.0).any()):
+            # Beyond the edge, too: up to it by shorter steps.
             step *= 0.5
             continue
         here, tangent, normal = new, ahead, across
@@ -205,16 +170,13 @@ def _followed(g: object, start: np.ndarray, way: float) -> list[np.ndarray]:
     return found
 
 
-def _onto(g: object, share: np.ndarray, normal: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Newton's method normal to the curve: the point on it, and the slope of g there."""
-    assert callable(g)
+def _onto(g: Distance, share: np.ndarray, normal: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Apply Newton's method normal to the curve; return the point on it and the slope of g."""
     for _ in range(NEWTON):
         value = g(share)
         if abs(value) < EXACT:
-            return share, _slope(g, share)
-        length = np.linalg.norm(normal)
-        unit = normal / length
-        h = DIFFERENCE
-        along = (g(share + h * unit) - value) / h
+            return share, slopes(g, share, DIFFERENCE)
+        unit = normal / np.linalg.norm(normal)
+        along = (g(share + DIFFERENCE * unit) - value) / DIFFERENCE
         share = share - value / along * unit
     raise NoOrbit('the curve is lost')

@@ -42,8 +42,8 @@ from scipy.sparse.linalg import ArpackError, eigs, LinearOperator
 NONE, UNSTABLE, LOCKED, STABLE = range(4)
 #: Nodes of a waveform that are kept.
 KEPT = 65
-#: Multipliers of an orbit with a delay are refined until the trivial one is 1 to this, so often.
-TRIVIAL, HALVINGS = 1e-4, 4
+#: Multipliers of a subspace that Arnoldi's method computes.
+LEADING = 4
 #: Random starts about rest: how many, how far, for how many periods, and how near to the orbit,
 #: over its range, a run has come that ends in it.
 STARTS, SCATTER, PERIODS, NEAR = 8, 1.0, 25, 0.15
@@ -63,7 +63,7 @@ class AtlasRow:
         columns: which points on the second, rising.
         near: row, column, waveforms (nodes, components) and period of orbits known close by.
         basin: whether runs from random starts are made.
-        again: whether all else has been tried: orbits are only led here from those close by.
+        again: whether all else has been tried: orbits are only continued from those close by.
 
     """
 
@@ -77,9 +77,9 @@ class AtlasRow:
 
 
 def assess_row(row: AtlasRow) -> list[dict[str, Any]]:
-    """Judge the gait at the points of a row: a dictionary of plain types for each.
+    """Assess the gait at the points of a row; return a dictionary of plain types for each.
 
-    Where several orbits are found it is the first that attracts, if only with a lock.
+    Of several orbits the first counts that attracts, if only with a lock.
     """
     finder = _Finder(row)
     return [finder.point(column) for column in row.columns]
@@ -118,7 +118,7 @@ class _Finder:
 
     def _orbits(self, network: Network, column: int, value: float) -> Iterator[Orbit]:
         gait = self.row.gait
-        if network.broken(gait) or other_gait(network, gait):
+        if network.broken(network.symmetry(gait)) or other_gait(network, gait):
             return
         if self.last is not None:
             with suppress(NoOrbit):
@@ -141,19 +141,16 @@ class _Finder:
                 continue
 
     def _led(self, near: tuple[int, int, list[list[float]], float], value: float) -> Orbit:
-        """The orbit that one close by becomes on the straight way here, in one step or several.
+        """Continue an orbit close by straight to here, in one step or several.
 
         Raises:
-            NoOrbit: it is lost on the way.
+            NoOrbit: it ends on the way.
 
         """
         chart, (row, column, wave, period) = self.row.chart, near
         begin = np.array([chart.first.values[row], chart.second.values[column]])
         end = np.array([self.one, value])
-        network = chart.at(*map(float, begin))
-        orbit = solve_from_path(network, network.symmetry(self.row.gait), path_of(wave), period)
-        if orbit is None:
-            raise NoOrbit('the orbit close by cannot be had')
+        orbit = solve_from_wave(chart.at(*map(float, begin)), self.row.gait, wave, period)
         for steps in STEPS:
             found = orbit
             try:
@@ -167,7 +164,7 @@ class _Finder:
         return orbit
 
     def _from_rest(self, network: Network) -> list[Any]:
-        """Branches of the gait's Hopf points in this row; once, where there is a delay."""
+        """Return the branches of the gait's Hopf points in this row, where there is a delay."""
         line, axis = self.row.chart.second.line, self.row.chart.second
         if line.names != (network.delay_parameter,):
             return []
@@ -193,7 +190,7 @@ class _Finder:
 
 
 def _judged(orbit: Orbit) -> dict[str, Any]:
-    """How stable an orbit is, and its numbers."""
+    """Return the stability of an orbit, and its numbers."""
     within, leading, unstable = leading_multipliers(orbit)
     attracts = leading < ATTRACTS
     return {'label': STABLE if attracts else LOCKED if within < ATTRACTS else UNSTABLE,
@@ -203,61 +200,81 @@ def _judged(orbit: Orbit) -> dict[str, Any]:
 
 
 def _proper(orbit: Orbit) -> Iterator[Orbit]:
-    """The orbit, unless it is another gait's or next to none."""
+    """Yield the orbit, unless it is another gait's or has almost no amplitude."""
     if orbit.levels[0, 0, 1] > 1e-3 and not richer(orbit):
         yield orbit
 
 
 def _wave(orbit: Orbit) -> list[list[float]]:
-    """States over a cycle at odd many even times, of all components."""
+    """Return the states at an odd number of even times of a cycle."""
     theta = np.arange(KEPT) / KEPT
     return np.round(orbit(theta * orbit.period), 5).tolist()
 
 
-def path_of(wave: list[list[float]]) -> Any:
-    """The states over times in cycles that kept waveforms stand for."""
+def solve_from_wave(network: Network, gait: str, wave: list[list[float]], period: float) -> Orbit:
+    """Solve for a gait's orbit from stored waveforms of it.
+
+    Raises:
+        NoOrbit: there is none near them.
+
+    """
     columns = np.array(wave).T
-    return lambda theta: np.array([collocation.evaluate(one, theta) for one in columns]).T
+    orbit = solve_from_path(network, network.symmetry(gait), lambda theta: np.array(
+        [collocation.evaluate(one, theta) for one in columns]).T, period)
+    if orbit is None:
+        raise NoOrbit('no orbit near the stored one')
+    return orbit
 
 
 def lock_of(orbit: Orbit) -> float:
-    """The gain of the symmetry lock that the generator would choose, 1/model time."""
+    """Return the gain of the symmetry lock that the generator would choose, 1/model time."""
     bound = orbit.network.sufficient_gain(RATE)
     return float(stability(orbit).chosen if bound is None else bound)
 
 
 def leading_multipliers(orbit: Orbit) -> tuple[float, float, int]:
-    """The largest multiplier in the class, the largest of all, and how many lie outside.
+    """Return the largest multiplier in the class, the largest of all, and how many lie outside.
 
-    Without the trivial one. With a delay they are computed by Arnoldi's method, six at most of
-    each subspace, which a map does not need more exactly than TRIVIAL.
+    Moduli, without the trivial one, as exact as a map needs them.
     """
-    if not isinstance(orbit, FourierOrbit):
-        spectrum = multipliers(orbit)
-        whole = np.concatenate([spectrum.within, spectrum.transverse])
-        return spectrum.leading_within, spectrum.leading, int((np.abs(whole) >= ATTRACTS).sum())
-    n = max(1, int(np.ceil(orbit.network.delay / (SPAN * orbit.period))))
-    for halving in range(HALVINGS):
-        equation = Variation(orbit, n * 2**halving)
-        inside = largest_of(equation, equation.inside)
-        if np.abs(inside - 1.0).min() <= TRIVIAL:
-            break
-    within = np.delete(inside, np.abs(inside - 1.0).argmin())
-    outside = np.concatenate([largest_of(equation, part) for part in equation.outside])
-    sizes = np.abs(np.concatenate([within, outside]))
-    return (float(np.abs(within).max(initial=0.0)), float(sizes.max(initial=0.0)),
+    parts = subspace_multipliers(orbit)
+    sizes = np.abs(np.concatenate(parts))
+    return (float(np.abs(parts[0]).max(initial=0.0)), float(sizes.max(initial=0.0)),
             int((sizes >= ATTRACTS).sum()))
 
 
-def largest_of(equation: Variation, columns: np.ndarray, many: int = 4, exact: float = 1e-6
-               ) -> np.ndarray:
-    """Largest multipliers in a subspace of the variational equation."""
+def subspace_multipliers(orbit: Orbit, exact: float = 1e-6, trivial: float = 1e-4,
+                         halvings: int = 4) -> list[np.ndarray]:
+    """Return the multipliers of each subspace; those of the class first, without the trivial one.
+
+    Args:
+        orbit: with a delay, the largest ones of each subspace are computed by Arnoldi's method.
+        exact: tolerance of Arnoldi's method.
+        trivial: error of the trivial multiplier above which the elements are halved.
+        halvings: of the elements, at most.
+
+    """
+    if not isinstance(orbit, FourierOrbit):
+        spectrum = multipliers(orbit)
+        return [spectrum.within, *spectrum.parts]
+    n = max(1, int(np.ceil(orbit.network.delay / (SPAN * orbit.period))))
+    for halving in range(halvings):
+        equation = Variation(orbit, n * 2**halving)
+        inside = _largest(equation, equation.inside, exact)
+        if np.abs(inside - 1.0).min() <= trivial:
+            break
+    return [np.delete(inside, np.abs(inside - 1.0).argmin()),
+            *(_largest(equation, part, exact) for part in equation.outside)]
+
+
+def _largest(equation: Variation, columns: np.ndarray, exact: float) -> np.ndarray:
+    """Return the largest multipliers in a subspace of the variational equation."""
     size, later = equation.period_map(columns, 0.0)
-    if size > 3 * many + 24:
+    if size > 3 * LEADING + 24:
         operator = LinearOperator((size, size), matvec=lambda x: later(x.reshape(-1, 1))[:, 0])
         start = np.random.default_rng(0).standard_normal(size)
         try:
-            return eigs(operator, k=many, ncv=20, tol=exact, v0=start, maxiter=15,
+            return eigs(operator, k=LEADING, ncv=20, tol=exact, v0=start, maxiter=15,
                         return_eigenvectors=False)
         except ArpackError:
             pass  # all of them, then
@@ -265,7 +282,7 @@ def largest_of(equation: Variation, columns: np.ndarray, many: int = 4, exact: f
 
 
 def basin(orbit: Orbit, lock: float) -> float:
-    """Share of random starts that end in an orbit, with the symmetry lock that it needs."""
+    """Return the share of random starts that end in an orbit, with the lock that it needs."""
     network = orbit.network
     rng = np.random.default_rng(0)
     rest = orbit(np.arange(16) / 16 * orbit.period).mean(axis=0)

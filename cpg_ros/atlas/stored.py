@@ -12,21 +12,22 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""An atlas on disk: parts as they are finished, and at last atlas.parquet and boundaries.json."""
+"""An atlas on disk: parts as they are finished, then atlas.parquet and boundaries.json."""
 
 from collections.abc import Iterator
 from dataclasses import asdict
 import hashlib
+from itertools import chain
 import json
 from pathlib import Path
 from typing import Any
 
 from cpg_ros.atlas.chart import Chart
+from cpg_ros.atlas.grid_refinement import NUMBERS, Sheet
 from cpg_ros.atlas.hopf_curves import Boundary
-from cpg_ros.atlas.refinement import NUMBERS, Sheet
 from cpg_ros.atlas.row_job import AtlasRow
 from cpg_ros.errors import InputError
-from cpg_ros.files.atomic_write import write_atomically
+from cpg_ros.files.atomic_write import replacing, stored_json, write_atomically
 from cpg_ros.fleet.results_table import library
 import numpy as np
 
@@ -36,10 +37,10 @@ LABELS = ('none', 'unstable', 'with lock', 'stable')
 
 
 class AtlasFolder:
-    """A folder that an atlas grows in."""
+    """The folder of an atlas."""
 
     def __init__(self, folder: Path, chart: Chart, gaits: tuple[str, ...]) -> None:
-        """Begin, or go on where an atlas of the same plane stopped.
+        """Start an atlas, or resume one of the same plane.
 
         Raises:
             InputError: the folder holds something else.
@@ -62,15 +63,12 @@ class AtlasFolder:
         return self.folder / PARTS / f'{hashlib.sha256(text.encode()).hexdigest()[:20]}.json'
 
     def get(self, row: AtlasRow) -> list[dict[str, Any]] | None:
-        """Return what a job found, if it is done."""
-        try:
-            found: list[dict[str, Any]] = json.loads(self._place(row).read_text())
-        except (FileNotFoundError, ValueError):
-            return None
+        """Return the points of a job, if it is done."""
+        found: list[dict[str, Any]] | None = stored_json(self._place(row))
         return found
 
     def put(self, row: AtlasRow, points: list[dict[str, Any]]) -> list[dict[str, Any]]:
-        """Keep what a job found, and return it as get will."""
+        """Store the points of a job, and return them as get will."""
         text = json.dumps(points)
         write_atomically(self._place(row), text)
         kept: list[dict[str, Any]] = json.loads(text)
@@ -78,14 +76,14 @@ class AtlasFolder:
 
     def curves(self) -> list[Boundary] | None:
         """Return the boundaries, if they are done."""
-        try:
-            text = json.loads((self.folder / 'boundaries.json').read_text())
-        except (FileNotFoundError, ValueError):
-            return None
-        return [Boundary(one['kind'], one['gait'], np.array(one['points'])) for one in text]
+        found = stored_json(self.folder / 'boundaries.json')
+        if found is None or any('gaits' not in one for one in found):
+            return None  # Those of an earlier version are followed anew.
+        return [Boundary(one['kind'], tuple(one['gaits']), np.array(one['points']))
+                for one in found]
 
     def put_curves(self, curves: list[Boundary]) -> None:
-        """Keep the boundaries."""
+        """Store the boundaries."""
         write_atomically(self.folder / 'boundaries.json', json.dumps([
             {**asdict(curve), 'points': curve.points.tolist()} for curve in curves]))
 
@@ -98,27 +96,20 @@ class AtlasFolder:
         """
         arrow = library()
         path = self.folder / 'atlas.parquet'
-        beside = path.with_name(f'.{path.name}.part')
-        names = [str(axis.line) for axis in (self.chart.first, self.chart.second)]
-        writer = None
-        try:
-            for gait, table in _tables(self.chart, sheets, names):
-                batch = arrow.table({'gait': [gait] * len(table[names[0]]), **table})
-                writer = writer or arrow.parquet.ParquetWriter(beside, batch.schema)
-                writer.write_table(batch)
-            if writer is not None:
-                writer.close()
-            beside.replace(path)
-        finally:
-            beside.unlink(missing_ok=True)
+        tables = map(arrow.table, _columns(self.chart, sheets))
+        first = next(tables)
+        with (replacing(path) as beside,
+              arrow.parquet.ParquetWriter(beside, first.schema) as writer):
+            for one in chain([first], tables):
+                writer.write_table(one)
         return path
 
 
-def _tables(chart: Chart, sheets: dict[str, Sheet], names: list[str]
-            ) -> Iterator[tuple[str, dict[str, Any]]]:
+def _columns(chart: Chart, sheets: dict[str, Sheet]) -> Iterator[dict[str, Any]]:
     one, other = np.meshgrid(chart.first.values, chart.second.values, indexing='ij')
     for gait, sheet in sheets.items():
         label = sheet.label.ravel()
-        yield gait, {names[0]: one.ravel(), names[1]: other.ravel(), 'exists': label > 0,
-                     'state': [LABELS[k] for k in label], 'computed': sheet.computed.ravel(),
-                     **{name: sheet.numbers[name].ravel() for name in NUMBERS}}
+        yield {'gait': [gait] * label.size, str(chart.first.line): one.ravel(),
+               str(chart.second.line): other.ravel(), 'exists': label > 0,
+               'state': [LABELS[k] for k in label], 'computed': sheet.computed.ravel(),
+               **{name: sheet.numbers[name].ravel() for name in NUMBERS}}

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What feedback has to know of a robot, from a recording of it walking.
+"""Calibration of the feedback from a recording of the walking robot.
 
 Imports ``feedback``, ``gaits`` and what is below; knows nothing of ROS.
 """

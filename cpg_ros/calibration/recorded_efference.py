@@ -29,7 +29,7 @@ from cpg_ros.networks.registry import NETWORKS
 from cpg_ros.robots.robot import Robot
 import numpy as np
 
-#: Joints are where the pattern has them this much later, s, if a bag does not tell: what a servo
+#: Joints are where the pattern has them this much later, s, if a bag has no phase: what a servo
 #: with a damping of a thirtieth of its stiffness, and some load, gives.
 LAG = 0.045
 #: Rows of a table whose speeds are nearer than this, m/s, are the same.
@@ -58,7 +58,7 @@ class Calibrated:
 
 def efference_from(recording: WalkRecording, robot: Robot, gait: str | None = None,
                    speed: float | None = None) -> Calibrated:
-    """Work out what a gait makes the body do.
+    """Measure the motion of the body in a gait.
 
     Args:
         recording: of one gait at one speed on flat ground.

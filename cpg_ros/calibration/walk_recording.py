@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A robot that walks, as a bag has it: joints, IMU and forces of the feet, on one clock."""
+"""Recording of a walking robot in a bag: joints, IMU and foot forces on one clock."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -38,7 +38,7 @@ OPTIONAL = ('phase',)
 
 @dataclass(frozen=True, eq=False, repr=False)
 class WalkRecording(ShortRepr):
-    """What a robot felt.
+    """Sensor data of a walking robot.
 
     Attributes:
         source: the bag.
@@ -62,7 +62,7 @@ class WalkRecording(ShortRepr):
 
 
 def read_walk(path: str | Path, robot: Robot, topics: Mapping[str, str]) -> WalkRecording:
-    """Read what feedback is made of out of a bag.
+    """Read the sensor data that feedback takes from a bag.
 
     Args:
         path: the bag.

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A robot file held against the robot's description: names, kinds, limits, and gaits."""
+"""Comparison of a robot file with the robot's description: names, kinds, limits, gaits."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -30,7 +30,7 @@ from cpg_ros.robots.robot import Joint, Motion, Robot
 
 #: Files have limits rounded: differences up to this many rad (rad/s) are none.
 ROUNDING = 1e-4
-#: Strides per second where neither the command line nor the robot file says (Hz).
+#: Strides per second where neither the command line nor the robot file gives them (Hz).
 USUAL_FREQUENCY = 1.0
 
 
@@ -86,7 +86,7 @@ class GaitCheck:
 
 @dataclass(frozen=True)
 class RobotCheck:
-    """All that was compared; it matches if nothing has a fault."""
+    """Result of a comparison; the files match if nothing has a fault."""
 
     robot: str
     source: str
@@ -142,7 +142,7 @@ class RobotCheck:
 def checked(robot: Robot, known: RobotDescription, names: tuple[str, str],
             gaits: Sequence[str] = (), frequency: float | None = None, amplitude: float = 1.0
             ) -> RobotCheck:
-    """Hold a robot file against the robot's description.
+    """Compare a robot file with the robot's description.
 
     Args:
         robot: what the file says.
@@ -232,7 +232,7 @@ def _gait(robot: Robot, known: RobotDescription, network: str, name: str,
 
 
 def unlimited(robot: Robot) -> Robot:
-    """Return a robot whose joints have no limits: a plan for it tells of all of them."""
+    """Return a robot whose joints have no limits, so that no plan for it fails on one."""
     return replace(robot, legs={leg: tuple(replace(
         joint, lower=-inf, upper=inf, velocity=inf) for joint in joints)
         for leg, joints in robot.legs.items()})

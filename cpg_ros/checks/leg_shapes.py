@@ -14,31 +14,28 @@
 
 """The part ``geometry`` of a first robot file, from the robot's description."""
 
-from cpg_ros.robots.body_keys import BodyGeometry, leg_of
+from cpg_ros.robots.body_keys import body_geometry, BodyGeometry, LegChain
 from cpg_ros.robots.description import RobotDescription
 from cpg_ros.robots.robot import Robot
 import numpy as np
 
 
 def geometry_from(robot: Robot, known: RobotDescription) -> BodyGeometry:
-    """Work out a robot's geometry, with those of its legs that feedback can displace."""
-    legs, radii = {}, []
+    """Return a robot's geometry, with those of its legs that feedback can displace."""
+    chains = {}
     for leg, joints in robot.legs.items():
         names = sorted((joint.name for joint in joints), key=lambda one: len(known.chain(one)))
         foot, radius = known.foot_below(names[-1])
         places = np.array([known.frame(name)[0] for name in names])
         if np.linalg.norm(foot - places[-1]) <= 1e-3:
             continue
-        found = leg_of(names, np.array([known.direction(name) for name in names]), places, foot)
-        if found is not None:
-            legs[leg] = found
-            radii.append(radius)
-    mass = sum(link.mass for link in known.links.values())
-    return BodyGeometry(round(mass, 6), round(float(np.mean(radii or 0.0)), 6), legs)
+        axes = np.array([known.direction(name) for name in names])
+        chains[leg] = LegChain(names, axes, places, foot, radius)
+    return body_geometry(sum(link.mass for link in known.links.values()), chains)
 
 
 def usable(robot: Robot, found: BodyGeometry, what: str) -> tuple[BodyGeometry | None, str]:
-    """Say which legs feedback cannot displace; return None where the geometry is of no use.
+    """Return the geometry, None where it is of no use, and which legs feedback can displace.
 
     Args:
         robot: with all its legs.

@@ -42,7 +42,7 @@ MARGIN, USED = 0.1, 0.8
 
 
 def robot_from(known: RobotDescription, name: str) -> tuple[Robot, str]:
-    """Make a robot file's content out of a description; also say how its joints were understood.
+    """Make a first robot from a description; return it and how its joints were interpreted.
 
     Raises:
         LegsError: the joints' names do not tell two or four legs.

@@ -132,8 +132,8 @@ def correct_point(curve: SolutionCurve, z: np.ndarray, border: np.ndarray, *, ex
         curve: in a fixed discretisation.
         z: unknowns near the point.
         border: that v is normal to.
-        exact: the tangent is that of the point. Otherwise it is that of the point before Newton's
-            last step, which spares a step: enough to go on by, not to find a fold by.
+        exact: take the tangent at the point itself. Otherwise it is taken before Newton's last
+            step, which saves a step: precise enough to continue from, not to locate a fold.
 
     """
     before = 0.0
@@ -227,7 +227,7 @@ def next_crossing(here: CurvePoint, way: float, value: float) -> CurvePoint | No
 
 
 def locate_fold(after: CurvePoint, step: float) -> CurvePoint | None:
-    """Return the fold that lies up to about a step before a point; None if it cannot be had."""
+    """Return the fold that lies up to about a step before a point; None if it cannot be found."""
     def rate(back: float) -> float:
         found = predict_and_correct(after, back)
         if found is None:
@@ -275,7 +275,7 @@ def continue_curve(start: CurvePoint, low: float, high: float, visit: Callable[[
         most: points, at most.
 
     Returns:
-        The numbers of those points that are folds, from 0, and why it ended: what visit said,
+        The indices of the points that are folds, and why it ended: what visit returned,
         'bound' (the last point is on it), 'steps', 'steep' (it cannot be resolved) or 'lost'
         (Newton fails however short the step).
 

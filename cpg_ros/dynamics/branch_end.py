@@ -84,7 +84,7 @@ def without_period(values: np.ndarray, periods: np.ndarray, scale: float) -> flo
     if not abs(slopes[-1]) * periods[-1] < STILL * scale:
         return None
     if not (np.sign(slopes) == np.sign(slopes[-1])).all() or not slopes.all():
-        # It winds in, in ever smaller turns: the last one is as near as can be told.
+        # It winds in, in ever smaller turns: the last one is the best estimate.
         return float(values[-1])
     middle = 0.5 * (periods[-4:-1] + periods[-3:])
     fall = np.log(slopes[0] / slopes[2])

@@ -16,7 +16,7 @@
 
 A branch says over which range of parameters a gait exists, where two orbits of it coexist, and
 how it ends: at a Hopf point of the rest state, where its amplitude falls to zero, at an orbit of
-more symmetry, near a homoclinic orbit, where its period has no bound, or at the ends asked for.
+more symmetry, near a homoclinic orbit, where its period has no bound, or at the ends of the range.
 """
 
 from collections.abc import Callable
@@ -25,7 +25,7 @@ from dataclasses import dataclass, replace
 from cpg_ros.dynamics import arclength
 from cpg_ros.dynamics.arclength import CurvePoint
 from cpg_ros.dynamics.branch_end import BranchEnd, grows_alone, without_period
-from cpg_ros.dynamics.orbit import curve_beside, curve_through
+from cpg_ros.dynamics.orbit_method import orbit_method
 from cpg_ros.dynamics.periodic import NoOrbit, Orbit, richer
 from cpg_ros.errors import InputError
 from cpg_ros.networks.network import Network
@@ -92,12 +92,12 @@ class Branch(ShortRepr):
 
     @property
     def values(self) -> np.ndarray:
-        """Of the points, shape (points,)."""
+        """Values of the parameter at the points, shape (points,)."""
         return np.array([point.value for point in self.points])
 
     @property
     def periods(self) -> np.ndarray:
-        """Of the points in model time, shape (points,)."""
+        """Periods of the orbits in model time, shape (points,)."""
         return np.array([point.orbit.period for point in self.points])
 
     @property
@@ -155,7 +155,7 @@ def continue_orbit(orbit: Orbit, along: ParameterLine | str, low: float, high: f
     along = ParameterLine.of(along, type(orbit.network))
     _check(orbit.network, orbit.symmetry, along, low, high)
     value, scales = along.value(orbit.network), (orbit.period, high - low)
-    curve, z = curve_through(orbit, along, scales)
+    curve, z = orbit_method(orbit.network).curve.through(orbit, along, scales)
     # At a fold the value cannot be held, but the period can.
     start = (arclength.resolve_point(curve, z, arclength.fixed_unknown(z.size, -1))
              or arclength.resolve_point(curve, z, arclength.fixed_unknown(z.size, -2)))
@@ -261,8 +261,8 @@ def continue_from_disturbance(network: Network, symmetry: Symmetry, along: Param
     """
     _check(network, symmetry, along, low, high)
     value = along.value(network)
-    curve, still, border = curve_beside(network, symmetry, along, (period, high - low), path,
-                                        disturbance, period)
+    curve, still, border = orbit_method(network).curve.beside(
+        network, symmetry, along, (period, high - low), path, disturbance, period)
     start = arclength.resolve_point(curve, still + amplitude * border, border)
     if start is None:
         raise NoOrbit(f'no orbit of amplitude {amplitude:g} was found near {along} {value:g}')
@@ -331,8 +331,6 @@ def _check(network: Network, symmetry: Symmetry, along: ParameterLine, low: floa
         raise InputError(f'the network is not on the line {along}')
     if not low <= value <= high:
         raise InputError(f'{along} {value:g} is not from {low:g} to {high:g}')
-    other = along.at(network, high if value != high else low).as_dict()
-    for family in network.families(symmetry):
-        if len({other[name] for name in family}) > 1:
-            raise InputError(f'{along} breaks the symmetry: it needs {", ".join(family)} '
-                             f'to be equal')
+    broken = along.at(network, high if value != high else low).broken(symmetry)
+    if broken:
+        raise InputError(f'{along} breaks the symmetry: it needs {broken} to be equal')

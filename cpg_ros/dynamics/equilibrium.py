@@ -26,7 +26,8 @@ from functools import cache, lru_cache
 
 from cpg_ros.dynamics.sign_changes import crossings
 from cpg_ros.errors import CpgError, InputError
-from cpg_ros.networks.equations import equations_of, values_of
+from cpg_ros.networks.equations import equations_of
+from cpg_ros.networks.field import Field
 from cpg_ros.networks.network import Network
 import numpy as np
 
@@ -47,55 +48,37 @@ class NoEquilibrium(CpgError):
     """The stand cannot be followed from the uncoupled cells to these couplings."""
 
 
-class Quotient:
-    """A network in which all cells are alike: a cell that hears itself, now as a delay ago."""
+class Quotient(Field[Network]):
+    """A network in which all cells are alike: a cell that hears itself, now as a delay ago.
+
+    Of the parameters that each cell has of its own, the first cell's stand for all.
+    """
 
     def __init__(self, network: Network) -> None:
-        """Take the parameters; of those that each cell has of its own, the first cell's."""
-        equations = self._equations = equations_of(type(network))
-        self.size = network.variables
-        self._variables = [one.variable for one in equations.arguments]
-        self._whole = [float(value.flat[0]) for value in values_of(network)]
-        by_cell = equations.by_cell
-        self._coupled = [(by_cell[row][0] if row in by_cell else row)
-                         in network.couplings for row in equations.rows]
-        self._p = self._whole
+        """Look at a network, all of whose couplings are there."""
+        super().__init__(network, np.zeros(network.cells, dtype=int))
+        self._whole = self._p
+        equations = self._equations
+        self._coupled = [equations.by_cell.get(row, (row,))[0] in network.couplings
+                         for row in equations.rows]
 
     def set_share(self, share: float) -> None:
         """Set the share of the couplings that is there."""
         self._p = [share * value if coupled else value
                    for value, coupled in zip(self._whole, self._coupled, strict=True)]
 
-    def rates(self, states: np.ndarray) -> np.ndarray:
-        """Rates at states, shape (..., variables)."""
-        found = self._equations.rates([states[..., v] for v in self._variables], self._p)
-        return np.stack(np.broadcast_arrays(*found, states[..., 0])[:-1], axis=-1)
-
-    def linearised(self, state: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Rates and their Jacobian, if all cells move together.
-
-        Args:
-            state: shape (variables, ...).
-
-        Returns:
-            Rates of the same shape, and the Jacobian, shape (variables, variables, ...).
-
-        """
-        found, slopes = self._equations.slopes([state[v] for v in self._variables], self._p)
-        rates, jacobian = np.empty(state.shape), np.zeros((self.size, *state.shape))
-        for v, rate in enumerate(found):
-            rates[v] = rate
-        for (v, k), slope in slopes.items():
-            jacobian[v, self._variables[k]] += slope
-        return rates, jacobian
+    def together(self, states: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return rates, (..., variables), and their Jacobian, if all cells move together."""
+        rates, now, past = self.linearised(states)
+        return rates, now + past if past.size else now
 
     def push(self, state: np.ndarray) -> np.ndarray:
         """Return the derivative of the rates by the share of the couplings, shape (variables,)."""
-        out = np.zeros(self.size)
-        found = self._equations.by_parameter([state[v] for v in self._variables], self._p)
+        out = np.zeros(state.size)
+        found = self._equations.by_parameter(self._arguments(state, None), self._p)
         for (v, r), slope in found.items():
             if self._coupled[r]:
-                out[v] += slope * self._whole[r]
+                out[v] += (slope * self._whole[r]).item()
         return out
 
     def newton(self, state: np.ndarray, most: int = 8) -> np.ndarray | None:
@@ -103,7 +86,7 @@ class Quotient:
         size = np.inf
         with np.errstate(all='ignore'):
             for _ in range(most):
-                rates, slope = self.linearised(state)
+                rates, slope = self.together(state)
                 try:
                     move = np.linalg.solve(slope, rates)
                 except np.linalg.LinAlgError:
@@ -122,10 +105,9 @@ class Quotient:
         sizes = np.full(len(states), np.inf)
         with np.errstate(all='ignore'):
             for _ in range(most):
-                rates, slopes = self.linearised(states.T)
-                slopes = np.moveaxis(slopes, -1, 0)
+                rates, slopes = self.together(states)
                 sound = np.linalg.det(slopes) != 0.0
-                moves = np.linalg.solve(slopes[sound], rates.T[sound, :, None])[..., 0]
+                moves = np.linalg.solve(slopes[sound], rates[sound, :, None])[..., 0]
                 states = states[sound] - moves
                 sizes = np.abs(moves).max(axis=1) / (1.0 + np.abs(states).max(axis=1))
                 arrived.append(states[sizes < 1e-14])
@@ -168,16 +150,16 @@ def equilibria(network: Network) -> np.ndarray:
     _check(network)
     cell, scanned = Quotient(network), _scanned(type(network))
     if scanned is None:
-        reached = cell.newton_from_all(_scattered(cell.size))
+        reached = cell.newton_from_all(_scattered(network.variables))
     else:
         solved = [cell.newton(start) for start in _roots(cell, scanned)]
         reached = np.array([state for state in solved if state is not None]
-                           ).reshape(-1, cell.size)
+                           ).reshape(-1, network.variables)
     found: list[np.ndarray] = []
     while len(reached):
         found.append(reached[0])
         reached = reached[~np.isclose(reached, reached[0], 1e-9, 1e-9).all(axis=1)]
-    return np.array(sorted(found, key=tuple)).reshape(-1, cell.size)
+    return np.array(sorted(found, key=tuple)).reshape(-1, network.variables)
 
 
 @cache
@@ -194,7 +176,7 @@ def _scanned(network: type[Network]) -> int | None:
 
 def _roots(cell: Quotient, scanned: int) -> Iterator[np.ndarray]:
     """States close to those at which ``f0 + F1 y`` vanishes for a y."""
-    n = cell.size
+    n = cell.kept.size
     others = [k for k in range(n) if k != scanned]
 
     def terms(x: np.ndarray) -> np.ndarray:
@@ -249,7 +231,7 @@ def equilibrium(network: Network) -> np.ndarray:
     state = _uncoupled(replace(  # type: ignore[type-var]
         network, **dict.fromkeys(network.couplings, 0.0)))
     share, step, grow = 0.0, 0.25, 2.0
-    slope = cell.linearised(state)[1]
+    slope = cell.together(state)[1]
     while share < 1.0:
         step = min(step, 1.0 - share)
         way = -step * np.linalg.solve(slope, cell.push(state))
@@ -257,7 +239,7 @@ def equilibrium(network: Network) -> np.ndarray:
         cell.set_share(share + step)
         if np.abs(way).max() <= LONGEST * size:
             new = cell.newton(state + way)
-        ahead = slope if new is None else cell.linearised(new)[1]
+        ahead = slope if new is None else cell.together(new)[1]
         # Beyond a fold the determinant has the other sign.
         if (new is not None and np.abs(new - state - way).max() <= MISS * size
                 and np.linalg.det(ahead) * np.linalg.det(slope) > 0.0):

@@ -20,12 +20,13 @@ which the symmetry lock -g (I - P) x shrinks and nothing else does.
 
 from dataclasses import dataclass
 
-from cpg_ros.dynamics.orbit import Orbit, orbit_method
+from cpg_ros.dynamics.orbit_method import orbit_method
+from cpg_ros.dynamics.periodic import Orbit
 from cpg_ros.short_repr import ShortRepr
 import numpy as np
 from scipy.optimize import brentq
 
-#: A multiplier from here on up is 1 as far as can be told.
+#: From here on a multiplier cannot be distinguished from 1.
 ATTRACTS = 1.0 - 1e-7
 #: Gains between none and the bound among which the smallest that is enough is looked for.
 GAINS = 8

@@ -18,24 +18,18 @@ And what stands nearest where there is none: the threshold at which rest gives w
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
-from cpg_ros.dynamics.continuation import continue_from_hopf
+from cpg_ros.dynamics.coexisting_orbits import coexisting_orbits, CoexistingOrbits
 from cpg_ros.dynamics.equilibrium import NoEquilibrium
 from cpg_ros.dynamics.floquet import attracts_with, Multipliers, multipliers, smallest_gain
-from cpg_ros.dynamics.hopf import first_hopf
-from cpg_ros.dynamics.hopf_search import hopf_points
-from cpg_ros.dynamics.orbit import NoOrbit, Orbit, solve_orbit
+from cpg_ros.dynamics.hopf_point import first_hopf
+from cpg_ros.dynamics.orbit import NoOrbit, Orbit
 from cpg_ros.dynamics.stability import stability
 from cpg_ros.networks.network import Network
-from cpg_ros.networks.parameter_line import ParameterLine
 from cpg_ros.short_repr import ShortRepr
-
-#: Hopf points are looked at up to this many times the delay, and so many turns more than the
-#: first of their kind.
-FURTHEST, TURNS = 4.0, 1
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -44,14 +38,24 @@ class GaitAssessment(ShortRepr):
 
     Attributes:
         gait: one of the network's gaits.
-        orbit: its orbit, or None.
+        orbit: its orbit, or None; of several one that attracts within the gait's class if any
+            does, nearest in period to that of the preset.
         why: why there is none, or ''.
+        others: the same of each coexisting orbit of the gait that was found.
+        searched: what others were searched from, or ''.
 
     """
 
     gait: str
     orbit: Orbit | None
     why: str = ''
+    others: tuple['GaitAssessment', ...] = ()
+    searched: str = ''
+
+    @property
+    def orbits(self) -> tuple['GaitAssessment', ...]:
+        """Itself and the others; none where there is no orbit."""
+        return () if self.orbit is None else (self, *self.others)
 
     @property
     def _orbit(self) -> Orbit:
@@ -108,16 +112,22 @@ class GaitAssessment(ShortRepr):
                 'floquet_error': self.multipliers.error,
                 'stable': self.stable, 'min_symmetry_gain': self.smallest_gain,
                 'default_symmetry_gain': self.default_gain,
-                'stable_with_default_gain': self.stable_with_default_gain}
+                'stable_with_default_gain': self.stable_with_default_gain,
+                'searched': self.searched, 'others': [one.as_dict() for one in self.others]}
 
 
-def verdicts(network: Network, done: Callable[[int], None] = lambda count: None
-             ) -> dict[str, GaitAssessment]:
-    """Judge every gait of a network.
+def verdicts(network: Network, done: Callable[[int], None] = lambda count: None,
+             near: Orbit | None = None, everything: bool = False) -> dict[str, GaitAssessment]:
+    """Judge every gait of a network, by all of its orbits that are found.
+
+    Where the orbit reached first is not stable, others are looked for from starts in the gait's
+    class; where none attracts in it, also by deflation and, with a delay, on branches.
 
     Args:
         network: parameters, all finite.
-        done: told how many gaits are done.
+        done: called with the number of gaits that are done.
+        near: a known orbit of one of the gaits, from which that one is solved for.
+        everything: look for all orbits of every gait.
 
     Raises:
         InputError: a parameter that is not finite, or a delay that is not positive.
@@ -126,47 +136,23 @@ def verdicts(network: Network, done: Callable[[int], None] = lambda count: None
     found = {}
     for count, gait in enumerate(network.gaits()):
         done(count)
+        known = near if near is not None and near.gait == gait else None
         try:
-            try:
-                found[gait] = GaitAssessment(gait, solve_orbit(network, gait))
-            except NoOrbit as error:
-                found[gait] = _beyond(network, gait, str(error))
-        except NoEquilibrium as error:
+            one = coexisting_orbits(network, gait, known, starts=everything,
+                                    everything=everything)
+            found[gait] = _assessed(one)
+            if not (found[gait].stable or one.starts):
+                found[gait] = _assessed(coexisting_orbits(network, gait, one.orbits[0],
+                                                          everything=False))
+        except (NoEquilibrium, NoOrbit) as error:
             found[gait] = GaitAssessment(gait, None, str(error))
     done(len(found))
     return found
 
 
-def _beyond(network: Network, gait: str, why: str) -> GaitAssessment:
-    """Look for an orbit that the solver does not reach from the first onset.
-
-    Those born with unstable roots in their own class, and those beyond a fold, lie on the
-    branches of the gait's Hopf points as the delay moves.
-    """
-    name, delay = network.delay_parameter, network.delay
-    if not name:
-        return GaitAssessment(gait, None, why)
-    line, shifts = ParameterLine((name,), (1.0,)), set(network.symmetry(gait).shifts)
-    for point in hopf_points(network, line, 0.0, FURTHEST * delay):
-        if set(point.block.symmetry.shifts) != shifts:
-            continue
-        if (point.value < delay) != (point.normal_form.side > 0) or point.n > TURNS:
-            continue
-        low, high = sorted((0.9 * point.value, delay)) if point.normal_form.side > 0 else (
-            0.5 * delay, 1.1 * point.value)
-        try:
-            branch = continue_from_hopf(point.network, point.block.symmetry, point.omega, line,
-                                        low, high, rest=point.state, vector=point.eigenvector,
-                                        most=80)
-            orbits = branch.at(delay)
-        except NoOrbit:
-            continue
-        if orbits:
-            return GaitAssessment(gait, orbits[-1])
-    first = first_hopf(network, gait)
-    if first is not None and first.value > delay:
-        why = f"{name} {delay:g} is below the {gait}'s critical delay {first.value:.4f}"
-    return GaitAssessment(gait, None, why)
+def _assessed(found: CoexistingOrbits) -> GaitAssessment:
+    first, *others = (GaitAssessment(found.gait, orbit) for orbit in found.orbits)
+    return replace(first, others=tuple(others), searched=found.searched)
 
 
 def nearest_threshold(network: Network) -> str:

@@ -24,7 +24,7 @@ from itertools import pairwise
 
 from cpg_ros.dynamics.delay_crossings import delay_crossings
 from cpg_ros.dynamics.equilibrium import equilibrium, NoEquilibrium
-from cpg_ros.dynamics.hopf import crossing_at, HopfPoint, ON_AXIS
+from cpg_ros.dynamics.hopf_point import crossing_at, HopfPoint, ON_AXIS
 from cpg_ros.dynamics.isotypic import Block, blocks, classes
 from cpg_ros.dynamics.sign_changes import crossings
 from cpg_ros.errors import InputError
@@ -45,7 +45,7 @@ def hopf_points(network: Network, line: ParameterLine | str, low: float, high: f
     """Find all Hopf points of the equilibrium between two values of parameters, by rising value.
 
     Values at which the network has no equilibrium are passed over. Where not the delay alone
-    moves, points closer to one another than (high - low)/240 are told apart only where a pair
+    moves, points closer to one another than (high - low)/240 are distinguished only where a pair
     crosses twice in the same class.
 
     Args:

@@ -24,11 +24,11 @@ once for that a delay ago. Oscillations of a class are primary gaits:
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cache, cached_property
-from itertools import product
 
 from cpg_ros.dynamics.characteristic import characteristic_roots, roots_right_of
 from cpg_ros.dynamics.expansion import Expansion
 from cpg_ros.errors import InputError
+from cpg_ros.networks.hk_theorem import homomorphisms
 from cpg_ros.networks.network import Network
 from cpg_ros.networks.symmetry import Group, Symmetry
 from cpg_ros.short_repr import ShortRepr
@@ -138,23 +138,8 @@ def characters(group: Group, variables: int, odd: bool) -> tuple[Symmetry, ...]:
             or its elements do not commute.
 
     """
-    elements = list(group.elements.values())
-    if sorted(element[0] for element in elements) != list(range(group.cells)):
-        raise InputError(f'the group has {len(elements)} symmetries of {group.cells} cells; '
-                         f'exactly one must take the first cell to each cell')
-    if any(a[b[i]] != b[a[i]] for a in elements for b in elements for i in range(group.cells)):
-        raise InputError('the group is not abelian')
-    orders = {name: group.order(name) for name, _ in group.generators}
-    found = []
-    for turns in product(*(range(order) for order in orders.values())):
-        shifts = {name: Fraction(turn, order)
-                  for (name, order), turn in zip(orders.items(), turns, strict=True)}
-        try:
-            found.append(Symmetry.of(group, shifts, variables, odd))
-        except InputError:
-            # Generators that are not independent: these shifts contradict one another.
-            continue
-    return tuple(found)
+    group.check_regular()
+    return tuple(homomorphisms(group, [name for name, _ in group.generators], variables, odd))
 
 
 def power(symmetry: Symmetry, n: int) -> Symmetry:
@@ -194,9 +179,7 @@ def classes(network: Network) -> tuple[Symmetry, ...]:
     """Return the symmetries of the classes, as blocks has them; it raises the same."""
     known = network.symmetry(network.gaits()[0])
     found = characters(known.group, network.variables, known.odd)
-    values = network.as_dict()
-    for family in network.families(found[0]):
-        if len({values[name] for name in family}) > 1:
-            raise InputError(f'{", ".join(family)} differ: the network does not have the '
-                             'symmetry of its gaits')
+    broken = network.broken(found[0])
+    if broken:
+        raise InputError(f'{broken} differ: the network does not have the symmetry of its gaits')
     return found

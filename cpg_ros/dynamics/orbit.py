@@ -12,37 +12,21 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Gaits as exact periodic orbits, for every network.
+"""Gaits as exact periodic orbits, for every network."""
 
-This is the one place that chooses between the two ways to solve for them: Fourier collocation,
-which takes any delay, and Gauss collocation on a mesh, which takes any steepness. Each is a folder
-with the same functions; what they solve for are orbits and curves that know what to do.
-"""
+from collections.abc import Callable, Sequence
+from functools import lru_cache
 
-from collections.abc import Callable
-from types import ModuleType
-from typing import Any, NamedTuple
-
-from cpg_ros.dynamics.fourier import curve as fourier_curve
-from cpg_ros.dynamics.fourier import floquet as fourier_floquet
-from cpg_ros.dynamics.fourier import mode as fourier_mode
-from cpg_ros.dynamics.fourier import solve as fourier_solve
-from cpg_ros.dynamics.mesh import curve as mesh_curve
-from cpg_ros.dynamics.mesh import floquet as mesh_floquet
-from cpg_ros.dynamics.mesh import mode as mesh_mode
-from cpg_ros.dynamics.mesh import solve as mesh_solve
-from cpg_ros.dynamics.periodic import NoOrbit, Orbit
+from cpg_ros.dynamics.branch_orbits import branch_orbits
+from cpg_ros.dynamics.orbit_method import orbit_method
+from cpg_ros.dynamics.periodic import NoOrbit, Orbit, richer
 from cpg_ros.networks.network import Network, Preset
-from cpg_ros.networks.parameter_line import ParameterLine
 from cpg_ros.networks.symmetry import Symmetry
 import numpy as np
 
 __all__ = [
     'NoOrbit',
     'Orbit',
-    'curve_beside',
-    'curve_through',
-    'orbit_method',
     'solve_beside',
     'solve_from_path',
     'solve_orbit',
@@ -50,26 +34,10 @@ __all__ = [
 ]
 
 
-class OrbitMethod(NamedTuple):
-    """Modules with the same functions, which find, follow and judge orbits."""
-
-    solve: ModuleType
-    curve: ModuleType
-    floquet: ModuleType
-    mode: ModuleType
-
-
-FOURIER = OrbitMethod(fourier_solve, fourier_curve, fourier_floquet, fourier_mode)
-MESH = OrbitMethod(mesh_solve, mesh_curve, mesh_floquet, mesh_mode)
-
-
-def orbit_method(network: Network) -> OrbitMethod:
-    """Return how a network's orbits are found, followed and judged."""
-    return FOURIER if network.delay_parameter else MESH
-
-
 def solve_orbit(network: Network, gait: str, near: Orbit | None = None) -> Orbit:
-    """Solve for the gait's orbit, with exact derivatives by every parameter.
+    """Solve for one orbit of the gait, with exact derivatives by every parameter.
+
+    A gait may have several: ``coexisting_orbits`` finds them and which of them attract.
 
     Args:
         network: parameters.
@@ -83,8 +51,14 @@ def solve_orbit(network: Network, gait: str, near: Orbit | None = None) -> Orbit
             the parameters are.
 
     """
-    found: Orbit = orbit_method(network).solve.solve(network, gait, near)
-    return found
+    preset = network.presets().get(gait)
+    try:
+        found: Orbit = orbit_method(network).solve.solve(network, gait, near)
+        return found
+    except NoOrbit as error:
+        if near is not None or (preset is not None and preset.start is not None):
+            raise
+        return _from_hopf_point(network, gait, error)
 
 
 def solve_beside(network: Network, near: Orbit) -> Orbit:
@@ -102,14 +76,31 @@ def solve_beside(network: Network, near: Orbit) -> Orbit:
     return found
 
 
+@lru_cache(maxsize=64)
 def solve_preset(preset: Preset) -> Orbit:
     """Solve for a preset's orbit; errors as in solve_orbit."""
-    found: Orbit = orbit_method(preset.network).solve.from_preset(preset)
-    return found
+    try:
+        found: Orbit = orbit_method(preset.network).solve.from_preset(preset)
+        return found
+    except NoOrbit as error:
+        if preset.start is not None:
+            raise
+        return _from_hopf_point(preset.network, preset.gait, error)
+
+
+def _from_hopf_point(network: Network, gait: str, error: NoOrbit) -> Orbit:
+    """Return the first orbit on the branches of the equilibrium's Hopf points, or raise."""
+    if not network.delay_parameter:
+        for orbits in branch_orbits(network, gait):
+            for orbit in orbits:
+                if not richer(orbit):
+                    return orbit
+    raise error
 
 
 def solve_from_path(network: Network, symmetry: Symmetry,
-                    path: Callable[[np.ndarray], np.ndarray], period: float) -> Orbit | None:
+                    path: Callable[[np.ndarray], np.ndarray], period: float,
+                    known: Sequence[float] = ()) -> Orbit | None:
     """Solve for an orbit from a guess; None where Newton's method leads to none.
 
     Args:
@@ -118,42 +109,9 @@ def solve_from_path(network: Network, symmetry: Symmetry,
         path: states, shape (m, components), as a function of times in cycles, shape (m,), that
             begin where cell 1 peaks.
         period: in model time.
+        known: periods, model time, of orbits that Newton's method is to be kept off.
 
     """
-    found: Orbit | None = orbit_method(network).solve.from_path(network, symmetry, path, period)
+    found: Orbit | None = orbit_method(network).solve.from_path(network, symmetry, path, period,
+                                                                known)
     return found
-
-
-def curve_through(orbit: Orbit, line: ParameterLine, scales: tuple[float, float]
-                  ) -> tuple[Any, np.ndarray]:
-    """Return the curve of a gait's orbits along a line of parameters, and the orbit's place on it.
-
-    Args:
-        orbit: of a network on the line.
-        line: of parameters.
-        scales: against which periods and values on the line are measured.
-
-    """
-    curve, place = orbit_method(orbit.network).curve.through(orbit, line, scales)
-    return curve, place
-
-
-def curve_beside(network: Network, symmetry: Symmetry, line: ParameterLine,
-                 scales: tuple[float, float], path: Callable[[np.ndarray], np.ndarray],
-                 disturbance: Callable[[np.ndarray], np.ndarray], period: float
-                 ) -> tuple[Any, np.ndarray, np.ndarray]:
-    """Return the curve of the orbits that leave a state or an orbit, that on it, and how.
-
-    Args:
-        network: at the place.
-        symmetry: of the orbits.
-        line: of parameters.
-        scales: against which periods and values on the line are measured.
-        path: states of what they leave, shape (m, components), over times in cycles.
-        disturbance: the direction in which they leave it, the same.
-        period: of the orbits, model time.
-
-    """
-    curve, point, border = orbit_method(network).curve.beside(network, symmetry, line, scales,
-                                                              path, disturbance, period)
-    return curve, point, border

@@ -15,6 +15,7 @@
 """Periodic orbits of a network in a gait, whatever solves them."""
 
 from abc import ABC, abstractmethod
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 import math
@@ -27,8 +28,14 @@ from cpg_ros.networks.symmetry import Symmetry
 from cpg_ros.short_repr import ShortRepr
 import numpy as np
 
-__all__ = ['NoOrbit', 'Orbit', 'added_symmetry', 'check_values', 'richer']
+__all__ = ['NOT_ISOLATED', 'NoOrbit', 'Orbit', 'Waveforms', 'added_symmetry', 'check_values',
+           'richer']
 
+#: Waveforms over theta in cycles, of a wave and a variable: ``waveform(theta, wave, variable)``.
+Waveforms = Callable[[np.ndarray, int, int], np.ndarray]
+#: Why there is no phase response.
+NOT_ISOLATED = ('the orbit is not isolated, so its phase has no response: a disturbance other '
+                'than along it does not decay, either')
 #: Points of a cycle among which extremes are looked for before they are refined.
 POINTS = 1024
 #: Points of a cycle at which signals are compared, at least; and parts of a cycle, of which no
@@ -80,7 +87,7 @@ class Orbit(ShortRepr, ABC):
     @property
     @abstractmethod
     def samples(self) -> int:
-        """Even points of a cycle that tell all there is to a waveform."""
+        """How many evenly spaced points of a cycle resolve a waveform."""
 
     @property
     def gait(self) -> str:
@@ -163,7 +170,7 @@ def check_values(network: Network, gait: str) -> None:
             raise InputError(f'{name} is {value}, not a finite number')
     if network.delay_parameter and network.delay <= 0.0:
         raise InputError(f'{network.delay_parameter} is {network.delay}, it must be positive')
-    broken = network.broken(gait)
+    broken = network.broken(network.symmetry(gait))
     if broken:
         raise NoOrbit(f'no {gait} with these weights: its symmetry needs {broken} to be equal')
     if other := other_gait(network, gait):
@@ -198,7 +205,7 @@ def added_symmetry(symmetry: Symmetry, x: np.ndarray, same: float) -> str:
     """
     most = same * np.ptp(x)
     names, lates, cells = _beyond(symmetry, len(x))
-    # One time tells of nearly all of them that they are none.
+    # A single time rules out nearly all of them.
     for k in np.flatnonzero(np.abs(x[0, cells] - x[lates]).max(axis=1) < most):
         if np.abs(x[:, cells[k]] - np.roll(x, -lates[k], axis=0)).max() < most:
             return names[k]

@@ -124,24 +124,26 @@ def _cycle(run: Trajectory, first: int) -> LimitCycle | None:
     return LimitCycle(lambda theta: run(begin + theta * found), found, drift)
 
 
-def starts(network: Network, symmetry: Symmetry) -> np.ndarray:
+def starts(network: Network, symmetry: Symmetry, random: int = RANDOM) -> np.ndarray:
     """States that the gait is sought from: waves with its phases, then any of its class."""
     variables = np.arange(network.variables)[:, None]
     turn = 2.0 * np.pi * symmetry.phases - 0.5 * np.pi * variables
     waves = np.multiply.outer(SIZES, np.cos(turn).ravel())
-    scattered = SCATTER * np.random.default_rng(0).standard_normal((RANDOM, network.components))
+    scattered = SCATTER * np.random.default_rng(0).standard_normal((random, network.components))
     # On the class, of any length there: fewer numbers, each as large.
     inside = scattered[:, :len(symmetry.basis)] @ symmetry.basis
     inside *= np.sqrt(network.components / len(symmetry.basis))
     return np.repeat(equilibrium(network), network.cells) + np.concatenate([waves, inside])
 
 
-def find_orbit(network: Network, gait: str) -> Iterator[tuple[Path, float]]:
+def find_orbit(network: Network, gait: str, random: int = RANDOM
+               ) -> Iterator[tuple[Path, float]]:
     """Yield what the network settles on in the gait's class, where it has the gait's symmetry.
 
     Args:
         network: parameters.
         gait: one of its gaits.
+        random: number of states at random, besides the waves.
 
     Yields:
         States over cycles, and the period in model time.
@@ -150,7 +152,7 @@ def find_orbit(network: Network, gait: str) -> Iterator[tuple[Path, float]]:
     symmetry = network.symmetry(gait)
     step = network.step * (1.0 if network.delay_parameter else COARSER)
     # As many at a time as advance together.
-    for some in np.split(starts(network, symmetry), (len(SIZES) + RANDOM) // LANES):
+    for some in np.array_split(starts(network, symmetry, random), (len(SIZES) + random) // LANES):
         histories: list[History] = list(some)
         before = 0
         for steps in LOOKED:

@@ -22,7 +22,7 @@ from fractions import Fraction
 
 from cpg_ros.dynamics.bifurcation import Bifurcation
 from cpg_ros.dynamics.continuation import Branch, continue_from_disturbance
-from cpg_ros.dynamics.orbit import orbit_method
+from cpg_ros.dynamics.orbit_method import orbit_method
 from cpg_ros.dynamics.periodic import NoOrbit, richer
 from cpg_ros.errors import InputError
 from cpg_ros.networks.parameter_line import ParameterLine
@@ -56,7 +56,7 @@ def switch_branch(bifurcation: Bifurcation, along: ParameterLine, low: float, hi
         raise InputError(f'at the torus point at {along} {bifurcation.value:g} no branch of '
                          'periodic orbits leaves')
     cycles = 2 if doubled else 1
-    disturbance = orbit_method(orbit.network).mode.mode(orbit, bifurcation.part,
+    disturbance = orbit_method(orbit.network).floquet.mode(orbit, bifurcation.part,
                                                         -1.0 if doubled else 1.0)
     theta = np.arange(POINTS) / POINTS
     symmetry = kept(orbit.symmetry, disturbance(cycles * theta), doubled)

@@ -18,7 +18,7 @@ Imports ``motion``, ``robots`` and what is below; knows nothing of ROS. All of i
 robots at a time: arrays have a leading axis of runs, which is 1 for a robot alone.
 """
 
-__all__ = ['efference_copy', 'estimate', 'feedback', 'foot_force', 'gains', 'gait_tables',
-           'heading', 'input_monitor', 'kinematics', 'law', 'memory', 'pace', 'placement',
-           'plausibility', 'posture', 'precompile', 'reflexes', 'sidestep', 'slope', 'speed',
-           'tegotae', 'tick', 'timetable', 'touchdown']
+__all__ = ['biped', 'clearance', 'efference_copy', 'estimate', 'feedback', 'foot_force', 'gains',
+           'gait_tables', 'heading', 'input_monitor', 'interpolation', 'kinematics', 'law',
+           'memory', 'pace', 'placement', 'plausibility', 'posture', 'reflexes', 'sidestep',
+           'slope', 'speed', 'stiffen', 'tegotae', 'tick', 'timetable', 'touchdown', 'warm_up']

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Efference copy: what the body does by itself in a gait, by stride phase and speed.
+"""Efference copy: the body's own motion in a gait, by stride phase and speed.
 
 Only what differs from it is fed back. The term is von Holst and Mittelstaedt's (1950).
 """
@@ -20,12 +20,13 @@ Only what differs from it is fed back. The term is von Holst and Mittelstaedt's 
 from dataclasses import dataclass
 
 from cpg_ros.errors import InputError
+from cpg_ros.feedback.interpolation import between_phases, between_speeds
 from cpg_ros.integration.jit import jit
 from cpg_ros.robots import body_keys
 from cpg_ros.robots.body_keys import EfferenceTable
 import numpy as np
 
-#: Bins of a stride, how many signals there are, and most speeds of a table; see ``body_keys``.
+#: Bins of a stride, number of signals, and most speeds of a table; see ``body_keys``.
 BINS, SIGNALS, SPEEDS = body_keys.BINS, len(body_keys.SIGNALS), body_keys.SPEEDS
 
 
@@ -61,33 +62,13 @@ class EfferenceCopy:
             key: tuple(tuple(row) for row in self.table[:, :, k].tolist())
             for k, key in enumerate(body_keys.SIGNALS)})
 
-    def __call__(self, phase: np.ndarray, speed: np.ndarray) -> np.ndarray:
-        """Return what is expected, shape (runs, SIGNALS).
-
-        Args:
-            phase: of the first leg, cycles, shape (runs,).
-            speed: wanted, m/s, shape (runs,).
-
-        """
-        out = np.zeros((len(phase), SIGNALS))
-        for row, one, fast in zip(out, phase, speed, strict=True):
-            expect(self.speeds, self.table, one, fast, 1.0, row)
-        return out
-
 
 @jit
 def expect(speeds, table, phase, speed, share, out):
     """Add a share of what is expected to out, shape (SIGNALS,); see EfferenceCopy."""
-    low = 0
-    while low + 2 < speeds.shape[0] and speed > speeds[low + 1]:
-        low += 1
-    high = min(low + 1, speeds.shape[0] - 1)
-    gap = speeds[high] - speeds[low]
-    up = min(max((speed - speeds[low]) / gap, 0.0), 1.0) if gap > 0.0 else 0.0
+    low, high, up = between_speeds(speeds, speed)
     # A bin's mean stands for its middle.
-    place = (phase * BINS - 0.5) % BINS
-    one = int(place) % BINS
-    two, on = (one + 1) % BINS, place - int(place)
+    one, two, on = between_phases((phase * BINS - 0.5) % BINS, BINS)
     for k in range(SIGNALS):
         below = table[low, one, k] + on * (table[low, two, k] - table[low, one, k])
         above = table[high, one, k] + on * (table[high, two, k] - table[high, one, k])

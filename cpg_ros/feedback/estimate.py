@@ -17,7 +17,7 @@
 import math
 from typing import NamedTuple
 
-from cpg_ros.feedback.kinematics import foot_of, Geometry, GRAVITY, slopes_of
+from cpg_ros.feedback.kinematics import foot_of, Geometry, GRAVITY, slopes_of, vertical
 from cpg_ros.integration.jit import entry, jit
 import numpy as np
 
@@ -63,13 +63,6 @@ def rpy_of(quaternions: np.ndarray) -> np.ndarray:
                      np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))], axis=-1)
 
 
-def upward(rpy: np.ndarray) -> np.ndarray:
-    """Return the vertical in the base's frame, shape (..., 3)."""
-    roll, pitch = rpy[..., 0], rpy[..., 1]
-    return np.stack([-np.sin(pitch), np.sin(roll) * np.cos(pitch),
-                     np.cos(roll) * np.cos(pitch)], axis=-1)
-
-
 @jit
 def velocity_by_leg(leg, joints, rates, slopes, turning, up, radius, out):
     """Fill the base's velocity according to one leg whose foot rolls on the ground, m/s.
@@ -108,15 +101,13 @@ def update(legs, sensors, run, dt, velocity, contact, leg_velocities, scratch):
     """Update the estimate of one run: velocity (3,) and contact (legs,), in place.
 
     Scratch are leg_velocities, shape (legs, 4), each leg's estimate and its weight, and scratch,
-    shape (5, 3).
+    shape (4, 3).
     """
     rows, columns = legs.rows, legs.columns
     angles, rates = sensors.joint_positions[run], sensors.joint_velocities[run]
     forces, rpy = sensors.foot_forces[run], sensors.rpy[run]
     turning, acceleration = sensors.angular_velocity[run], sensors.acceleration[run]
-    up, slopes, now = scratch[4], scratch[:3], scratch[3]
-    up[0], up[1] = -math.sin(rpy[1]), math.sin(rpy[0]) * math.cos(rpy[1])
-    up[2] = math.cos(rpy[0]) * math.cos(rpy[1])
+    up, slopes, now = vertical(rpy[0], rpy[1]), scratch[:3], scratch[3]
     vx, vy, vz = velocity[0], velocity[1], velocity[2]
     velocity[0] += dt * (acceleration[0] - GRAVITY * up[0] - (turning[1] * vz - turning[2] * vy))
     velocity[1] += dt * (acceleration[1] - GRAVITY * up[1] - (turning[2] * vx - turning[0] * vz))
@@ -168,7 +159,7 @@ class BodyState:
         legs = len(geometry.hips)
         self.velocity = np.zeros((runs, 3))
         self.contact = np.zeros((runs, legs), dtype=bool)
-        self.scratch = np.zeros((legs, 4)), np.zeros((5, 3))
+        self.scratch = np.zeros((legs, 4)), np.zeros((4, 3))
 
     def update(self, sensors: SensorData, dt: float) -> None:
         """Update the estimate with what is measured, dt in s after the last time."""

@@ -25,7 +25,6 @@ from cpg_ros.feedback.memory import Memory
 from cpg_ros.feedback.tick import PlannedMotion, tick
 from cpg_ros.feedback.timetable import Timetable
 from cpg_ros.integration.jit import bound
-from cpg_ros.motion.pattern import Pattern
 from cpg_ros.motion.plan import GaitPlan
 import numpy as np
 
@@ -93,42 +92,15 @@ class Feedback:
             share: of all corrections, 0 to 1.
             level: of the pattern: 0 at the stand, 1 in the full gait.
 
+        Raises:
+            InputError: the gains are new, and one is outside its limits.
+
         """
         # A plain tuple, which is made faster than a named one.
         arguments = (self._legs, self._tables, self.gains, self.memory, sensors, planned,
                      (dt, share * level, level), self.angles)
         if self._tick is None or self._bound is not self.gains:
+            self.gains.check()
             self._tick, self._bound = bound(tick, *arguments), self.gains
         self._tick(*arguments)
         return self.angles
-
-
-def close(pattern: Pattern, feedback: Feedback, measure: Callable[[], SensorData],
-          velocity: np.ndarray, heading: np.ndarray, dt: float = 0.002) -> None:
-    """Let a feedback of one run correct a pattern from now on, at ticks of dt.
-
-    Strides need a pattern with a drive; without one, speed and heading are not controlled.
-
-    Args:
-        pattern: whose angles are corrected before its limits hold them.
-        feedback: that has learnt its gaits.
-        measure: called at each tick for the sensor data.
-        velocity: wanted forward and to the left, m/s, shape (1, 2); may be changed in place.
-        heading: wanted, rad, shape (1,); the same.
-        dt: s.
-
-    """
-    gaits, mix, memory = np.zeros((1, 2), dtype=np.int64), np.zeros(1), feedback.memory
-
-    def correct(angles: np.ndarray) -> np.ndarray:
-        old, new, mix[0] = pattern.fading
-        gaits[0] = feedback.slot(old), feedback.slot(new)
-        planned = PlannedMotion(angles[None], pattern.phases[:1], gaits, mix, velocity, heading)
-        corrected = feedback.advance(measure(), planned, dt, 1.0, pattern.level)
-        pattern.frequency_scale = float(memory.frequency_scale[0])
-        if pattern.drive is not None and new.motion.steering is not None:
-            stride, pace = new.steer(float(velocity[0, 0]), 0.0)
-            pattern.steer(np.clip(stride + memory.stride[0], -1.0, 1.0), pace)
-        return corrected[0]
-
-    pattern.correct = correct

@@ -12,21 +12,14 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""How much of the ground's force a leg's motors bear, where feet have no sensors."""
+"""Foot forces from joint torques, for feet without sensors."""
 
-import math
-
-from cpg_ros.feedback.kinematics import slopes_of
+from cpg_ros.feedback.kinematics import cross, slopes_of, vertical
 from cpg_ros.integration.jit import entry, jit
 import numpy as np
 
-#: A leg whose joints hardly move its foot says nothing: least determinant, m^3.
+#: Least determinant, m^3: in a leg below it, torques do not determine the force.
 SINGULAR = 1e-6
-
-
-@jit
-def _cross(a, b):
-    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
 @jit
@@ -49,8 +42,8 @@ def load_of(leg, columns, angles, efforts, up, slopes):
         # Nothing holds it sideways: no force there.
         slopes[1, 0], effort = 1.0, (0.0, effort[1], effort[2])
     # By virtual work the efforts are -J^T F; J^-T has the cross products of J's rows as rows.
-    forward, left, upward = (_cross(slopes[1], slopes[2]), _cross(slopes[2], slopes[0]),
-                             _cross(slopes[0], slopes[1]))
+    forward, left, upward = (cross(slopes[1], slopes[2]), cross(slopes[2], slopes[0]),
+                             cross(slopes[0], slopes[1]))
     volume = slopes[0, 0] * forward[0] + slopes[0, 1] * forward[1] + slopes[0, 2] * forward[2]
     if abs(volume) < SINGULAR:
         return 0.0
@@ -67,8 +60,6 @@ def loads_of(rows, columns, angles, efforts, roll, pitch, out):
     Rows and columns are the geometry's; angles in rad, efforts in N m, shape (joints,); roll
     and pitch in rad.
     """
-    up = (-math.sin(pitch), math.sin(roll) * math.cos(pitch),
-          math.cos(roll) * math.cos(pitch))
-    slopes = np.empty((3, 3))
+    up, slopes = vertical(roll, pitch), np.empty((3, 3))
     for leg in range(len(out)):
         out[leg] = load_of(rows[leg], columns[leg], angles, efforts, up, slopes)

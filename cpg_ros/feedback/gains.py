@@ -17,7 +17,9 @@
 from collections.abc import Sequence
 from typing import Any
 
+from cpg_ros.errors import InputError
 from cpg_ros.feedback import (
+    clearance,
     heading,
     pace,
     placement,
@@ -26,6 +28,7 @@ from cpg_ros.feedback import (
     sidestep,
     slope,
     speed,
+    stiffen,
     tegotae,
     touchdown,
 )
@@ -33,7 +36,8 @@ from cpg_ros.feedback.law import Gain, Law, named_tuple
 
 #: In the order in which parameters and the reference list them.
 LAWS: Sequence[Law] = [module.LAW for module in (
-    posture, placement, pace, reflexes, slope, heading, speed, sidestep, touchdown, tegotae)]
+    posture, placement, pace, stiffen, reflexes, clearance, slope, heading, speed, sidestep,
+    touchdown, tegotae)]
 #: Gains of no single law.
 COMMON = {'smooth': Gain(0.008, 0.08, 's',
                          'time constant with which every displacement is smoothed')}
@@ -52,3 +56,11 @@ class Gains(_Fields):  # type: ignore[misc]
     """
 
     __slots__ = ()
+
+    def check(self) -> None:
+        """Raise InputError if a gain is outside its limits."""
+        for name, gain in GAINS.items():
+            value = getattr(self, name)
+            if not gain.low <= value <= gain.high:
+                raise InputError(f"gain '{name}' is {value:g}, but must be from {gain.low:g} to "
+                                 f'{gain.high:g}' + (f' {gain.unit}' if gain.unit else ''))

@@ -14,8 +14,8 @@
 
 """Heading: a robot that has been turned away from its heading turns back."""
 
-import math
-
+from cpg_ros.feedback.interpolation import between_speeds
+from cpg_ros.feedback.kinematics import wrapped
 from cpg_ros.feedback.law import Gain, Law
 from cpg_ros.integration.jit import jit
 
@@ -29,8 +29,7 @@ LAW = Law(
 @jit
 def yaw_rate(wanted, yaw, gains):
     """Return the yaw rate that corrects the heading, rad/s; headings in rad."""
-    error = (wanted - yaw + math.pi) % (2.0 * math.pi) - math.pi
-    return min(max(gains.turn * error, -gains.turn_most), gains.turn_most)
+    return min(max(gains.turn * wrapped(wanted - yaw), -gains.turn_most), gains.turn_most)
 
 
 @jit
@@ -43,9 +42,5 @@ def response(speeds, yaw_rates, speed):
         speed: forward, m/s.
 
     """
-    k = 0
-    while k + 2 < speeds.shape[0] and speed > speeds[k + 1]:
-        k += 1
-    gap = speeds[k + 1] - speeds[k]
-    up = min(max((speed - speeds[k]) / gap, 0.0), 1.0) if gap > 0.0 else 0.0
-    return yaw_rates[k] + up * (yaw_rates[k + 1] - yaw_rates[k])
+    low, high, up = between_speeds(speeds, speed)
+    return yaw_rates[low] + up * (yaw_rates[high] - yaw_rates[low])

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Whether an input of the feedback is valid, and since when it is not."""
+"""Monitoring of the feedback's inputs: whether each is valid, or since when it is not."""
 
 import math
 
@@ -90,7 +90,7 @@ class Fade:
         self._way, self._good = 0.0, 0.0
 
     def advance(self, good: bool, dt: float) -> float:
-        """Return the share dt in s later; good says whether all is well."""
+        """Return the share dt in s later; good if all inputs are valid."""
         self._good = self._good + dt if good else 0.0
         if self._good >= GOOD or (good and self._way >= 1.0):
             self._way = min(1.0, self._way + dt / FADE)

@@ -90,6 +90,11 @@ class Geometry:
         return LegArrays(self.rows, self.columns, self.radius, self.weight)
 
 
+def bend_of(upper: complex, lower: complex, second: float) -> float:
+    """Return to which side the second of two links is bent at an angle, rad: 1 or -1."""
+    return 1.0 if np.sin(second + np.angle(lower / upper)) >= 0.0 else -1.0
+
+
 def geometry_of(robot: Robot, body: BodyGeometry | None = None) -> Geometry:
     """Return the geometry of a robot's legs: its file's, or another one.
 
@@ -119,8 +124,7 @@ def geometry_of(robot: Robot, body: BodyGeometry | None = None) -> Geometry:
         # What the links themselves are off sideways belongs to the leg's plane.
         thighs[k, 1] += leg.calf[1] + leg.foot[1]
         uppers[k], lowers[k] = (complex(link[2], link[0]) for link in (leg.calf, leg.foot))
-        bend = turns[k, 2] * offsets[own[-1]] + np.angle(lowers[k] / uppers[k])
-        bends[k] = 1.0 if np.sin(bend) >= 0.0 else -1.0
+        bends[k] = bend_of(uppers[k], lowers[k], turns[k, 2] * offsets[own[-1]])
     return Geometry(columns, turns, hips, thighs, uppers, lowers, bends, body.foot_radius,
                     GRAVITY * body.mass)
 
@@ -153,6 +157,18 @@ def slopes_of(leg, hip, thigh, calf, out):
                                        -leg[1] * ch * whole_x)
     out[0, 2], out[1, 2], out[2, 2] = (leg[2] * lower_z, leg[2] * sh * lower_x,
                                        -leg[2] * ch * lower_x)
+
+
+@jit
+def vertical(roll, pitch):
+    """Return the vertical in the frame of a base that leans by these angles, rad."""
+    return -math.sin(pitch), math.sin(roll) * math.cos(pitch), math.cos(roll) * math.cos(pitch)
+
+
+@jit
+def cross(a, b):
+    """Return the product of two vectors, a tuple."""
+    return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
 
 
 @jit
@@ -209,72 +225,9 @@ def _feet(rows, columns, angles, out):
                                   angles[k, columns[leg, 1]], angles[k, columns[leg, 2]])
 
 
-@entry
-def _slopes(rows, columns, angles, out):
-    for k in range(angles.shape[0]):
-        for leg in range(rows.shape[0]):
-            slopes_of(rows[leg], angles[k, columns[leg, 0]], angles[k, columns[leg, 1]],
-                      angles[k, columns[leg, 2]], out[k, leg])
-
-
-@entry
-def _joints(rows, places, out):
-    for k in range(places.shape[0]):
-        for leg in range(rows.shape[0]):
-            out[k, leg] = joints_of(rows[leg], places[k, leg, 0], places[k, leg, 1],
-                                    places[k, leg, 2])
-
-
-@entry
-def _moved(rows, columns, places, ways, angles):
-    for k in range(places.shape[0]):
-        for leg in range(rows.shape[0]):
-            move_foot(rows[leg], columns[leg], angles[k], places[k, leg], ways[k, leg])
-
-
-def _flat(values: np.ndarray, last: int) -> np.ndarray:
-    """Make one of all leading axes, `last` are not."""
-    return np.ascontiguousarray(values, dtype=float).reshape(-1, *values.shape[-last:])
-
-
 def forward(geometry: Geometry, angles: np.ndarray) -> np.ndarray:
     """Return where the feet are, m, shape (..., legs, 3); angles in rad, shape (..., joints)."""
     out = np.empty((*angles.shape[:-1], len(geometry.hips), 3))
-    _feet(geometry.rows, geometry.columns, _flat(angles, 1), out.reshape(-1, *out.shape[-2:]))
+    flat = np.ascontiguousarray(angles, dtype=float).reshape(-1, angles.shape[-1])
+    _feet(geometry.rows, geometry.columns, flat, out.reshape(-1, *out.shape[-2:]))
     return out
-
-
-def jacobian(geometry: Geometry, angles: np.ndarray) -> np.ndarray:
-    """Return the feet's derivatives by hip, thigh and calf, m/rad, shape (..., legs, 3, 3)."""
-    out = np.empty((*angles.shape[:-1], len(geometry.hips), 3, 3))
-    _slopes(geometry.rows, geometry.columns, _flat(angles, 1), out.reshape(-1, *out.shape[-3:]))
-    return out
-
-
-def inverse(geometry: Geometry, feet: np.ndarray) -> np.ndarray:
-    """Return angles of hip, thigh and calf, rad, shape (..., legs, 3), with the feet there.
-
-    A place out of reach is taken to the nearest on its line to the thigh joint. The feet, in m,
-    have shape (..., legs, 3).
-    """
-    out = np.empty(feet.shape)
-    _joints(geometry.rows, _flat(feet, 2), out.reshape(-1, *out.shape[-2:]))
-    return out
-
-
-def displace(geometry: Geometry, angles: np.ndarray, feet: np.ndarray, way: np.ndarray
-             ) -> np.ndarray:
-    """Return angles with the feet moved, rad, shape (..., joints).
-
-    Exactly the angles that came in where the way is 0, and limits are the caller's business.
-
-    Args:
-        geometry: of the legs.
-        angles: rad, shape (..., joints).
-        feet: where these put the feet, m, shape (..., legs, 3).
-        way: by which they are to be moved, m, shape (..., legs, 3).
-
-    """
-    found = np.array(angles, dtype=float)
-    _moved(geometry.rows, geometry.columns, _flat(feet, 2), _flat(way, 2), _flat(found, 1))
-    return found

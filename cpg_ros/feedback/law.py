@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What a feedback law declares beside its kernel: its switch, its gains and its state."""
+"""Declaration of a feedback law beside its kernel: its switch, its gains and its state."""
 
 from collections import namedtuple
 from collections.abc import Iterable, Mapping
@@ -22,13 +22,14 @@ from typing import Any
 
 @dataclass(frozen=True)
 class Gain:
-    """A gain of a law, which may be set from 0 to its upper limit.
+    """A gain of a law, which may be set within its limits.
 
     Attributes:
         default: found on a simulated Go2.
         high: upper limit.
         unit: '' for a pure number.
         text: what it does, without the unit.
+        low: lower limit.
 
     """
 
@@ -36,6 +37,7 @@ class Gain:
     high: float
     unit: str
     text: str
+    low: float = 0.0
 
 
 @dataclass(frozen=True)

@@ -38,7 +38,7 @@ SCRATCH = {
     'previous_contact': StateVariable('contact before this tick', ('legs',), False),
     'leg_velocities': StateVariable("see estimate.update; then the planned feet's places [m]",
                                     ('legs', 4)),
-    'scratch': StateVariable('see estimate.update', (5, 3)),
+    'scratch': StateVariable('see estimate.update', (4, 3)),
     'expected': StateVariable('signals of the efference copy', (SIGNALS,))}
 _Fields: Any = named_tuple('Memory', [*VARIABLES, *SCRATCH])
 

@@ -12,11 +12,11 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Pace: a body that is pushed sideways steps faster, for a while.
+"""Pace: a body that is pushed steps faster, for a while.
 
 A gait at a higher frequency sways less and is faster than its efference copy says, which would
-pass for a push. The law therefore fatigues, and it disregards the forward speed, which follows
-from the frequency itself.
+pass for a push. The law therefore fatigues, and it weights the forward speed, which follows from
+the frequency itself, less than the sideways speed.
 """
 
 import math
@@ -25,14 +25,16 @@ from cpg_ros.feedback.law import Gain, Law, StateVariable
 from cpg_ros.integration.jit import jit
 
 LAW = Law(
-    'pace', 'take faster strides for a while when the body is pushed sideways', True,
+    'pace', 'take faster strides for a while when the body is pushed', True,
     gains={
         'pace_from': Gain(0.12, 1.2, 'm/s',
-                          'sideways velocity error above which strides become faster'),
+                          'velocity error above which strides become faster'),
+        'pace_forward': Gain(0.7, 1.0, '',
+                             'share of the forward velocity error beside the sideways one'),
         'pace_gain': Gain(4.0, 40.0, 's/m',
                           'relative increase of the stride frequency per m/s above pace_from'),
-        'pace_most': Gain(0.8, 8.0, '', 'largest relative increase of the stride frequency'),
-        'pace_fatigue': Gain(2.0, 20.0, '',
+        'pace_most': Gain(2.4, 8.0, '', 'largest relative increase of the stride frequency'),
+        'pace_fatigue': Gain(0.5, 20.0, '',
                              'how many times the mean of recent increases is subtracted from '
                              'a new one'),
         'pace_memory': Gain(2.0, 20.0, 's', 'time constant of the mean of recent increases')},
@@ -41,16 +43,29 @@ LAW = Law(
 
 
 @jit
-def frequency_change(left, fatigue, gains):
+def velocity_error(forward, left, gains):
+    """Return by how much a body is pushed, m/s.
+
+    Args:
+        forward: velocity beyond what is expected, m/s.
+        left: the same, to the left.
+        gains: of the law.
+
+    """
+    return math.sqrt(left * left + (gains.pace_forward * forward)**2)
+
+
+@jit
+def frequency_change(error, fatigue, gains):
     """Return the relative increase of the stride frequency.
 
     Args:
-        left: velocity to the left beyond what is expected, m/s.
+        error: see velocity_error, m/s.
         fatigue: mean of the recent increases, see update_fatigue.
         gains: of the law.
 
     """
-    fresh = min(max(gains.pace_gain * (abs(left) - gains.pace_from), 0.0), gains.pace_most)
+    fresh = min(max(gains.pace_gain * (error - gains.pace_from), 0.0), gains.pace_most)
     return max(fresh - gains.pace_fatigue * fatigue, 0.0)
 
 

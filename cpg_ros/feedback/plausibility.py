@@ -12,10 +12,10 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What a robot can feel and what it cannot: every message of a sensor is judged before it is used.
+"""Plausibility of sensor messages: each is checked before the feedback uses it.
 
-Rules of thumb for legged robots; what is ten times too large is told from a stumble by how long
-it lasts.
+Rules of thumb for legged robots. A value that is far too large counts as a fault only if it lasts
+longer than a stumble does.
 """
 
 import math
@@ -23,7 +23,7 @@ import math
 from cpg_ros.feedback.kinematics import GRAVITY
 from cpg_ros.integration.jit import entry
 
-#: What is wrong with a message, by the number that a judge returns.
+#: What is wrong with a message, by the number that the checks return.
 VERDICTS = ('', 'numbers that are not finite', 'an orientation whose length is not 1',
             'no orientation (its covariance begins with -1)', 'an impossible angular velocity',
             'an impossible acceleration',
@@ -39,22 +39,22 @@ APART, FORGET, GAP = 0.15, 0.2, 0.05
 BEYOND, OUTRUN = 0.3, 3.0
 #: Loads of all feet within TELLING, and drawn by one, in weights.
 HEAVIEST, DRAWN = 4.0, -0.5
-#: Numbers of a sensor_msgs/Imu; what its judge keeps in mind: acceleration (3), vertical (3), how
-#: far it has parted from where the angular velocity has it (3), whether there is a last message.
+#: Numbers of a sensor_msgs/Imu, and of the memory of its check: acceleration (3), vertical (3),
+#: drift of the vertical from the integrated angular velocity (3), whether there is a last message.
 IMU, IMU_MEMORY = 37, 10
 
 
 @entry
-def judge_imu(values, dt, memory, lean, turning, push):
-    """Fill lean, turning and push if they can be; return an index into VERDICTS, 0 for good.
+def judge_imu(values, dt, memory, rpy, angular_velocity, acceleration):
+    """Fill the last three if the message is plausible; return an index into VERDICTS, 0 for good.
 
     Args:
         values: the numbers of a sensor_msgs/Imu in its order, shape (IMU,).
         dt: since the last one, s.
         memory: shape (IMU_MEMORY,), zeros at first; overwritten.
-        lean: roll, pitch and yaw, rad, shape (3,).
-        turning: of the base, rad/s, shape (3,).
-        push: what the accelerometer shows, m/s^2, shape (3,).
+        rpy: roll, pitch and yaw, rad, shape (3,).
+        angular_velocity: of the base, rad/s, shape (3,).
+        acceleration: what the accelerometer shows, m/s^2, shape (3,).
 
     """
     for k in (0, 1, 2, 3, 13, 14, 15, 25, 26, 27):
@@ -85,17 +85,17 @@ def judge_imu(values, dt, memory, lean, turning, push):
     memory[9] = 1.0
     if math.sqrt(parted) > APART:
         return 6
-    lean[0] = math.atan2(up[1], up[2])
-    lean[1] = math.asin(min(max(-up[0], -1.0), 1.0))
-    lean[2] = math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
+    rpy[0] = math.atan2(up[1], up[2])
+    rpy[1] = math.asin(min(max(-up[0], -1.0), 1.0))
+    rpy[2] = math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
     for k in range(3):
-        turning[k], push[k] = values[13 + k], values[25 + k]
+        angular_velocity[k], acceleration[k] = values[13 + k], values[25 + k]
     return 0
 
 
 @entry
 def judge_joints(positions, velocities, places, lower, upper, fastest, angles, rates):
-    """Fill angles and rates if they can be; return an index into VERDICTS, 0 for good.
+    """Fill angles and rates if plausible; return an index into VERDICTS, 0 for good.
 
     Args:
         positions: of a message, in its own order, rad.
@@ -122,8 +122,8 @@ def judge_joints(positions, velocities, places, lower, upper, fastest, angles, r
 
 
 @entry
-def judge_loads(loads, places, weight, dt, memory, felt):
-    """Fill felt if it can be; return an index into VERDICTS, 0 for good.
+def judge_loads(loads, places, weight, dt, memory, forces):
+    """Fill forces if plausible; return an index into VERDICTS, 0 for good.
 
     Args:
         loads: of the feet, N, in any order.
@@ -131,7 +131,7 @@ def judge_loads(loads, places, weight, dt, memory, felt):
         weight: of the robot, N.
         dt: since the last ones, s.
         memory: shape (1,), zeros at first; overwritten.
-        felt: N, shape (legs,).
+        forces: N, shape (legs,).
 
     """
     whole = 0.0
@@ -145,7 +145,7 @@ def judge_loads(loads, places, weight, dt, memory, felt):
     if memory[0] > HEAVIEST * weight:
         return 9
     for k in range(len(places)):
-        felt[k] = loads[places[k]]
+        forces[k] = loads[places[k]]
     return 0
 
 

@@ -40,7 +40,7 @@ LAW = Law(
 
 @jit
 def landing(wanted, stance, gains):
-    """Return where a foot is to land, m to the left of where the gait has it.
+    """Return the touchdown target of a foot, m to the left of the gait's own.
 
     That is half of the distance that the body moves over the foot.
 

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Tegotae: a leg that bears load stays in its stance, one that does not goes on.
+"""Tegotae: load on a leg holds it in its stance, lack of load lets it swing.
 
 Owaki, Kano, Nagasawa, Tero and Ishiguro, "Simple robot suggests physical interlimb communication
 is essential for quadruped walking", J. R. Soc. Interface 10 (2013) 20120669: each leg's phase goes

@@ -18,6 +18,7 @@ import math
 from typing import NamedTuple
 
 from cpg_ros.feedback import (
+    clearance,
     heading,
     pace,
     placement,
@@ -26,6 +27,7 @@ from cpg_ros.feedback import (
     sidestep,
     slope,
     speed,
+    stiffen,
     tegotae,
     touchdown,
 )
@@ -164,7 +166,7 @@ def tick(legs, tables, gains, memory, sensors, planned, step, out):
         row = int((phase + LEAD) % 1.0 * POINTS) % POINTS
         now = int(phase % 1.0 * POINTS) % POINTS
         out[run] = planned.angles[run]
-        phase_rate, standing, mean_x, mean_y = 0.0, 0, 0.0, 0.0
+        phase_rate, standing, mean_x, mean_y, stumbling = 0.0, 0, 0.0, 0.0, 0.0
         for leg in range(rows.shape[0]):
             hip, thigh, calf = columns[leg, 0], columns[leg, 1], columns[leg, 2]
             feet[leg, 0], feet[leg, 1], feet[leg, 2] = foot_of(
@@ -200,6 +202,11 @@ def tick(legs, tables, gains, memory, sensors, planned, step, out):
                 z += turns * reflexes.advance(
                     memory.reflex_state[run, leg], contact, swings_now, progress, foot[2],
                     roll * foot[1] - pitch * foot[0], gains, dt)
+            if gains.clearance:
+                stumbling += clearance.stumbles(contact, swings_now, progress)
+                if swinging:
+                    z += turns * clearance.lift(memory.clearance_share[run],
+                                                tables.progress[slot, row, leg], gains)
             if gains.tegotae:
                 phase_rate += tegotae.rate(max(sensors.foot_forces[run, leg], 0.0) / legs.weight,
                                            swings_now, progress, gains)
@@ -212,10 +219,20 @@ def tick(legs, tables, gains, memory, sensors, planned, step, out):
             displacement[2] += quick * (share * z - displacement[2])
             move_foot(rows[leg], columns[leg], out[run], foot, displacement)
 
+        memory.clearance_share[run] = clearance.update(
+            memory.clearance_share[run], stumbling if share == 1.0 else 0.0, gains, dt)
         scale, frequency = 1.0, max(strode / dt, 0.1)
+        error = turns * pace.velocity_error(off.vx, off.vy, gains)
         if gains.pace:
-            scale += share * turns * pace.frequency_change(off.vy, memory.fatigue[run], gains)
+            scale += share * pace.frequency_change(error, memory.fatigue[run], gains)
         memory.fatigue[run] = pace.update_fatigue(memory.fatigue[run], scale - 1.0, gains, dt)
+        memory.kp_scale[run] = 1.0
+        if gains.stiffen:
+            # Before the full gait is reached the body is not yet where the efference copy has it.
+            memory.stiff_for[run] = stiffen.remaining(
+                memory.stiff_for[run], error if share == 1.0 else 0.0, gains, dt)
+            if memory.stiff_for[run] > 0.0:
+                memory.kp_scale[run] = gains.stiffen_kp
         scale += share * phase_rate / (2.0 * math.pi * frequency * rows.shape[0])
         if gains.touchdown:
             change = share * touchdown.frequency_change(memory.phase_correction[run], frequency)

@@ -16,6 +16,7 @@
 
 import itertools
 
+from cpg_ros.feedback.interpolation import periodic
 from cpg_ros.feedback.kinematics import forward, Geometry
 from cpg_ros.motion.plan import GaitPlan
 from cpg_ros.robots.robot import Robot
@@ -64,12 +65,6 @@ def _hops(robot: Robot, swinging: np.ndarray) -> bool:
 def _paired(robot: Robot, one: str, other: str) -> bool:
     return (robot.girdles.get(one) == robot.girdles.get(other)
             and {robot.sides.get(one), robot.sides.get(other)} == {'left', 'right'})
-
-
-def periodic(values: np.ndarray, phase: np.ndarray) -> np.ndarray:
-    """Look up what is given at even phases of a cycle, from 0 on, at phases in cycles."""
-    grid = np.arange(values.size + 1) / values.size
-    return np.interp(phase % 1.0, grid, np.append(values, values[0]))
 
 
 def _swing(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

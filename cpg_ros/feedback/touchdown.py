@@ -39,7 +39,7 @@ EARLIEST = 0.5
 
 @jit
 def phase_change(swinging, progress, duty, gains):
-    """Return by how much a leg's phase is to be changed when its foot lands, cycles.
+    """Return the change of a leg's phase when its foot lands, cycles.
 
     Args:
         swinging: whether it is meant to be in the air.

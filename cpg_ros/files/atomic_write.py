@@ -12,10 +12,14 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Files are written whole or not at all: beside, then renamed."""
+"""Files are written whole or not at all: under another name, then renamed."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+import json
 import os
 from pathlib import Path
+from typing import Any
 
 
 def write_atomically(path: str | Path, content: str | bytes) -> None:
@@ -25,12 +29,27 @@ def write_atomically(path: str | Path, content: str | bytes) -> None:
         OSError: it cannot be written; the error has the file's name, also where a disk is full.
 
     """
-    path = Path(path)
-    beside = path.with_name(f'.{path.name}.{os.getpid()}.part')
     try:
-        beside.write_bytes(content.encode() if isinstance(content, str) else content)
-        beside.replace(path)
+        with replacing(Path(path)) as beside:
+            beside.write_bytes(content.encode() if isinstance(content, str) else content)
     except OSError as error:
         raise OSError(error.errno, error.strerror, str(path)) from error
+
+
+@contextmanager
+def replacing(path: Path) -> Iterator[Path]:
+    """Yield the name of a file to write, which then replaces another one, unless writing fails."""
+    beside = path.with_name(f'.{path.name}.{os.getpid()}.part')
+    try:
+        yield beside
+        beside.replace(path)
     finally:
         beside.unlink(missing_ok=True)
+
+
+def stored_json(path: Path) -> Any:
+    """Return what a file of JSON holds; None if it is missing, or damaged by a disk failure."""
+    try:
+        return json.loads(path.read_text())
+    except (FileNotFoundError, ValueError):
+        return None

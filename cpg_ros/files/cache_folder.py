@@ -13,10 +13,10 @@
 # limitations under the License.
 
 
-"""A cache whose folders are named by what their contents follow from.
+"""A cache whose folders are named after the inputs of their contents.
 
-Contents that follow from something else are in another folder, so nothing in a folder is ever out
-of date. What is no longer used is removed when a new folder is made.
+Contents with other inputs are in another folder, so nothing in a folder is ever out of date.
+Folders that are no longer used are removed when a new one is made.
 """
 
 from collections.abc import Iterator
@@ -45,7 +45,7 @@ def cache_folder(name: str) -> Path | None:
     """Return a folder of the cache, which stays as long as this process runs.
 
     Args:
-        name: says all that the contents follow from.
+        name: identifies the inputs of the contents.
 
     Returns:
         The folder, created if need be; None if nothing can be written. A warning says so.

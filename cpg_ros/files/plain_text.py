@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Plain text: JSON of what is known, and tables in aligned columns."""
+"""Plain text: JSON without numbers that it lacks, and tables in aligned columns."""
 
 import json
 import math

@@ -12,9 +12,10 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Reading YAML files that people write: what is wrong is said with its file, key and reason."""
+"""Reading YAML files that people write: an error names the file, the key and the reason."""
 
-from collections.abc import Mapping, Set
+from collections.abc import Mapping, Sequence, Set
+from itertools import pairwise
 import math
 from pathlib import Path
 from typing import Any
@@ -93,7 +94,7 @@ def shown(value: Any) -> str:
 
 
 class YamlReader:
-    """Takes checked values out of one file's tree, and says where a bad one stands."""
+    """Takes checked values out of one file's tree; errors name the place of a bad value."""
 
     def __init__(self, path: Path, what: str, error: type[CpgError], largest: float) -> None:
         """Read for a file that is called ``what``; failures are of the type ``error``.
@@ -138,6 +139,19 @@ class YamlReader:
         if abs(value) > self.largest:
             raise self.fail(where, f'must be at most {self.largest:g}, not {shown(value)}')
         return float(value)
+
+    def numbers(self, value: Any, where: str, count: int | None = None) -> tuple[float, ...]:
+        """Return a list of finite numbers, at least one, or as many as ``count``."""
+        listed = self.items(value, where)
+        if count not in (None, len(listed)):
+            raise self.fail(where, f'takes {count} numbers, not {len(listed)}')
+        return tuple(self.number(entry, f'{where}[{k}]') for k, entry in enumerate(listed))
+
+    def check_rising(self, values: Sequence[float], where: str) -> None:
+        """Check that each number is above the one before it."""
+        for k, (before, after) in enumerate(pairwise(values)):
+            if not before < after:
+                raise self.fail(f'{where}[{k + 1}]', f'{after:g} is not above {before:g}')
 
     def text(self, value: Any, where: str) -> str:
         """Return a name."""

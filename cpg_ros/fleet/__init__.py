@@ -18,5 +18,4 @@ Imports ``inversion`` and what is below; knows nothing of ROS.
 """
 
 __all__ = ['executors', 'many_recordings', 'options', 'outcomes', 'recording_job',
-           'recordings_found', 'renewable_executor', 'results', 'results_page', 'results_table',
-           'tally', 'tls']
+           'recordings_found', 'results', 'results_page', 'results_table', 'tally', 'tls']

@@ -20,7 +20,7 @@ executor; on one that is no fleet a broken pool ends the work.
 """
 
 import asyncio
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from concurrent.futures import CancelledError, Executor, ProcessPoolExecutor
 import contextlib
 import logging
@@ -32,10 +32,8 @@ import time
 from typing import Any
 
 import cpg_ros
-from cpg_ros.errors import CpgError, InputError
-from cpg_ros.fleet.outcomes import in_order
-from cpg_ros.fleet.renewable_executor import RenewableExecutor
-from cpg_ros.fleet.tally import Tally
+from cpg_ros.errors import CpgError, InputError, MissingLibraryError
+from cpg_ros.fleet.outcomes import Fleet
 from cpg_ros.fleet.tls import Certificates, exposed, security, TLS
 
 #: Within this many seconds an address answers, or is said not to; and a scheduler that was lost
@@ -48,35 +46,11 @@ EXPECTED = 4
 
 
 class NoCluster(CpgError):
-    """Nothing answers at the address, or it is of no use; the message says which."""
-
-
-class DaskMissing(CpgError):
-    """The optional dependency is missing; the message says how to get it."""
-
-
-class Fleet(RenewableExecutor):
-    """Worker processes, or a cluster's workers, that results come from in the order of the jobs.
-
-    Attributes:
-        what: the jobs of map are called, where it tells how far they are; '' to tell nothing.
-
-    """
-
-    what = ''
-
-    def map(self, function: Callable[..., Any], *iterables: Any, timeout: float | None = None,
-            chunksize: int = 1) -> Iterator[Any]:
-        """Yield results in the order of the jobs; jobs of a worker that dies are done again."""
-        jobs = list(zip(*iterables, strict=False))
-        with Tally(self.what, len(jobs), bool(self.what)) as tally:
-            for result in in_order(self, function, jobs, tally.tick):
-                tally.add()
-                yield result
+    """No usable scheduler responds at an address; the message says why."""
 
 
 def _begin(parent: int) -> None:
-    """Make a worker process end with its parent and leave Ctrl-C to it."""
+    """Make a worker process exit with its parent, and leave Ctrl-C to the parent."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
 
     def watch() -> None:
@@ -113,13 +87,13 @@ def processes(jobs: int = 0) -> Fleet:
 
 
 def cores() -> int:
-    """Cores that this process may use."""
+    """Return the number of cores that this process may use."""
     return (len(os.sched_getaffinity(0)) if hasattr(os, 'sched_getaffinity')
             else os.cpu_count() or 1)
 
 
 def _package() -> str:
-    """Where a worker has the package (runs there)."""
+    """Return where a worker has the package; runs on the worker."""
     return cpg_ros.__file__ or ''
 
 
@@ -135,7 +109,7 @@ def cluster(address: str, say: Callable[[str], None] = lambda line: None,
 
     Raises:
         InputError: the address is none, or the certificates cannot be used.
-        DaskMissing: dask is missing.
+        MissingLibraryError: dask is missing.
         NoCluster: nothing answers, there are no workers, or they do not
             have the package.
 
@@ -143,11 +117,11 @@ def cluster(address: str, say: Callable[[str], None] = lambda line: None,
     try:
         from distributed import Client
     except ImportError as error:
-        raise DaskMissing("--dask needs dask and distributed: pip install 'cpg-ros[fleet]'"
-                          ) from error
+        raise MissingLibraryError('--dask needs dask and distributed: pip install dask '
+                                  'distributed') from error
     if '://' not in address:
         raise InputError(f"'{address}' is not the address of a scheduler, such as tcp://host:8786")
-    # What happens is said here, in a line.
+    # Failures are reported here, in a line.
     for name in ('distributed', 'distributed.core', 'distributed.client', 'distributed.comm'):
         logging.getLogger(name).setLevel(logging.CRITICAL)
     held: list[Any] = []
@@ -155,7 +129,7 @@ def cluster(address: str, say: Callable[[str], None] = lambda line: None,
     safe = security(address, certificates)
 
     def connect(seconds: float) -> tuple[Executor, int]:
-        # A client that has not come to be takes its time to go.
+        # A client that fails to connect takes long to close.
         own[:] = [_answers(address, seconds, safe)]
         client = Client(address, timeout=seconds, set_as_default=False, security=safe)
         held[:] = [client]
@@ -195,7 +169,7 @@ def cluster(address: str, say: Callable[[str], None] = lambda line: None,
 
 
 def _answers(address: str, seconds: float, safe: Any) -> str:
-    """See that a scheduler answers at an address; return the address that it gives itself.
+    """Check that a scheduler responds at an address; return the address that it reports.
 
     Raises:
         InputError: it is no address.
@@ -220,7 +194,7 @@ def _answers(address: str, seconds: float, safe: Any) -> str:
             ' to these certificates' if address.startswith(TLS) else '')) from error
     except (ValueError, RuntimeError, ImportError) as error:
         raise InputError(f'{address}: {" ".join(str(error).split())}') from error
-    # What speaks another language is taken for a message of any length.
+    # Another protocol is taken for a message of any length.
     except MemoryError as error:
         raise NoCluster(f'what answers at {address} is not a dask scheduler') from error
     if not isinstance(found, dict) or found.get('type') != 'Scheduler':
@@ -229,13 +203,13 @@ def _answers(address: str, seconds: float, safe: Any) -> str:
 
 
 def _leave(held: list[Any]) -> None:
-    # A scheduler that is gone cannot be taken leave of.
+    # A scheduler that is gone cannot close the connection.
     with contextlib.suppress(OSError, TimeoutError, CancelledError):
         held[0].close(timeout=2)
 
 
 def _workers_checked(client: Any, address: str) -> None:
-    """See that there are workers, and that they have the package.
+    """Check that there are workers, and that they have the package.
 
     Raises:
         NoCluster: there are none, or one lacks it.

@@ -38,7 +38,7 @@ LOOK, TABLES = 2.0, 30.0
 
 @dataclass(frozen=True)
 class Summary:
-    """What was done: recordings there are, those of them without a fit, and those left alone."""
+    """Numbers of recordings: all, those without a fit, those done before; and the files."""
 
     done: int
     failed: int
@@ -47,7 +47,7 @@ class Summary:
 
 
 def settings_digest(settings: FitSettings) -> str:
-    """What tells one way of fitting from another."""
+    """Return a digest that differs between settings."""
     values = {field.name: getattr(settings, field.name) for field in fields(settings)}
     values |= values.pop('reading')
     lines = '\n'.join(f'{name}={value!r}' for name, value in values.items())
@@ -63,7 +63,7 @@ class Folders:
 
         Raises:
             InputError: a folder is not there or has no recordings, or out holds something else.
-            DaskMissing: pyarrow is missing.
+            MissingLibraryError: pyarrow is missing.
 
         """
         library()
@@ -74,14 +74,14 @@ class Folders:
         self.recordings = list(found(folders))
 
     def tasks(self, recordings: Iterable[Path]) -> Iterator[Task]:
-        """Make the jobs, each when it is wanted."""
+        """Yield the jobs, each made when it is needed."""
         for one in recordings:
             row = self.results.get(one)
             yield Task(one.absolute(), self.settings, row['digest'] if row else '',
                        (self.results.folder / FITTED).absolute(), self.results.name(one))
 
     def keep(self, outcome: JobOutcome[Task], shown: Path, tally: Tally) -> None:
-        """Keep what came of a job, unless nothing new did."""
+        """Store the outcome of a job, unless the recording was done before."""
         if outcome.error is None and 'reason' not in outcome.value:
             before = self.results.get(shown) or {'reason': ''}
             tally.add(failed=bool(before['reason']), kept=True)
@@ -95,7 +95,7 @@ class Folders:
     def run(self, executor: Executor) -> Summary:
         """Invert all recordings that are not done, and write the table and the page.
 
-        On KeyboardInterrupt they are written of what is done, too, and it is raised again.
+        On KeyboardInterrupt, both are written for the finished recordings before it is raised.
 
         Raises:
             InputError: there are none.
@@ -121,14 +121,14 @@ class Folders:
 
     def watch(self, executor: Executor, say: Callable[[str], None],
               goes_on: Callable[[], bool] = lambda: True) -> Summary:
-        """Invert what there is and what comes, until it is interrupted.
+        """Invert the recordings in the folders, and new ones, until interrupted.
 
-        A recording is taken once its files stay as they are between two looks.
+        A recording is read once its files do not change between two looks.
 
         Args:
             executor: any.
             say: takes a line for each recording that is taken.
-            goes_on: asked before every look.
+            goes_on: called before every look; False ends the watch.
 
         """
         seen: dict[Path, Any] = {}
@@ -156,7 +156,7 @@ class Folders:
         return summary
 
     def write(self, kept: int = 0) -> Summary:
-        """Write the table and the page of what is done."""
+        """Write the table and the page of the finished recordings."""
         def rows() -> Iterator[dict[str, Any]]:
             return self.results.rows(self.recordings)
 

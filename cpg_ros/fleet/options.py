@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The options that choose where jobs run, alike for all executables that run many."""
+"""The options that choose where jobs run, the same for all executables that run many."""
 
 from argparse import ArgumentParser, Namespace
 from collections.abc import Callable, Iterator
@@ -20,7 +20,8 @@ from concurrent.futures import Executor
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 
 from cpg_ros.errors import InputError
-from cpg_ros.fleet.executors import cluster, Fleet, processes
+from cpg_ros.fleet.executors import cluster, processes
+from cpg_ros.fleet.outcomes import Fleet
 from cpg_ros.fleet.tls import Certificates
 
 #: More processes than this are a mistake.
@@ -35,19 +36,19 @@ def add_options(parser: ArgumentParser) -> None:
     where.add_argument('--jobs', type=int, default=0, metavar='N', help='worker processes on '
                        'this machine (default: one per core); the results do not depend on the '
                        'number')
-    where.add_argument('--dask', metavar='ADDRESS', help="scheduler of a dask cluster to use "
-                       "instead, such as tcp://head:8786 (pip install 'cpg-ros[fleet]')")
+    where.add_argument('--dask', metavar='ADDRESS', help='scheduler of a dask cluster to use '
+                       'instead, such as tcp://head:8786 (pip install dask distributed)')
     parser.add_argument('--tls', nargs=3, metavar=('CA', 'CERT', 'KEY'), help="for --dask "
                         "tls://...: certificate of the cluster's own authority, this client's "
                         'certificate and its key, as PEM files')
 
 
 def chosen_fleet(chosen: Namespace, say: Callable[[str], None]) -> Fleet:
-    """Return the fleet that the options ask for.
+    """Return the fleet that the options choose.
 
     Raises:
-        InputError: a number of processes that cannot be, or certificates that cannot be used.
-        NoCluster: nothing answers at the address.
+        InputError: an impossible number of processes, or unusable certificates.
+        NoCluster: no scheduler responds at the address.
 
     """
     if not 0 <= chosen.jobs <= MOST:
@@ -61,11 +62,11 @@ def chosen_fleet(chosen: Namespace, say: Callable[[str], None]) -> Fleet:
 
 @contextmanager
 def working(chosen: Namespace, what: str, say: Callable[[str], None]) -> Iterator[Fleet]:
-    """Lend the fleet that the options ask for; an error lets go of it at once.
+    """Open the fleet that the options choose; close it at the end, and at once on an error.
 
     Args:
         chosen: options.
-        what: its jobs are called, in the lines that tell how far they are.
+        what: name of its jobs in progress messages.
         say: takes a line when a scheduler is lost.
 
     Raises:
@@ -88,7 +89,7 @@ def executor_for(count: int, chosen: Namespace, what: str, say: Callable[[str], 
 
     Args:
         count: number of jobs.
-        chosen: options; with --dask, a single job is sent, too.
+        chosen: options; with --dask, a single job is sent as well.
         what: as of working.
         say: as of working.
 

@@ -12,10 +12,11 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A stream of jobs into an executor, and of what comes of them out of it.
+"""A stream of jobs into an executor, and of their outcomes out of it.
 
-Jobs are made only when there is room for them, and an outcome is let go of once it is taken: what
-the client holds does not grow with the number of jobs.
+Jobs are made only when there is room for them, and an outcome is released once it is taken: what
+the client holds does not grow with the number of jobs. A fleet is an executor that is made anew
+when it breaks.
 """
 
 from collections import deque
@@ -27,23 +28,25 @@ import itertools
 from typing import Any, Generic, TypeVar
 
 from cpg_ros.errors import CpgError
-from cpg_ros.fleet.renewable_executor import RenewableExecutor
+from cpg_ros.fleet.tally import Tally
 
-#: The clock goes on while nothing ends: s.
+#: Longest time between two calls of tick, s.
 TICK = 0.5
-#: Times a job may be alone at a worker that dies before the job is blamed.
+#: Number of workers that may die under a job, while it runs alone, before it is blamed.
 DEATHS = 2
+#: Jobs that an executor has room for, where nothing else is known.
+ROOM = 8
 
 Job = TypeVar('Job')
 
 
 class WorkerDied(CpgError):
-    """The process that a job ran in died of it."""
+    """The process that ran a job died."""
 
 
 @dataclass(frozen=True)
 class JobOutcome(Generic[Job]):
-    """What came of a job.
+    """The outcome of a job.
 
     Attributes:
         job: its arguments.
@@ -57,14 +60,74 @@ class JobOutcome(Generic[Job]):
     error: BaseException | None = None
 
 
+class Fleet(Executor):
+    """An executor that survives the loss of its workers, and yields results in order.
+
+    Attributes:
+        inner: the executor that runs the jobs now.
+        room: jobs that are handed to it at the same time.
+        what: name of the jobs of map in progress messages; '' prints none.
+
+    """
+
+    what = ''
+
+    def __init__(self, inner: Executor, room: int = ROOM,
+                 renew: Callable[[], tuple[Executor, int]] | None = None,
+                 close: Callable[[bool], None] = lambda wait: None) -> None:
+        """Run jobs with an executor.
+
+        Args:
+            inner: the executor.
+            room: jobs that are handed to it at the same time.
+            renew: makes another one like it and returns it with its room; without it a broken
+                executor ends the work.
+            close: releases the workers; if it is given True, after the jobs under way.
+
+        """
+        self.inner, self.room = inner, room
+        self._renew, self._close = renew, close
+
+    def submit(self, function: Callable[..., Any], /, *arguments: Any, **options: Any
+               ) -> Future[Any]:
+        """Submit a job."""
+        return self.inner.submit(function, *arguments, **options)
+
+    def map(self, function: Callable[..., Any], *iterables: Any, timeout: float | None = None,
+            chunksize: int = 1) -> Iterator[Any]:
+        """Yield results in the order of the jobs; jobs of a worker that dies are done again."""
+        jobs = list(zip(*iterables, strict=False))
+        with Tally(self.what, len(jobs), bool(self.what)) as tally:
+            for result in in_order(self, function, jobs, tally.tick):
+                tally.add()
+                yield result
+
+    def lost(self, error: BaseException) -> bool:
+        """Whether an error means that the executor broke, not that the job failed."""
+        return self._renew is not None and isinstance(error, BrokenProcessPool | CancelledError)
+
+    def renew(self) -> None:
+        """Replace an executor that broke.
+
+        Raises:
+            NoCluster: a scheduler does not come back.
+
+        """
+        assert self._renew is not None
+        self.inner, self.room = self._renew()
+
+    def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
+        """Release the workers, without waiting for jobs that are under way if wait is False."""
+        self._close(wait)
+
+
 class _Stream(Generic[Job]):
     def __init__(self, executor: Executor, function: Callable[..., Any],
                  jobs: Iterable[Job]) -> None:
-        self.fleet = (executor if isinstance(executor, RenewableExecutor)
-                      else RenewableExecutor(executor))
+        self.fleet = executor if isinstance(executor, Fleet) else Fleet(executor)
         self.function, self.jobs = function, iter(jobs)
         self.flying: dict[Future[Any], Job] = {}
-        # Jobs that were under way when a worker died: they go alone, and so are told apart.
+        # Jobs that were running when a worker died: each runs alone, which identifies the cause.
         self.suspects: deque[tuple[Job, int]] = deque()
         self.alone: tuple[Job, int] | None = None
 
@@ -77,7 +140,7 @@ class _Stream(Generic[Job]):
         return True
 
     def fill(self) -> None:
-        """Hand over as many jobs as there is room for."""
+        """Submit as many jobs as there is room for."""
         if self.alone is not None and self.flying:
             return
         if self.suspects:
@@ -87,18 +150,14 @@ class _Stream(Generic[Job]):
                     self.suspects.appendleft(self.alone)
                     self.fleet.renew()
             return
-        while len(self.flying) < self.fleet.room:
-            for job in itertools.islice(self.jobs, 1):
-                if not self._send(job):
-                    self.suspects.append((job, 0))
-                    self.fleet.renew()
-                    return
-                break
-            else:
+        for job in itertools.islice(self.jobs, max(0, self.fleet.room - len(self.flying))):
+            if not self._send(job):
+                self.suspects.append((job, 0))
+                self.fleet.renew()
                 return
 
     def ended(self) -> Iterator[JobOutcome[Job]]:
-        """Yield what has come of jobs, after a while at most."""
+        """Yield the outcomes of jobs that have ended; wait TICK at most."""
         done, _ = wait(self.flying, TICK, FIRST_COMPLETED)
         broken: BaseException | None = None
         back: list[Job] = []
@@ -133,13 +192,13 @@ class _Stream(Generic[Job]):
 
 def outcomes(executor: Executor, function: Callable[[Job], Any], jobs: Iterable[Job],
              tick: Callable[[], None] = lambda: None) -> Iterator[JobOutcome[Job]]:
-    """Yield what comes of jobs, in the order in which they end.
+    """Yield the outcomes of jobs, in the order in which they end.
 
-    A job whose worker dies is done again; one that its worker died of twice, when it was alone
-    there, has the error WorkerDied. What was under way when a scheduler was lost is done again.
+    A job whose worker dies runs again; if its worker dies twice while the job runs alone, its
+    error is WorkerDied. Jobs that were running when a scheduler was lost run again.
 
     Args:
-        executor: any; a RenewableExecutor survives the loss of workers.
+        executor: any; a Fleet survives the loss of workers.
         function: of a job; both and the result travel to another process.
         jobs: as they are wanted.
         tick: called twice a second at least.

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""One recording inverted, as a job: what comes of it in plain types, or why nothing does."""
+"""The inversion of one recording, as a job: the result in plain types, or the reason for none."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -79,7 +79,7 @@ def read(path: Path, settings: FitSettings) -> Recording:
 
 
 def invert_recording(task: Task) -> dict[str, Any]:
-    """Invert a recording; whatever is wrong with it is in what is returned.
+    """Invert a recording; the result contains whatever is wrong with it.
 
     Returns:
         ``digest``, and nothing else if that is the known one; otherwise the fields of a row of
@@ -94,13 +94,13 @@ def invert_recording(task: Task) -> dict[str, Any]:
             return {'digest': task.known}
         settings = task.settings
         found = fit_recording(read(task.recording, settings), settings.robot, settings.network,
-                              settings.gait, settings.free, settings.order, settings.preset,
-                              settings.starts)
+                              settings.gait, free=settings.free, order=settings.order,
+                              preset=settings.preset, starts=settings.starts)
         row |= {**_facts(found), 'picture': picture(found)}
         row['files'] = _files(task, found)
     except (CpgError, OSError) as error:
         row['reason'] = ' '.join(str(error).split())
-    # A mistake of the program costs one row, too, and is told with its place.
+    # A bug costs one row, too, and is reported with its traceback.
     except Exception as error:
         row['reason'] = f'{type(error).__name__}: {" ".join(str(error).split())}'
         row['traceback'] = traceback.format_exc()

@@ -14,7 +14,7 @@
 
 """A folder of results: a file for every recording that is done, from which the table is made.
 
-Each is written beside and renamed, so that whatever ends the work ends it between two rows.
+Each is written under another name and renamed, so that the work always ends between two rows.
 """
 
 from collections.abc import Iterator
@@ -25,7 +25,7 @@ from pathlib import Path
 from typing import Any
 
 from cpg_ros.errors import InputError
-from cpg_ros.files.atomic_write import write_atomically
+from cpg_ros.files.atomic_write import stored_json, write_atomically
 from cpg_ros.files.plain_text import printable
 from cpg_ros.fleet.recordings_found import RESULTS
 
@@ -34,7 +34,7 @@ ROWS, FITTED = 'rows', 'fitted'
 
 
 def key(recording: Path) -> str:
-    """What a recording's files are called here, by where it is."""
+    """Return the name of a recording's files here, from its path."""
     return hashlib.sha256(os.fsencode(recording.resolve())).hexdigest()[:16]
 
 
@@ -48,7 +48,7 @@ class Results:
     """
 
     def __init__(self, folder: Path, settings: str) -> None:
-        """Make the folder, or go on in it.
+        """Make the folder, or resume in it.
 
         Raises:
             InputError: it holds something else.
@@ -68,17 +68,11 @@ class Results:
 
     def get(self, recording: Path) -> dict[str, Any] | None:
         """Return a recording's row, if it was made with the same settings."""
-        try:
-            row = json.loads(self._place(recording).read_text())
-        except FileNotFoundError:
-            return None
-        except ValueError:
-            # A disk that was torn away from under a write: the row is done again.
-            return None
-        return row if row.get('settings') == self.settings else None
+        row: dict[str, Any] | None = stored_json(self._place(recording))
+        return row if row and row.get('settings') == self.settings else None
 
     def put(self, recording: Path, row: dict[str, Any]) -> None:
-        """Keep what came of a recording: first its files, then the row that names them.
+        """Store the result of a recording: first its files, then the row that names them.
 
         Raises:
             OSError: it cannot be written.
@@ -104,7 +98,4 @@ class Results:
 
     def rows(self, recordings: list[Path]) -> Iterator[dict[str, Any]]:
         """Yield the rows of those recordings that have one, in their order."""
-        for one in recordings:
-            row = self.get(one)
-            if row is not None:
-                yield row
+        yield from filter(None, map(self.get, recordings))

@@ -19,6 +19,7 @@ from html import escape
 from pathlib import Path
 from typing import Any
 
+from cpg_ros.files.atomic_write import replacing
 from cpg_ros.files.page_style import STYLE
 
 MORE = """
@@ -55,20 +56,17 @@ HEADS = ('file', 'gait', 'frequency [Hz]', 'confidence', 'residual / range [%]',
          'mean cycles', 'remarks', 'seconds')
 
 
-def _number(value: float | None, form: str) -> str:
+def _number(value: float | None, form: str, more: str = '') -> str:
     if value is None:
         return '<td class="num" data-v=""></td>'
-    return f'<td class="num" data-v="{value!r}">{value:{form}}</td>'
+    return f'<td class="num" data-v="{value!r}">{value:{form}}{more}</td>'
 
 
 def _row(row: dict[str, Any]) -> str:
     fitted = row.get('fitted', '')
     name = (f'<a href="{escape(fitted)}">{escape(row["file"])}</a>' if fitted
             else escape(row['file']))
-    frequency = row.get('frequency')
-    hertz = ('<td class="num" data-v=""></td>' if frequency is None else
-             f'<td class="num" data-v="{frequency!r}">{frequency:.4f} &plusmn; '
-             f'{row["frequency_error"]:.1g}</td>')
+    error = row.get('frequency_error') or 0.0
     parameters = '<br>'.join(
         f'{escape(name)} {one["value"]:.5g} ({one["low"]:.5g} to {one["high"]:.5g})'
         for name, one in row.get('parameters', {}).items())
@@ -76,7 +74,8 @@ def _row(row: dict[str, Any]) -> str:
     remarks = '<br>'.join(escape(text) for text in
                           ([row['reason']] if row['reason'] else row.get('warnings', [])))
     return (f'<tr{" class=fails" if row["reason"] else ""}><td>{name}</td>'
-            f'<td>{escape(row.get("gait", ""))}</td>{hertz}'
+            f'<td>{escape(row.get("gait", ""))}</td>'
+            f'{_number(row.get("frequency"), ".4f", f" &plusmn; {error:.1g}")}'
             f'{_number(row.get("confidence"), ".2f")}'
             f'{_number(None if share is None else 100.0 * share, ".1f")}'
             f'<td class="value">{parameters}</td><td>{row.get("picture", "")}</td>'
@@ -90,19 +89,14 @@ def write_page(path: Path, rows: Iterable[dict[str, Any]], done: int, failed: in
         OSError: it cannot be written.
 
     """
-    beside = path.with_name(f'.{path.name}.part')
     title = f'{done} recordings, {done - failed} fitted, {failed} not'
-    try:
-        with beside.open('w', encoding='utf-8') as out:
-            out.write(f'<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8">'
-                      f'<title>{title}</title><style>{STYLE}{MORE}</style></head><body>\n'
-                      f'<h1>{title}</h1>\n<p><input placeholder="show rows that contain this" '
-                      'aria-label="filter"> Click a column head to sort. Grey: recorded; blue: '
-                      'fitted.</p>\n<table><thead><tr>'
-                      + ''.join(f'<th>{escape(head)}</th>' for head in HEADS)
-                      + '</tr></thead><tbody>\n')
-            out.writelines(_row(row) for row in rows)
-            out.write(f'</tbody></table><script>{SCRIPT}</script></body></html>\n')
-        beside.replace(path)
-    finally:
-        beside.unlink(missing_ok=True)
+    with replacing(path) as beside, beside.open('w', encoding='utf-8') as out:
+        out.write(f'<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8">'
+                  f'<title>{title}</title><style>{STYLE}{MORE}</style></head><body>\n'
+                  f'<h1>{title}</h1>\n<p><input placeholder="show rows that contain this" '
+                  'aria-label="filter"> Click a column head to sort. Grey: recorded; blue: '
+                  'fitted.</p>\n<table><thead><tr>'
+                  + ''.join(f'<th>{escape(head)}</th>' for head in HEADS)
+                  + '</tr></thead><tbody>\n')
+        out.writelines(_row(row) for row in rows)
+        out.write(f'</tbody></table><script>{SCRIPT}</script></body></html>\n')

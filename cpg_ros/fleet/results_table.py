@@ -20,7 +20,8 @@ import json
 from pathlib import Path
 from typing import Any
 
-from cpg_ros.fleet.executors import DaskMissing
+from cpg_ros.errors import MissingLibraryError
+from cpg_ros.files.atomic_write import replacing
 
 #: Rows that are held at once.
 BATCH = 256
@@ -29,8 +30,6 @@ FIRST = {'file': '', 'digest': '', 'reason': '', 'gait': '', 'recognised': '',
          'frequency': 'Hz', 'frequency_error': 'Hz', 'confidence': '', 'cycles': '',
          'begin': 's', 'end': 's', 'network': '', 'rms_share': ''}
 TEXT = ('file', 'digest', 'reason', 'gait', 'recognised', 'network', 'fitted')
-#: After them: maps of leg to phase and of joint to error (rad), and a list.
-LAST = ('phases', 'joints', 'warnings', 'fitted', 'seconds')
 #: What each parameter has: its value, standard error and 95 % interval.
 PARTS = ('value', 'stderr', 'low', 'high')
 
@@ -41,13 +40,13 @@ def library() -> Any:
     """Return pyarrow.
 
     Raises:
-        DaskMissing: it is not installed.
+        MissingLibraryError: it is not installed.
 
     """
     try:
         import pyarrow.parquet
     except ImportError as error:
-        raise DaskMissing("tables need pyarrow: pip install 'cpg-ros[fleet]'") from error
+        raise MissingLibraryError('tables need pyarrow: pip install pyarrow') from error
     return pyarrow
 
 
@@ -106,22 +105,16 @@ def write_tables(folder: Path, rows: Rows) -> list[Path]:
                                        if FIRST.get(name) else None)
                            for name, kind in kinds.items()])
     parquet, table = folder / 'table.parquet', folder / 'table.csv'
-    beside = [folder / f'.{path.name}.part' for path in (parquet, table)]
-    try:
-        with (arrow.parquet.ParquetWriter(beside[0], schema) as out,
-              beside[1].open('w', newline='', encoding='utf-8') as text):
-            writer = csv.DictWriter(text, list(kinds), lineterminator='\n')
-            writer.writeheader()
-            for batch in _batches(rows(), columns):
-                out.write_table(arrow.Table.from_pylist(
-                    [{**row, 'phases': list(row['phases'].items()),
-                      'joints': list(row['joints'].items())} for row in batch], schema))
-                writer.writerows(_cells_of(row) for row in batch)
-        for part, path in zip(beside, (parquet, table), strict=True):
-            part.replace(path)
-    finally:
-        for part in beside:
-            part.unlink(missing_ok=True)
+    with (replacing(parquet) as one, replacing(table) as other,
+          arrow.parquet.ParquetWriter(one, schema) as out,
+          other.open('w', newline='', encoding='utf-8') as text):
+        writer = csv.DictWriter(text, list(kinds), lineterminator='\n')
+        writer.writeheader()
+        for batch in _batches(rows(), columns):
+            out.write_table(arrow.Table.from_pylist(
+                [{**row, 'phases': list(row['phases'].items()),
+                  'joints': list(row['joints'].items())} for row in batch], schema))
+            writer.writerows(_cells_of(row) for row in batch)
     return [parquet, table]
 
 

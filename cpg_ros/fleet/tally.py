@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""How far many jobs have come: done, failed, rate and time left.
+"""The progress of many jobs: done, failed, rate and time left.
 
 On a terminal one line is redrawn in place; elsewhere (a log) it is a line a minute and one at the
 end.
@@ -38,7 +38,7 @@ def _time(seconds: float) -> str:
 
 
 class Tally:
-    """Counts jobs and says how far they are, on standard error.
+    """Counts jobs and reports their progress on standard error.
 
     Attributes:
         total: jobs there are; None while that is not known.
@@ -68,7 +68,7 @@ class Tally:
 
     @property
     def line(self) -> str:
-        """Where it stands."""
+        """The progress, as one line."""
         spent = self._clock() - self._began
         worked = self.done - self.kept
         rate = worked / spent if spent > 0.0 else 0.0
@@ -82,7 +82,7 @@ class Tally:
         return ', '.join(parts)
 
     def tick(self) -> None:
-        """Say where it stands if it is time to."""
+        """Report the progress if it is due."""
         now = self._clock()
         if not self._enabled or now - self._reported < (REDRAWN if self._live else MINUTE):
             return

@@ -32,5 +32,6 @@ __all__ = [
            'recording_like',
            'steady_stretch',
            'stride',
+           'usable_joints',
            'waveform_comparison',
 ]

@@ -42,7 +42,7 @@ CODES = {'lf': 'lf', 'fl': 'lf', 'rf': 'rf', 'fr': 'rf',
 OTHER = {'arm', 'neck', 'head', 'torso', 'waist', 'trunk', 'spine', 'tail', 'gripper', 'finger',
          'thumb', 'hand', 'wheel', 'eye', 'ear', 'camera'}
 UPPER = {'shoulder', 'elbow', 'wrist', 'forearm', 'sh', 'el', 'wr'}
-#: Names of joints, which tell a code that is written without a gap: flhip, RRcalf, lknee.
+#: Names of joints, by which a code written without a gap is found: flhip, RRcalf, lknee.
 JOINTS = ('hip', 'thigh', 'calf', 'knee', 'ankle', 'abd', 'haa', 'hfe', 'kfe', 'upper', 'lower',
           'shoulder', 'elbow', 'coxa', 'femur', 'tibia', 'foot', 'leg', 'joint', 'hx', 'hy', 'kn')
 #: In the networks' order.
@@ -56,7 +56,7 @@ _STUCK = re.compile(rf'(?<![a-z])({"|".join((*CODES, *SIDES, *ENDS))})(?=({"|".j
 
 
 class LegsError(CpgError):
-    """No legs can be told from the names; the message says which are there or missing."""
+    """No legs can be identified from the names; the message lists those there or missing."""
 
 
 @dataclass(frozen=True)
@@ -96,7 +96,7 @@ def words_of(name: str) -> list[str]:
 
 
 def _read(words: Sequence[str]) -> tuple[str, str, frozenset[str]]:
-    """Return leg of four or six, leg of two ('' for none), and the words that told it."""
+    """Return leg of four or six, leg of two ('' for none), and the words that name it."""
     codes = {CODES[word] for word in words if word in CODES}
     sides = {SIDES[word] for word in words if word in SIDES}
     ends = {ENDS[word] for word in words if word in ENDS}
@@ -112,7 +112,7 @@ def _read(words: Sequence[str]) -> tuple[str, str, frozenset[str]]:
 
 
 def role_of(name: str) -> str:
-    """Return a joint's name without what tells its leg: equal for the same joint of each leg."""
+    """Return a joint's name without its leg: equal for the same joint of each leg."""
     counted, rest = _COUNTED.findall(name), _COUNTED.sub('', name)
     if len(counted) == 1 and any(sign.isalpha() for sign in rest):
         return ' '.join(words_of(rest))
@@ -129,8 +129,8 @@ def legs_of(joints: Sequence[str], whole: bool = False) -> Legs:
         whole: these are all that the robot has, so that one with FL and FR alone is a biped.
 
     Raises:
-        LegsError: no leg, or not all of two, four or six legs can be told, or they are of two
-            robots.
+        LegsError: no leg, or not all of two, four or six legs can be identified, or they are of
+            two robots.
 
     """
     counted = _counted(joints)

@@ -16,35 +16,32 @@
 
 A leg is ahead of another by the shift at which the same joints of both are most alike (circular
 cross-correlation of all of them). An angle may be counted in the opposite sense in another leg,
-as abduction is; by the mean angles, or by which sense makes the waveforms more alike, that is
-told. Legs with other joints, such as an animal's fore and hind ones, are compared by the first
-harmonic of the joint that moves most: half a cycle is then uncertain, as nothing says which sense
+as abduction is; the mean angles, or the sense that makes the waveforms more alike, decide.
+Legs with other joints, such as an animal's fore and hind ones, are compared by the first
+harmonic of the joint that moves most: half a cycle is then uncertain, as it is unknown which sense
 of an elbow corresponds to that of a knee. Insects' legs are compared by their feet (insect_legs).
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 from cpg_ros.gaits.insect_legs import foot_phases
 from cpg_ros.gaits.leg_names import role_of
 from cpg_ros.gaits.recognition import recognise
+from cpg_ros.gaits.waveform_comparison import best_shift
 from cpg_ros.networks.network import Network
 from cpg_ros.networks.stated_gait import nearest_gait, TOLERANCE
 import numpy as np
 
-#: Places at which shifts are tried.
-GRID = 1024
 #: Joints whose mean angles are this much larger than what they move by RMS have a sign.
 SIGNED = 1.0
-#: Correlations that differ by more tell the sense of a joint.
+#: Correlations that differ by more decide the sense of a joint.
 CLEARER = 0.2
-#: A joint that moves by less than this share of the variance of another tells no leg's phase.
+#: A joint that moves by less than this share of the variance of another decides no leg's phase.
 TELLING = 0.05
 #: By how much legs in a gait are off its phases, RMS, cycles: what the odds of gaits rest on.
 SCATTER = 0.06
-#: From here on one of two gaits is told.
-DISTINCT = 0.95
 #: Largest violation of a symmetry, over the cells' RMS, and samples a cycle for it.
 BY_CELLS, SAMPLES = 0.2, 128
 
@@ -57,8 +54,8 @@ class GaitMatch:
         gait: None if no gait is near enough.
         nearest: the nearest one.
         distance: of that, in cycles: RMS over the legs after the best common shift.
-        margin: how much further the next gait is that is told apart, cycles.
-        alike: gaits that the nearest cannot be told from, itself among them.
+        margin: how much further the next distinct gait is, cycles.
+        alike: gaits that cannot be distinguished from the nearest, itself among them.
         sure: probability that it is the nearest and no other, by the scatter of legs' phases.
         notes: one line each.
 
@@ -80,30 +77,18 @@ def _cross(ahead: np.ndarray, behind: np.ndarray) -> np.ndarray:
     return terms
 
 
-def _peak(terms: np.ndarray) -> tuple[float, float]:
-    """Return the shift by which the first is ahead, in cycles, and the correlation there."""
-    turn = 2j * np.pi * np.arange(terms.size)
-    theta = float(np.argmax(np.fft.ifft(terms.conj(), GRID).real)) / GRID
-    at = theta
-    for _ in range(8):
-        there = terms * np.exp(-turn * theta)
-        slope, bend = -np.sum(turn * there).real, np.sum(turn * turn * there).real
-        if bend < 0.0:
-            theta = float(np.clip(theta - slope / bend, at - 1.0 / GRID, at + 1.0 / GRID))
-    return theta, float(np.sum(terms * np.exp(-turn * theta)).real)
-
-
 def _power(c: np.ndarray) -> float:
     return float(np.sum(np.abs(c[1:])**2))
 
 
 def _sense(a: np.ndarray, b: np.ndarray) -> float:
-    """Tell whether two joints count angles in the same sense, 1 or -1; 0 if nothing tells."""
+    """Return 1 if two joints count angles in the same sense, -1 if not, 0 if unknown."""
     levels, sizes = (a[0].real, b[0].real), np.sqrt([2.0 * _power(a), 2.0 * _power(b)])
     if all(abs(level) > SIGNED * size for level, size in zip(levels, sizes, strict=True)):
         return float(np.sign(levels[0] * levels[1]))
     terms = _cross(a, b)
-    gain = (_peak(terms)[1] - _peak(-terms)[1]) / max(np.sqrt(_power(a) * _power(b)), 1e-300)
+    gain = best_shift(terms)[1] - best_shift(-terms)[1]
+    gain /= max(np.sqrt(_power(a) * _power(b)), 1e-300)
     return float(np.sign(gain)) if abs(gain) > CLEARER else 0.0
 
 
@@ -128,7 +113,7 @@ def leg_phases(legs: Mapping[str, Sequence[str]], c: Mapping[str, np.ndarray]
 
     Returns:
         Leg -> phase in cycles, [0, 1): x_leg(t) = x_first(t + phase T); notes; legs whose
-        phase may be half a cycle off, as nothing tells the sense of their angles; and joints
+        phase may be half a cycle off, as the sense of their angles is unknown; and joints
         that count angles in the opposite sense of the first leg's.
 
     """
@@ -171,12 +156,12 @@ def _shift(pairs: list[tuple[str, str]], c: Mapping[str, np.ndarray]
            ) -> tuple[float, list[str], bool]:
     """Return by how much the second of each pair is ahead of the first, all together.
 
-    And the joints that count angles in the opposite sense, and whether any joint's sense is told.
+    And the joints that count angles in the opposite sense, and whether any joint's sense is known.
     """
     power = {pair: _power(c[pair[0]]) * _power(c[pair[1]]) for pair in pairs}
     least = TELLING**2 * max(power.values())
     senses = {pair: _sense(c[pair[0]], c[pair[1]]) for pair in pairs}
-    # Those whose sense is told come first: the others have to agree with them.
+    # Those whose sense is known come first: the others have to agree with them.
     pairs = sorted(pairs, key=lambda pair: (not (senses[pair] and power[pair] >= least),
                                             -power[pair]))
     sense_known = bool(senses[pairs[0]])
@@ -190,13 +175,13 @@ def _shift(pairs: list[tuple[str, str]], c: Mapping[str, np.ndarray]
             total = np.zeros_like(terms)
         elif not sense:
             # As agrees with those that move more.
-            turn = np.exp(-2j * np.pi * np.arange(terms.size) * _peak(total)[0])
+            turn = np.exp(-2j * np.pi * np.arange(terms.size) * best_shift(total)[0])
             sense = 1.0 if np.sum(terms * turn).real >= 0.0 else -1.0
         if sense < 0.0:
             mirrored.append(other)
         total = total + sense * terms
     assert total is not None
-    return _peak(total)[0], mirrored, sense_known
+    return best_shift(total)[0], mirrored, sense_known
 
 
 def _symmetry(network: type[Network], gait: str) -> Any:
@@ -251,7 +236,7 @@ def match_gait(phases: Mapping[str, float], network: type[Network]) -> GaitMatch
         size[gait] = -symmetry.waves.max()
     fits = [gait for gait in apart if apart[gait] <= max(TOLERANCE, min(apart.values()))]
     nearest = min(fits, key=lambda gait: (-size[gait], round(apart[gait], 9)))
-    # Others that ask the same of the legs; those that ask less fit no worse, which says nothing.
+    # Others with the same phases of the legs; less constrained ones never fit worse.
     same = [gait for gait in fits if size[gait] == size[nearest]
             and abs(apart[gait] - apart[nearest]) < 1e-9]
     margin = min((apart[gait] for gait in apart if gait not in same
@@ -270,22 +255,6 @@ def match_gait(phases: Mapping[str, float], network: type[Network]) -> GaitMatch
         notes.append(f'{kind} sequence: {", ".join(order).upper()}')
     return GaitMatch(nearest if apart[nearest] <= TOLERANCE else None, nearest, apart[nearest],
                      margin, tuple(same), 1.0 / (1.0 + sum(odds)), tuple(notes))
-
-
-def match_by_probability(found: GaitMatch, gait: str, share: float) -> GaitMatch:
-    """Name one of two gaits that move the legs alike, by the probability that it is this one.
-
-    Its rival is not mentioned any more where it is nineteen times as likely.
-    """
-    other = next(one for one in found.alike if one != gait)
-    nearest, loser = (gait, other) if share > 0.5 else (other, gait)
-    more = max(share, 1.0 - share)
-    notes = tuple(note for note in found.notes if 'move alike' not in note)
-    return replace(found, gait=None if found.gait is None else nearest, nearest=nearest,
-                   alike=(nearest,) if more >= DISTINCT else found.alike,
-                   sure=min(2.0 * found.sure, 1.0) * more,
-                   notes=(*notes, f'{nearest}, not {loser}, by how the legs are bent and for how '
-                          f'long they go with the ground: {more:.0%} sure'))
 
 
 def match_gait_by_cells(c: np.ndarray, network: type[Network]) -> GaitMatch:

@@ -28,7 +28,7 @@ from scipy.linalg import solve_toeplitz, toeplitz
 HARMONICS = 32
 #: Least eigenvalue of the normal matrix of harmonics, of at most 1.
 DETERMINED = 0.1
-#: Places in the cycle told apart for that; many more than harmonics.
+#: Places in the cycle that are distinguished for that; many more than harmonics.
 BINS = 4096
 
 
@@ -52,9 +52,32 @@ class HarmonicCycle(ShortRepr):
 
     def __call__(self, phases: np.ndarray) -> np.ndarray:
         """Return the signals at phases in cycles, shape (m,), as an array (m, channels)."""
-        c = self.coefficients
-        weights = np.vstack([c.real[:1], 2.0 * c.real[1:], -2.0 * c.imag[1:]])
-        return evaluate_series(weights, rows_of(np.asarray(phases, dtype=float), len(c) - 1)).T
+        return evaluate_coefficients(self.coefficients, np.asarray(phases, dtype=float)).T
+
+
+def weights_of(c: np.ndarray) -> np.ndarray:
+    """Return the weights of rows, (2 n + 1, channels), for complex coefficients (n + 1, channels).
+
+    The series is ``Re(c_0 + 2 sum_n c_n exp(2 pi i n phase))``.
+    """
+    return np.vstack([c.real[:1], 2.0 * c.real[1:], -2.0 * c.imag[1:]])
+
+
+def coefficients_of(weights: np.ndarray) -> np.ndarray:
+    """Return the complex coefficients of a series for the weights of its rows."""
+    n = len(weights) // 2
+    return np.vstack([weights[:1], 0.5 * (weights[1:1 + n] - 1j * weights[1 + n:])])
+
+
+def slopes_of(weights: np.ndarray) -> np.ndarray:
+    """Return the weights of a series' derivative by its phase in radians."""
+    n = np.arange(1, len(weights) // 2 + 1)[:, None]
+    return np.vstack([0.0 * weights[:1], n * weights[1 + len(n):], -n * weights[1:1 + len(n)]])
+
+
+def evaluate_coefficients(c: np.ndarray, phases: np.ndarray) -> np.ndarray:
+    """Return the channels, (channels, m), that coefficients give at phases in cycles, (m,)."""
+    return evaluate_series(weights_of(c), rows_of(phases, len(c) - 1))
 
 
 def rows_of(phases: np.ndarray, harmonics: int) -> np.ndarray:
@@ -107,8 +130,13 @@ def fit_series(values: np.ndarray, rows: np.ndarray) -> np.ndarray:
         sums[1 + n:] /= values.shape[1]
     means = np.einsum('nm,cm->nc', rows, values) / values.shape[1]
     upper = means[1:1 + n] - 1j * means[1 + n:]
-    c = solve_toeplitz(sums, np.vstack([upper[::-1].conj(), means[:1], upper]))[n:]
-    return np.vstack([c[:1].real, 2.0 * c[1:].real, -2.0 * c[1:].imag])
+    right = np.vstack([upper[::-1].conj(), means[:1], upper])
+    try:
+        c = solve_toeplitz(sums, right)[n:]
+    except np.linalg.LinAlgError:
+        # Samples at fewer phases than there are terms: of all series the smallest.
+        c = np.linalg.lstsq(toeplitz(sums), right)[0][n:]
+    return weights_of(c)
 
 
 def mean_cycle(t: np.ndarray, signals: np.ndarray, period: float) -> HarmonicCycle:
@@ -130,7 +158,5 @@ def mean_cycle(t: np.ndarray, signals: np.ndarray, period: float) -> HarmonicCyc
     rows = rows_of((t - t[0]) / period, harmonics)
     weights = fit_series(signals.T, rows)
     left = signals.T - evaluate_series(weights, rows)
-    coefficients = np.vstack([weights[:1], 0.5 * (weights[1:1 + harmonics]
-                                                  - 1j * weights[1 + harmonics:])])
-    return HarmonicCycle(period, coefficients, float(t[0]),
+    return HarmonicCycle(period, coefficients_of(weights), float(t[0]),
                          float(np.sqrt(np.mean(left * left) / signals.var(axis=0).mean())))

@@ -21,11 +21,17 @@ them, so that it never slips by one.
 """
 
 from cpg_ros.errors import InputError
-from cpg_ros.gaits.mean_cycle import evaluate_series, fit_series, resolvable_harmonics, rows_of
+from cpg_ros.gaits.mean_cycle import (
+    evaluate_series,
+    fit_series,
+    resolvable_harmonics,
+    rows_of,
+    slopes_of,
+)
 import numpy as np
 from scipy.interpolate import PchipInterpolator
 
-#: What deviates by less, as a share of the signals' RMS, does not tell a period from its half.
+#: Deviations below this share of the signals' RMS do not distinguish a period from its half.
 NEGLIGIBLE = 0.005
 #: A recording that repeats is at some lag this near to itself; unrelated signals have 1.
 REPEATS = 0.5
@@ -52,7 +58,6 @@ def _refined(t: np.ndarray, x: np.ndarray, period: float) -> tuple[float, np.nda
     # Well below the sampling rate: at a period of whole samples higher ones are aliases.
     usual = int(0.4 * period / np.median(np.diff(t)))
     harmonics = min(usual, resolvable_harmonics(t, period))
-    n = np.arange(1, harmonics + 1)[:, None]
 
     def fit(rate: float) -> tuple[float, np.ndarray, np.ndarray, np.ndarray]:
         rows = rows_of(centred * rate, harmonics)
@@ -63,9 +68,7 @@ def _refined(t: np.ndarray, x: np.ndarray, period: float) -> tuple[float, np.nda
     rate = 1.0 / period
     error, rows, weights, left = fit(rate)
     for _ in range(20):
-        turned = np.vstack([0.0 * weights[:1], n * weights[1 + harmonics:],
-                            -n * weights[1:1 + harmonics]])
-        by_rate = 2.0 * np.pi * centred * evaluate_series(turned, rows)
+        by_rate = 2.0 * np.pi * centred * evaluate_series(slopes_of(weights), rows)
         by_rate -= evaluate_series(fit_series(by_rate, rows), rows)
         step = float(np.sum(by_rate * left) / max(np.sum(by_rate * by_rate), 1e-300))
         step = float(np.clip(step, -0.1 / span, 0.1 / span))
@@ -169,7 +172,7 @@ def find_period(t: np.ndarray, signals: np.ndarray) -> float:
     if best[0] > REPEATS:
         raise InputError(f'no period found: the signals do not repeat steadily within half of '
                          f'the {_span(t):g} recorded; at least two periods are needed')
-    # Where samples are few, lags tell a cycle from its like halves less well than this does.
+    # Where samples are few, lags separate a cycle from its like halves less well than this does.
     for share in (2, 3):
         if best[0] > NEGLIGIBLE ** 2 and holds_two(t, share * best[1]):
             best = longer if better(longer := tried(share * best[1])) else best

@@ -24,7 +24,14 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 from cpg_ros.errors import InputError
-from cpg_ros.gaits.mean_cycle import evaluate_series, fit_series, resolvable_harmonics, rows_of
+from cpg_ros.gaits.mean_cycle import (
+    coefficients_of,
+    evaluate_coefficients,
+    evaluate_series,
+    fit_series,
+    resolvable_harmonics,
+    rows_of,
+)
 from cpg_ros.short_repr import ShortRepr
 import numpy as np
 
@@ -35,7 +42,7 @@ HARMONICS = 24
 FAR, WILD = 30.0, 3.0
 #: Samples of a long recording that are fitted at once, and fewest cycles in them.
 BLOCK, CYCLES = 1 << 15, 20.0
-#: Fewest cycles for the scatter to be told for every phase by itself, and as how many cycles
+#: Fewest cycles for the scatter to be estimated at every phase by itself, and as how many cycles
 #: that of all phases together counts there: that of a few may be small by chance.
 ENOUGH, POOLED = 4, 4
 
@@ -66,9 +73,7 @@ class PhaseAverage(ShortRepr):
 
     def mean(self, theta: np.ndarray) -> np.ndarray:
         """Return the mean cycles at theta in cycles, shape (joints, m)."""
-        c = self.coefficients
-        weights = np.vstack([c.real[:1], 2.0 * c.real[1:], -2.0 * c.imag[1:]])
-        return evaluate_series(weights, rows_of(theta, len(c) - 1))
+        return evaluate_coefficients(self.coefficients, theta)
 
 
 def blocks(phases: np.ndarray) -> list[slice]:
@@ -127,18 +132,13 @@ def average_cycles(phases: np.ndarray, positions: np.ndarray, theta: np.ndarray,
                 weights[:, joint], rests[joint] = some[:, 0], (at[keep], own[0], fewer)
             spikes[joint] = np.count_nonzero(~keep)
             left[joint] = rests[joint][1].var() / max(variance, 1e-300)
-    c = _coefficients(weights)
+    c = coefficients_of(weights)
     lead = c[1, list(first)]
     zero = -float(np.angle(lead[np.argmax(np.abs(lead))])) / (2.0 * np.pi)
     turned = c * np.exp(2j * np.pi * zero * np.arange(len(c)))[:, None]
     scatter = [_scatter(at - zero, rest, bins, theta) for at, rest, bins in rests]
     spread, error = (np.array(one) for one in zip(*scatter, strict=True))
     return PhaseAverage(zero, turned, spread, error, there.sum(axis=0) - spikes, spikes, left)
-
-
-def _coefficients(weights: np.ndarray) -> np.ndarray:
-    n = len(weights) // 2
-    return np.vstack([weights[:1], 0.5 * (weights[1:1 + n] - 1j * weights[1 + n:])])
 
 
 def _fitted(phases: np.ndarray, x: np.ndarray) -> tuple[np.ndarray, np.ndarray, int]:
@@ -168,7 +168,7 @@ def _scatter(phases: np.ndarray, rest: np.ndarray, bins: int, theta: np.ndarray
     number = have.sum(axis=0)
     middle = means.sum(axis=0) / np.maximum(number, 1)
     square = np.sum(np.where(have, means - middle, 0.0)**2, axis=0)
-    # What is there once tells nothing.
+    # A single value has no scatter.
     free = np.maximum(number - 1, 0)
     pooled = square[free > 0].sum() / max(free.sum(), 1)
     square = (np.full(bins, pooled) if np.median(number) < ENOUGH

@@ -49,7 +49,7 @@ HARMONICS, FEW = 8, 4.0
 #: Variance of the phase at an end, over that of strides' lengths (found by simulation: strides of
 #: 0 to 3 % of scatter, alone and in runs, and of shapes that vary by 0 to 10 %).
 HASTE = 0.08
-#: Fewest rates of which a drift is told from wander.
+#: Fewest rates in which a drift is separated from wander.
 DRIFTS = 12
 #: Steps of Gauss-Newton, the most that one may move the phase, in cycles.
 STEPS, FARTHEST = 6, 0.1
@@ -269,7 +269,8 @@ def _straight(grid: np.ndarray, x: np.ndarray, phases: np.ndarray, span: float
     early = (np.bincount(block, np.einsum('jn,jn->n', slope, left))
              / np.maximum(np.bincount(block, np.einsum('jn,jn->n', slope, slope)), 1e-300))
     cycles = float(phases[1] - phases[0])
-    wander = max(float(np.mean(early[1:] * early[:-1])), 0.0) / max(1.0 - 1.0 / cycles, 0.1)**2
+    together = float(np.sum(early[1:] * early[:-1])) / max(early.size - 1, 1)
+    wander = max(together, 0.0) / max(1.0 - 1.0 / cycles, 0.1)**2
     return phases, float(np.hypot(own, np.sqrt(12.0 * wander / cycles) / span))
 
 

@@ -26,9 +26,9 @@ from cpg_ros.gaits.phase_average import blocks, PhaseAverage
 import numpy as np
 from scipy.special import stdtrit
 
-#: Share of a whole stride's slope that a stride must have for its phase to be told.
+#: Share of a whole stride's slope that a stride must have for its phase to be estimated.
 ENOUGH = 0.5
-#: Fewest strides from which a scatter is told.
+#: Fewest strides from which a scatter is estimated.
 STRIDES = 3
 
 
@@ -40,7 +40,7 @@ class PhaseScatter:
         spread: standard deviation of single strides, cycles; nan if there are too few.
         error: standard error of the mean, cycles; nan as well.
         half_width: of its 95 % interval (Student), cycles; nan as well.
-        strides: that tell.
+        strides: how many were used.
 
     """
 
@@ -63,7 +63,7 @@ def phase_scatter(phases: np.ndarray, x: np.ndarray, found: PhaseAverage,
         names: of the joints, in the order of x.
 
     Returns:
-        Leg -> scatter; of the first leg, which all are told against, zeros.
+        Leg -> scatter; zeros for the first leg, the reference of all.
 
     """
     theta = phases - found.zero

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What speaks against what was found in a recording, and how sure it is all the same."""
+"""Checks of what was found in a recording, and how much confidence they leave."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -168,19 +168,19 @@ def _by_parts(phases: np.ndarray, x: np.ndarray, legs: Mapping[str, Sequence[str
 
 
 def limping(legs: Mapping[str, Sequence[str]], c: Mapping[str, np.ndarray]) -> list[str]:
-    """Say which leg moves by much less than the others do."""
+    """Name the legs that move by much less than the others do, one line each."""
     size = {leg: float(np.sqrt(sum(np.sum(np.abs(c[name][1:])**2) for name in listed)
                                / len(listed))) for leg, listed in legs.items()}
-    said = []
+    found = []
     for leg, own in size.items():
         usual = float(np.median([other for name, other in size.items() if name != leg]))
         if own < LIMPS * usual:
-            said.append(f'{leg} moves by {own / usual:.2f} of what the other legs do')
-    return said
+            found.append(f'{leg} moves by {own / usual:.2f} of what the other legs do')
+    return found
 
 
 def quality_notes(warp: PhaseEstimate, found: PhaseAverage, names: Sequence[str]) -> list[str]:
-    """Say what the errors rest on, whether the frequency drifts, and which samples were wild."""
+    """Note few cycles, a drift of the frequency, and samples left out, one line each."""
     notes = []
     if warp.cycles < SURE:
         notes.append(f'only {warp.cycles:.1f} cycles: errors are rough, one figure for the whole '

@@ -14,7 +14,7 @@
 
 """Which gait is this? The spatio-temporal symmetry of a recorded or simulated rhythm.
 
-A symmetry g with shift theta asks ``x_{g(i)}(t) = x_i(t + theta T)`` of every cell (Buono &
+A symmetry g with shift theta means ``x_{g(i)}(t) = x_i(t + theta T)`` for every cell (Buono &
 Golubitsky 2001, section 2.1). Here its violation is measured, for every g and theta, on the
 mean cycle; H and K are what is violated by less than the tolerance and forms a homomorphism.
 """
@@ -26,14 +26,13 @@ from fractions import Fraction
 from cpg_ros.errors import InputError
 from cpg_ros.gaits.mean_cycle import HarmonicCycle, mean_cycle
 from cpg_ros.gaits.period import find_period, holds_two
+from cpg_ros.gaits.waveform_comparison import best_shift
 from cpg_ros.networks.hk_theorem import symmetries
 from cpg_ros.networks.symmetry import Group, Permutation, Symmetry
 from cpg_ros.short_repr import ShortRepr
 import numpy as np
 
-#: Grid for the best shift, per cycle; a mean cycle has far fewer harmonics.
-GRID = 1024
-#: Fewest samples that can be told from noise.
+#: Fewest samples of a rhythm.
 FEWEST = 8
 #: Largest distance of a symmetry that holds in whatever noise; the distance, in what noise and
 #: tolerance explain, at which a gait is as likely as none; and the largest distance of several in
@@ -61,7 +60,8 @@ class Recognition(ShortRepr):
         confidence: probability that it is the nearest gait, not another nor none of them.
         period: in the unit of the times.
         phases: of the cells against cell 1 in cycles, [0, 1), shape (cells,): the shift of best
-            correlation; between different waveforms it is no more than that.
+            correlation; between different waveforms it is no more than that. Cells to which H
+            gives one waveform are compared with the first of them.
         h: names of the elements of H, the largest consistent set within the tolerance.
         k: those among them with shift 0.
         distances: element name -> (its best shift in cycles, its distance there). An element
@@ -90,15 +90,8 @@ def _best_shift(ahead: np.ndarray, behind: np.ndarray) -> float:
     """
     cross = np.sum(ahead * behind.conj(), axis=1)
     cross[0] = 0.0
-    turn = -2j * np.pi * np.arange(cross.size)
-    best = theta = float(np.argmax(np.fft.fft(cross, GRID).real)) / GRID
-    for _ in range(8):
-        terms = cross * np.exp(turn * theta)
-        slope, curvature = np.sum(turn * terms).real, np.sum(turn * turn * terms).real
-        if curvature < 0.0:
-            theta = float(np.clip(theta - slope / curvature, best - 1 / GRID, best + 1 / GRID))
     # A rounding error below 0 is 0, not 1.
-    return round(theta % 1.0, 12) % 1.0
+    return round(best_shift(cross)[0] % 1.0, 12) % 1.0
 
 
 class _Violations:
@@ -167,7 +160,7 @@ def recognise(t: np.ndarray, signals: np.ndarray, group: Group, gaits: Mapping[s
     """Find the symmetry of a rhythm, and the named gait that has it.
 
     Of several gaits within the tolerance the one with the largest H is meant, and among those
-    the one that fits best: every walk is also a skip, which asks less.
+    the one that fits best: every walk is also a skip, which has fewer symmetries.
 
     Args:
         t: increasing times, evenly or unevenly spaced, shape (m,).
@@ -176,7 +169,7 @@ def recognise(t: np.ndarray, signals: np.ndarray, group: Group, gaits: Mapping[s
         gaits: name -> symmetry, of that group. A wave and the same one run backwards count as
             two gaits.
         period: in the unit of t; found if not given.
-        tolerance: largest distance of a symmetry that holds; see Recognised. What noise makes
+        tolerance: largest distance of a symmetry that holds; see Recognition. What noise makes
             of a distance comes on top.
 
     Raises:
@@ -200,7 +193,7 @@ def recognise(t: np.ndarray, signals: np.ndarray, group: Group, gaits: Mapping[s
     apart = {name: violations.of(gait) for name, gait in gaits.items()}
     best = min(gaits, key=apart.__getitem__)
     known = apart[best] <= tolerance
-    # A gait that includes another fits no better, as it asks more; that is no demerit.
+    # A gait that includes another has more constraints and fits no better; that is no demerit.
     fitting = [name for name, gait in gaits.items()
                if (apart[name] <= tolerance if known else apart[name] <= apart[best] + tolerance
                    and set(gait.shifts) >= set(gaits[best].shifts))]
@@ -209,13 +202,26 @@ def recognise(t: np.ndarray, signals: np.ndarray, group: Group, gaits: Mapping[s
     others = [name for name, gait in gaits.items()
               if not set(gait.shifts) <= set(gaits[nearest].shifts)]
     second = min(others, key=apart.__getitem__, default=None)
-    phases = [_best_shift(cycle[:, [cell]], cycle[:, :1]) for cell in range(group.cells)]
     sure = _sure(apart[nearest], [apart[name] for name in others], float(np.hypot(alone, noise)))
     return Recognition(nearest if known else None, nearest, apart[nearest],
                        apart[second] - apart[nearest] if second is not None else np.inf, second,
-                       noise, sure, period, np.array(phases), found.h, found.k,
+                       noise, sure, period, _phases(cycle, found), found.h, found.k,
                        {name: violations.best(element)
                         for name, element in group.elements.items()})
+
+
+def _phases(cycle: np.ndarray, symmetry: Symmetry) -> np.ndarray:
+    """Return the phases of the cells against cell 1 in cycles, [0, 1).
+
+    Two waveforms may correlate equally well at several shifts, among which noise would choose
+    anew for each cell.
+    """
+    first = [int(np.argmax(symmetry.waves == wave)) for wave in symmetry.waves]
+    ahead = {cell: _best_shift(cycle[:, [cell]], cycle[:, :1]) for cell in set(first)}
+    phases = [ahead[head] + _best_shift(cycle[:, [cell]], cycle[:, [head]])
+              for cell, head in enumerate(first)]
+    # As in _best_shift: a rounding error below 1 is 0.
+    return np.round(phases, 12) % 1.0
 
 
 def _noise(cycle: HarmonicCycle, samples: int) -> float:

@@ -35,7 +35,7 @@ FINER = 4.0
 GRID = 1 << 18
 #: Mean square difference over twice the variance: 0 if it repeats exactly, 1 if unrelated.
 REPEATS = 0.25
-#: Fewest cycles that can be told to repeat.
+#: Fewest cycles in which a repetition shows.
 CYCLES = 1.4
 #: A multiple of the lag is the period if it repeats so much better: less than this share of the
 #: difference, and so much less.

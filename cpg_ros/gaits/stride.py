@@ -21,12 +21,11 @@ real stride is quite as long as the last (warp), and averaged over that phase (w
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from cpg_ros.errors import CpgError, InputError
-from cpg_ros.gaits.leg_motion import check_travel, running_probability
+from cpg_ros.errors import InputError
+from cpg_ros.gaits.leg_motion import check_travel
 from cpg_ros.gaits.leg_names import Legs
 from cpg_ros.gaits.leg_phases import (
     leg_phases,
-    match_by_probability,
     match_gait,
     match_gait_by_cells,
 )
@@ -59,6 +58,7 @@ from cpg_ros.gaits.steady_stretch import (
     FINER,
     resample_evenly,
 )
+from cpg_ros.gaits.usable_joints import NoSteadyGait, usable_joints, with_angles
 from cpg_ros.networks.network import Network
 from cpg_ros.short_repr import ShortRepr
 import numpy as np
@@ -67,8 +67,6 @@ import numpy as np
 POINTS = 64
 #: Joints that all move by less stand (rad).
 STILL = 0.01
-#: Fewest samples of a joint.
-SAMPLES = 8
 #: In stretches of fewer cycles than SURE strides must be more alike: the mean square difference
 #: over twice the variance.
 ALIKE = 0.1
@@ -76,17 +74,8 @@ ALIKE = 0.1
 LEFT = 0.5
 #: Stretches that are followed, and how much other motion, in cycles, is worth a note.
 SEEDS, OTHERS = 4, 3.0
-#: A sample is no motion if it is off both neighbours by this many standard deviations and times
-#: as much as they differ.
-SPIKE = 3.0
 #: What fewer cycles leave of the confidence.
 FEW_CYCLES = 0.9
-
-
-class NoSteadyGait(CpgError):
-    """A recording has no steady gait; the message says what it has instead."""
-
-    exit_code = 1
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -113,10 +102,10 @@ class Stride(ShortRepr):
         scatter: leg -> how well its phase is known, and kept from stride to stride.
         gait: name, None if none is near enough.
         nearest: the nearest gait.
+        alike: gaits that the recording cannot tell from the nearest, that one among them.
         distance: of the leg phases from the nearest, RMS over legs, cycles.
         margin: how much further the next gait is, cycles.
-        confidence: probability that gait and frequency are those named, as far as the recording
-            tells.
+        confidence: probability that gait and frequency are those named, given the recording.
         issues: what speaks against them, one line each.
         notes: one line each.
         warp: stride phase of the recording's times within the stretch.
@@ -138,6 +127,7 @@ class Stride(ShortRepr):
     scatter: dict[str, PhaseScatter]
     gait: str | None
     nearest: str
+    alike: tuple[str, ...]
     distance: float
     margin: float
     confidence: float
@@ -145,8 +135,15 @@ class Stride(ShortRepr):
     notes: tuple[str, ...]
     warp: PhaseEstimate
 
+    @property
+    def verdict(self) -> str:
+        """Which gait it is: its name, 'walk or run: cannot tell', or which one is nearest."""
+        if self.gait is None:
+            return f'none of the gaits; nearest {self.nearest}'
+        return self.gait if len(self.alike) < 2 else f'{" or ".join(self.alike)}: cannot tell'
+
     def _summary(self) -> str:
-        return (f'{self.gait or f"no gait, nearest {self.nearest}"}: {self.cycles} cycles of '
+        return (f'{self.verdict}: {self.cycles} cycles of '
                 f'{self.frequency:.6g} +- {self.frequency_error:.2g} Hz, {self.begin:.6g} to '
                 f'{self.end:.6g} s, {len(self.joints)} joints')
 
@@ -163,7 +160,7 @@ def find_stride(recording: RecordingLike, legs: Legs | Mapping[str, Sequence[str
         cells: joint -> the cell that drives it, from 1. A leg's phase is then that of its first
             cell.
         gains: joint -> w_x + i w_y, rad, the first two weights of its readout. With these gaits
-            that move the legs alike (walk and run of the biped) are told apart, if every cell
+            that move the legs alike (walk and run of the biped) are distinguished, if every cell
             has a joint.
 
     Raises:
@@ -177,11 +174,14 @@ def find_stride(recording: RecordingLike, legs: Legs | Mapping[str, Sequence[str
     if set(legs) != set(own):
         raise InputError(f'{source}: legs are {", ".join(legs)}; the network {kind.name} has '
                          f'{", ".join(own)}')
-    chosen, positions, notes = _usable(recording, {leg: legs[leg] for leg in own})
+    chosen, positions, notes = usable_joints(recording, {leg: legs[leg] for leg in own})
     times = recording.times
     names = [name for name in recording.joints if any(name in one for one in chosen.values())]
     rough, others = _regions(times, positions, source)
     notes += others
+    within = index_range(times, rough.begin, rough.end)
+    names, chosen, full = with_angles(names, chosen, positions[within], source, notes)
+    positions = positions[:, full]
     warp = estimate_phase(times, positions, rough)
     if warp.cycles < CYCLES:
         raise NoSteadyGait(f'{source}: no steady gait: only {warp.cycles:.1f} cycles of '
@@ -189,13 +189,9 @@ def find_stride(recording: RecordingLike, legs: Legs | Mapping[str, Sequence[str
     inside = index_range(times, warp.knots[0], warp.knots[-1])
     phases, x = warp(times[inside]), positions[inside]
     theta = np.arange(POINTS) / POINTS
-    full = np.isfinite(x).sum(axis=0) >= SAMPLES
-    if not full.all():
-        lost = [name for name, good in zip(names, full, strict=True) if not good]
-        notes.append(f'left out, without angles in the stretch: {", ".join(lost)}')
-        names = [name for name in names if name not in lost]
-        chosen = _kept(chosen, names, source)
-        x = x[:, full]
+    # Of the rough stretch, strides that differ at its ends were left out.
+    names, chosen, full = with_angles(names, chosen, x, source, notes)
+    x = x[:, full]
     try:
         found = average_cycles(phases, x, theta,
                                [names.index(name) for name in chosen[next(iter(own))]])
@@ -225,69 +221,23 @@ def find_stride(recording: RecordingLike, legs: Legs | Mapping[str, Sequence[str
         by_cells = _cell_signals(c, cells, gains, kind)
         if by_cells is not None:
             gait = match_gait_by_cells(by_cells, kind)
-    if set(gait.alike) == {'walk',
-                           'run'} and (share := running_probability(chosen, c)) is not None:
-        gait = match_by_probability(gait, 'run', share)
     if len(gait.alike) > 1:
-        rivals = ' or '.join(other for other in gait.alike if other != gait.nearest)
         # The odds of the gait have this already.
-        issues.append(QualityIssue(f'it may as well be a {rivals}: name the gait it is (--gait)',
-                                   1.0))
+        issues.append(QualityIssue(f'{" or ".join(gait.alike)}: cannot tell, the legs move in the '
+                                   'same phases; name the gait it is (--gait)', 1.0))
     return Stride(float(warp.knots[0]), float(warp.knots[-1]), warp.frequency,
                   warp.frequency_error, int(warp.cycles + 1e-6), tuple(names), theta,
                   found.mean(theta), found.spread, found.error, found.counts, ahead,
                   phase_scatter(phases, x, found, leading, names), gait.gait,
-                  gait.nearest, gait.distance, gait.margin,
+                  gait.nearest, gait.alike, gait.distance, gait.margin,
                   gait.sure * float(np.prod([one.left for one in issues])),
                   tuple(one.message for one in issues if one.message),
                   (*notes, *by_legs, *limping(chosen, c), *gait.notes),
                   replace(warp, phases=warp.phases - found.zero))
 
 
-def _kept(legs: Mapping[str, Sequence[str]], names: Sequence[str], source: str
-          ) -> dict[str, tuple[str, ...]]:
-    """Keep the legs' joints that are among names, at least one of each leg."""
-    kept = {leg: tuple(name for name in listed if name in names) for leg, listed in legs.items()}
-    for leg, listed in kept.items():
-        if not listed:
-            raise NoSteadyGait(f'{source}: none of the joints of {leg} '
-                               f'({", ".join(legs[leg])}) has angles')
-    return kept
-
-
-def _usable(recording: RecordingLike, legs: Mapping[str, Sequence[str]]
-            ) -> tuple[dict[str, tuple[str, ...]], np.ndarray, list[str]]:
-    """Return the legs' joints that have angles, their positions without spikes, and notes."""
-    listed = [name for name in recording.joints if any(name in one for one in legs.values())]
-    # Joint by joint in memory, as they are averaged.
-    x = np.empty((len(listed), len(recording.times))).T
-    for column, name in zip(x.T, listed, strict=True):
-        column[:] = recording.positions[:, recording.joints.index(name)]
-        column[np.isinf(column)] = np.nan
-    enough = np.isfinite(x).sum(axis=0) >= SAMPLES
-    names = [name for name, good in zip(listed, enough, strict=True) if good]
-    lost = [name for name in listed if name not in names]
-    notes = [f'left out, without angles: {", ".join(lost)}'] if lost and names else []
-    if len(recording.times) < SAMPLES:
-        raise NoSteadyGait(f'{recording.source}: {len(recording.times)} samples are not enough '
-                           f'for a gait, at least {SAMPLES} are needed')
-    kept = _kept(legs, names, recording.source)
-    x = x if enough.all() else x[:, enough]
-    spikes = 0
-    for column in x.T:
-        before, here, after = column[:-2], column[1:-1], column[2:]
-        off = np.abs(here - 0.5 * (before + after))
-        with np.errstate(invalid='ignore'):
-            wild = ((off > SPIKE * np.nanstd(column)) & (off > SPIKE * np.abs(after - before)))
-        here[wild] = np.nan
-        spikes += int(np.count_nonzero(wild))
-    if spikes:
-        notes.append(f'left out, far off both neighbours: {spikes} samples')
-    return kept, x, notes
-
-
 def _regions(times: np.ndarray, x: np.ndarray, source: str) -> tuple[RoughPhase, list[str]]:
-    """Find the longest stretch of steady motion, and say which others there are."""
+    """Find the longest stretch of steady motion; return it, and notes on the others."""
     reach = np.nanmax(x, axis=0) - np.nanmin(x, axis=0)
     if reach.max() < STILL:
         raise NoSteadyGait(f'{source}: no steady gait: the joints stand, none moves by more than '

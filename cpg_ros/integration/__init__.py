@@ -22,4 +22,5 @@ from cpg_ros.errors import needed
 # Before any of its modules: one line where numba is missing, not a traceback.
 needed('numba')
 
-__all__ = ['field_code', 'jit', 'kernel', 'loops', 'simulate', 'stepper']
+__all__ = ['compilation', 'field_code', 'jit', 'kernel', 'kernel_arguments', 'loops',
+           'simulate', 'stepper']

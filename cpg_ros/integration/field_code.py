@@ -20,7 +20,7 @@ step share it.
 """
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 from cpg_ros.integration.loops import LoopProgram, Writer
 from cpg_ros.networks.cell import Source
@@ -85,12 +85,25 @@ def _function(name: str, head: str, doc: str, slices: Sequence[str], lines: Sequ
     return f'    @decorate\n    def {name}({head}):\n        """{doc}"""\n{body}'
 
 
-def kernel_source(equations: Equations) -> str:
-    """Write a module with ``compiled(decorate)``, which returns (drive or None, field).
+class LoweredPart(NamedTuple):
+    """A part of the right-hand side, as loops over the cells work it out.
 
-    ``drive(n, past, p, lanes, work, out)`` fills ``DRIVEN`` arrays of the length n / variables;
-    ``field(n, z, driven, p, lanes, work, out)`` the rates. ``p`` has a row for each parameter of
-    the equations, ``work`` room for ``WORK`` such arrays and ``EXTRA`` cells.
+    Attributes:
+        name: ``drive``, what depends on delayed states alone, or ``field``, the rates.
+        program: the functions that are worked out first.
+        results: expressions of what the part fills in, one for each array.
+
+    """
+
+    name: str
+    program: LoopProgram
+    results: list[Any]
+
+
+def lowered_parts(equations: Equations) -> list[LoweredPart]:
+    """Return ``drive``, where anything is heard a delay ago, and ``field``.
+
+    The results of ``drive`` stand in those of ``field`` as d0, d1 ...
     """
     rates, symbols = expressions(equations)
     count = len(equations.arguments)
@@ -98,27 +111,42 @@ def kernel_source(equations: Equations) -> str:
     delayed = {symbol for symbol, one in arguments if one.delayed}
     now = {symbol for symbol, one in arguments if not one.delayed}
     driven, rest = _split(rates, delayed, now)
-    variables = len(rates)
-    texts, most, extra = [], 0, 0
-    sources: dict[Source, int] = {}
-    for name, results, state in (('drive', driven, 'past'), ('field', rest, 'z')):
+    parts = []
+    for name, results in (('drive', driven), ('field', rest)):
         if not results:
             continue
         results, powers = _share_exponentials(results)
         program = LoopProgram([(symbol, one) for symbol, one in arguments
                                if one.delayed == (name == 'drive')], powers)
-        lowered = [program.lowered(part) for part in results]
+        parts.append(LoweredPart(name, program, [program.lowered(part) for part in results]))
+    return parts
+
+
+def kernel_source(equations: Equations) -> str:
+    """Write a module with ``compiled(decorate)``, which returns (drive or None, field).
+
+    ``drive(n, past, p, lanes, work, out)`` fills ``DRIVEN`` arrays of the length n / variables;
+    ``field(n, z, driven, p, lanes, work, out)`` the rates. ``p`` has a row for each parameter of
+    the equations, ``work`` room for ``WORK`` such arrays and ``EXTRA`` cells.
+    """
+    parts = lowered_parts(equations)
+    driven = len(parts[0].results) if len(parts) > 1 else 0
+    variables = len(parts[-1].results)
+    texts, most, extra = [], 0, 0
+    sources: dict[Source, int] = {}
+    for name, program, lowered in parts:
+        state = 'past' if name == 'drive' else 'z'
         used = {str(symbol) for part in (*lowered, *(call for _, call in program.functions),
                                          *(what for _, what, _ in program.fetched))
                 for symbol in part.free_symbols}
         slices = [f'm = n // {variables}']
         slices += [f'z{v} = {state}[{v} * m:{v + 1} * m]' for v in range(variables)
                    if f'z{v}' in used]
-        slices += [f'd{k} = driven[{k} * m:{k + 1} * m]' for k in range(len(driven))
+        slices += [f'd{k} = driven[{k} * m:{k + 1} * m]' for k in range(driven)
                    if f'd{k}' in used]
         slices += [f'p_{row} = p[{r}]' for r, row in enumerate(equations.rows)
                    if f'p_{row}' in used]
-        slices += [f'o{k} = out[{k} * m:{k + 1} * m]' for k in range(len(results))]
+        slices += [f'o{k} = out[{k} * m:{k + 1} * m]' for k in range(len(lowered))]
         writer = Writer(program, sources)
         most, extra = max(most, writer.arrays), max(extra, writer.extra)
         writer.loops([(f'o{k}', part) for k, part in enumerate(lowered)])
@@ -135,5 +163,5 @@ def kernel_source(equations: Equations) -> str:
         f'from cpg_ros.integration.jit import {", ".join(known)}' if known else '') if line)
     head += 'from numpy import array\n' if sources else ''
     places = ''.join(f'SOURCE_{k} = array({source!r})\n' for source, k in sources.items())
-    return (f'{head}\n{places}DRIVEN, WORK, EXTRA = {len(driven)}, {most}, {extra}\n\n\n'
+    return (f'{head}\n{places}DRIVEN, WORK, EXTRA = {driven}, {most}, {extra}\n\n\n'
             f'def compiled(decorate):\n{code}\n    return {"drive" if driven else None}, field\n')

@@ -81,6 +81,18 @@ def bound(kernel, *arguments):
     return kernel.compile(tuple(typeof(argument) for argument in arguments))
 
 
+def bound_by_first_call(kernel):
+    """Return a kernel that is bound, see above, to arguments like those of its first call."""
+    code = None
+
+    def call(*arguments):
+        nonlocal code
+        if code is None:
+            code = bound(kernel, *arguments)
+        return code(*arguments)
+    return call
+
+
 def renamed(function, key: str):
     """Give a function that is compiled once for each network a name of its own for this one.
 

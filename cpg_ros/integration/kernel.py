@@ -34,7 +34,8 @@ import math
 from types import FunctionType
 from typing import Any
 
-from cpg_ros.integration.jit import jit, kept, part, renamed
+from cpg_ros.integration.jit import bound_by_first_call, jit, kept, part, renamed
+from cpg_ros.integration.kernel_arguments import Ring, Samples, System
 from cpg_ros.networks import generated
 from cpg_ros.networks.equations import equations_of
 from cpg_ros.networks.network import Network
@@ -48,17 +49,20 @@ def _field_code():
     return field_code
 
 
-def _compiled(decorate, equations):
+def _compiled(decorate, network, alone=False):
     """Compile the stepping of a network with a numba decorator.
 
     Args:
         decorate: numba's decorator.
-        equations: of the network.
+        network: to be stepped.
+        alone: a single lane, so that the loops over components have a known length.
 
     Returns:
         The functions past_state, restart and steps_of.
 
     """
+    equations = equations_of(network)
+
     def own(function):
         return decorate(renamed(function, equations.key))
 
@@ -67,19 +71,20 @@ def _compiled(decorate, equations):
     drive, rates = code.compiled(own)
     delays = drive is not None
     driven_rows, work_rows, extra = max(code.DRIVEN, 1), max(code.WORK, 1), code.EXTRA + 1
-    variables = len(equations.texts)
+    variables, components = network.variables, network.cells * network.variables
 
     @own
-    def field(n, x, k, weight, driven, p, gain, basis, lanes, work, out):
+    def field(n, system, driven, x, weight, k, work, out):
         """Right-hand side at z = x + weight k, with the symmetry lock -gain (I - P) z.
 
-        P projects on the rows of basis, shape (r, components); work is scratch, room for z and
-        for what the rates need.
+        P projects on the rows of the basis; work is scratch, room for z and for what the rates
+        need.
         """
+        lanes, basis, gain = n // components, system.basis, system.gain
         z, along = work[:n], work[n:]
         for i in range(n):
             z[i] = x[i] + weight * k[i]
-        rates(n, z, driven, p, lanes, along, out)
+        rates(n, z, driven, system.p, lanes, along, out)
         if gain != 0.0:
             for i in range(n):
                 out[i] -= gain * z[i]
@@ -100,12 +105,12 @@ def _compiled(decorate, equations):
                             out[cell * lanes + lane] += gain * along[lane] * basis[r, cell]
 
     @own
-    def past_state(n, x, after, before, head, c, tau, step, first, stride, out):
-        """State at t_head + c step - tau, for tau >= c step, by the cubic Hermite interpolant.
+    def past_state(n, ring, head, back, first, stride, out):
+        """State ``back`` steps before the head node, by the cubic Hermite interpolant.
 
         Only every stride-th component from first on is filled in.
         """
-        back = tau / step - c
+        step, x, after, before = ring
         nodes = max(1, math.ceil(back))
         start = head - nodes
         if start < 0:
@@ -126,26 +131,29 @@ def _compiled(decorate, equations):
                           + h01 * x[end, i] + h11 * before[end, i])
 
     @own
-    def past_states(n, x, after, before, head, c, tau, step, out):
-        """Return the same with a delay a lane, tau of shape (lanes,); one pass if all agree."""
-        lanes = tau.shape[0]
+    def past_states(n, tau, ring, head, c, out):
+        """State at t_head + c step - tau, tau of shape (lanes,); one pass if all agree."""
+        lanes, step = tau.shape[0], ring.step
         same = True
         for lane in range(1, lanes):
             same = same and tau[lane] == tau[0]
         if same:
-            past_state(n, x, after, before, head, c, tau[0], step, 0, 1, out)
+            past_state(n, ring, head, tau[0] / step - c, 0, 1, out)
         else:
             for lane in range(lanes):
-                past_state(n, x, after, before, head, c, tau[lane], step, lane, lanes, out)
+                past_state(n, ring, head, tau[lane] / step - c, lane, lanes, out)
 
     @own
-    def steps_of(n, lanes, p, tau, gain, basis, step, x, after, before, head, steps, noise,
-                 states, slopes, row, every):
+    def steps_of(system, ring, head, steps, noise, record, row):
         """Take RK4 steps from the head node; return the new head.
 
         ``noise`` is the standard deviation of white noise per square root of model time, added
-        once a step (Euler-Maruyama); the caller seeds.
+        once a step (Euler-Maruyama); the caller seeds. The first step here is number ``row``.
         """
+        step, x, after, before = ring
+        every, states, slopes = record
+        n = components if alone else x.shape[1]
+        lanes = n // components
         past = np.empty(n)
         middle = np.zeros(driven_rows * n // variables)
         end = np.zeros(driven_rows * n // variables)
@@ -157,19 +165,19 @@ def _compiled(decorate, equations):
             now, k1 = x[head], after[head]
             # Stages 2 and 3 share one delayed state, stage 4 and the next step's first another.
             if delays:
-                past_states(n, x, after, before, head, 0.5, tau, step, past)
-                drive(n, past, p, lanes, work, middle)
-                past_states(n, x, after, before, head, 1.0, tau, step, past)
-                drive(n, past, p, lanes, work, end)
-            field(n, now, k1, 0.5 * step, middle, p, gain, basis, lanes, work, k2)
-            field(n, now, k2, 0.5 * step, middle, p, gain, basis, lanes, work, k3)
-            field(n, now, k3, step, end, p, gain, basis, lanes, work, k4)
+                past_states(n, system.tau, ring, head, 0.5, past)
+                drive(n, past, system.p, lanes, work, middle)
+                past_states(n, system.tau, ring, head, 1.0, past)
+                drive(n, past, system.p, lanes, work, end)
+            field(n, system, middle, now, 0.5 * step, k1, work, k2)
+            field(n, system, middle, now, 0.5 * step, k2, work, k3)
+            field(n, system, end, now, step, k3, work, k4)
             for i in range(n):
                 x[new, i] = now[i] + step / 6.0 * (k1[i] + 2.0 * (k2[i] + k3[i]) + k4[i])
             if noise > 0.0:
                 for i in range(n):
                     x[new, i] += kick * np.random.normal()
-            field(n, x[new], k4, 0.0, end, p, gain, basis, lanes, work, after[new])
+            field(n, system, end, x[new], 0.0, k4, work, after[new])
             for i in range(n):
                 before[new, i] = after[new, i]
             if row % every == 0:
@@ -182,52 +190,52 @@ def _compiled(decorate, equations):
         return head
 
     @own
-    def restart(n, lanes, p, tau, gain, basis, step, x, after, before, head):
+    def restart(system, ring, head):
         """Recompute the slope that leaves the head node, after parameters have changed."""
+        n = ring.x.shape[1]
+        lanes = n // components
         past, driven = np.empty(n), np.zeros(driven_rows * n // variables)
         work = np.zeros(n + work_rows * n // variables + extra * lanes)
         if delays:
-            past_states(n, x, after, before, head, 0.0, tau, step, past)
-            drive(n, past, p, lanes, work, driven)
-        field(n, x[head], x[head], 0.0, driven, p, gain, basis, lanes, work, after[head])
+            past_states(n, system.tau, ring, head, 0.0, past)
+            drive(n, past, system.p, lanes, work, driven)
+        field(n, system, driven, ring.x[head], 0.0, ring.x[head], work, ring.after[head])
 
     return past_state, restart, steps_of
 
 
 # What the entry points below use of a network, which ``kernels`` puts in place of these.
-_components: Any = None
 _past_state: Any = None
 _restart: Any = None
 _steps: Any = None
 _steps_of_one: Any = None
 
 
-def set_slope(p, tau, gain, basis, step, x, after, before, head):
+def set_slope(system, ring, head):
     """Recompute the slope that leaves the head node, after parameters have changed."""
-    _restart(x.shape[1], tau.shape[0], p, tau, gain, basis, step, x, after, before, head)
+    _restart(system, ring, head)
 
 
-def advance(p, tau, gain, basis, step, x, after, before, clock, duration, out):
+def advance(system, ring, clock, duration, out):
     """Advance the output instant of one lane by duration and evaluate there.
 
     clock is (head, ahead): the newest node and its distance beyond the output instant, in
     [0, step). out receives x, x', x'' at that instant, shape (3, components).
     """
+    step, x, after, before = ring
     head = int(clock[0])
     ahead = clock[1] - duration
     if ahead < 0.0:
         steps = math.ceil(-ahead / step)
         nothing = np.empty((0, 0, 0))
         # Not the unrolled code: it gains nothing here and takes 15 s more to compile.
-        head = _steps(x.shape[1], tau.shape[0], p, tau, gain, basis, step, x,
-                      after, before, head, steps, 0.0, nothing, nothing,
-                      np.int64(0), np.int64(1))
+        head = _steps(system, ring, head, steps, 0.0, Samples(1, nothing, nothing), 0)
         ahead = max(0.0, ahead + steps * step)
     clock[0] = head
     clock[1] = ahead
     start = head - 1 if head > 0 else x.shape[0] - 1
     s = 1.0 - ahead / step
-    _past_state(x.shape[1], x, after, before, head, 0.0, ahead, step, 0, 1, out[0])
+    _past_state(x.shape[1], ring, head, ahead / step, 0, 1, out[0])
     for i in range(x.shape[1]):
         rise = (x[head, i] - x[start, i]) / step
         out[1, i] = ((1.0 - s) * (1.0 - 3.0 * s) * after[start, i]
@@ -236,45 +244,43 @@ def advance(p, tau, gain, basis, step, x, after, before, clock, duration, out):
                      + (6.0 * s - 2.0) * before[head, i]) / step
 
 
-def integrate_one(p, tau, gain, basis, step, x, after, before, head, steps, noise,
-                  seed, states, slopes, row, every):
+def integrate_one(system, ring, head, steps, noise, seed, record, row):
     """Return what integrate does for a single trajectory, in one piece, loops unrolled."""
     np.random.seed(seed)
-    return _steps_of_one(_components, 1, p, tau, gain, basis, step, x, after, before, head,
-                         steps, noise, states, slopes, row, every)
+    return _steps_of_one(system, ring, head, steps, noise, record, row)
 
 
-def integrate(p, tau, gain, basis, step, x, after, before, head, steps, noise, seed,
-              states, slopes, row, every):
-    """Take steps of one block of lanes; return the new head.
-
-    What is reached is recorded in states and slopes, shape (lanes, rows, components): every
-    ``every``-th step, the first one here being number ``row``.
-    """
+def integrate(system, ring, head, steps, noise, seed, record, row):
+    """Take steps of one block of lanes, the first one number ``row``; return the new head."""
     np.random.seed(seed)
-    return _steps(x.shape[1], tau.shape[0], p, tau, gain, basis, step, x, after,
-                  before, head, steps, noise, states, slopes, row, every)
+    return _steps(system, ring, head, steps, noise, record, row)
 
 
-def integrate_many(p, tau, gain, basis, step, x, after, before, head, steps, noise,
-                   seeds, states, slopes, row, every):
+def integrate_many(system, ring, head, steps, noise, seeds, record, row):
     """Take and record steps of many blocks on all cores; return the new head.
 
-    Arrays have a leading axis, the block; states and slopes stay as they are.
+    Arrays of coefficients, delays, states and slopes have a leading axis, the block; the record
+    has one of all lanes.
     """
+    p, tau, gain, basis = system
+    step, x, after, before = ring
+    every, states, slopes = record
     lanes = tau.shape[1]
     for m in prange(x.shape[0]):
         np.random.seed(seeds[m])
         mine = slice(m * lanes, min((m + 1) * lanes, states.shape[0]))
-        _steps(x.shape[2], lanes, p[m], tau[m], gain, basis, step, x[m],
-               after[m], before[m], head, steps, noise, states[mine], slopes[mine],
-               row, every)
+        _steps(System(p[m], tau[m], gain, basis), Ring(step, x[m], after[m], before[m]), head,
+               steps, noise, Samples(every, states[mine], slopes[mine]), row)
     return (head + steps) % x.shape[1]
 
 
 @dataclass(frozen=True)
 class Kernels:
-    """The entry points above, compiled for one kind of network."""
+    """The entry points above, compiled for one kind of network.
+
+    They do not look at the types of their arguments: arrays must be C-contiguous, of floats, and
+    times, gains and noise floats.
+    """
 
     set_slope: Callable[..., None]
     advance: Callable[..., None]
@@ -290,11 +296,11 @@ def kernels(network: type[Network]) -> Kernels:
     A trajectory by itself has code of its own, built in one piece, its loops unrolled; lanes run
     through loops of any length in vector registers, which need functions of their own.
     """
-    equations = equations_of(network)
-    _, _, steps_of_one = _compiled(part, equations)
-    past_state, restart, steps = _compiled(jit, equations)
-    names = {'_components': network.cells * network.variables, '_past_state': past_state,
-             '_restart': restart, '_steps': steps, '_steps_of_one': steps_of_one}
+    _, _, steps_of_one = _compiled(part, network, alone=True)
+    past_state, restart, steps = _compiled(jit, network)
+    names = {'_past_state': past_state, '_restart': restart, '_steps': steps,
+             '_steps_of_one': steps_of_one}
+    key = equations_of(network).key
 
     def of_network(function, **options):
         """Compile a copy of an entry point that finds the network's functions as its globals.
@@ -304,7 +310,7 @@ def kernels(network: type[Network]) -> Kernels:
         """
         copy = FunctionType(function.__code__, {**globals(), **names}, function.__name__)
         copy.__doc__ = function.__doc__
-        return kept(renamed(copy, equations.key), generated.folder(equations.key), **options)
+        return bound_by_first_call(kept(renamed(copy, key), generated.folder(key), **options))
 
     return Kernels(of_network(set_slope), of_network(advance), of_network(integrate_one),
                    of_network(integrate), of_network(integrate_many, parallel=True))

@@ -20,6 +20,7 @@ from dataclasses import dataclass
 from cpg_ros.errors import InputError
 from cpg_ros.files.progress_bar import progress_bar
 from cpg_ros.integration import kernel
+from cpg_ros.integration.kernel_arguments import Ring, Samples, System
 from cpg_ros.networks.network import Network
 from cpg_ros.networks.symmetry import Symmetry
 from cpg_ros.short_repr import ShortRepr
@@ -91,10 +92,11 @@ def sample_history(history: History, nodes: int, step: float, components: int
     """
     if callable(history):
         times = (np.arange(nodes) - nodes + 1) * step
-        x = np.array(history(times), dtype=float)
+        # Compiled code is for arrays of this order in memory.
+        x = np.array(history(times), dtype=float, order='C')
         derivative = getattr(history, 'derivative', None)
         if derivative is not None:
-            slopes = np.array(derivative(times), dtype=float)
+            slopes = np.array(derivative(times), dtype=float, order='C')
         else:
             # One-sided at both ends, where nothing is known of the other side.
             offsets = np.arange(5)
@@ -192,18 +194,23 @@ def simulate(network: Network | Sequence[Network], history: History | Sequence[H
             after[block, :, :, lane] = before[block, :, :, lane] = past_slopes
     flat = [array.reshape(*array.shape[:2], components * lanes) for array in (x, after, before)]
     flat_p = p.reshape(blocks, -1, cells * lanes)
-    gain, basis = (0.0, np.zeros((1, components))) if lock is None else (lock[0], lock[1].basis)
+    step, noise = float(step), float(noise)
+    gain, basis = (0.0, np.zeros((1, components))) if lock is None else (
+        float(lock[0]), lock[1].basis)
 
     compiled = kernel.kernels(type(networks[0]))
     head = nodes - 1
-    for block in range(blocks):
-        compiled.set_slope(flat_p[block], tau[block], gain, basis, step,
-                           *(array[block] for array in flat), head)
+    systems = [System(one_p, one_tau, gain, basis)
+               for one_p, one_tau in zip(flat_p, tau, strict=True)]
+    rings = [Ring(step, *block) for block in zip(*flat, strict=True)]
+    for system, ring in zip(systems, rings, strict=True):
+        compiled.set_slope(system, ring, head)
     states = np.empty((batch, rows + 1, components))
     slopes = np.empty_like(states)
     for m, (block, lane) in enumerate(np.ndindex(blocks, lanes)):
         if m < batch:
             states[m, 0], slopes[m, 0] = x[block, head, :, lane], after[block, head, :, lane]
+    record = Samples(every, states, slopes)
     with progress_bar('simulating', steps, enabled=progress) as bar:
         done = 0
         while done < steps:
@@ -212,13 +219,12 @@ def simulate(network: Network | Sequence[Network], history: History | Sequence[H
             if blocks == 1:
                 alone = lanes == 1 and networks[0].variables == 1
                 one_block = compiled.integrate_one if alone else compiled.integrate
-                head = one_block(flat_p[0], tau[0], gain, basis, step,
-                                 *(array[0] for array in flat), head, chunk, noise, seeds[0],
-                                 states, slopes, done + 1, every)
+                head = one_block(systems[0], rings[0], head, chunk, noise, seeds[0], record,
+                                 done + 1)
             else:
-                head = compiled.integrate_many(flat_p, tau, gain, basis, step, *flat, head,
-                                               chunk, noise, seeds, states, slopes, done + 1,
-                                               every)
+                head = compiled.integrate_many(
+                    System(flat_p, tau, gain, basis), Ring(step, *flat), head,
+                    chunk, noise, seeds, record, done + 1)
             done += chunk
             bar(done)
 

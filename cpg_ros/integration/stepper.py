@@ -20,6 +20,7 @@ import math
 
 from cpg_ros.errors import InputError
 from cpg_ros.integration import kernel
+from cpg_ros.integration.kernel_arguments import Ring, System
 from cpg_ros.integration.simulate import History, sample_history
 from cpg_ros.networks.network import Network
 from cpg_ros.networks.symmetry import Symmetry
@@ -59,7 +60,7 @@ class Stepper:
         max_delay = max(network.longest_delay, step) if max_delay is None else max_delay
         if not (math.isfinite(step) and step > 0.0 and max_delay >= step):
             raise InputError(f'step {step} must be positive and at most max_delay {max_delay}')
-        self.step = step
+        self.step = float(step)
         self.max_delay = max_delay
         nodes = math.ceil(max_delay / step) + 3
         states, slopes = sample_history(history, nodes, step, network.components)
@@ -72,7 +73,7 @@ class Stepper:
 
     def set(self, network: Network, gain: float = 0.0,  # noqa: A003
             symmetry: Symmetry | None = None) -> None:
-        """Go on with other parameters from the next step, keeping the history.
+        """Continue with other parameters from the next step, keeping the history.
 
         Raises:
             ValueError: the delay is shorter than a step or longer than the ring, a gain
@@ -89,11 +90,11 @@ class Stepper:
         self.network, self.gain, self.symmetry = network, gain, symmetry
         self._kernels = kernel.kernels(type(network))
         self._tau[0] = network.delay
-        self._fixed = (network.coefficients, self._tau, float(gain),
-                       np.zeros((1, network.components)) if symmetry is None else symmetry.basis,
-                       self.step,
-                       self._x, self._after, self._before)
-        self._kernels.set_slope(*self._fixed, int(self._clock[0]))
+        self._system = System(
+            network.coefficients, self._tau, float(gain),
+            np.zeros((1, network.components)) if symmetry is None else symmetry.basis)
+        self._ring = Ring(self.step, self._x, self._after, self._before)
+        self._kernels.set_slope(self._system, self._ring, int(self._clock[0]))
 
     def advance(self, duration: float) -> np.ndarray:
         """Advance by a duration in model time (0 or more).
@@ -102,7 +103,7 @@ class Stepper:
 
         The array returned is the same one every time.
         """
-        self._kernels.advance(*self._fixed, self._clock, duration, self.now)
+        self._kernels.advance(self._system, self._ring, self._clock, duration, self.now)
         return self.now
 
     def copy(self) -> 'Stepper':
@@ -125,7 +126,7 @@ class Stepper:
     def disturb(self, offset: np.ndarray) -> None:
         """Add an offset, shape (components,), to the newest state; the history before it stays."""
         self._x[int(self._clock[0])] += offset
-        self._kernels.set_slope(*self._fixed, int(self._clock[0]))
+        self._kernels.set_slope(self._system, self._ring, int(self._clock[0]))
 
     def superpose(self, motion: Callable[[np.ndarray], np.ndarray],
                   slope: Callable[[np.ndarray], np.ndarray]) -> None:
@@ -145,4 +146,4 @@ class Stepper:
         slopes = slope(times)
         self._after[oldest_first] += slopes
         self._before[oldest_first] += slopes
-        self._kernels.set_slope(*self._fixed, newest)
+        self._kernels.set_slope(self._system, self._ring, newest)

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What a fit has to be taken with a grain of salt for, in words."""
+"""The caveats of a fit, in words."""
 
 from collections.abc import Mapping, Sequence
 
@@ -30,7 +30,7 @@ TOGETHER, AT_BOUND = 0.95, 1e-5
 def findings(free: Sequence[Free], estimates: Mapping[str, Estimate], known: Spread,
              best: Minimisation
              ) -> list[str]:
-    """List what the user of a fit must know.
+    """List the caveats of a fit.
 
     Args:
         free: the free numbers.
@@ -60,8 +60,9 @@ def findings(free: Sequence[Free], estimates: Mapping[str, Estimate], known: Spr
         if np.isfinite(one.stderr) and (not one.bounded or max(
                 one.high - one.value, one.value - one.low) > WIDE * abs(one.value)):
             found.append(
-                f'{name} is badly determined: anything from {one.low:.4g} to {one.high:.4g} fits '
-                'as well' + ('' if one.bounded else ', and there is no orbit or a bound beyond')
+                f'{name} is badly determined: any value from {one.low:.4g} to {one.high:.4g} fits '
+                'as well' + ('' if one.bounded else ', and the range ends there only because its '
+                             'bound is reached or the gait ceases to exist')
                 + '; with a free readout, it affects only the shape of the waveform')
     errors = known.correlation
     for k in range(len(free)):

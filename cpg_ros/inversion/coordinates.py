@@ -23,7 +23,7 @@ from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import replace
 
-from cpg_ros.dynamics.hopf import first_hopf, HopfPoint
+from cpg_ros.dynamics.hopf_point import first_hopf, HopfPoint
 from cpg_ros.dynamics.periodic import NoOrbit
 from cpg_ros.inversion.free_parameters import Free, with_values, within_hopf_set
 from cpg_ros.inversion.trust_region import Evaluate, Minimisation, minimise
@@ -132,7 +132,7 @@ class Coordinates:
 
     def descend(self, evaluate: Evaluate, start: np.ndarray, tolerance: float, most: int = 100
                 ) -> Minimisation:
-        """Go down from values that have an orbit; as trials.descend, but in coordinates.
+        """Minimise from values that have an orbit; as trust_region.minimise, but in coordinates.
 
         Args:
             evaluate: the problem, in values.

@@ -21,6 +21,7 @@ cycle, so it is the shape, size and phases of the waveforms that are fitted, not
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 from cpg_ros.dynamics.orbit import Orbit, solve_orbit
 from cpg_ros.dynamics.periodic import NoOrbit
@@ -58,7 +59,7 @@ class CycleFit(ShortRepr):
 
     @property
     def evaluations(self) -> int:
-        """How many orbits were asked for."""
+        """How many orbits were solved for."""
         return self.trial.evaluations
 
     @property
@@ -115,15 +116,14 @@ def fit_cycle(samples: np.ndarray, theta: np.ndarray, start: Delayed, gait: str,
         if not one.low < value < one.high:
             raise InputError(f'{one.name} {value:g} to start from is not between {one.low:g} '
                              f'and {one.high:g}')
-    solved: dict[bytes, Orbit] = {}
+
+    # The method evaluates residual and derivative at the same values, one after the other.
+    @lru_cache(maxsize=1)
+    def solved(values: tuple[float, ...]) -> Orbit:
+        return solve_orbit(with_values(start, free, values), gait)
 
     def orbit_at(values: np.ndarray) -> Orbit:
-        key = values.tobytes()
-        if key not in solved:
-            found = solve_orbit(with_values(start, free, values), gait)
-            solved.clear()
-            solved[key] = found
-        return solved[key]
+        return solved(tuple(values.tolist()))
 
     def evaluate(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         states, slopes = cycle_samples(orbit_at(values), theta)

@@ -12,10 +12,10 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A fit for every steady gait: where the one asked for has no orbit, a humbler one.
+"""A fit for every steady gait: where the requested one has no orbit, a simpler one.
 
 In turn: other starts, lower orders of the readouts, one free parameter alone, and last the
-parameters of the preset as they are, with readouts fitted to them. What was given up is said.
+parameters of the preset, with readouts fitted to them. A warning names what was given up.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -29,7 +29,7 @@ from cpg_ros.motion.plan import refusal
 from cpg_ros.networks.network import Network
 import numpy as np
 
-#: Half the room that a parameter has which is to stay what it is, of its size.
+#: Half the range of a parameter that keeps its value, over that value.
 STAYS = 1e-9
 #: Names, order and starts of a fit, and what they are in words.
 Way = tuple[tuple[str, ...], int, Sequence[Mapping[str, float]], str]
@@ -48,8 +48,9 @@ def _ways(names: tuple[str, ...], order: int, starts: Sequence[Mapping[str, floa
 
 def fit_with_fallbacks(cycle: MeanCycle, cells: Mapping[str, int], network: Network, gait: str,
                        free: Sequence[str], order: int, starts: Sequence[Mapping[str, float]],
-                       done: Callable[[float], None]) -> tuple[Fit, tuple[str, ...]]:
-    """Fit as asked for, or as near to it as leads to a gait that the generator runs.
+                       done: Callable[[float], None] = lambda share: None
+                       ) -> tuple[Fit, tuple[str, ...]]:
+    """Fit with these names and this order, or as near to them as the generator runs.
 
     Args: as of invert.
 
@@ -92,5 +93,5 @@ def _as_it_is(cycle: MeanCycle, cells: Mapping[str, int], network: Network, gait
     bounds = {name: (max(kind.low, value - room), min(kind.high, value + room))}
     fit = invert(cycle, cells, network, gait, (name,), order, bounds=bounds, profiles=False,
                  done=done)
-    # The parameter was never fitted: an interval would say what is not known.
+    # The parameter was never fitted: an interval would claim what is not known.
     return replace(fit, parameters={}, correlation=np.empty((0, 0)), warnings=())

@@ -38,11 +38,9 @@ def _text() -> str:
 
 def _grid(count: int, height: float) -> tuple[Figure, np.ndarray]:
     """Return a figure of panels in columns, those beyond the count left empty."""
-    matplotlib.use('Agg')
-    from matplotlib import pyplot
     rows = -(-count // COLUMNS)
-    figure, grid = pyplot.subplots(rows, COLUMNS, figsize=(10.5, 0.5 + height * rows),
-                                   sharex=True, squeeze=False, layout='constrained')
+    figure = Figure((10.5, 0.5 + height * rows), layout='constrained')
+    grid = figure.subplots(rows, COLUMNS, sharex=True, squeeze=False)
     for axes in grid.flat[count:]:
         axes.axis('off')
     for axes in grid.flat[:count]:
@@ -97,10 +95,8 @@ def errors(found: RecordingFit) -> Figure:
 
 def phases(found: RecordingFit) -> Figure:
     """Draw the recorded phases of the legs beside those of the gait, round the cycle."""
-    matplotlib.use('Agg')
-    from matplotlib import pyplot
-    figure, axes = pyplot.subplots(figsize=(6.0, 0.9 + 0.45 * len(found.stride.phases)),
-                                   layout='constrained')
+    figure = Figure((6.0, 0.9 + 0.45 * len(found.stride.phases)), layout='constrained')
+    axes = figure.subplots()
     orbit = found.fit.orbit
     cells = next(iter(orbit.network.legs.values()))
     wanted = {leg: float(orbit.phases[own[0] - 1]) for leg, own in cells.items()}
@@ -133,12 +129,11 @@ def phases(found: RecordingFit) -> Figure:
 
 def stretch(found: RecordingFit) -> Figure:
     """Draw the whole recording of the joint that moves most, and the stretch in it."""
-    matplotlib.use('Agg')
-    from matplotlib import pyplot
     recording, stride = found.recording, found.stride
     name = stride.joints[int(np.argmax(np.ptp(stride.mean, axis=1)))]
     angles = recording.positions[:, recording.joints.index(name)]
-    figure, axes = pyplot.subplots(figsize=(10.5, 2.4), layout='constrained')
+    figure = Figure((10.5, 2.4), layout='constrained')
+    axes = figure.subplots()
     # Lowest and highest of each column of the picture: all there is to see of a long recording.
     edges = np.linspace(0, len(angles), min(COLUMN, len(angles)) + 1).astype(int)[:-1]
     low, high = (extreme.reduceat(np.where(np.isnan(angles), none, angles), edges)
@@ -158,12 +153,10 @@ def stretch(found: RecordingFit) -> Figure:
 
 def convergence(found: RecordingFit) -> Figure:
     """Objective and parameters over the iterations of each start."""
-    matplotlib.use('Agg')
-    from matplotlib import pyplot
     names = list(found.fit.parameters)
     trials = [trial for trial in found.fit.starts if len(trial.path)]
-    figure, grid = pyplot.subplots(1, 1 + len(names), figsize=(3.4 * (1 + len(names)), 2.6),
-                                   squeeze=False, layout='constrained')
+    figure = Figure((3.4 * (1 + len(names)), 2.6), layout='constrained')
+    grid = figure.subplots(1, 1 + len(names), squeeze=False)
     for number, trial in enumerate(trials):
         steps = np.arange(len(trial.path))
         for k, axes in enumerate(grid.flat):

@@ -34,7 +34,6 @@ FIGURES = (('The recording', fit_figures.stretch),
 
 def _stride(found: RecordingFit) -> list[str]:
     stride, fit = found.stride, found.fit
-    named = (f'{stride.gait}' if stride.gait else f'none of the gaits; nearest {stride.nearest}')
     return [
         f'{found.recording.source}: {len(found.recording.times)} samples, '
         f'{found.recording.times[-1]:.2f} s; {found.read}.',
@@ -42,9 +41,9 @@ def _stride(found: RecordingFit) -> list[str]:
         f'at {stride.frequency:.4f} +- {stride.frequency_error:.1g} Hz.',
         'Phases [cycles]: ' + ', '.join(f'{leg} {phase:.3f}'
                                         for leg, phase in stride.phases.items())
-        + f': {named} ({stride.distance:.3f} of a cycle off, the next one '
+        + f': {stride.verdict} ({stride.distance:.3f} of a cycle off, the next one '
         f'{stride.margin:.3f} further).',
-        f'Confidence that gait and frequency are these: {found.confidence:.0%}.',
+        f'Confidence in {stride.nearest} and this frequency: {found.confidence:.0%}.',
         f'Fitted: {fit.gait} of the {fit.network.name} network, readout of order {fit.order}, '
         f'{100.0 * fit.mean_rms_share:.1f} % of the range left on average'
         f'{": a poor fit" if found.poor else ""}.']
@@ -144,10 +143,8 @@ def _html_table(rows: list[tuple[str, ...]]) -> str:
 
 
 def _image(figure: Figure, name: str) -> str:
-    from matplotlib import pyplot
     out = io.BytesIO()
     figure.savefig(out, format='png', dpi=110)
-    pyplot.close(figure)
     return (f'<figure><img alt="{escape(name)}" src="data:image/png;base64,'
             f'{base64.b64encode(out.getvalue()).decode("ascii")}"></figure>')
 

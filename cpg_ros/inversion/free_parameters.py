@@ -18,7 +18,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TypeVar
 
-from cpg_ros.dynamics.hopf import first_hopf
+from cpg_ros.dynamics.hopf_point import first_hopf
 from cpg_ros.errors import InputError
 from cpg_ros.networks.network import Network
 import numpy as np
@@ -58,7 +58,7 @@ def free_numbers(network: Network, gait: str, names: Sequence[str],
         network: parameters.
         gait: one of its gaits.
         names: of parameters, or of groups that the network sets together.
-        bounds: name -> lower and upper bound, where they are to be narrower than the range.
+        bounds: name -> lower and upper bound, where narrower than the range.
 
     Raises:
         InputError: a name is unknown or given twice, or bounds cannot be used.

@@ -12,13 +12,13 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A gait fitted to a recording: parameters, readouts, how well they do, and what is not known."""
+"""A gait fitted to a recording: parameters, readouts, errors and uncertainties."""
 
 from dataclasses import dataclass
 from functools import cached_property
 
 from cpg_ros.dynamics.gait_assessment import GaitAssessment
-from cpg_ros.dynamics.hopf import first_hopf, HopfPoint
+from cpg_ros.dynamics.hopf_point import first_hopf, HopfPoint
 from cpg_ros.dynamics.periodic import Orbit
 from cpg_ros.inversion.identifiability import Estimate
 from cpg_ros.inversion.trust_region import Minimisation
@@ -45,8 +45,8 @@ class Fit(ShortRepr):
         order: of the readouts.
         harmonics: of a Morris-Lecar cell's waveform that joints follow.
         parameters: free number -> estimate.
-        correlation: of the free numbers, in their order; not a number where the data do not
-            tell one from others.
+        correlation: of the free numbers, in their order; nan where the data do not separate one
+            from others.
         cells: joint -> the cell behind it, from 1.
         readouts: joint -> offset and weights, rad, as a robot file takes them.
         theta: cycles, shape (m,).

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""How well a fit determines its free numbers: standard errors, intervals, and what it cannot tell.
+"""How well a fit determines its free numbers: standard errors, intervals, and undetermined ones.
 
 The residual of a model that is not the truth is no noise: it is larger than the standard errors
 of the mean cycle, and neighbouring instants share it. So a joint counts with what its readout
@@ -33,9 +33,9 @@ import numpy as np
 #: Half the width of a 95 % interval, in standard errors.
 QUANTILE = 1.959964
 #: Singular values of the scaled derivative below this share of the largest are exact zeros, and
-#: numbers with this share in such a direction cannot be told.
+#: numbers with this share in such a direction are not determined.
 ZERO, SHARE = 1e-7, 1e-3
-#: The root of the rise of the cost is what the quadratic says, within these factors, or its
+#: The root of the rise of the cost is that of the quadratic, within these factors, or its
 #: profile is followed; steps that may mend the rest.
 REGULAR, STEPS_NEARBY = (0.7, 1.43), 3
 #: Steps of a profile on either side, and its tolerance in standard errors.
@@ -55,7 +55,7 @@ class Estimate:
 
     Attributes:
         value: where the cost is least.
-        stderr: standard error; infinite where the data do not tell it from others.
+        stderr: standard error; infinite where the data do not separate it from others.
         low, high: 95 % interval, within the bounds.
         bounded: whether the data bound it on both sides; where not, an end of the interval is
             that of the bounds, or the edge of where there is an orbit.

@@ -44,13 +44,13 @@ KNOWN_FREQUENCY = 1e-4
 TOLERANCE, LAST = 1e-6, 1e-8
 #: Times that joints are weighted anew, and the relative change of a weight that is none.
 WEIGHINGS, SAME = 4, 0.02
-#: Halvings that find where the generator begins to refuse.
+#: Halvings that find where the generator begins to reject the gait.
 HALVINGS = 6
 
 
 def invert(cycle: MeanCycle, cells: Mapping[str, int], network: Network, gait: str,
            free: Sequence[str] = (), order: int = 3,
-           starts: Sequence[Mapping[str, float]] = ({},),
+           starts: Sequence[Mapping[str, float]] = ({},), *,
            bounds: Mapping[str, tuple[float, float]] | None = None, harmonics: int = HARMONICS,
            time_scale: float = 0.0, profiles: bool = True,
            done: Callable[[float], None] = lambda share: None) -> Fit:
@@ -66,11 +66,11 @@ def invert(cycle: MeanCycle, cells: Mapping[str, int], network: Network, gait: s
         starts: free number -> value to start from; {} starts from the network's own values.
         bounds: free number -> lower and upper bound, where narrower than the range.
         harmonics: of a Morris-Lecar cell's waveform that joints follow.
-        time_scale: seconds in a unit of model time, if the period is to be fitted, too; 0
-            leaves it free, as the generator's frequency does.
+        time_scale: seconds in a unit of model time, to fit the period, too; 0 leaves it free,
+            as the generator's frequency does.
         profiles: whether intervals are those of the profile likelihood where the cost is not
             quadratic; they take most of the time.
-        done: told which share of the work is done, 0 to 1.
+        done: called with the share of the work that is done, 0 to 1.
 
     Raises:
         InputError: names, bounds or starts cannot be used.
@@ -116,7 +116,7 @@ def invert(cycle: MeanCycle, cells: Mapping[str, int], network: Network, gait: s
     if flaw:
         warnings = [f'the generator would refuse the {gait} that fits best: {flaw}' + (
             '' if runs is None else '; this is the best one on the way there that it runs')]
-    # The cost is not least there, and no profile tells how far.
+    # The cost is not least there, so that there is no profile to follow.
     return _judged(problem, trials, others, by_cost[0] if runs is None else runs,
                    profiles and not flaw, warnings, done)
 
@@ -148,8 +148,7 @@ def _trial(problem: CycleProblem, begin: np.ndarray, weigh: bool) -> Minimisatio
         problem.begin(values)
         values[-1] = problem.first_phase(values)
     except NoOrbit as error:
-        return Minimisation(values, values, float('inf'), np.empty((0, 1 + values.size)), 1, False,
-                            str(error))
+        return Minimisation.without_orbit(values, error)
     if weigh:
         problem.sizes = np.maximum(problem.joints.stated, _left(problem, values))
     return problem.coordinates.descend(problem, values, TOLERANCE)
@@ -168,10 +167,10 @@ def _weighed(problem: CycleProblem, values: np.ndarray) -> np.ndarray:
 
 def _that_runs(problem: CycleProblem, by_cost: Sequence[np.ndarray], way: np.ndarray
                ) -> tuple[np.ndarray | None, str]:
-    """Return the best values that the generator runs, and why it refuses the very best, or ''.
+    """Return the best values that the generator runs, and why it rejects the very best, or ''.
 
-    Stability takes longer to judge than an orbit to solve for: it is asked for of where the fit
-    has ended, and where that is refused of as many places on the way there as a bisection takes.
+    Stability takes longer to assess than an orbit to solve for: it is assessed where the fit has
+    ended, and if that is rejected, at as many places on the way there as a bisection takes.
 
     Args:
         problem: the fit.
@@ -233,7 +232,7 @@ def _along_the_valley(problem: CycleProblem, values: np.ndarray) -> list[Minimis
 def _judged(problem: CycleProblem, trials: Sequence[Minimisation], elsewhere: Sequence[np.ndarray],
             values: np.ndarray, profiles: bool, warnings: Sequence[str],
             done: Callable[[float], None]) -> Fit:
-    """Say what was found, and how sure it is."""
+    """Return the fit at values, with its uncertainties."""
     joints, best = problem.joints, min(trials, key=lambda trial: trial.cost)
     placed = problem.best_readouts(values)
     optimum = _optimum(problem, values, elsewhere)

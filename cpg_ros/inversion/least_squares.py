@@ -149,7 +149,7 @@ class CycleProblem:
         return list(self._solved.values())[int(gaps.argmin())][0]
 
     def best_readouts(self, values: np.ndarray) -> ReadoutFit:
-        """Return the best readouts; NoOrbit as in orbit."""
+        """Return the best readouts; raises NoOrbit as ``begin`` does."""
         key = np.asarray(values).tobytes()
         if self._placed is None or self._placed[0] != key:
             orbit, seen = self._solve(values)
@@ -172,11 +172,9 @@ class CycleProblem:
             psi, by_phase = basis(self.order, x, y, z)
             moved = basis_moved(self.order, x, y, seen.derivatives(theta, shift, wave,
                                                                    self._members))
-            part = project(psi, np.concatenate([moved, by_phase[..., None]], axis=-1),
-                           self.joints.data[:, columns])
-            weights[:, columns] = part.weights
-            residual[:, columns] = part.residual
-            jacobian[:, columns] = part.jacobian
+            weights[:, columns], residual[:, columns], jacobian[:, columns] = project(
+                psi, np.concatenate([moved, by_phase[..., None]], axis=-1),
+                self.joints.data[:, columns])
         return weights, residual, jacobian
 
     def __call__(self, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -194,7 +192,7 @@ class CycleProblem:
         return np.append(left, off), np.vstack([slopes, by_period])
 
     def cost(self, values: np.ndarray) -> float:
-        """Half the sum of squares; NoOrbit as in placed."""
+        """Half the sum of squares; raises NoOrbit as ``begin`` does."""
         left = self(values)[0]
         return 0.5 * float(left @ left)
 

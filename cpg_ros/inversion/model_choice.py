@@ -15,9 +15,9 @@
 """Which network explains a recording? All that have its legs, fitted and judged on other strides.
 
 Every other stride is fitted, and the fit is held against the mean cycle of those left out: a
-network that follows noise gains nothing by it. Networks whose errors a recording does not tell
-apart, joint by joint, are ranked by how few numbers they take: readouts of order 3 make many a
-waveform of one that is nearly sinusoidal.
+network that follows noise gains nothing by it. Networks whose errors a recording cannot
+distinguish, joint by joint, are ranked by how few numbers they take: readouts of order 3 make many
+a waveform of one that is nearly sinusoidal.
 """
 
 from collections.abc import Callable, Sequence
@@ -27,16 +27,15 @@ from cpg_ros.errors import CpgError, InputError
 from cpg_ros.gaits.phase_average import average_cycles
 from cpg_ros.gaits.stride import Stride
 from cpg_ros.inversion.fallback_fits import fit_with_fallbacks
+from cpg_ros.inversion.gait_fit import STANDS
 from cpg_ros.inversion.recording_fit import leg_joints, networks_of, preset_of, stride_of
 from cpg_ros.inversion.variable_projection import WEIGHTS
 from cpg_ros.recordings.recording import Recording
 from cpg_ros.robots.robot import Robot
 import numpy as np
 
-#: Networks are told apart where their errors differ by so many standard errors of the difference.
+#: Networks are distinct where their errors differ by so many standard errors of the difference.
 DISTINCT = 2.0
-#: A joint whose mean cycle has a smaller range stands (rad).
-STANDS = 0.01
 
 
 @dataclass(frozen=True)
@@ -52,7 +51,7 @@ class NetworkComparison:
         numbers: all numbers, those of the readouts included.
         why: why nothing was fitted, or ''.
         by_joint: error of each joint that moves.
-        alike: whether the recording does not tell it from the network of the least error.
+        alike: whether the recording cannot distinguish it from the network of the least error.
 
     """
 
@@ -68,17 +67,17 @@ class NetworkComparison:
 
 
 def compare_networks(recording: Recording, robot: Robot | None = None, order: int = 3,
-                     done: Callable[[float],
-                                    None] = lambda share: None) -> list[NetworkComparison]:
+                     done: Callable[[float], None] = lambda share: None
+                     ) -> list[NetworkComparison]:
     """Fit every network that has the recording's legs; the best on other strides come first.
 
-    Of several that the recording does not tell apart the one with the fewest numbers is first.
+    Of several that the recording cannot distinguish, the one with the fewest numbers is first.
 
     Args:
         recording: joints over time.
         robot: whose networks, legs and cells are taken; all shipped ones by default.
         order: of the readouts, 1 to 3.
-        done: told which share of the work is done, 0 to 1.
+        done: called with the share of the work that is done, 0 to 1.
 
     Raises:
         CpgError: there are no legs or no steady gait, or no network has such legs.
@@ -99,8 +98,7 @@ def compare_networks(recording: Recording, robot: Robot | None = None, order: in
         parameters = preset_of(kind.name, gait).network.with_phases(stride.phases)
         done(count / len(kinds))
         try:
-            fit, _ = fit_with_fallbacks(half, cells, parameters, gait, (), order, ({},),
-                                        _no_progress)
+            fit, _ = fit_with_fallbacks(half, cells, parameters, gait, (), order, ({},))
         except CpgError as error:
             found.append(NetworkComparison(kind.name, gait, why=str(error)))
             continue
@@ -125,10 +123,6 @@ def _distinct(one: NetworkComparison, least: NetworkComparison) -> bool:
     if more.size < 2:
         return one.error > least.error
     return bool(more.mean() > DISTINCT * more.std(ddof=1) / np.sqrt(more.size))
-
-
-def _no_progress(share: float) -> None:
-    """Tell nobody how far a single fit is."""
 
 
 def split_strides(recording: Recording, stride: Stride) -> tuple[Stride, np.ndarray]:
@@ -163,7 +157,7 @@ def _shares(joints: Sequence[str], errors: np.ndarray, recorded: np.ndarray
 
 
 def indistinguishable(found: Sequence[NetworkComparison], order: int) -> str:
-    """Say which networks a recording does not tell apart by readouts of an order, if any."""
+    """Name the networks that a recording cannot distinguish by readouts of an order, or ''."""
     alike = [one.network for one in found if one.alike]
     if len(alike) < 2:
         return ''

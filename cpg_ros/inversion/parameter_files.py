@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A fit as files that the generator loads as they are: its parameters, and a robot file."""
+"""A fit as files that the generator loads: its parameters, and a robot file."""
 
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -108,7 +108,7 @@ def parameter_tree(found: RecordingFit, robot: Path) -> dict[str, Any]:
 
 
 def _planned(parameters: Path, robot: Path) -> None:
-    """Have the generator's own plan made from files as they were written; Refused as in plan."""
+    """Plan the gait as the generator does, from the files written; raises PlanError."""
     tree = yaml.safe_load(parameters.read_text())['/**']['ros__parameters']
     kind = find_network(tree['network'])
     network = kind(**tree[kind.name])
@@ -120,7 +120,7 @@ def write_fitted(path: str | Path, found: RecordingFit, robot: Robot | None = No
                  named: Path | None = None) -> list[Path]:
     """Write the parameter file, and beside it the robot file that it names.
 
-    Nothing gets their names that the generator would refuse.
+    Files that the generator would reject are not kept.
 
     Args:
         path: of the parameter file; frequencies in it are in Hz, angles in rad.
@@ -132,7 +132,7 @@ def write_fitted(path: str | Path, found: RecordingFit, robot: Robot | None = No
         The files written.
 
     Raises:
-        InputError: the robot's limits do not let a joint move so.
+        InputError: a joint would exceed the robot's limits.
         CpgError: as in fitted_robot.
         OSError: a file cannot be written.
 

@@ -92,7 +92,8 @@ class RecordingFit(ShortRepr):
         rms, share = fit.rms, fit.rms_share
         verdict = fit.verdict
         return {
-            'gait': fit.gait, 'recognised': stride.gait, 'nearest': stride.nearest,
+            'gait': fit.gait, 'recognised': stride.gait if len(stride.alike) < 2 else None,
+            'nearest': stride.nearest, 'alike': list(stride.alike),
             'distance': stride.distance, 'margin': stride.margin, 'confidence': self.confidence,
             'frequency': stride.frequency, 'frequency_error': stride.frequency_error,
             'cycles': stride.cycles, 'begin': stride.begin, 'end': stride.end,
@@ -176,7 +177,7 @@ def stride_of(recording: Recording, legs: Mapping[str, Sequence[str]], kind: typ
 
 
 def _none_of(kind: type[Network], stride: Stride) -> str:
-    """Say that the phases are those of no gait, what they are and how far they scatter."""
+    """Return a line on phases that are those of no gait: their values and their scatter."""
     phases = ', '.join(f'{leg} {phase:.3f}' + (
         f' +- {stride.scatter[leg].spread:.3f}' if stride.scatter[leg].spread > 0.0 else '')
         for leg, phase in stride.phases.items())
@@ -186,7 +187,7 @@ def _none_of(kind: type[Network], stride: Stride) -> str:
 
 
 def _phases_as_estimates(fit: Fit, stride: Stride) -> dict[str, Estimate]:
-    """What the recording tells of the phases that a network's parameters state."""
+    """Return the estimates of the phases that are parameters of the network."""
     known, found = fit.network.as_dict(), {}
     for leg, one in list(stride.scatter.items())[1:]:
         name = fit.network.offsets.get(leg)
@@ -199,21 +200,21 @@ def _phases_as_estimates(fit: Fit, stride: Stride) -> dict[str, Estimate]:
 
 
 def fit_recording(recording: Recording, robot: Robot | None = None, network: str = '',
-                  gait: str = '', free: Sequence[str] = (), order: int = 3, preset: str = '',
+                  gait: str = '', *, free: Sequence[str] = (), order: int = 3, preset: str = '',
                   starts: Sequence[Mapping[str, float]] = ({},),
                   done: Callable[[float], None] = lambda share: None) -> RecordingFit:
     """Find the steady gait of a recording and fit a network's gait and readouts to it.
 
     Args:
         recording: joints over time.
-        robot: which joints belong to which legs and cells; told from their names by default.
+        robot: which joints belong to which legs and cells; by default their names decide.
         network: name or file; by default the robot's first, or the first that has such legs.
         gait: of the network; by default the recorded one, as it is recognised.
         free: parameters to fit; the network's usual ones by default.
         order: of the readouts, 1 to 3.
         preset: whose parameters are taken that are not free; the gait's by default.
         starts: free number -> value to start from.
-        done: told which share of the fit is done, 0 to 1.
+        done: called with the share of the fit that is done, 0 to 1.
 
     Raises:
         CpgError: one line that says what is wrong: no legs, no steady gait (NoSteadyGait), no

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A trust region from one start, with a record of its way.
+"""A trust region from one start, with a record of its path.
 
 Values without an orbit are infeasible: the region shrinks until it holds a step that has one.
 """
@@ -39,7 +39,7 @@ class Minimisation(ShortRepr):
         cost: half the sum of squares there; infinite where the start had no orbit.
         path: cost and values at the start and after every accepted step, shape
             (iterations + 1, 1 + values).
-        evaluations: orbits that were asked for.
+        evaluations: orbits that were solved for.
         converged: whether a tolerance was met.
         why: the reason where there was nothing to start from, or ''.
 
@@ -53,6 +53,11 @@ class Minimisation(ShortRepr):
     converged: bool
     why: str = ''
 
+    @classmethod
+    def without_orbit(cls, start: np.ndarray, error: NoOrbit) -> 'Minimisation':
+        """Return what comes of a start that has no orbit."""
+        return cls(start, start, float('inf'), np.empty((0, 1 + start.size)), 1, False, str(error))
+
     @property
     def iterations(self) -> int:
         """Accepted steps."""
@@ -64,7 +69,7 @@ def minimise(evaluate: Evaluate, start: np.ndarray, low: np.ndarray, high: np.nd
     """Minimise half the sum of squares within bounds, by scipy's 'trf' and exact derivatives.
 
     Args:
-        evaluate: the problem; asked again for values it has just been asked for.
+        evaluate: the problem; called twice in a row with the same values.
         start: values, shape (n,).
         low: lower bounds, shape (n,).
         high: upper bounds.
@@ -78,8 +83,7 @@ def minimise(evaluate: Evaluate, start: np.ndarray, low: np.ndarray, high: np.nd
     try:
         size = evaluate(start)[0].size
     except NoOrbit as error:
-        return Minimisation(start, start, float('inf'), np.empty((0, 1 + start.size)), 1, False,
-                            str(error))
+        return Minimisation.without_orbit(start, error)
 
     def residual(values: np.ndarray) -> np.ndarray:
         nonlocal evaluations

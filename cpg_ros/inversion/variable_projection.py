@@ -20,10 +20,7 @@ are a linear least-squares problem; put in place they leave a residual of the ne
 alone. Its exact derivative is Golub & Pereyra's (1973).
 """
 
-from dataclasses import dataclass
-
-from cpg_ros.motion.readout import monomials
-from cpg_ros.short_repr import ShortRepr
+from cpg_ros.motion.joint_polynomial import monomials
 import numpy as np
 
 #: Weights of each readout order.
@@ -68,29 +65,18 @@ def basis_moved(order: int, x: np.ndarray, y: np.ndarray, slopes: np.ndarray) ->
             + by_y[:, :count, None] * slopes[1][:, None])
 
 
-@dataclass(frozen=True, eq=False, repr=False)
-class Projection(ShortRepr):
-    """What the best linear readout of some joints leaves.
-
-    Attributes:
-        weights: offset and weights of each joint, shape (1 + weights, joints).
-        residual: fitted minus recorded, shape (m, joints).
-        jacobian: its derivative, the readout staying the best, shape (m, joints, variables).
-
-    """
-
-    weights: np.ndarray
-    residual: np.ndarray
-    jacobian: np.ndarray
-
-
-def project(psi: np.ndarray, moved: np.ndarray, data: np.ndarray) -> Projection:
-    """Fit a basis to joints and differentiate what is left.
+def project(psi: np.ndarray, moved: np.ndarray, data: np.ndarray
+            ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Fit a basis to joints and differentiate the residual.
 
     Args:
         psi: basis, shape (m, n).
         moved: its derivatives, shape (m, n, variables).
         data: of the joints, shape (m, joints).
+
+    Returns:
+        Offset and weights of each joint, shape (n, joints); the residual, fitted minus recorded,
+        (m, joints); and its derivative, the readout staying the best, (m, joints, variables).
 
     Raises:
         numpy.linalg.LinAlgError: the basis is not independent.
@@ -104,4 +90,4 @@ def project(psi: np.ndarray, moved: np.ndarray, data: np.ndarray) -> Projection:
     pulled = np.einsum('mnv,mj->njv', moved, left)
     pulled = np.linalg.solve(r.T, pulled.reshape(len(r), -1))
     # The second part vanishes with the residual: it is what Kaufman (1975) leaves out.
-    return Projection(weights, left, along - (q @ pulled).reshape(along.shape))
+    return weights, left, along - (q @ pulled).reshape(along.shape)

@@ -12,11 +12,11 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What joints see of a gait: x of every waveform as harmonics, and how it moves with parameters.
+"""The signals of a gait that drive joints, as harmonics, and their derivatives by parameters.
 
 The generator's joints are polynomials in x and in y, its derivative by phase in radians: x is the
-cell over the gait's peak where that drives them (dynamics.readout), and the cell's waveform up to
-a few harmonics, running from -1 to 1, where its phase does (dynamics.phase_readout). Both are
+cell over the gait's peak where that drives them (motion.readout), and the cell's waveform up to
+a few harmonics, running from -1 to 1, where its phase does (motion.phase_readout). Both are
 short Fourier series, ``x(theta) = Re sum_k terms_k exp(2 pi i k theta)``.
 """
 
@@ -93,7 +93,7 @@ def _turns(theta: bytes, count: int) -> np.ndarray:
 
 
 def signals(orbit: Orbit, harmonics: int) -> Signals:
-    """Return what joints see of a gait.
+    """Return the signals of a gait that drive joints.
 
     Args:
         orbit: the gait, with its derivatives.

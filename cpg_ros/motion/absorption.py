@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""How jumps of a network's output are absorbed: a difference that dies out smoothly."""
+"""Absorb jumps of a network's output: the difference decays smoothly."""
 
 from cpg_ros.motion.smoothstep import smoothstep
 import numpy as np
@@ -34,12 +34,12 @@ class Absorption:
         return self._time < ABSORB
 
     def begin(self) -> None:
-        """Take note that the output jumps here; the next ``smooth`` measures it."""
+        """Mark a jump of the output here; the next ``smooth`` measures it."""
         self._jump, self._time = None, 0.0
 
     def smooth(self, wanted: np.ndarray, rate: np.ndarray, dt: float,
                before: tuple[np.ndarray, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
-        """Add a difference that starts where the output was and dies out.
+        """Add a difference that starts where the output was and decays.
 
         Args:
             wanted: positions, rad, (joints,).

@@ -15,7 +15,7 @@
 """The duty factor: how much of a stride a leg stands, whatever its network does.
 
 A leg stands while its driving signal falls, from peak to trough, which is the network's own share
-of the cycle. Another share D is made by telling the joints another phase: the circle is mapped
+of the cycle. Another share D is made by reading the joints at another phase: the circle is mapped
 onto itself by
 
     tan(pi (phase' - own)) = k tan(pi (phase - centre)),  k = tan(pi D0 / 2) / tan(pi D / 2),
@@ -34,13 +34,13 @@ from cpg_ros.errors import InputError
 from cpg_ros.integration.jit import jit
 import numpy as np
 
-#: Shares of a stride that may be asked for.
+#: Smallest and largest duty factor that can be set.
 LEAST, MOST = 0.3, 0.9
 
 
 @jit
 def retimed_phase(phase, k, centre, own):
-    """Return the phase that joints are told, its derivative by the phase, and the second one.
+    """Return the phase at which joints are read, and its first and second derivative by the phase.
 
     All in cycles; with k = 1 nothing changes.
     """
@@ -74,10 +74,10 @@ def stance(values: np.ndarray, crest: float) -> float:
 
 
 class Duty:
-    """The shares of a stride that legs stand, and what has to be told to the joints for it.
+    """The duty factors of legs, and the maps of phase that bring them about.
 
     Attributes:
-        shares: shares asked for, shape (legs,).
+        shares: of the stride that each leg stands, shape (legs,).
 
     """
 
@@ -90,7 +90,7 @@ class Duty:
             leg_cells: the cell that gives each leg's phase, from 0, shape (legs,).
             begin: phase of that cell at which each leg begins to stand, cycles, shape (legs,).
             own: shares that legs stand by themselves, shape (legs,).
-            shares: shares that they are to stand, shape (legs,).
+            shares: wanted shares, shape (legs,).
 
         Raises:
             InputError: a share is not from LEAST to MOST, or not one of a cycle.
@@ -116,18 +116,3 @@ class Duty:
         found = self._maps[legs].copy()
         found[:, 1:] += (self._phases[cells] - self._phases[self._leg_cells[legs]])[:, None]
         return found
-
-
-def maps_of_cells(size: int, cells: np.ndarray, maps: np.ndarray | None) -> np.ndarray:
-    """Return the maps of all cells from those of joints, shape (size, 3).
-
-    Args:
-        size: cells there are.
-        cells: the cell behind each joint, from 0, shape (joints,).
-        maps: of the joints, shape (joints, 3), equal for those of a cell; None changes nothing.
-
-    """
-    found = np.tile([1.0, 0.0, 0.0], (size, 1))
-    if maps is not None:
-        found[cells] = maps
-    return found

@@ -37,7 +37,7 @@ def joint_readout(orbit: Orbit, cells: np.ndarray, weights: np.ndarray, leg_cell
         maps: what the duty factor makes of the phase of each joint's cell, shape (joints, 3).
 
     Raises:
-        NoPhase: a waveform does not tell the phase.
+        NoPhase: the phase does not follow from a waveform.
 
     """
     if orbit.network.readout == 'waveform':

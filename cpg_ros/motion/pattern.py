@@ -30,8 +30,7 @@ from cpg_ros.motion.ramp import Ramp
 from cpg_ros.motion.readout import confine
 from cpg_ros.motion.resumption import Resumption
 from cpg_ros.motion.smoothstep import smoothstep
-from cpg_ros.motion.steering import Drive
-from cpg_ros.motion.strides import scale
+from cpg_ros.motion.strides import Drive, scale
 from cpg_ros.motion.track import Track
 import numpy as np
 
@@ -59,6 +58,7 @@ class Pattern:
         held: ticks in which a limit held a joint back.
         correct: takes and returns angles before limits hold them; None for the gait as it is.
         frequency_scale: factor of the pattern's clock.
+        substep: longest part of a tick while gaits fade or the ramp moves, s.
 
     """
 
@@ -70,9 +70,10 @@ class Pattern:
         self._leg = robot.leg_of_joint
         self.faults = self.held = 0
         self.correct: Callable[[np.ndarray], np.ndarray] | None = None
-        self.frequency_scale = 1.0
-        self._offset, self._lower = robot.column('offset'), robot.column('lower')
-        self._upper, self._limit = robot.column('upper'), robot.column('velocity')
+        self.frequency_scale, self.substep = 1.0, SUBSTEP
+        self._offset = robot.column('offset')
+        self._limits = np.stack([robot.column(name) for name in ('lower', 'upper', 'velocity')])
+        self._fastest = self._limits[2]
         self._requests: deque = deque()
         self._tracks = [Track(program, 0.0, drive)]
         self.position, self.velocity = self._offset.copy(), np.zeros_like(self._offset)
@@ -105,16 +106,16 @@ class Pattern:
         """
         # Where the joints were found, from the stand, and what is left of that.
         self._found, self._lead = angles - self._offset, Ramp(1.0)
-        self.position[:] = np.clip(angles, self._lower, self._upper)
+        self.position[:] = np.clip(angles, *self._limits[:2])
         if self._found.any():
             self._lead_in(time)
 
     def _lead_in(self, time: float) -> None:
         left = self._lead.level * np.abs(self._found)
-        fastest = float(np.max(1.5 * left / np.maximum(0.5 * self._limit, 1e-9)))
+        fastest = float(np.max(1.5 * left / np.maximum(0.5 * self._fastest, 1e-9)))
         self._lead.go(0.0, max(time, SHORTEST, fastest))
 
-    # -- asked from other threads ---------------------------------------------------------
+    # -- requests from other threads ------------------------------------------------------
 
     def apply(self, program: GaitPlan, transition: float) -> None:
         """Change to a program over a transition in s; 0 leaves it to the network's dynamics."""
@@ -127,7 +128,7 @@ class Pattern:
         self._requests.append((enabled, max(ramp, SHORTEST)))
 
     def steer(self, stride: np.ndarray, pace: float) -> None:
-        """Ask for the legs' strides, shape (legs,), and the pace; see Drive.
+        """Request the legs' strides, shape (legs,), and the pace; see Drive.
 
         Raises:
             ValueError: the pattern was made without a drive.
@@ -138,7 +139,7 @@ class Pattern:
         self.drive.set_target(stride, pace, at_once=self._ramp.level == 0.0)
 
     def attach(self, drive: Drive) -> None:
-        """Take a drive from now on; one that has not been asked for anything changes nothing."""
+        """Use a drive from now on; one that has no target yet changes nothing."""
         self.drive = drive
         for track in self._tracks:
             track.drive = drive
@@ -183,7 +184,7 @@ class Pattern:
 
     @property
     def recovering(self) -> bool:
-        """Tell whether a fault is still being got over."""
+        """Tell whether the pattern is still recovering from a fault."""
         return self._recovering and self._absorption.active
 
     # -- the tick --------------------------------------------------------------------------
@@ -198,7 +199,7 @@ class Pattern:
         calm = (len(self._tracks) == 1 and not (self._ramp.active or self._lead.active)
                 and not self._absorption.active)
         if not (calm and self._cruise(clock)):
-            parts = max(1, math.ceil(clock / SUBSTEP - 1e-9))
+            parts = max(1, math.ceil(clock / self.substep - 1e-9))
             for _ in range(parts):
                 self._step(clock / parts)
         wanted, rate = self._wanted, self._rate if share == 1.0 else share * self._rate
@@ -212,11 +213,11 @@ class Pattern:
                 before += rate
                 rate = before
             self._corrected, self._correction = now, before
-        self.held += confine(wanted, rate, self._lower, self._upper, self._limit,
-                             dt, self.position, self.velocity, self._behind) > 0
+        self.held += confine(wanted, rate, self._limits, dt, self.position, self.velocity,
+                             self._behind) > 0
 
     def resume(self, stall: float) -> None:
-        """Go on after a stall in s from where the pattern stood, slowed in.
+        """Resume after a stall in s from where the pattern stopped, slowly at first.
 
         Belongs to the thread of advance.
         """
@@ -247,7 +248,7 @@ class Pattern:
     def _cruise(self, dt: float) -> bool:
         """One gait, at the stand or in full swing: nothing to mix, nothing to allocate.
 
-        False if the network left its orbit: the tick is to be worked out anew.
+        Returns False if the network left its orbit: the tick must then be computed again.
         """
         self._slowing, self._slower, self._last_rate = 1.0, 1.0, None
         track, drive = self._tracks[0], self.drive
@@ -263,8 +264,8 @@ class Pattern:
             self._step(0.0)
             return False
         if drive is not None:
-            scale(self._ramp.level, frequency, drive.rate, self._leg, self._offset, track.angle,
-                  track.rise, track.reach, self._wanted, self._rate)
+            scale(self._ramp.level, frequency, drive.rate, self._leg, self._offset, track.motion,
+                  self._wanted, self._rate)
             return True
         np.multiply(track.angle, self._ramp.level, out=self._wanted)
         self._wanted += self._offset
@@ -324,7 +325,7 @@ class Pattern:
         if moving:
             # The pattern slows where it would outrun the gaits at the next substep.
             bound = SHORT_OF * np.minimum(np.max([t.program.speed + SHIFTING * (
-                np.abs(t.program.shift) + np.abs(found)) for t in tracks], axis=0), self._limit)
+                np.abs(t.program.shift) + np.abs(found)) for t in tracks], axis=0), self._fastest)
             ahead = rate if self._last_rate is None else 2.0 * rate - self._last_rate
             self._last_rate = rate
             self._slower = 1.0 / max(1.0, float(np.max(np.abs(ahead) / np.maximum(bound, 1e-9))))

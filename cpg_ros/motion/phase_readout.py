@@ -15,7 +15,7 @@
 """From cells to joints by the cells' phase: for relaxation oscillators.
 
 A Morris-Lecar cell jumps: its potential crosses most of its range within a few per cent of a
-stride, and on the way it may double back so that neither variable tells the phase. No joint can
+stride, and on the way it may double back so that neither variable gives the phase. No joint can
 follow that. Instead every cell is followed as a lock-in amplifier follows a signal: a phase and an
 amplitude run with the strides and are drawn to what the cell does, by what its two variables and
 the gait's orbit at that phase differ by, along the first harmonic of that orbit and across it. On
@@ -31,11 +31,14 @@ derivatives of the positions whatever the network does, and whatever is done to 
 
 from functools import lru_cache
 import math
+from typing import Any, NamedTuple
 
 from cpg_ros.dynamics.periodic import Orbit
-from cpg_ros.integration.jit import entry
-from cpg_ros.motion.duty import at_even_phases, maps_of_cells, retimed_phase
-from cpg_ros.motion.readout import monomials, NoPhase, TURN
+from cpg_ros.integration.jit import bound, entry
+from cpg_ros.motion import joint_polynomial
+from cpg_ros.motion.duty import retimed_phase
+from cpg_ros.motion.joint_polynomial import DrivenJoints, over_cycle, TURN
+from cpg_ros.motion.readout import NoPhase
 import numpy as np
 
 #: Points of a cycle in the tables of an orbit: a cell may jump within a hundredth of a cycle.
@@ -52,29 +55,54 @@ PHASE_SHARE = 4.0
 LEAST_SHARE = 0.1
 
 
+class PhaseMap(NamedTuple):
+    """An orbit as its cells' clocks see it, and the smooth waveform that joints follow.
+
+    Attributes:
+        shape: mean and half range of both variables of each wave, shape (waves, 4).
+        circles: cosine and sine term of both variables' first harmonic over its mean square,
+            shape (waves, 4).
+        tables: both variables from their mean over their half range, and their slopes from row
+            to row, over the phase, shape (waves, POINTS, 4).
+        terms: cosine and sine terms of x, shape (waves, 1 + H, 2).
+        crests: phase at which x peaks, shape (waves,).
+
+    """
+
+    shape: np.ndarray
+    circles: np.ndarray
+    tables: np.ndarray
+    terms: np.ndarray
+    crests: np.ndarray
+
+
+class GaitCells(NamedTuple):
+    """The cells of a gait.
+
+    Attributes:
+        waves: number of each cell's waveform, shape (size,).
+        phases: phase of each cell in the gait, cycles, shape (size,).
+        maps: what the duty factor makes of each cell's phase, shape (size, 3), see motion.duty.
+        known: the waveforms.
+
+    """
+
+    waves: np.ndarray
+    phases: np.ndarray
+    maps: np.ndarray
+    known: PhaseMap
+
+
 @entry
-def observe_phases(now, strides, waves, phases, shape, circles, tables, harmonics, crests,
-                   cells, weights, leg_cells, maps, clocks, angle, rise, legs):
-    """Let the cells' clocks go on and read joints and legs off them.
+def observe_phases(now, strides, gait, joints, clocks, angle, rise, legs):
+    """Advance the cells' clocks and read joints and legs off them.
 
     Args:
         now: x, x', x'' of the components, two or more of each cell, shape (3, ...); only x
             of the first two is used.
         strides: since the last look; with 0 the clocks stand and are only read.
-        waves: number of each cell's waveform, shape (size,).
-        phases: phase of each cell in the gait, cycles, shape (size,).
-        shape: mean and half range of both variables of each wave, shape (waves, 4).
-        circles: cosine and sine term of both variables' first harmonic over its mean
-            square, shape (waves, 4).
-        tables: both variables from their mean over their half range, and their slopes from
-            row to row, over the phase, shape (waves, POINTS, 4).
-        harmonics: cosine and sine terms of x, shape (waves, 1 + H, 2).
-        crests: phase at which x peaks, shape (waves,).
-        cells: the cell behind each joint, shape (joints,).
-        weights: readout weights of each joint in rad, shape (joints, 6).
-        leg_cells: the cell that gives each leg's phase.
-        maps: what the duty factor makes of each cell's phase, shape (size, 3), see
-            motion.duty.
+        gait: GaitCells.
+        joints: DrivenJoints.
         clocks: of each cell, shape (10, size): phase (cycles), what its speed (cycles a
             stride) is above 1 now and at the next look, amplitude, its rate (per stride)
             now and at the next look; and x, y and their derivatives by the strides.
@@ -87,6 +115,8 @@ def observe_phases(now, strides, waves, phases, shape, circles, tables, harmonic
         clocks stand.
 
     """
+    waves, phases, maps, (shape, circles, tables, harmonics, crests) = gait
+    cells, weights, leg_cells = joints
     distance, sum_ = 0.0, 0.0
     pull = PULL / (1.0 + 2.0 * PULL * strides)
     share = strides / (SMOOTHING + strides)
@@ -158,17 +188,13 @@ def observe_phases(now, strides, waves, phases, shape, circles, tables, harmonic
     for joint in range(cells.shape[0]):
         cell = cells[joint]
         x, y, dx, dy = clocks[6, cell], clocks[7, cell], clocks[8, cell], clocks[9, cell]
-        w = weights[joint]
-        angle[joint] = (w[0] * x + w[1] * y + w[2] * x * x + w[3] * x * y
-                        + (w[4] * x + w[5] * y) * x * x)
-        rise[joint] = ((w[0] + 2.0 * w[2] * x + w[3] * y + 3.0 * w[4] * x * x
-                        + 2.0 * w[5] * x * y) * dx
-                       + (w[1] + w[3] * x + w[5] * x * x) * dy)
+        angle[joint] = joint_polynomial.value(weights[joint], x, y)
+        rise[joint] = joint_polynomial.rate(weights[joint], x, y, dx, dy)
     for leg in range(leg_cells.shape[0]):
         phase = clocks[0, leg_cells[leg]] - crests[waves[leg_cells[leg]]]
         phase -= math.floor(phase)
         legs[leg] = phase if phase < 1.0 else 0.0
-    # Whatever max makes of a NaN: it comes through the sum.
+    # max may lose a NaN; the sum keeps it.
     return distance + 0.0 * sum_
 
 
@@ -201,38 +227,6 @@ def evaluate(terms: np.ndarray, theta: np.ndarray, order: int = 0) -> np.ndarray
     return (np.exp(TURN * 1j * np.multiply.outer(theta, k)) @ complex_terms).real
 
 
-class PhaseMap:
-    """An orbit as its cells' clocks see it, and the smooth waveform that joints follow.
-
-    Attributes:
-        shape, circles, tables, terms, crests: as observe_phases takes them (terms: harmonics).
-
-    """
-
-    def __init__(self, orbit: Orbit, harmonics: int) -> None:
-        count, theta = int(orbit.waves.max()) + 1, np.arange(POINTS) / POINTS
-        self.shape, self.circles = np.empty((2, count, 4))
-        self.tables = np.empty((count, POINTS, 4))
-        self.terms, self.crests = np.empty((count, 1 + harmonics, 2)), np.empty(count)
-        for wave, levels in enumerate(orbit.levels):
-            half = levels[:2, 1]
-            states, slopes = (np.stack([orbit.waveform(theta, order, wave, variable)
-                                        for variable in (0, 1)], axis=1) for order in (0, 1))
-            mean = states.mean(axis=0)
-            states = (states - mean) / half
-            first = 2.0 * np.fft.rfft(states, axis=0)[1] / POINTS
-            square = 0.5 * (np.abs(first)**2).sum()
-            if square < LEAST_SHARE * (states**2).mean(axis=0).sum():
-                raise NoPhase('its waveform repeats within a cycle: the first harmonic, by '
-                              f'which its phase is followed, has less than {LEAST_SHARE:.0%} '
-                              'of it')
-            self.shape[wave] = *mean, *half
-            self.circles[wave] = np.stack([first.real, -first.imag], axis=1).ravel() / square
-            self.tables[wave] = np.hstack([states, slopes / half / POINTS])
-            self.terms[wave] = smooth_terms(states[:, 0], harmonics)
-            self.crests[wave] = _crest(self.terms[wave])
-
-
 @lru_cache(maxsize=64)
 def phase_map(orbit: Orbit, harmonics: int) -> PhaseMap:
     """Return an orbit's phase map, made once.
@@ -241,14 +235,35 @@ def phase_map(orbit: Orbit, harmonics: int) -> PhaseMap:
         NoPhase: a waveform has hardly any first harmonic.
 
     """
-    return PhaseMap(orbit, harmonics)
+    count, theta = int(orbit.waves.max()) + 1, np.arange(POINTS) / POINTS
+    known = PhaseMap(np.empty((count, 4)), np.empty((count, 4)), np.empty((count, POINTS, 4)),
+                     np.empty((count, 1 + harmonics, 2)), np.empty(count))
+    for wave, levels in enumerate(orbit.levels):
+        half = levels[:2, 1]
+        states, slopes = (np.stack([orbit.waveform(theta, order, wave, variable)
+                                    for variable in (0, 1)], axis=1) for order in (0, 1))
+        mean = states.mean(axis=0)
+        states = (states - mean) / half
+        first = 2.0 * np.fft.rfft(states, axis=0)[1] / POINTS
+        square = 0.5 * (np.abs(first)**2).sum()
+        if square < LEAST_SHARE * (states**2).mean(axis=0).sum():
+            raise NoPhase('its waveform repeats within a cycle: the first harmonic, by which its '
+                          f'phase is followed, has less than {LEAST_SHARE:.0%} of it')
+        known.shape[wave] = *mean, *half
+        known.circles[wave] = np.stack([first.real, -first.imag], axis=1).ravel() / square
+        known.tables[wave] = np.hstack([states, slopes / half / POINTS])
+        known.terms[wave] = smooth_terms(states[:, 0], harmonics)
+        known.crests[wave] = _crest(known.terms[wave])
+    return known
 
 
 class PhaseReadout:
-    """Joints driven by the phase of cells, which their first two variables tell.
+    """Joints driven by the phase of cells, which follows from their first two variables.
 
     Attributes:
         start: phase of the first leg at the orbit's phase 0, cycles.
+        gait: the cells of the gait.
+        joints: the cells behind joints and legs.
         angles, rises: of the joints over a cycle, rad and rad per cycle, shape (joints, m).
 
     """
@@ -264,37 +279,35 @@ class PhaseReadout:
 
         """
         known = phase_map(orbit, harmonics)
-        self._phases = orbit.phases
-        self._view = (orbit.waves, orbit.phases, known.shape, known.circles, known.tables,
-                      known.terms, known.crests, cells, weights, leg_cells,
-                      maps_of_cells(len(orbit.phases), cells, maps))
+        of_cells = np.tile([1.0, 0.0, 0.0], (len(orbit.phases), 1))
+        if maps is not None:
+            of_cells[cells] = maps
+        self.gait = GaitCells(orbit.waves, orbit.phases, of_cells, known)
+        self.joints = DrivenJoints(cells, weights, leg_cells)
+        self._observe: Any = None
         self.start = float((orbit.phases[leg_cells[0]]
                             - known.crests[orbit.waves[leg_cells[0]]]) % 1.0)
-        theta = np.arange(512) / 512
-        self.angles, self.rises = np.empty((2, len(cells), theta.size))
-        for joint, cell in enumerate(cells):
-            phase, steep = theta, np.ones(theta.size)
-            if maps is not None and maps[joint, 0] != 1.0:
-                phase, steep = at_even_phases(maps[joint], theta.size)
-            x, y, z = (evaluate(known.terms[orbit.waves[cell]], phase, order)
-                       for order in range(3))
-            values, slopes = monomials(x, y, z)
-            self.angles[joint] = weights[joint] @ values
-            self.rises[joint] = steep * (weights[joint] @ slopes)
+        self.angles, self.rises = over_cycle(weights, lambda joint, phase: tuple(
+            evaluate(known.terms[orbit.waves[cells[joint]]], phase, order)
+            for order in range(3)), maps, 512)
 
     def clocks(self, phase: float) -> np.ndarray:
         """Return the cells' clocks where the gait has them at a phase of its orbit in cycles."""
-        clocks = np.zeros((10, self._phases.size))
-        clocks[0], clocks[3] = (phase + self._phases) % 1.0, 1.0
+        phases = self.gait.phases
+        clocks = np.zeros((10, phases.size))
+        clocks[0], clocks[3] = (phase + phases) % 1.0, 1.0
         return clocks
 
     def look(self, now: np.ndarray, strides: float, clocks: np.ndarray, angle: np.ndarray,
              rise: np.ndarray, legs: np.ndarray) -> float:
-        """Let clocks go on by some strides to a state and read joints and legs.
+        """Advance clocks by some strides to a state and read joints and legs.
 
-        See observe_phases.
+        See observe_phases; arrays are C-contiguous and of float64.
         """
-        return observe_phases(now, strides, *self._view, clocks, angle, rise, legs)
+        arguments = now, strides, self.gait, self.joints, clocks, angle, rise, legs
+        if self._observe is None:
+            self._observe = bound(observe_phases, *arguments)
+        return self._observe(*arguments)
 
 
 def _crest(terms: np.ndarray) -> float:

@@ -12,13 +12,14 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What the generator is asked to do, worked out and checked before anything moves."""
+"""Plan a gait on a robot: everything is computed and checked before anything moves."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 
-from cpg_ros.dynamics.orbit import Orbit, solve_orbit, solve_preset
+from cpg_ros.dynamics.coexisting_orbits import coexisting_orbits
+from cpg_ros.dynamics.orbit import Orbit, solve_preset
 from cpg_ros.dynamics.stability import Stability, stability
 from cpg_ros.errors import CpgError, InputError
 from cpg_ros.integration.stepper import Stepper
@@ -39,7 +40,7 @@ SAME = 1e-6
 
 
 class PlanError(CpgError):
-    """The request cannot be run; the message says why, with the figures."""
+    """The gait cannot be run; the message gives the reason and the figures."""
 
     exit_code = 1
 
@@ -77,6 +78,7 @@ class GaitPlan(ShortRepr):
         span: smallest and largest deviation of each joint from its offset, rad, (2, joints).
         speed: largest speed of each joint, rad/s, shape (joints,).
         duty: share of the stride that each leg stands, shape (legs,).
+        step: model time per step; the network's own if None.
 
     """
 
@@ -94,6 +96,7 @@ class GaitPlan(ShortRepr):
     span: np.ndarray
     speed: np.ndarray
     duty: np.ndarray
+    step: float | None = None
 
     def _summary(self) -> str:
         return (f'{self.name} on {self.robot.name}: {self.frequency:.6g} Hz, symmetry gain '
@@ -103,11 +106,12 @@ class GaitPlan(ShortRepr):
     def seed(self) -> Stepper:
         """A stepper on the orbit at phase 0; copy it, do not advance it."""
         network = self.orbit.network
-        return Stepper(network, self.orbit, gain=self.gain, symmetry=self.orbit.symmetry)
+        return Stepper(network, self.orbit, self.step, gain=self.gain,
+                       symmetry=self.orbit.symmetry)
 
     @property
     def speeds(self) -> tuple[float, float]:
-        """Slowest and fastest forward speed that steering can ask for, m/s."""
+        """Slowest and fastest forward speed that steering allows, m/s."""
         speed = self._steering.speed
         return speed[0], speed[-1]
 
@@ -128,7 +132,7 @@ class GaitPlan(ShortRepr):
             turn: yaw rate, rad/s, positive to the left.
 
         Raises:
-            Refused: the robot file does not say how to steer this gait.
+            PlanError: the robot file does not say how to steer this gait.
 
         """
         left, right, frequency = self._steering.ask(speed, turn)
@@ -162,18 +166,26 @@ class GaitPlan(ShortRepr):
 def gait_of(preset: Preset, network: Network) -> tuple[Orbit, Stability]:
     """Solve for a preset's gait with parameters of its own, and judge its stability.
 
+    Of several orbits it is one that attracts within the gait's class, if any does; of those, the
+    one reached from the preset or else that whose period is nearest to the preset's.
+
     Raises:
         CpgError: bad parameters, or no such orbit (NoOrbit).
 
     """
     known = None if preset.start is None else solve_preset(preset)
-    if known is None or network != preset.network:
-        known = solve_orbit(network, preset.gait, known)
-    return known, stability(known)
+    found = coexisting_orbits(network, preset.gait, known, starts=False, everything=False)
+    orbit = found.orbits[0]
+    judged = stability(orbit)
+    if judged.flaw and found.searched:
+        count = len(found.orbits)
+        whole = 'this is the only orbit' if count == 1 else f'none of {count} orbits attracts'
+        judged = replace(judged, flaw=f'{judged.flaw}; {whole}, {found.searched}')
+    return orbit, judged
 
 
 def refusal(orbit: Orbit, gait: str, harmonics: int) -> str:
-    """Say why the generator would refuse a gait, whatever the robot, or ''.
+    """Return why the generator would reject a gait, whatever the robot, or ''.
 
     It knows the parameters only, and comes to the gait from the shipped preset.
 
@@ -206,11 +218,11 @@ def plan(robot: Robot, name: str, preset: Preset, network: Network, frequency: f
         frequency: strides per second (Hz); 0 takes one model time unit as a second.
         amplitude: factor on every joint's readout weights.
         gain: symmetry lock in 1/model time; negative chooses one that makes the gait attract.
-        duty: share of the stride that legs stand; 0 for the gait's own, which the robot file
-            says or else the network does.
+        duty: share of the stride that legs stand; 0 for the gait's own, from the robot file or
+            else from the network.
 
     Raises:
-        Refused: there is no such orbit, it does not attract, or a joint would leave its limits.
+        PlanError: there is no such orbit, it does not attract, or a joint would leave its limits.
 
     """
     gait = preset.gait
@@ -256,7 +268,7 @@ def plan(robot: Robot, name: str, preset: Preset, network: Network, frequency: f
 
 
 def _stands(robot: Robot, motion: Motion, orbit: Orbit, duty: float) -> Duty:
-    """Return for how much of a stride legs stand, by themselves and as asked for."""
+    """Return the duty factors: the gait's own, and the wanted ones."""
     begin, own = standing(orbit, robot.leg_cells, robot.harmonics)
     if motion.stance is not None:
         begin, own = begin + motion.stance[0], np.full(own.size, motion.stance[1])
@@ -270,7 +282,7 @@ def _stands(robot: Robot, motion: Motion, orbit: Orbit, duty: float) -> Duty:
 
 def _beyond(joint: Joint, low: float, high: float, fastest: float
             ) -> Iterator[tuple[float, str, str]]:
-    """Say of each limit how far a joint is beyond it, which it is, and the figure.
+    """Yield for each limit how far a joint is beyond it, its name and the figure.
 
     Args:
         joint: which.

@@ -20,7 +20,7 @@ from cpg_ros.motion.smoothstep import smoothstep
 
 
 class Ramp:
-    """A level and its rate, on the way to where it was sent.
+    """A level and its rate, on the way to its target.
 
     Attributes:
         level: 0 at the stand, 1 in the full gait, or where the joints were found.
@@ -58,7 +58,7 @@ class Ramp:
         self._parts.append((level, rate, end, time))
 
     def advance(self, clock: float) -> None:
-        """Go on by a time in s."""
+        """Advance by a time in s."""
         start, start_rate, end, time = self._parts[0]
         self._past += clock
         s = self._past / time if time > 0.0 else 1.0

@@ -19,22 +19,22 @@ the gait's peak, y its derivative by phase. See phase_readout for those whose ph
 """
 
 import math
+from typing import Any
 
 from cpg_ros.dynamics.periodic import Orbit
 from cpg_ros.errors import CpgError
-from cpg_ros.integration.jit import entry, jit
-from cpg_ros.motion.duty import at_even_phases
-from cpg_ros.motion.retimed_waveform import read_retimed, tables
+from cpg_ros.integration.jit import bound, entry, jit
+from cpg_ros.motion import joint_polynomial
+from cpg_ros.motion.joint_polynomial import DrivenJoints, monomials, over_cycle, TURN
+from cpg_ros.motion.retimed_waveform import read_retimed, Retiming, tables, Waveform
 import numpy as np
 
 #: Entries of the tables over one cycle.
 TABLE = 512
 
-TURN = 2.0 * math.pi
-
 
 class NoPhase(CpgError):
-    """A waveform does not tell its phase and so cannot drive joints; the message says why."""
+    """A waveform does not determine its phase and so cannot drive joints; the message says why."""
 
 
 @jit
@@ -50,64 +50,62 @@ def lookup(table, cycles):
 
 
 @entry
-def observe(now, peak, period, cells, weights, phases, leg_cells, wave, lead, angle, rise,
-            leg_phases):
+def observe(now, wave, joints, angle, rise, legs):
     """Read joints and legs off a network's state.
 
     Args:
         now: x, x', x'' of the cells, shape (3, cells).
-        peak: largest value of a cell on the gait's orbit.
-        period: of the orbit, model time.
-        cells: the cell behind each joint, shape (joints,).
-        weights: readout weights of each joint in rad, shape (joints, 6).
-        phases: phase of each cell in the gait.
-        leg_cells: the cell that gives each leg's phase.
-        wave: normalised waveform over the cycle.
-        lead: phase minus angle, both in cycles, as a function of the angle.
+        wave: Waveform of the gait.
+        joints: DrivenJoints.
         angle: filled with the joints' deviation from their offset, rad.
         rise: filled with its derivative by phase, rad per cycle.
-        leg_phases: filled with the legs' phases in cycles, [0, 1).
+        legs: filled with the legs' phases in cycles, [0, 1).
 
     Returns:
         The largest distance of a cell from where the gait has it, in units of the peak.
 
     """
-    by_phase = period / TURN
-    for joint in range(cells.shape[0]):
-        cell = cells[joint]
+    peak, by_phase = wave.peak, wave.period / TURN
+    for joint in range(joints.cells.shape[0]):
+        cell = joints.cells[joint]
         x = now[0, cell] / peak
         y = now[1, cell] * by_phase / peak
         z = now[2, cell] * by_phase * by_phase / peak
-        w = weights[joint]
-        angle[joint] = (w[0] * x + w[1] * y + w[2] * x * x + w[3] * x * y
-                        + (w[4] * x + w[5] * y) * x * x)
-        rise[joint] = TURN * ((w[0] + 2.0 * w[2] * x + w[3] * y + 3.0 * w[4] * x * x
-                               + 2.0 * w[5] * x * y) * y
-                              + (w[1] + w[3] * x + w[5] * x * x) * z)
-    for leg in range(leg_cells.shape[0]):
-        cell = leg_cells[leg]
+        angle[joint] = joint_polynomial.value(joints.weights[joint], x, y)
+        rise[joint] = TURN * joint_polynomial.rate(joints.weights[joint], x, y, y, z)
+    for leg in range(joints.leg_cells.shape[0]):
+        cell = joints.leg_cells[leg]
         turn = math.atan2(-now[1, cell] * by_phase, now[0, cell]) / TURN
-        phase = turn + lookup(lead, turn)
-        leg_phases[leg] = phase - math.floor(phase)
-    base = leg_phases[0] - phases[leg_cells[0]]
+        phase = turn + lookup(wave.lead, turn)
+        legs[leg] = phase - math.floor(phase)
+    base = legs[0] - wave.phases[joints.leg_cells[0]]
     distance, sum_ = 0.0, 0.0
-    for cell in range(phases.shape[0]):
-        off = abs(now[0, cell] / peak - lookup(wave, base + phases[cell]))
+    for cell in range(wave.phases.shape[0]):
+        off = abs(now[0, cell] / peak - lookup(wave.values, base + wave.phases[cell]))
         distance = max(distance, off)
         sum_ += off
-    # Whatever max makes of a NaN: it comes through the sum.
+    # max may lose a NaN; the sum keeps it.
     return distance + 0.0 * sum_
 
 
 @entry
-def confine(wanted, wanted_rate, lower, upper, speed, dt, position, velocity, behind):
-    """Move position to the wanted one within the joints' limits; count those held back.
+def confine(wanted, wanted_rate, limits, dt, position, velocity, behind):
+    """Move joints to the wanted positions within their limits; count those held back.
 
-    position and behind, which joints were held back, are those of the last tick on entry. Where a
-    limit bites, and where a joint catches up, velocity is the difference quotient, so that it
-    stays the derivative of what is published.
+    Where a limit bites, and where a joint catches up, velocity is the difference quotient, so that
+    it stays the derivative of what is published.
+
+    Args:
+        wanted: positions, rad, shape (joints,).
+        wanted_rate: their velocities, rad/s.
+        limits: lowest and highest angle, rad, and largest speed, rad/s, shape (3, joints).
+        dt: since the last tick, s.
+        position: of the last tick, rad; overwritten.
+        velocity: filled, rad/s.
+        behind: whether a limit held each joint back in the last tick; overwritten.
+
     """
-    held = 0
+    held, (lower, upper, speed) = 0, limits
     for joint in range(position.shape[0]):
         last = position[joint]
         reach = speed[joint] * dt * (1.0 + 1e-9)
@@ -135,7 +133,7 @@ def lead_table(x: np.ndarray, y: np.ndarray) -> np.ndarray:
 
     Raises:
         NoPhase: the curve does not turn steadily about the origin, so that its angle does
-            not tell the phase.
+            not determine the phase.
 
     """
     phase = np.arange(x.size + 1) / x.size
@@ -147,29 +145,15 @@ def lead_table(x: np.ndarray, y: np.ndarray) -> np.ndarray:
     return np.interp(grid, angle, phase) - grid
 
 
-def monomials(x: np.ndarray, y: np.ndarray, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Evaluate x, y, x^2, x y, x^3, x^2 y and their derivatives by phase in cycles.
-
-    Args:
-        x: readout signal, any shape.
-        y: its derivative by phase in radians.
-        z: the second one.
-
-    Returns:
-        Two arrays of shape (6, ...).
-
-    """
-    values = np.stack([x, y, x * x, x * y, x**3, x * x * y])
-    slopes = TURN * np.stack([y, z, 2 * x * y, y * y + x * z, 3 * x * x * y,
-                              2 * x * y * y + x * x * z])
-    return values, slopes
-
-
 class WaveReadout:
     """Joints driven by the cells' waveform.
 
     Attributes:
         start: phase of the first leg at the orbit's phase 0, cycles.
+        angles, rises: of the joints over a cycle, rad and rad per cycle, shape (joints, m).
+        wave: the gait's waveform.
+        joints: the cells behind joints and legs.
+        retiming: what the duty factor makes of it, None for nothing.
 
     """
 
@@ -186,40 +170,46 @@ class WaveReadout:
                 3), see motion.duty; None for nothing.
 
         Raises:
-            NoPhase: the waveform does not tell the phase.
+            NoPhase: the waveform does not determine the phase.
 
         """
         theta = np.arange(TABLE) / TABLE
         x = orbit.waveform(theta) / orbit.peak
         y = orbit.waveform(theta, 1) / (TURN * orbit.peak)
         z = orbit.waveform(theta, 2) / (TURN**2 * orbit.peak)
-        self._view = (orbit.peak, orbit.period, cells, weights, orbit.phases, leg_cells, x,
-                      lead_table(x, y))
+        self.wave = Waveform(orbit.peak, orbit.period, orbit.phases, x, lead_table(x, y))
+        self.joints = DrivenJoints(cells, weights, leg_cells)
+        self._observe: Any = None
+        self._read_retimed: Any = None
         self.start = float(orbit.phases[leg_cells[0]])
-        self._retiming = None
+        self.retiming = None
         if maps is None or (maps[:, 0] == 1.0).all():
             values, slopes = monomials(x, y, z)
             self.angles, self.rises = weights @ values, weights @ slopes
             return
-        self._retiming = (orbit.peak, orbit.period, cells, weights, *tables(orbit), maps)
-        self.angles, self.rises = np.empty((2, len(cells), TABLE))
-        for joint, one in enumerate(maps):
-            phase, steep = at_even_phases(one, TABLE)
-            x, y, z = (orbit.waveform(phase, n) / (TURN**n * orbit.peak) for n in range(3))
-            values, slopes = monomials(x, y, z)
-            self.angles[joint] = weights[joint] @ values
-            self.rises[joint] = steep * (weights[joint] @ slopes)
+        self.retiming = Retiming(*tables(orbit), maps)
+        self.angles, self.rises = over_cycle(weights, lambda _, phase: tuple(
+            orbit.waveform(phase, n) / (TURN**n * orbit.peak) for n in range(3)), maps, TABLE)
 
     def clocks(self, phase: float) -> np.ndarray:
-        """Return nothing: a state tells all by itself."""
+        """Return an empty array: the state alone determines the joints."""
         return np.empty((0, 0))
 
     def look(self, now: np.ndarray, strides: float, clocks: np.ndarray, angle: np.ndarray,
              rise: np.ndarray, legs: np.ndarray) -> float:
-        """Read joints and legs off a state, however many strides after the last; see observe."""
-        distance: float = observe(now, *self._view, angle, rise, legs)
-        if self._retiming is not None:
-            read_retimed(now, *self._retiming, angle, rise)
+        """Read joints and legs off a state, however many strides after the last.
+
+        See observe; arrays are C-contiguous and of float64.
+        """
+        arguments = now, self.wave, self.joints, angle, rise, legs
+        if self._observe is None:
+            self._observe = bound(observe, *arguments)
+        distance: float = self._observe(*arguments)
+        if self.retiming is not None:
+            retimed = now, self.wave, self.joints, self.retiming, angle, rise
+            if self._read_retimed is None:
+                self._read_retimed = bound(read_retimed, *retimed)
+            self._read_retimed(*retimed)
         return distance
 
 

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""How a pattern's clock goes on after a stall: from where it stood, slowed in."""
+"""Resume a pattern's clock after a stall: from where it stopped, slowed at first."""
 
 from cpg_ros.motion.smoothstep import smoothstep
 

@@ -21,17 +21,55 @@ theta; rates follow by the chain rule from x, x' and x'': they are derivatives a
 """
 
 import math
+from typing import NamedTuple
 
 from cpg_ros.dynamics.periodic import Orbit
 from cpg_ros.integration.jit import entry, jit
+from cpg_ros.motion import joint_polynomial
 from cpg_ros.motion.duty import retimed_phase
+from cpg_ros.motion.joint_polynomial import TURN
 import numpy as np
 
-TURN = 2.0 * math.pi
 #: Entries of the tables over one cycle.
 POINTS = 512
 #: Squares of a size below this are those of a cell at rest, which has no phase.
 REST = 1e-12
+
+
+class Waveform(NamedTuple):
+    """The waveform of a gait's cells.
+
+    Attributes:
+        peak: largest value of a cell on the orbit.
+        period: of the orbit, model time.
+        phases: phase of each cell in the gait, cycles, shape (cells,).
+        values: over the peak, on even phases of a cycle, shape (m,).
+        lead: phase minus angle, both in cycles, on even angles, shape (m,).
+
+    """
+
+    peak: float
+    period: float
+    phases: np.ndarray
+    values: np.ndarray
+    lead: np.ndarray
+
+
+class Retiming(NamedTuple):
+    """How joints follow a waveform at another phase than their cells'.
+
+    Attributes:
+        lead: of the orbit on even angles: phase minus angle, cycles, and its slope per entry,
+            shape (m, 2).
+        cycle: of the orbit on even phases: x and its slope per entry, y and its slope, shape
+            (m, 4).
+        maps: k, centre and own of each joint, shape (joints, 3), see motion.duty.
+
+    """
+
+    lead: np.ndarray
+    cycle: np.ndarray
+    maps: np.ndarray
 
 
 @jit
@@ -52,33 +90,30 @@ def _hermite(table, column, cycles):
 
 
 @entry
-def read_retimed(now, peak, period, cells, weights, lead, cycle, maps, angle, rise):
+def read_retimed(now, wave, joints, retiming, angle, rise):
     """Read joints off a network's state at the retimed phase.
 
     Args:
         now: x, x', x'' of the cells, shape (3, cells).
-        peak: largest value of a cell on the gait's orbit.
-        period: of the orbit, model time.
-        cells: the cell behind each joint, shape (joints,).
-        weights: readout weights of each joint in rad, shape (joints, 6).
-        lead: of the orbit over its angle: phase minus angle, cycles, and slope per entry.
-        cycle: of the orbit over its phase: x and its slope per entry, y and the same.
-        maps: k, centre and own of each joint, shape (joints, 3), see motion.duty.
+        wave: Waveform of the gait.
+        joints: DrivenJoints.
+        retiming: Retiming.
         angle: filled with the joints' deviation from their offset, rad.
         rise: filled with its derivative by phase, rad per cycle.
 
     """
-    by_phase = period / TURN
+    peak, by_phase = wave.peak, wave.period / TURN
+    lead, cycle, maps = retiming
     last, x, y, dx, dy = -1, 0.0, 0.0, 0.0, 0.0
-    for joint in range(cells.shape[0]):
-        cell = cells[joint]
+    for joint in range(joints.cells.shape[0]):
+        cell = joints.cells[joint]
         if cell != last:
             last = cell
             x = now[0, cell] / peak
             y = now[1, cell] * by_phase / peak
             z = now[2, cell] * by_phase * by_phase / peak
             square = x * x + y * y
-            # Derivatives by the phase that goes on evenly, in radians.
+            # Derivatives by the phase that advances evenly, in radians.
             turning = (y * y - x * z) / square if square > REST else 1.0
             growing = y * (x + z) / square if square > REST else 0.0
             turn = math.atan2(-y, x) / TURN
@@ -95,16 +130,12 @@ def read_retimed(now, peak, period, cells, weights, lead, cycle, maps, angle, ri
             speed = size * steep * going
             x, y = size * unit_x, size * unit_y
             dx, dy = speed * unit_y + growing * unit_x, speed * unit_z + growing * unit_y
-        w = weights[joint]
-        angle[joint] = (w[0] * x + w[1] * y + w[2] * x * x + w[3] * x * y
-                        + (w[4] * x + w[5] * y) * x * x)
-        rise[joint] = TURN * ((w[0] + 2.0 * w[2] * x + w[3] * y + 3.0 * w[4] * x * x
-                               + 2.0 * w[5] * x * y) * dx
-                              + (w[1] + w[3] * x + w[5] * x * x) * dy)
+        angle[joint] = joint_polynomial.value(joints.weights[joint], x, y)
+        rise[joint] = TURN * joint_polynomial.rate(joints.weights[joint], x, y, dx, dy)
 
 
 def tables(orbit: Orbit) -> tuple[np.ndarray, np.ndarray]:
-    """Return lead and cycle as ``read_retimed`` takes them; the waveform must tell its phase."""
+    """Return lead and cycle of a Retiming; the waveform must determine its phase."""
     grid = np.arange(POINTS) / POINTS
 
     def unit(theta: np.ndarray) -> tuple[np.ndarray, ...]:

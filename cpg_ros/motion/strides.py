@@ -12,19 +12,21 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Strides of another length and pace than the gait's own, compiled."""
+"""Steering a gait: how long each leg's stride is, and how fast strides follow one another."""
 
 import math
 
 from cpg_ros.integration.jit import entry
+import numpy as np
 
-#: What is asked for is approached with this time constant, s.
+#: Targets are approached with this time constant, s.
 TIME_CONSTANT = 0.2
+_NOTHING = np.zeros(0)
 
 
 @entry
 def approach(targets, trim, dt, now, rate):
-    """Let strides and pace go on for dt in s towards what is asked for.
+    """Advance strides and pace towards their targets by dt in s.
 
     Args:
         targets: targets, shape (legs + 1,).
@@ -47,21 +49,21 @@ def approach(targets, trim, dt, now, rate):
 
 
 @entry
-def lengthen(stride, leg, shift, angle, rise, reach, lift):
-    """Make the joints' way as long as their legs' strides are.
+def lengthen(stride, leg, shift, motion):
+    """Scale the joints' motion to the strides of their legs.
 
     Args:
         stride: of each leg, shape (legs,).
         leg: of each joint, shape (joints,); all others too.
         shift: added to the angles, rad.
-        angle: deviations of the gait from the stand, rad; overwritten.
-        rise: their derivatives by phase, rad per cycle; overwritten.
-        reach: deviations of the gait in place, rad; overwritten with the derivatives of the
-            angles by the stride.
-        lift: derivatives of the gait in place by phase, rad per cycle.
+        motion: shape (4, joints): deviations of the gait from the stand, rad, and their
+            derivatives by phase, rad per cycle, both overwritten; deviations of the gait in
+            place, rad, overwritten with the derivatives of the angles by the stride; and their
+            derivatives by phase, rad per cycle.
 
     """
     # angle = in_place + stride (angle - in_place), and so its derivatives.
+    angle, rise, reach, lift = motion
     for joint in range(len(leg)):
         longer = stride[leg[joint]] - 1.0
         reach[joint] = angle[joint] - reach[joint]
@@ -70,8 +72,8 @@ def lengthen(stride, leg, shift, angle, rise, reach, lift):
 
 
 @entry
-def scale(level, frequency, change, leg, offset, angle, rise, reach, wanted, speed):
-    """Fill in where a gait wants the joints, rad, and how fast, rad/s, shape (joints,).
+def scale(level, frequency, change, leg, offset, motion, wanted, speed):
+    """Fill in the joints' angles, rad, and velocities, rad/s, of a gait, shape (joints,).
 
     Args:
         level: share of the gait about the stand.
@@ -79,13 +81,55 @@ def scale(level, frequency, change, leg, offset, angle, rise, reach, wanted, spe
         change: of the legs' strides, 1/s, shape (legs,).
         leg: of each joint, shape (joints,); all others too.
         offset: the stand, rad.
-        angle: as of lengthen.
-        rise: as of lengthen.
-        reach: as of lengthen.
+        motion: as lengthen leaves it, shape (4, joints).
         wanted: filled, rad.
         speed: filled, rad/s.
 
     """
+    angle, rise, reach, _ = motion
     for joint in range(len(leg)):
         wanted[joint] = level * angle[joint] + offset[joint]
         speed[joint] = level * (frequency * rise[joint] + change[leg[joint]] * reach[joint])
+
+
+class Drive:
+    """Strides of the legs and their pace, on the way to their targets.
+
+    Each approaches its target as a critically damped oscillator does, so that a change of
+    target changes neither value nor rate at once.
+
+    Attributes:
+        stride: factor of each leg's stride, shape (legs,); 1 is the gait as it is.
+        rate: its derivative, 1/s.
+        pace: factor of the stride frequency.
+        trim: added to the targets of the strides, shape (legs,), such as by feedback; None for
+            nothing.
+
+    """
+
+    def __init__(self, legs: int) -> None:
+        # One row: the legs' strides and the pace.
+        self._now, self._rate = np.ones(legs + 1), np.zeros(legs + 1)
+        self._target = (np.ones(legs + 1), False)
+        self.stride, self.rate = self._now[:legs], self._rate[:legs]
+        self.trim: np.ndarray | None = None
+
+    @property
+    def pace(self) -> float:
+        """Factor of the stride frequency."""
+        return float(self._now[-1])
+
+    def set_target(self, stride: np.ndarray, pace: float, at_once: bool = False) -> None:
+        """Set the targets, to be reached at once where nothing moves yet.
+
+        May be called from another thread than advance.
+        """
+        self._target = np.append(stride, pace), at_once
+
+    def advance(self, dt: float) -> None:
+        """Advance by dt in s."""
+        target, at_once = self._target
+        if at_once:
+            self._now[:], self._rate[:] = target, 0.0
+            return
+        approach(target, _NOTHING if self.trim is None else self.trim, dt, self._now, self._rate)

@@ -12,13 +12,12 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""One network running one gait, and a watch that it is still where the gait has it."""
+"""One network running one gait, and the watchdog that compares it with the gait's orbit."""
 
 import math
 
 from cpg_ros.motion.plan import GaitPlan
-from cpg_ros.motion.steering import Drive
-from cpg_ros.motion.strides import lengthen
+from cpg_ros.motion.strides import Drive, lengthen
 import numpy as np
 
 #: Off the orbit: a cell further away than this share of the peak, or the phase behind or ahead
@@ -36,6 +35,7 @@ class Track:
     """A network running one program.
 
     Attributes:
+        motion: the three that follow, and one of its own, in one array, shape (4, joints).
         angle: of each joint from the stand, rad.
         rise: its derivative by phase, rad per cycle.
         reach: its derivative by the stride of the joint's leg, rad; only with a drive.
@@ -49,7 +49,8 @@ class Track:
         self.progress = 0.0
         self.drive = drive
         self._leg = program.robot.leg_of_joint
-        self.angle, self.rise, self.reach, self._lift = np.zeros((4, self._leg.size))
+        self.motion = np.zeros((4, self._leg.size))
+        self.angle, self.rise, self.reach, self._lift = self.motion
         self.legs = np.zeros(len(program.robot.legs))
         self.stepper = program.seed.copy()
         self._clocks = program.readout.clocks(0.0)
@@ -79,8 +80,7 @@ class Track:
         distance = program.readout.look(now, strides, clocks, angle, rise, self.legs)
         if self.drive is not None:
             program.in_place.look(now, 0.0, clocks, self.reach, self._lift, self.legs)
-            lengthen(self.drive.stride, self._leg, program.shift, angle, rise, self.reach,
-                     self._lift)
+            lengthen(self.drive.stride, self._leg, program.shift, self.motion)
         else:
             angle += program.shift
         return distance

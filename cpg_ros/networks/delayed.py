@@ -26,6 +26,7 @@ import math
 from typing import Any, ClassVar
 
 from cpg_ros.networks.cell import Cell
+from cpg_ros.networks.leg_numbers import places
 from cpg_ros.networks.network import known, LeastCoupling, Network, Preset, Range
 from cpg_ros.networks.network_definition import leg_count
 from cpg_ros.networks.rings import across, behind, ring_gaits, ring_places, ring_symmetry
@@ -67,9 +68,8 @@ class Delayed(Network):
     couplings: ClassVar[tuple[str, ...]] = ('c', 'd')
     legs: ClassVar[dict[str, dict[str, tuple[int, ...]]]] = {
         'implicit': {'lh': (1, 7), 'rh': (2, 8), 'lf': (3, 5), 'rf': (4, 6)}}
-    sides: ClassVar[dict[str, str]] = {
-        'lh': 'left', 'rh': 'right', 'lf': 'left', 'rf': 'right'}
-    girdles: ClassVar[dict[str, str]] = {'lh': 'hind', 'rh': 'hind', 'lf': 'fore', 'rf': 'fore'}
+    sides: ClassVar[dict[str, str]] = places(4)['sides']
+    girdles: ClassVar[dict[str, str]] = places(4)['girdles']
     usual_gait: ClassVar[str] = 'trot'
     usual_robot: ClassVar[str] = 'quadruped'
     free: ClassVar[tuple[str, ...]] = ('c', 'tau')
@@ -94,9 +94,7 @@ class Delayed(Network):
     @classmethod
     def fitted(cls, legs: int) -> dict[str, Any]:
         """Return what two rings for this many legs have; InputError for an odd number."""
-        places = ring_places(legs)
-        return {**places, 'usual_gait': next(iter(ring_gaits(legs))),
-                'usual_robot': 'hexapod' if legs == 6 else ''}
+        return {**ring_places(legs), 'usual_gait': next(iter(ring_gaits(legs)))}
 
     @classmethod
     def presets(cls) -> dict[str, Preset]:
@@ -156,8 +154,8 @@ class Delayed(Network):
 def _presets(network: type[Delayed]) -> dict[str, Preset]:
     """Return a set for each gait of any number of legs: the signs of c and d choose it.
 
-    Of the two waves that can run round, d makes the wanted one the faster one (Im A > 0), which
-    attracts; a gives all waves the same Re A, but for rounding.
+    Two waves can run round; d makes the wanted one the faster one (Im A > 0), which attracts;
+    a gives all waves the same Re A, but for rounding.
     """
     found = {}
     for gait, (j, k) in network.modes().items():

@@ -19,7 +19,8 @@ periodic solutions with spatio-temporal symmetries H and spatial symmetries K ex
 subgroups K of H with cyclic quotient H/K. Which gait such a pair is, is not known here.
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cache
@@ -95,16 +96,11 @@ def admissible_pairs(group: Group) -> tuple[Pair, ...]:
     """Return all pairs H, K of Theorem 2.2, from the largest H and in it from the largest K.
 
     Raises:
-        ValueError: the theorem does not apply: not exactly one symmetry takes the first cell
+        InputError: the theorem does not apply: not exactly one symmetry takes the first cell
             to each cell, or two symmetries do not commute.
 
     """
-    elements = group.elements.values()
-    if sorted(element[0] for element in elements) != list(range(group.cells)):
-        raise ValueError(f'the group has {len(elements)} symmetries of {group.cells} cells; '
-                         f'exactly one must take the first cell to each cell')
-    if any(a[b[i]] != b[a[i]] for a, b in combinations(elements, 2) for i in range(group.cells)):
-        raise ValueError('the group is not abelian')
+    group.check_regular()
     found = []
     for h, k in product(reversed(subgroups(group)), repeat=2):
         order = len(h) // len(k)
@@ -122,16 +118,25 @@ def symmetries(group: Group) -> tuple[Symmetry, ...]:
     A pair of order m has phi(m) of them (Euler's function): the element with shift 1/m may have
     any multiple of it prime to m. With m = 4 these are a wave and the same run backwards.
     """
-    found = []
-    for h in reversed(subgroups(group)):
-        names = generators(group, h)
-        orders = [group.order(name) for name in names]
-        for turns in product(*(range(order) for order in orders)):
-            try:
-                found.append(Symmetry.of(group, {
-                    name: Fraction(turn, order)
-                    for name, turn, order in zip(names, turns, orders, strict=True)}))
-            except InputError:
-                # Generators that are not independent: these shifts contradict one another.
-                continue
-    return tuple(found)
+    return tuple(one for h in reversed(subgroups(group))
+                 for one in homomorphisms(group, generators(group, h)))
+
+
+def homomorphisms(group: Group, names: Iterable[str], variables: int = 2, odd: bool = False
+                  ) -> Iterator[Symmetry]:
+    """Yield all homomorphisms into the circle of the subgroup that some elements generate.
+
+    Args:
+        group: of a network.
+        names: of the elements.
+        variables: as of a Symmetry.
+        odd: as of a Symmetry.
+
+    """
+    orders = {name: group.order(name) for name in names}
+    for turns in product(*(range(order) for order in orders.values())):
+        shifts = {name: Fraction(turn, order)
+                  for (name, order), turn in zip(orders.items(), turns, strict=True)}
+        # Where generators are not independent, some shifts contradict one another.
+        with suppress(InputError):
+            yield Symmetry.of(group, shifts, variables, odd)

@@ -15,7 +15,7 @@
 """Networks for other numbers of legs: ``delayed6`` is the delayed network for six legs.
 
 A network that takes any even number of legs says by a rule what changes with it (``fitted``);
-from that rule a class of networks is made for each number that is asked for, with the name of its
+from that rule a class of networks is made for each number requested, with the name of its
 family and the number: a network like any other, with parameters, gaits and presets of its own.
 
 Legs are named for where they are. Two: left and right. Four: left and right, hind and fore (lh,
@@ -23,7 +23,7 @@ rh, lf, rf); six have a middle pair, lm and rm, between them. More are counted o
 the foremost, l1 r1 l2 r2 ..., as arachnologists do.
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from functools import cache
 import re
@@ -33,9 +33,11 @@ from cpg_ros.errors import InputError
 from cpg_ros.networks.network_definition import AnyDefinition, leg_count
 
 BIPED = ('left', 'right')
+#: Number of legs -> the shipped robot that a network of so many legs starts with.
+ROBOTS = {2: 'biped', 4: 'quadruped', 6: 'hexapod'}
 #: Pairs of legs from the head on.
 GIRDLES = ('fore', 'middle', 'hind')
-#: Most legs that a network can be asked for.
+#: Largest number of legs.
 MOST = 32
 
 _NUMBERED = re.compile(r'(?P<family>\w*?[a-z_])(?P<legs>\d+)')
@@ -68,20 +70,21 @@ def leg_names(legs: int) -> tuple[str, ...]:
     return BIPED if legs == 2 else tuple(side + pair for pair in found for side in 'lr')
 
 
-def places(legs: int) -> dict[str, dict[str, str]]:
-    """Return ``sides`` and ``girdles`` of the legs, as a network states them.
+def places(legs: int) -> dict[str, Any]:
+    """Return ``sides`` and ``girdles`` of the legs and ``usual_robot``, as a network states them.
 
     Raises:
         InputError: as of pairs.
 
     """
     if legs == 2:
-        return {'sides': {leg: leg for leg in BIPED}, 'girdles': {}}
+        return {'sides': {leg: leg for leg in BIPED}, 'girdles': {}, 'usual_robot': ROBOTS[2]}
     known = pairs(legs)
     words = dict.fromkeys(known, 'middle') | {known[0]: 'hind', known[-1]: 'fore'}
     names = leg_names(legs)
     return {'sides': {leg: {'l': 'left', 'r': 'right'}[leg[0]] for leg in names},
-            'girdles': {leg: words[leg[1:]] for leg in names}}
+            'girdles': {leg: words[leg[1:]] for leg in names},
+            'usual_robot': ROBOTS.get(legs, '')}
 
 
 def with_legs(network: type[AnyDefinition], legs: int) -> type[AnyDefinition]:
@@ -97,15 +100,31 @@ def with_legs(network: type[AnyDefinition], legs: int) -> type[AnyDefinition]:
 
 @cache
 def _made(family: type[Any], legs: int) -> type[Any]:
-    stated: dict[str, Any] = family.fitted(legs)
-    names: tuple[str, ...] = stated.pop('fields', ())
     # Where legs have parameters of their own, they are not those of the family's legs.
-    bases = (family.__bases__ if names else (family,))
-    found = type(f'{family.__name__}{legs}', bases, {
+    bases = family.__bases__ if 'fields' in family.fitted(legs) else (family,)
+    return for_legs(legs)(type(f'{family.__name__}{legs}', bases, {
         '__module__': family.__module__, '__doc__': family.__doc__, 'family': family,
-        'name': f'{family.name}{legs}', '__annotations__': dict.fromkeys(names, float),
-        **stated})
-    return dataclass(frozen=True)(found) if names else found
+        'name': f'{family.name}{legs}'}))
+
+
+def for_legs(legs: int) -> Callable[[type[Any]], type[Any]]:
+    """Make a class the dataclass of a network for a number of legs, as its ``fitted`` states it.
+
+    What the class states itself stays.
+
+    Raises:
+        InputError: the network takes no such number.
+
+    """
+    def decorate(network: type[Any]) -> type[Any]:
+        stated = network.fitted(legs)
+        network.__annotations__ = {**vars(network).get('__annotations__', {}),
+                                   **dict.fromkeys(stated.pop('fields', ()), float)}
+        for name, value in stated.items():
+            if name not in vars(network):
+                setattr(network, name, value)
+        return dataclass(frozen=True)(network)
+    return decorate
 
 
 def restored(family: type[AnyDefinition], legs: int, values: tuple[float, ...]
@@ -126,7 +145,7 @@ def footfall_order(legs: Iterable[str], sides: Mapping[str, str], girdles: Mappi
 
     With more than four legs those of a side stay together, so that waves are seen.
     """
-    # Legs stand from hind to fore: those of middle pairs are told by their order alone.
+    # Legs stand from hind to fore: only their order distinguishes the middle pairs.
     listed = list(legs)[::-1]
     rank = [GIRDLES.index(girdles.get(leg, 'fore')) for leg in listed]
     right = [sides.get(leg) == 'right' for leg in listed]

@@ -99,7 +99,7 @@ class LegPairs(Network):
 
     #: Cells of a leg: one, or two antagonists.
     each: ClassVar[int] = 1
-    #: Of the parameters but the weights; and the largest weight.
+    #: Ranges of the parameters other than the weights, and the largest weight.
     own_ranges: ClassVar[dict[str, Range]]
     most: ClassVar[float] = 20.0
     #: The parameters but the weights of all presets, and how large weights are usually looked for.
@@ -107,8 +107,8 @@ class LegPairs(Network):
     looked_for: ClassVar[float] = 2.0
 
     @classmethod
-    def stated(cls, legs: int) -> dict[str, Any]:
-        """Return what the network has for a number of legs; InputError for an odd one."""
+    def fitted(cls, legs: int) -> dict[str, Any]:
+        """Return what the network has for this many legs; InputError for an odd number."""
         names, heard = leg_names(legs), partners(legs)
         groups = {kind: tuple(f'k_{names[j]}_{names[i]}' for i, j in enumerate(sources))
                   for kind, sources in heard.items()}
@@ -122,15 +122,8 @@ class LegPairs(Network):
                          **dict.fromkeys(groups, (-cls.looked_for, cls.looked_for))},
             'ranges': {**cls.own_ranges, **{name: Range(
                 -cls.most, cls.most, 'weight from {1} to {2}'.format(*name.split('_')))
-                for name in weights}}}
-
-    @classmethod
-    def fitted(cls, legs: int) -> dict[str, Any]:
-        """Return what the network has for this many legs; InputError for an odd number."""
-        stated = cls.stated(legs)
-        return {**stated, 'usual_gait': next(iter(gait_phases(legs))),
-                'fields': stated['couplings'],
-                'usual_robot': {2: 'biped', 6: 'hexapod'}.get(legs, '')}
+                for name in weights}},
+            'usual_gait': next(iter(gait_phases(legs))), 'fields': weights}
 
     @classmethod
     def heard(cls) -> dict[str, tuple[int, ...]]:

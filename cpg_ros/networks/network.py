@@ -18,8 +18,9 @@ What it states of its parameters, cells and equations is in network_definition.
 """
 
 from abc import abstractmethod
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 import dataclasses
+from functools import wraps
 from typing import Any, NamedTuple, TypeAlias, TypeVar
 
 from cpg_ros.errors import InputError
@@ -51,6 +52,11 @@ class Network(NetworkDefinition):
     What tells one network from another stands in these two; everything else asks.
     """
 
+    def __init_subclass__(cls, **options: Any) -> None:
+        super().__init_subclass__(**options)
+        if 'symmetry' in cls.__dict__:
+            cls.symmetry = _of_cell(cls.symmetry)  # type: ignore[assignment,method-assign]
+
     def __reduce__(self) -> Any:
         if self.family is None:
             return super().__reduce__()
@@ -77,17 +83,14 @@ class Network(NetworkDefinition):
         """
         found: dict[str, float] = {}
         for name, value in values.items():
-            members = self.groups.get(name, (name,))
-            if not set(members) <= set(self.parameters()):
-                known = ', '.join((*self.groups, *self.parameters()))
-                raise InputError(f"'{name}' is not one of {known}")
-            found |= dict.fromkeys(members, value)
+            found |= dict.fromkeys(self.members(name), value)
         return dataclasses.replace(self, **found)  # type: ignore[type-var]
 
     @property
     def coefficients(self) -> np.ndarray:
         """The parameters as the kernel takes them, a value for each cell, shape (rows, cells)."""
-        return np.array([np.broadcast_to(value, self.cells) for value in values_of(self)])
+        return np.array([np.broadcast_to(value, self.cells) for value in values_of(self)],
+                        dtype=float)
 
     @classmethod
     def presets(cls) -> dict[str, Preset]:
@@ -160,10 +163,10 @@ class Network(NetworkDefinition):
         """Say what in the parameters rules a gait out, where that is known beforehand, or ''."""
         return ''
 
-    def broken(self, gait: str) -> str:
-        """Name parameters that would have to be equal for the gait, or '' if all are."""
+    def broken(self, symmetry: Symmetry) -> str:
+        """Name parameters that would have to be equal for the symmetry, or '' if all are."""
         values = self.as_dict()
-        return next((', '.join(family) for family in self.families(self.symmetry(gait))
+        return next((', '.join(family) for family in self.families(symmetry)
                      if len({values[name] for name in family}) > 1), '')
 
     def character(self, gait: str, assignment: str) -> str:
@@ -187,6 +190,15 @@ class Network(NetworkDefinition):
         apart = {float((symmetry.phases[b] - symmetry.phases[a]) % 1.0) for a, b in pairs}
         return ('run-like' if alike and apart == {0.0} else
                 'walk-like' if alike and apart == {0.5} else 'neither')
+
+
+def _of_cell(symmetry: Callable[[Any, str], Symmetry]) -> Callable[[Any, str], Symmetry]:
+    """Give symmetries as many variables as the network's cells have: its states tell."""
+    @wraps(symmetry)
+    def sized(network: Any, gait: str) -> Symmetry:
+        return symmetry(network, gait).sized(type(network).variables)
+
+    return sized
 
 
 def known(gait: str, gaits: tuple[str, ...]) -> str:

@@ -65,9 +65,9 @@ class NetworkDefinition(ABC):
         legs: assignment of cells to legs -> leg -> cells numbered from 1, the first of which
             gives the leg's phase; the first assignment is the usual one.
         family: of a network made for another number of legs, the one it is made after.
-        sides: leg -> left or right; where this is not said, robot files say it.
+        sides: leg -> left or right; where it is not given, robot files give it.
         girdles: leg -> fore, middle or hind, the same; of two legs neither.
-        muscles: name -> cell from 1, where cells drive muscles: phases are told of each, and
+        muscles: name -> cell from 1, where cells drive muscles: phases are reported for each, and
             diagrams draw when it is active. Otherwise both are of legs, which stand while their
             first cell falls.
         groups: name -> parameters that can be set together under it.
@@ -148,6 +148,20 @@ class NetworkDefinition(ABC):
     def parameters(cls) -> tuple[str, ...]:
         """Names of the parameters, in their own order."""
         return _names(cls)
+
+    @classmethod
+    def members(cls, name: str) -> tuple[str, ...]:
+        """Return the parameters of a group, or the parameter of this name alone.
+
+        Raises:
+            InputError: a name that is neither a parameter nor a group of the network.
+
+        """
+        members = cls.groups.get(name, (name,))
+        if not set(members) <= set(cls.parameters()):
+            known = ', '.join((*cls.groups, *cls.parameters()))
+            raise InputError(f"'{name}' is not one of {known}")
+        return members
 
     @property
     def components(self) -> int:

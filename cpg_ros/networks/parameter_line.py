@@ -49,11 +49,8 @@ class ParameterLine:
         signs: list[float] = []
         for part in text.split('='):
             name = part.strip().removeprefix('-')
-            members = network.groups.get(name, (name,))
+            members = network.members(name)
             for member in members:
-                if member not in network.parameters():
-                    known = ', '.join((*network.groups, *network.parameters()))
-                    raise InputError(f"'{name}' is not one of {known}")
                 if member in names:
                     raise InputError(f"'{text}' names {member} twice")
             sign = -1.0 if part.strip().startswith('-') else 1.0

@@ -39,8 +39,8 @@ class Preset(ShortRepr, Generic[AnyDefinition]):
     Attributes:
         gait: one of the network's gaits.
         network: parameters.
-        start: a state on the gait's orbit, shape (components,), where it has to be told from
-            other orbits and from rest; None where the solver finds it by itself.
+        start: a state on the gait's orbit, shape (components,), to distinguish it from other
+            orbits and from rest; None where the solver finds it by itself.
         period: of that orbit, model time, to about a per cent.
 
     """

@@ -24,6 +24,7 @@ from fractions import Fraction
 from typing import Any, ClassVar
 
 from cpg_ros.networks.cell import Cell
+from cpg_ros.networks.leg_numbers import places
 from cpg_ros.networks.morris_lecar import MorrisLecar
 from cpg_ros.networks.network import known, Network, Range
 from cpg_ros.networks.symmetry import GAITS, Symmetry, Z4_Z2
@@ -70,9 +71,8 @@ class Quadruped(Network):
         'implicit': {'lh': (1, 7), 'rh': (2, 8), 'lf': (3, 5), 'rf': (4, 6)},
         'zigzag': {'lh': (1, 5), 'rh': (2, 6), 'lf': (3, 7), 'rf': (4, 8)},
         'crisscross': {'lh': (1, 6), 'rh': (2, 5), 'lf': (3, 8), 'rf': (4, 7)}}
-    sides: ClassVar[dict[str, str]] = {
-        'lh': 'left', 'rh': 'right', 'lf': 'left', 'rf': 'right'}
-    girdles: ClassVar[dict[str, str]] = {'lh': 'hind', 'rh': 'hind', 'lf': 'fore', 'rf': 'fore'}
+    sides: ClassVar[dict[str, str]] = places(4)['sides']
+    girdles: ClassVar[dict[str, str]] = places(4)['girdles']
     usual_gait: ClassVar[str] = 'trot'
     usual_robot: ClassVar[str] = 'quadruped'
     free: ClassVar[tuple[str, ...]] = ('alpha', 'beta')

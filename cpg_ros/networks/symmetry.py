@@ -24,7 +24,7 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import cache, cached_property
-from itertools import product
+from itertools import combinations, product
 import math
 
 from cpg_ros.errors import InputError
@@ -78,6 +78,20 @@ class Group:
         """Least common multiple of the orders of all elements."""
         return math.lcm(*(self.order(name) for name in self.elements))
 
+    def check_regular(self) -> None:
+        """Check that exactly one element takes the first cell to each cell, and that all commute.
+
+        Raises:
+            InputError: they do not.
+
+        """
+        elements = self.elements.values()
+        if sorted(element[0] for element in elements) != list(range(self.cells)):
+            raise InputError(f'the group has {len(elements)} symmetries of {self.cells} cells; '
+                             f'exactly one must take the first cell to each cell')
+        if any(_compose(a, b) != _compose(b, a) for a, b in combinations(elements, 2)):
+            raise InputError('the group is not abelian')
+
     def order(self, name: str, modulo: Collection[str] = ('1',)) -> int:
         """Return the smallest power of an element that lies in a subgroup, given by names."""
         subgroup = [self.elements[member] for member in modulo]
@@ -130,7 +144,7 @@ class Symmetry(ShortRepr):
     Attributes:
         group: of the network.
         shifts: element name -> shift in cycles, a homomorphism on H.
-        variables: state variables of each cell.
+        variables: state variables of each cell; a network sees to it that they are its own.
         odd: whether the network has the symmetry x -> -x, and the gait it with a shift of 1/2:
             every waveform is its own negative half a cycle later.
         leads: phase of each cell in cycles as the network's parameters state it, where the
@@ -166,6 +180,12 @@ class Symmetry(ShortRepr):
     def led(self, leads: tuple[float, ...]) -> 'Symmetry':
         """Return the same symmetry with other stated phases of the cells."""
         return self if leads == self.leads else replace(self, leads=leads)
+
+    def sized(self, variables: int) -> 'Symmetry':
+        """Return the same symmetry of cells with as many variables."""
+        if variables == self.variables:
+            return self
+        return _generated(self.group, self.shifts, variables, self.odd).led(self.leads)
 
     @property
     def h(self) -> tuple[str, ...]:

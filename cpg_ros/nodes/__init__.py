@@ -17,13 +17,13 @@
 Imports every subpackage but ``tools``.
 """
 
-__all__ = ['bag_recorder', 'bounded_request', 'bridge_base', 'bridge_health', 'bridge_interface',
-           'bridge_loop', 'bridge_parameters', 'bridge_start', 'cells_publisher', 'cmd_vel',
-           'command_publishers', 'command_topics', 'console', 'deadline_thread', 'diagnostics',
-           'feedback_loop', 'feedback_parameters', 'feedback_switch', 'generator',
-           'generator_parameters', 'inversion_node', 'joint_publishers', 'kernels',
-           'launch_arguments', 'local_socket', 'lockstep', 'log_queue', 'measured_pose',
-           'message_block', 'message_types', 'node_base', 'node_client', 'other_publishers',
-           'parameter_services', 'parameter_spec', 'polled_group', 'qos_profiles', 'raw_messages',
-           'real_time', 'robot_sim', 'sensor_input', 'sensor_publishers', 'shutdown', 'unitree',
-           'watchdog', 'watchdog_link']
+__all__ = ['bag_recorder', 'bounded_request', 'bridge_base', 'bridge_interface', 'bridge_loop',
+           'bridge_parameters', 'bridge_start', 'cmd_vel', 'command_topics', 'console',
+           'deadline_thread', 'diagnostics', 'feedback_loop', 'feedback_parameters',
+           'feedback_switch', 'generator', 'generator_parameters', 'health_publisher',
+           'inversion_node', 'joint_publishers', 'kernels', 'kp_scale', 'launch_arguments',
+           'local_socket', 'lockstep', 'log_queue', 'measured_pose', 'message_block',
+           'message_types', 'node_base', 'node_client', 'other_publishers', 'parameter_services',
+           'parameter_spec', 'polled_group', 'qos_profiles', 'raw_messages', 'real_time',
+           'robot_sim', 'sensor_input', 'sensor_publishers', 'shutdown', 'unitree', 'watchdog',
+           'watchdog_link']

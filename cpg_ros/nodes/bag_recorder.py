@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What is published on topics, recorded into a bag, raw, by whoever calls again and again."""
+"""Records topics into a bag, as bytes; the caller takes the messages regularly."""
 
 from collections import Counter
 from pathlib import Path
@@ -24,7 +24,7 @@ from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rosbags.interfaces import Connection
 
-#: How often messages are to be taken, s, and how many of a topic may wait for the disk.
+#: How often to take the messages, s, and how many of a topic may wait for the disk.
 EVERY, DEPTH = 0.02, 5000
 
 
@@ -38,7 +38,7 @@ class BagRecorder:
     """
 
     def __init__(self, node: Node, path: Path) -> None:
-        """Open the bag; it has its name only when it is whole.
+        """Open the bag; it gets its name when it is complete.
 
         Args:
             node: that subscribes.
@@ -55,7 +55,7 @@ class BagRecorder:
 
     @property
     def size(self) -> int:
-        """What the bag holds, bytes."""
+        """Size of the bag, bytes."""
         return self._writer.size
 
     def subscribe(self, topic: str, kind: str) -> bool:
@@ -66,7 +66,7 @@ class BagRecorder:
         except UnknownType as error:
             self.passed_over[topic] = str(error)
             return False
-        # What every publisher offers: a reliable subscription hears no best-effort publisher.
+        # What every publisher offers: a reliable subscription matches no best-effort publisher.
         offered = [one.qos_profile for one in self._node.get_publishers_info_by_topic(topic)]
         latched = offered and all(one.durability == DurabilityPolicy.TRANSIENT_LOCAL
                                   for one in offered)

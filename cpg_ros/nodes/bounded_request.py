@@ -12,10 +12,10 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Requests of a service whose first field is a sequence, refused by its length alone.
+"""Requests of a service whose first field is a sequence, bounded in length.
 
-What rclpy takes it converts to Python objects at once: 100,000 parameters are 5 s of that, and
-millions of objects for the garbage collector, whatever the service then answers.
+rclpy converts every request to Python objects at once: for 100,000 parameters that takes 5 s and
+leaves millions of objects to the garbage collector, whatever the service then answers.
 """
 
 import ctypes
@@ -34,13 +34,13 @@ _kept: list[Any] = []
 
 
 def bounded(service: type, most: int) -> type:
-    """Return what to take instead of a service's Request.
+    """Return a type to take instead of a service's Request.
 
-    Taken is a Request, or, if its first field has more elements than ``most``, their number.
+    Taken is a Request or, if its first field has more than ``most`` elements, their number.
 
     Args:
-        service: its kind, of whose requests the first field is a sequence of any elements.
-        most: elements at most.
+        service: type of a service whose requests begin with a sequence.
+        most: largest number of elements.
 
     """
     check_for_type_support(service)

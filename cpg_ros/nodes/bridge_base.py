@@ -23,15 +23,15 @@ import signal
 import time
 from typing import Any, ClassVar
 
-from cpg_ros.nodes.bridge_health import BridgeHealth
 from cpg_ros.nodes.bridge_loop import BridgeLoop
 from cpg_ros.nodes.bridge_start import StartRefused, StartSequence, Wait
-from cpg_ros.nodes.command_publishers import OtherCommandPublishers
+from cpg_ros.nodes.health_publisher import Health, HealthPublisher, STEADY
+from cpg_ros.nodes.log_queue import QUEUE
+from cpg_ros.nodes.other_publishers import others_on
 from cpg_ros.nodes.shutdown import endings
 from cpg_ros.safety.robot_state import RobotState
 from cpg_ros.safety.supervisor import ACTIVE, BridgeState
-from rclpy.clock import Clock
-from rclpy.clock_type import ClockType
+from diagnostic_msgs.msg import DiagnosticStatus
 from std_srvs.srv import Trigger
 
 #: How often the network is checked for others who command the robot, s.
@@ -60,17 +60,13 @@ class BridgeNode(BridgeLoop):
     def __init__(self, state: RobotState) -> None:
         """Declare the parameters, check them, and prepare to start; as the base class does."""
         super().__init__(state)
-        self._others = OtherCommandPublishers(self, self.topic, self.interface.watchdog_name(),
-                                              own=int(not self.dry),
-                                              tolerated=self._value('own_publishers'))
         self._start: StartSequence | None = None
         self._refusal = self._hazard = ''
         self.create_service(Trigger, '~/stop', self._stop)
         self.create_service(Trigger, '~/start', self._start_again)
-        self._health = BridgeHealth(self, self.robot.name, self.supervisor, self.ticker)
-        self._steady = Clock(clock_type=ClockType.STEADY_TIME)
-        self._timers = [self.create_timer(CHECK, self._check_network, clock=self._steady),
-                        self.create_timer(1.0, self._report_health, clock=self._steady)]
+        self._before = 0, 0, 0
+        self._health = HealthPublisher(self, 'robot', self.robot.name, self._report_health)
+        self._timer = self.create_timer(CHECK, self._check_network, clock=STEADY)
         self._warn_of_unknown()
 
     # -- what a bridge may add ------------------------------------------------------------
@@ -127,11 +123,16 @@ class BridgeNode(BridgeLoop):
             wait(0.02)
         self.log_step('the robot is heard')
 
+    def _others(self) -> str:
+        """Return who else commands the robot, or ''."""
+        return others_on(self, self.topic, int(not self.dry), self._value('own_publishers'),
+                         f'/{self.interface.watchdog_name()}')
+
     def _check_publishers(self, wait: Wait) -> None:
         if self._hazard:
             raise StartRefused(self._hazard)
         end, logged = time.monotonic() + FORGOTTEN, False
-        while names := self._others.names():
+        while names := self._others():
             if not names.endswith(f'/{self.interface.bridge_name()}') or ',' in names:
                 raise StartRefused(f'the robot is commanded by {names}, too')
             if time.monotonic() > end:
@@ -187,20 +188,39 @@ class BridgeNode(BridgeLoop):
         if (hazard := self.network_hazard()) and not self._hazard:
             self._hazard = hazard
             self.get_logger().error(hazard)
-        if self.supervisor.state in ACTIVE and (names := self._others.names()):
+        if self.supervisor.state in ACTIVE and (names := self._others()):
             reason = f'the robot is commanded by {names}, too'
             self._requests.append(lambda now: self.supervisor.sit(now, reason))
 
-    def _report_health(self) -> None:
-        state, command, robot = (self.supervisor.state, self.supervisor.command,
-                                 self.supervisor.robot)
-        if self._health.publish(self.received, self.sent, self._refusal, self.dry,
-                                self.measured_values()):
+    def _report_health(self) -> Health:
+        """Publish what changes slowly, and return the status.
+
+        ERROR while the robot sits down or is damped, or was not started; WARN while it is silent.
+        """
+        supervisor, ticker, before = self.supervisor, self.ticker, self._before
+        self._before = counts = ticker.ticks, self.received, self.sent
+        ticks, received, sent = (new - old for new, old in zip(counts, before, strict=True))
+        state, command, robot = supervisor.state, supervisor.command, supervisor.robot
+        if received:
             self.publish_slow_measurements(self.get_clock().now().nanoseconds)
         if self.dry and state is not BridgeState.IDLE:
             torque = command.kp * (command.q - robot.q) - command.kd * robot.dq
             self.get_logger().info(f'dry run: {state.value}, the largest torque would be '
                                    f'{abs(torque).max():.1f} N m')
+        if state in (BridgeState.DAMPING, BridgeState.SITTING):
+            level, text = DiagnosticStatus.ERROR, f'{state.value}: {supervisor.reason}'
+        elif self._refusal and state is BridgeState.IDLE:
+            level, text = DiagnosticStatus.ERROR, f'not started: {self._refusal}'
+        elif not received:
+            level, text = DiagnosticStatus.WARN, 'the robot is not heard'
+        else:
+            level, text = DiagnosticStatus.OK, state.value + ' (dry run)' * self.dry
+        return level, text, {
+            'phase': state.value, 'ticks in the last second': ticks,
+            'states in the last second': received, 'commands in the last second': sent,
+            'late ticks': ticker.late, 'dropped ticks': ticker.dropped,
+            'worst delay of a tick [ms]': f'{1e3 * ticker.worst:.3f}',
+            'log lines dropped': QUEUE.dropped, **self.measured_values()}
 
     # -- beginning and end ----------------------------------------------------------------
 

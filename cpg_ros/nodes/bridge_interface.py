@@ -12,9 +12,8 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What a bridge and its watchdog share: names, topics and messages of one maker's robots."""
+"""The names, topics and messages that a bridge and its watchdog share."""
 
-from importlib import import_module
 from typing import ClassVar
 
 from cpg_ros.safety.robot_state import JointCommand
@@ -51,7 +50,7 @@ class RobotInterface:
 
     @classmethod
     def reference(cls) -> str:
-        """Return the name by which ``load`` finds this class."""
+        """Return the name by which ``pkgutil.resolve_name`` finds this class."""
         return f'{cls.__module__}:{cls.__name__}'
 
     @staticmethod
@@ -68,10 +67,3 @@ class RobotInterface:
     def make_command() -> JointCommand:
         """Return a command, to be filled and encoded."""
         raise NotImplementedError
-
-
-def load(reference: str) -> type[RobotInterface]:
-    """Return the class of a reference ``module:name``."""
-    module, name = reference.split(':')
-    found: type[RobotInterface] = getattr(import_module(module), name)
-    return found

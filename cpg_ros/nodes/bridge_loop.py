@@ -20,16 +20,15 @@ import math
 import time
 from typing import ClassVar
 
-from cpg_ros.errors import CpgError
 from cpg_ros.nodes.bridge_interface import RobotInterface
-from cpg_ros.nodes.command_publishers import command_qos
 from cpg_ros.nodes.command_topics import Commands, KINDS
 from cpg_ros.nodes.deadline_thread import Ticker
+from cpg_ros.nodes.kp_scale import KpScaleSubscription
 from cpg_ros.nodes.local_socket import address, listening, NameTaken
 from cpg_ros.nodes.node_base import StartedNode, StartError
-from cpg_ros.nodes.parameter_spec import Spec
+from cpg_ros.nodes.parameter_spec import fixed, Spec
 from cpg_ros.nodes.polled_group import PolledSubscription
-from cpg_ros.nodes.qos_profiles import latched
+from cpg_ros.nodes.qos_profiles import command_qos, latched
 from cpg_ros.nodes.watchdog_link import WatchdogLink
 from cpg_ros.robots.robot import Robot
 from cpg_ros.robots.robot_file import load_robot
@@ -72,28 +71,23 @@ class BridgeLoop(StartedNode):
             state: into which the robot's states are read.
 
         Raises:
-            StartError: a parameter, the robot file or the messages cannot be used.
+            CpgError: a parameter, the robot file or the messages cannot be used.
 
         """
         interface = self.interface
         # A real robot has no simulated time.
         super().__init__(interface.bridge_name(),
                          parameter_overrides=[Parameter('use_sim_time', value=False)])
-        for name, spec in self.specs.items():
-            self._declare(name, spec.fixed())
+        self._declare(fixed(self.specs))
         self._one_of('command', KINDS)
         value, period = self._value, 1.0 / self._value('rate')
         self.dry: bool = value('dry_run')
-        try:
-            command_type, state_type = interface.command_type(), interface.state_type()
-            self.robot = load_robot(value('robot'))
-            settings = self.make_settings(self.robot, {
-                'period': period, 'tilt': math.radians(value('tilt')),
-                'target_timeout': value('target_timeout'),
-                'state_timeout': value('state_timeout'), 'hottest': value('hottest'),
-                'astray': math.inf if self.dry else 0.4})
-        except CpgError as error:
-            raise StartError(str(error)) from error
+        command_type, state_type = interface.command_type(), interface.state_type()
+        self.robot = load_robot(value('robot'))
+        settings = self.make_settings(self.robot, {
+            'period': period, 'tilt': math.radians(value('tilt')),
+            'target_timeout': value('target_timeout'), 'state_timeout': value('state_timeout'),
+            'hottest': value('hottest'), 'astray': math.inf if self.dry else 0.4})
         self._order = np.array([self.robot.order.index(name) for name in settings.names])
         self._changes: deque[tuple[BridgeState, str]] = deque()
         self.supervisor = Supervisor(settings, state, interface.make_command(),
@@ -114,6 +108,7 @@ class BridgeLoop(StartedNode):
                                           raw=interface.raw_states)
         self._commands = Commands(self, self.robot, value('command'), period,
                                   settings.stand.take(self._order.argsort()))
+        self._kp_scale = KpScaleSubscription(self)
         self._every = max(1, round(value('rate') / value('sensor_rate')))
         self._requests: deque[Callable[[float], None]] = deque()
         self._ending = self._new = False
@@ -147,6 +142,7 @@ class BridgeLoop(StartedNode):
         now, supervisor = time.monotonic(), self.supervisor
         self._take_state(now)
         self._take_targets(now)
+        supervisor.kp_scale = self._kp_scale.take(now)
         while self._requests:
             self._requests.popleft()(now)
         if supervisor.step(now):

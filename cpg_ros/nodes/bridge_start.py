@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The start of a bridge, step by step, in a thread of its own; a step that fails refuses it."""
+"""The start of a bridge, step by step, in a thread of its own; a step that fails ends it."""
 
 from collections.abc import Callable, Sequence
 import threading
@@ -50,7 +50,7 @@ class StartSequence(threading.Thread):
         return self._cancelled.is_set()
 
     def cancel(self, reason: str) -> None:
-        """Refuse the start at its next wait or step."""
+        """Cancel the start at its next wait or step."""
         self._reason = reason
         self._cancelled.set()
 

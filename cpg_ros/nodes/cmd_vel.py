@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Walking as the topic cmd_vel asks: fast or slow, turning, and standing where nobody asks."""
+"""Walking by the topic cmd_vel: speed, turning, and standing without a command."""
 
 from collections.abc import Callable
 import math
@@ -21,18 +21,18 @@ from typing import Any
 
 from cpg_ros.motion.pattern import Pattern
 from cpg_ros.motion.plan import GaitPlan
-from geometry_msgs.msg import Twist
-from rclpy.clock import Clock
-from rclpy.clock_type import ClockType
+from cpg_ros.nodes.health_publisher import STEADY
+from cpg_ros.nodes.other_publishers import node_of
+from cpg_ros.nodes.qos_profiles import OVERRIDABLE
+from geometry_msgs.msg import Twist, TwistStamped
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
-from rclpy.qos_overriding_options import QoSOverridingOptions
 
-#: How often it is seen whether the last command is too old, s.
+#: How often the age of the last command is checked, s.
 LOOK = 0.02
 #: Time between two warnings of a kind, s.
 QUIET = 5.0
-#: Fastest way to the side, m/s, which takes feedback.
+#: Largest speed to the side, m/s, which needs feedback.
 ASIDE = 0.2
 
 
@@ -42,6 +42,18 @@ class CmdVel:
     def __init__(self, node: Node, pattern: Pattern, program: GaitPlan, enabled: bool,
                  timeout: Callable[[], float], ramp: Callable[[], float],
                  closed: Callable[[], bool]) -> None:
+        """Follow the commands on ``cmd_vel``.
+
+        Args:
+            node: that subscribes; its parameter ``stamped_cmd_vel`` says which type.
+            pattern: to be steered.
+            program: gait that it walks.
+            enabled: whether the robot may walk.
+            timeout: returns how long a command counts, s.
+            ramp: returns the duration of the ramp between stand and gait, s.
+            closed: returns whether feedback is active.
+
+        """
         self._program, self._enabled = program, enabled
         self._deciding = threading.Lock()
         self._node, self._pattern, self._timeout, self._ramp = node, pattern, timeout, ramp
@@ -50,22 +62,24 @@ class CmdVel:
         self._target, self._when, self._stale = (0.0, 0.0, 0.0), -math.inf, True
         self._up = False
         self._log = node.get_logger()
+        self._stamped = node.get_parameter('stamped_cmd_vel').value
+        # What is published under another type: it does not arrive.
+        self._misfit = ''
         node.create_subscription(
-            Twist, 'cmd_vel', self._take, QoSProfile(depth=10),
-            qos_overriding_options=QoSOverridingOptions.with_default_policies())
-        # On the steady clock: a system clock that is set must not stop the robot, nor keep it
-        # going.
-        self._steady = Clock(clock_type=ClockType.STEADY_TIME)
-        node.create_timer(LOOK, self._look, clock=self._steady)
+            TwistStamped if self._stamped else Twist, 'cmd_vel',
+            self._take_stamped if self._stamped else self._take, QoSProfile(depth=10),
+            qos_overriding_options=OVERRIDABLE)
+        # A system clock that is set must not stop the robot, nor keep it going.
+        node.create_timer(LOOK, self._look, clock=STEADY)
 
     @property
     def walking(self) -> bool:
-        """Tell whether a fresh command asks for motion."""
+        """Whether a fresh command demands motion."""
         return self._enabled and not self._stale and self._target != (0.0, 0.0, 0.0)
 
     @property
     def motion(self) -> tuple[float, float, float]:
-        """Speeds forward and to the left, m/s, and yaw rate, rad/s, that are walked now."""
+        """The current speeds forward and to the left, m/s, and yaw rate, rad/s."""
         if not self.walking:
             return 0.0, 0.0, 0.0
         speed, aside, turn = self._target
@@ -74,7 +88,7 @@ class CmdVel:
 
     @property
     def state(self) -> str:
-        """What is asked for, for diagnostics."""
+        """The command as text, for diagnostics."""
         if self._stale:
             return 'none'
         speed, aside, turn = self._target
@@ -83,7 +97,32 @@ class CmdVel:
 
     def _now(self) -> float:
         clock: Any = self._node.get_clock()
-        return (clock if clock.ros_time_is_active else self._steady).now().nanoseconds * 1e-9
+        return (clock if clock.ros_time_is_active else STEADY).now().nanoseconds * 1e-9
+
+    def look_for_misfits(self) -> str:
+        """Return who publishes commands of the other type, which do not arrive; log news."""
+        own, other = ('geometry_msgs/msg/TwistStamped', 'geometry_msgs/msg/Twist')[
+            ::1 if self._stamped else -1]
+        names = sorted({node_of(one) for one in self._node.get_publishers_info_by_topic(
+            self._node.resolve_topic_name('cmd_vel')) if one.topic_type == other})
+        text = '' if not names else (
+            f'cmd_vel is published as {other} by {", ".join(names)}, but this generator takes '
+            f'{own}: set stamped_cmd_vel to {str(not self._stamped).lower()}')
+        if text and text != self._misfit:
+            self._log.warning(text)
+        self._misfit = text
+        return text
+
+    def _take_stamped(self, message: TwistStamped) -> None:
+        """Take a command, unless it was on its way for too long; a stamp of 0 is none."""
+        stamp = message.header.stamp
+        now = self._node.get_clock().now().nanoseconds * 1e-9
+        age = now - stamp.sec - 1e-9 * stamp.nanosec
+        if (stamp.sec or stamp.nanosec) and age > self._timeout():
+            self._log.warning(f'cmd_vel ignored: its stamp is {age:.3g} s old; the clocks of '
+                              'sender and generator must agree', throttle_duration_sec=QUIET)
+            return
+        self._take(message.twist)
 
     def _take(self, message: Twist) -> None:
         speed, turn, aside = message.linear.x, message.angular.z, message.linear.y
@@ -117,13 +156,13 @@ class CmdVel:
             self._act()
 
     def follow(self, program: GaitPlan) -> None:
-        """Steer this gait from now on."""
+        """Steer a new gait."""
         with self._deciding:
             self._program = program
             self._act()
 
     def enable(self, enabled: bool) -> None:
-        """Say whether the robot may walk at all."""
+        """Set whether the robot may walk at all."""
         with self._deciding:
             self._enabled = enabled
             self._act()
@@ -143,6 +182,6 @@ class CmdVel:
             self._pattern.enable(walking, self._ramp())
 
     def end(self) -> None:
-        """Leave the pattern alone from now on, as it is ramped down for the last time."""
+        """Leave the pattern alone: it is being ramped down for the last time."""
         with self._deciding:
             self._enabled = self._up = False

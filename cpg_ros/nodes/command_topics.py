@@ -40,15 +40,15 @@ class _Bad(CpgError):
 
 
 class Commands:
-    """The angles that the last good messages asked for.
+    """The angles of the last valid messages.
 
-    ``take`` reads what has arrived, in the thread that uses it: of each topic the last message,
-    whole or, where anything in it is wrong, not at all.
+    ``take`` reads the messages that have arrived, in the thread that uses them. A message is used
+    as a whole or, if anything in it is invalid, not at all.
 
     Attributes:
-        angles: rad, in ``robot.order``; until commands come, what it was made with.
+        angles: rad, in ``robot.order``; before the first command, those passed to __init__.
         topics: the names of the topics, resolved.
-        refused: what was wrong with messages that the last ``take`` could not use; '' if nothing.
+        refused: why the last ``take`` rejected a message; '' if it did not.
 
     """
 
@@ -76,36 +76,33 @@ class Commands:
         if kind == 'joint_states':
             for leg, joints in robot.legs.items():
                 topic = f'{leg}/joint_states'
-                self._listen(JointState, topic, partial(
-                    self._states, topic, tuple(joint.name for joint in joints)))
+                self._listen(JointState, topic, self._states, tuple(one.name for one in joints))
         elif kind == 'joint_trajectory':
-            self._listen(JointTrajectory, COMMAND_TOPICS[kind],
-                         partial(self._trajectory, COMMAND_TOPICS[kind]))
+            self._listen(JointTrajectory, COMMAND_TOPICS[kind], self._trajectory)
         else:
-            self._listen(Float64MultiArray, COMMAND_TOPICS[kind],
-                         partial(self._array, COMMAND_TOPICS[kind]))
+            self._listen(Float64MultiArray, COMMAND_TOPICS[kind], self._array)
         self.topics = [subscription.topic for subscription, _ in self._sources]
 
-    def _listen(self, kind: type, topic: str, read: Any) -> None:
-        self._sources.append((
-            PolledSubscription(self._node, kind, topic, QoSProfile(depth=10)), read))
+    def _listen(self, kind: type, topic: str, read: Any, *known: Any) -> None:
+        subscription = PolledSubscription(self._node, kind, topic, QoSProfile(depth=10))
+        self._sources.append((subscription, partial(read, topic, *known)))
         self._fresh.append(False)
 
     @property
     def connected(self) -> bool:
-        """Whether somebody publishes on every topic."""
+        """Whether every topic has a publisher."""
         return all(self._node.count_publishers(topic) for topic in self.topics)
 
     def expect(self, since: int) -> None:
-        """Wait for commands from now on that are not stamped before an instant, ns."""
+        """Expect commands that are not stamped before an instant, ns."""
         self._since = since
         self._fresh = [False] * len(self._fresh)
 
     def take(self) -> bool:
-        """Take what has arrived; return whether all topics have brought what is expected."""
+        """Read what has arrived; return whether every topic has brought an expected command."""
         self.refused = ''
         for k, (subscription, read) in enumerate(self._sources):
-            # Every one: what cannot be used is told even if a better one has followed.
+            # All of them: an invalid one is reported even if a valid one has followed.
             for message, _ in subscription.take():
                 try:
                     self._fresh[k] |= read(message)

@@ -12,13 +12,13 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Standard output and error of a node, written by a process of its own that may be blocked.
+"""Standard output and error of a node, written by a separate process that may be blocked.
 
-A terminal paused by Ctrl-S, or a pipe that nobody reads, blocks whoever writes to it; a thread of
-C++ code that is blocked there with the interpreter's lock stops all others. So both streams become
-pipes that are never waited for: what does not fit is lost, and counted where possible. Another
-process, which outlives the node even if it crashes, relays what is in the pipes. As a program,
-this file is that process: python console.py DESCRIPTOR ... with what each stream is read from.
+A terminal paused by Ctrl-S, or a pipe that nobody reads, blocks its writers; a thread of C++ code
+that is blocked there with the interpreter's lock stops all others. So both streams become pipes
+that never block: what does not fit is lost, and counted where possible. Another process, which
+outlives the node even if it crashes, relays the contents of the pipes. As a program, this file is
+that process: python console.py DESCRIPTOR ... with the descriptors from which it reads.
 """
 
 import array
@@ -45,7 +45,7 @@ SIGNALS = signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT
 
 
 class _Stream(io.FileIO):
-    """A stream that loses what does not fit, instead of an error amid a print."""
+    """A stream that drops what does not fit, instead of raising an error in a print."""
 
     def __init__(self, descriptor: int, terminal: bool) -> None:
         super().__init__(descriptor, 'w', closefd=False)
@@ -66,8 +66,8 @@ class Console:
     """Standard output and error of this process, made so that writing never blocks.
 
     Attributes:
-        colored: whether log lines are to have colors: they go to a terminal, or
-            RCUTILS_COLORIZED_OUTPUT says so.
+        colored: whether log lines have colors: they go to a terminal, or
+            RCUTILS_COLORIZED_OUTPUT is set to 1.
 
     """
 
@@ -128,11 +128,11 @@ class Console:
 
     @property
     def lost(self) -> int:
-        """Lines that were lost: of logs, because there was no room; of all, for other reasons."""
+        """Number of lost lines: of the log for lack of room, of both streams for other reasons."""
         return self._lost + sum(self._shared[1:WORDS * len(self._writes):WORDS])
 
     def drain(self, patience: float) -> None:
-        """Wait until all has been relayed, for that long at most, s."""
+        """Wait until everything has been relayed, but no longer than ``patience``, s."""
         end = time.monotonic() + patience
         while self._waiting() and self._relay.poll() is None and time.monotonic() < end:
             time.sleep(0.002)
@@ -170,7 +170,7 @@ def _relay(read: int, write: int, shared: memoryview) -> None:
 
 
 def main(arguments: Sequence[str]) -> None:
-    """Relay streams: a descriptor of what is shared, then those of the pipes."""
+    """Relay streams; arguments are the descriptors of the shared memory and of the pipes."""
     for number in SIGNALS:
         signal.signal(number, signal.SIG_IGN)
     memory, *reads = map(int, arguments)

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A thread that ticks on absolute deadlines, on the steady clock or on simulated time."""
+"""A thread that ticks on absolute deadlines, by the steady clock or by simulated time."""
 
 from collections.abc import Callable
 import threading
@@ -23,12 +23,12 @@ from rclpy.clock import JumpThreshold
 from rclpy.duration import Duration
 from rclpy.node import Node
 
-#: Behind by this many periods, as after a suspended process, those are left out: a robot must not
-#: be driven through what it missed, and never gets more than two ticks at once.
+#: A ticker that is this many periods behind, as after a suspension, leaves them out: a robot must
+#: not be driven through the motion it missed, and never gets more than two ticks at once.
 STALL = 2
 #: Steps of simulated time that are no stall, s: /clock may be that coarse, or lose a message.
 COARSE = 0.05
-#: What makes up for lost time, as a simulation may, does so when behind by no more than this, s.
+#: A ticker that makes up for lost time, as a simulation may, makes up for no more than this, s.
 MOST_BEHIND = 1.0
 #: Simulated time that steps back by no more than this (messages out of order, two publishers of
 #: /clock) is waited for until it is past where it was; further back is a jump, s.
@@ -38,9 +38,10 @@ STOPPED = 0.2
 
 
 def system_offset() -> int:
-    """System time minus steady time, ns: what is read between two readings of the other.
+    """Return system time minus steady time, ns.
 
-    A thread switch in between would put its length into the offset; then it is read again.
+    It is read between two readings of the steady clock, and again if they are far apart: a thread
+    switch in between would add its length to the offset.
     """
     narrowest, offset = 1 << 62, 0
     for _ in range(5):
@@ -54,23 +55,60 @@ def system_offset() -> int:
     return offset
 
 
-class Ticker(threading.Thread):
+class TickThread(threading.Thread):
+    """A thread of ticks that counts them, and reports the exception that ends it.
+
+    Attributes:
+        rate: of the ticks, Hz.
+        ticks: ticks so far.
+        late: those that were late.
+        dropped: periods left out.
+
+    """
+
+    def __init__(self, name: str, rate: float, failed: Callable[[BaseException], None]) -> None:
+        super().__init__(name=name, daemon=True)
+        self.rate = rate
+        self.ticks = self.late = self.dropped = 0
+        self._worst, self._failed = 0.0, failed
+        self._ending = threading.Event()
+
+    @property
+    def worst(self) -> float:
+        """Longest delay of a tick since this was last read, s."""
+        worst, self._worst = self._worst, 0.0
+        return worst
+
+    def end(self) -> None:
+        """Stop after the tick under way."""
+        self._ending.set()
+
+    def run(self) -> None:
+        """Tick until ended; hand any exception to ``failed``."""
+        try:
+            self._run()
+        except BaseException as error:
+            self._failed(error)
+
+    def _run(self) -> None:
+        raise NotImplementedError
+
+
+class Ticker(TickThread):
     """Calls ``tick(dt, stamp)`` once a period, dt in s and the stamp in ns of ROS time.
 
     The deadlines stay on their grid, so the rate has no drift. A tick that is late by less than
     a period is made up for at once; after a stall the periods that have passed are left out,
-    ``resume`` is told how long it was in s, and the next tick is at the next deadline. The stamp
-    is that of the deadline. With simulated time the deadlines are instants of ``/clock``: it
-    pauses with the clock, and a jump back calls ``restart``; but after ``stop_moving`` it goes on
-    by the steady clock where ``/clock`` stands still for STOPPED s or jumps back.
+    ``resume`` gets its length in s, and the next tick is at the next deadline. The stamp is that
+    of the deadline. With simulated time the deadlines are instants of ``/clock``: the ticker
+    pauses with the clock, and a jump back calls ``restart``; but after ``stop_moving`` it
+    continues by the steady clock if ``/clock`` stands still for STOPPED s or jumps back.
 
     Attributes:
-        ticks: ticks so far.
-        late: those that began more than a period after their deadline.
+        late: ticks that began more than a period after their deadline.
         dropped: periods left out in stalls.
         jumps: of simulated time back.
-        stopping: whether the ticks do not wait for ``/clock``; set False once all is at rest.
-        worst: longest delay behind a deadline since it was last read, s.
+        stopping: whether the ticks do not wait for ``/clock``; set it False at rest.
 
     """
 
@@ -78,43 +116,32 @@ class Ticker(threading.Thread):
                  restart: Callable[[], None], failed: Callable[[BaseException], None],
                  resume: Callable[[float], None] | None = None,
                  begin: Callable[[], None] = lambda: None) -> None:
-        """Be ready to tick.
+        """Prepare to tick.
 
         Args:
             node: whose clock says whether time is simulated.
             rate: of the ticks, Hz.
             tick: called with dt and stamp.
             restart: called where simulated time jumps back.
-            failed: called with what ended the thread.
+            failed: called with the exception that ended the thread.
             resume: called after a stall; None: up to MOST_BEHIND is made up for instead.
             begin: called first thing in the thread.
 
         """
-        super().__init__(name='ticker', daemon=True)
-        self.rate = rate
-        self.ticks = self.late = self.dropped = self.jumps = 0
-        self.stopping = False
-        self._worst = 0.0
+        super().__init__('ticker', rate, failed)
+        self.jumps = 0
+        self.stopping = self._resuming = False
         self._clock: Any = node.get_clock()
-        self._tick, self._restart, self._failed = tick, restart, failed
-        self._resume, self._begin = resume, begin
-        self._resuming = False
-        self._ending = threading.Event()
+        self._tick, self._restart, self._resume, self._begin = tick, restart, resume, begin
         self._moved = threading.Event()
         threshold = JumpThreshold(min_forward=Duration(nanoseconds=1),
                                   min_backward=Duration(nanoseconds=-1))
         self._jumps = self._clock.create_jump_callback(
             threshold, post_callback=lambda _: self._moved.set())
 
-    @property
-    def worst(self) -> float:
-        """Longest delay behind a deadline since this was last read, s."""
-        worst, self._worst = self._worst, 0.0
-        return worst
-
     def end(self) -> None:
         """Stop after the tick under way."""
-        self._ending.set()
+        super().end()
         self._moved.set()
 
     def stop_moving(self) -> None:
@@ -122,24 +149,20 @@ class Ticker(threading.Thread):
         self.stopping = True
         self._moved.set()
 
-    def run(self) -> None:
-        """Tick until ended; hand any exception to ``failed``."""
-        try:
-            self._begin()
-            if self._clock.ros_time_is_active:
-                self._run_simulated()
-            else:
-                self._run_steady(time.monotonic_ns(),
-                                 lambda deadline: deadline + system_offset(), lambda: True)
-        except BaseException as error:
-            self._failed(error)
+    def _run(self) -> None:
+        self._begin()
+        if self._clock.ros_time_is_active:
+            self._run_simulated()
+        else:
+            self._run_steady(time.monotonic_ns(), lambda deadline: deadline + system_offset(),
+                             lambda: True)
 
     def _period(self) -> int:
         return round(1e9 / self.rate)
 
     def _run_steady(self, deadline: int, stamp: Callable[[int], int],
                     going: Callable[[], bool]) -> None:
-        """Tick by the steady clock from a deadline, ns, while going; stamp gives its stamp."""
+        """Tick by the steady clock while ``going``; the deadline, and its ``stamp``, in ns."""
         ending = self._ending
         while not ending.is_set() and going():
             period = self._period()
@@ -159,10 +182,10 @@ class Ticker(threading.Thread):
             self._tick(period * 1e-9, stamp(deadline))
 
     def _stalled(self, behind: int, period: int) -> tuple[int, bool]:
-        """Return how far the deadline must leap, ns, and whether its tick is left out, too.
+        """Return how far the deadline must leap, ns, and whether to leave out its tick, too.
 
-        So that no two ticks come together then; but where every sleep is longer than a stall,
-        some must come.
+        Leaving it out keeps ticks apart after a stall; but where every sleep is longer than a
+        stall, some ticks must remain.
         """
         resume = self._resume
         if resume is None:
@@ -178,7 +201,7 @@ class Ticker(threading.Thread):
         return missed * period, skip
 
     def _run_simulated(self) -> None:
-        # The last tick's stamp, the latest time, and how far that went on; 0 before the first.
+        # The last tick's stamp, the latest time, and its last step; 0 before the first.
         deadline = last = step = 0
         moved = time.monotonic()
         while not self._ending.is_set():
@@ -192,7 +215,7 @@ class Ticker(threading.Thread):
             elif self.stopping and deadline and (
                     back > JITTER * 1e9 or time.monotonic() >= moved + STOPPED):
                 deadline = self._stop_by_steady_clock(deadline)
-                # Time is taken as it comes next, wherever that is.
+                # The next time counts, whatever it is.
                 last, moved = 0, time.monotonic()
                 continue
             if now == 0 or 0 <= back <= JITTER * 1e9:
@@ -217,7 +240,7 @@ class Ticker(threading.Thread):
                 self._tick(period * 1e-9, deadline)
 
     def _stop_by_steady_clock(self, stamp: int) -> int:
-        """Tick on from a stamp, ns, until all is at rest; return the last one."""
+        """Continue the ticks from a stamp, ns, until the robot is at rest; return the last one."""
         now = time.monotonic_ns()
         ahead = stamp - now
 

@@ -20,11 +20,10 @@ from cpg_ros.motion.pattern import Pattern
 from cpg_ros.nodes.cmd_vel import CmdVel
 from cpg_ros.nodes.deadline_thread import Ticker
 from cpg_ros.nodes.feedback_switch import FeedbackSwitch
+from cpg_ros.nodes.health_publisher import Health, HealthPublisher
 from cpg_ros.nodes.log_queue import QUEUE
 from cpg_ros.nodes.other_publishers import OtherPublishers
-from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
-from rclpy.clock import Clock
-from rclpy.clock_type import ClockType
+from diagnostic_msgs.msg import DiagnosticStatus
 from rclpy.node import Node
 
 #: Time between two warnings of jumps of simulated time in the log, s.
@@ -42,12 +41,9 @@ class Diagnostics:
         self._feedback = feedback
         self._node, self._pattern, self._ticker = node, pattern, ticker
         self._others, self._cmd_vel = others, cmd_vel
-        self._publisher = node.create_publisher(DiagnosticArray, '/diagnostics', 10)
         self._before = self._counts()
         self._silent = 0
-        # On the steady clock: health is wanted when simulated time stands still, too.
-        self._clock = Clock(clock_type=ClockType.STEADY_TIME)
-        self._timer = node.create_timer(1.0, self.publish, clock=self._clock)
+        self._publisher = HealthPublisher(node, 'pattern', pattern.robot.name, self._status)
 
     def _counts(self) -> dict[str, int]:
         ticker, pattern = self._ticker, self._pattern
@@ -55,13 +51,14 @@ class Diagnostics:
                 'dropped ticks': ticker.dropped, 'jumps back of simulated time': ticker.jumps,
                 'watchdog re-seeds': pattern.faults, 'ticks held by limits': pattern.held}
 
-    def publish(self) -> None:
-        """Publish one status."""
+    def _status(self) -> Health:
+        """Return the status of the last second."""
         counts, before, pattern = self._counts(), self._before, self._pattern
         self._before = counts
         new = {key: counts[key] - before[key] for key in counts}
         program = pattern.program
         self._silent = 0 if new['ticks'] else self._silent + 1
+        misfit = self._cmd_vel.look_for_misfits() if self._cmd_vel else ''
         if new['watchdog re-seeds'] or pattern.recovering:
             level, text = DiagnosticStatus.ERROR, 'the network left its orbit and was re-seeded'
             if program.gain == 0.0:
@@ -76,6 +73,8 @@ class Diagnostics:
             level, text = DiagnosticStatus.WARN, f'nothing is published: {self._why_silent()}'
         elif 100 * new['dropped ticks'] > new['ticks']:
             level, text = DiagnosticStatus.WARN, f'{new["dropped ticks"]} ticks dropped'
+        elif misfit:
+            level, text = DiagnosticStatus.WARN, misfit
         elif self._feedback.out:
             level, text = DiagnosticStatus.WARN, f'no feedback: {self._feedback.out}'
         elif new['ticks held by limits'] and not self._feedback.active:
@@ -84,27 +83,20 @@ class Diagnostics:
             level, text = DiagnosticStatus.WARN, f'{new["late ticks"]} late ticks'
         else:
             level, text = DiagnosticStatus.OK, self._state()
-        values = {
+        values: dict[str, object] = {
             'gait': program.name, 'character': program.character, 'state': self._state(),
             'network': program.orbit.network.name,
             'frequency [Hz]': f'{program.frequency:.6g}',
             'period [model time]': f'{program.orbit.period:.8g}',
             'symmetry gain [1/model time]': f'{program.gain:.4g}',
             'rate wanted [Hz]': f'{self._ticker.rate:.6g}', 'ticks in the last second':
-            str(new['ticks']), **{key: str(value) for key, value in counts.items()},
+            new['ticks'], **counts,
             'worst delay of a tick [ms]': f'{1e3 * self._ticker.worst:.3f}',
-            'log lines dropped': str(QUEUE.dropped),
-        }
+            'log lines dropped': QUEUE.dropped}
         if self._cmd_vel:
             values['cmd_vel'] = self._cmd_vel.state
         values |= self._feedback.state(1e-9 * self._node.get_clock().now().nanoseconds)
-        status = DiagnosticStatus(
-            level=level, name=f'{self._node.get_fully_qualified_name()}: pattern', message=text,
-            hardware_id=self._pattern.robot.name,
-            values=[KeyValue(key=key, value=value) for key, value in values.items()])
-        message = DiagnosticArray(status=[status])
-        message.header.stamp = self._node.get_clock().now().to_msg()
-        self._publisher.publish(message)
+        return level, text, values
 
     def _why_anew(self, jumps: int) -> str:
         publishers = self._node.count_publishers('/clock')

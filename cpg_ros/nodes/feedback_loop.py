@@ -12,14 +12,13 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The loop through the robot: from the topics of its sensors to the pattern, at every tick."""
+"""The feedback loop: from the topics of the robot's sensors to the pattern, at every tick."""
 
 from collections.abc import Callable
 import math
 
 from cpg_ros.feedback.estimate import TOUCH
 from cpg_ros.feedback.feedback import Feedback
-from cpg_ros.feedback.gains import Gains
 from cpg_ros.feedback.gait_tables import SLOTS
 from cpg_ros.feedback.input_monitor import Fade
 from cpg_ros.feedback.kinematics import Geometry
@@ -31,43 +30,46 @@ from cpg_ros.motion.plan import GaitPlan
 from cpg_ros.nodes.sensor_input import SensorInput
 import numpy as np
 
-#: A heading that is asked for is no further ahead of the robot's than this, rad.
+#: The wanted heading is at most this far ahead of the measured one, rad.
 FURTHEST = 0.5
 #: After a share of 0, displacements are as good as 0 after this time, s.
 DIES_OUT = 0.3
-#: Contacts that go with the gait for less than this, on the mean of a stride, are of another time.
+#: Share of a stride, on average, in which the contacts must agree with the gait.
 AGREES = 0.5
 #: Wanted speeds forward and to the left, m/s, and wanted yaw rate, rad/s.
 Motion = Callable[[], tuple[float, float, float]]
 
 
 class FeedbackLoop:
-    """Corrects a pattern by what the robot feels, as long as that can be believed.
+    """Corrects a pattern by the robot's sensors, as long as they are plausible.
 
-    ``sense`` belongs to the thread of the ticks, what else there is to any.
+    Call ``sense`` from the thread of the ticks; all other methods are for any thread.
 
     Attributes:
-        gains: of the laws; may be replaced.
-        wanted: whether the feedback is to be on.
-        faults: what keeps it out, such as 'imu: no messages for 3.2 s'; empty while it is in.
-        waiting: whether an input has never come.
+        feedback: its laws, whose gains may be replaced.
+        wanted: whether the feedback is enabled.
+        faults: what interrupts it, such as 'imu: no messages for 3.2 s'; empty while it is active.
+        waiting: whether an input has never arrived.
         share: of all corrections, 0 to 1.
+        kp_scale: factor of the servos' proportional gain.
 
     """
 
-    def __init__(self, pattern: Pattern, geometry: Geometry, motion: Motion) -> None:
-        """Be ready to correct a pattern.
+    def __init__(self, pattern: Pattern, geometry: Geometry, inputs: SensorInput, motion: Motion
+                 ) -> None:
+        """Prepare to correct a pattern.
 
         Args:
             pattern: to be corrected.
             geometry: of the robot's legs.
-            motion: what is wanted.
+            inputs: the robot's sensors.
+            motion: returns the wanted motion.
 
         """
         self._pattern, self._geometry, self._motion = pattern, geometry, motion
-        self._feedback = Feedback(geometry, joints=len(pattern.robot.joints))
+        self._inputs = inputs
+        self.feedback = Feedback(geometry, joints=len(pattern.robot.joints))
         self._known: list[tuple[GaitPlan, Timetable]] = []
-        self._inputs: SensorInput | None = None
         self._least = TOUCH * geometry.weight
         self._planned = PlannedMotion(np.zeros((1, len(pattern.robot.joints))), np.zeros(1),
                                       np.zeros((1, 2), dtype=np.int64), np.zeros(1),
@@ -77,67 +79,47 @@ class FeedbackLoop:
         self.restart()
         self.learn(pattern.program)
 
-    @property
-    def gains(self) -> Gains:
-        """Gains of the laws."""
-        return self._feedback.gains
-
-    @gains.setter
-    def gains(self, gains: Gains) -> None:
-        self._feedback.gains = gains
-
     def restart(self) -> None:
-        """Begin anew, as where simulated time jumps back."""
+        """Start again, as where simulated time jumps back."""
         self._fade, self.share, self._spent = Fade(), 0.0, math.inf
-        self._dt, self._agrees, self._out = 0.0, 1.0, math.nan
-        self._feedback.reset()
-        if self._inputs is not None:
-            self._inputs.restart()
+        self._dt, self._agrees = 0.0, 1.0
+        self.feedback.reset()
+        self._inputs.restart()
         self._release()
 
     def learn(self, program: GaitPlan) -> None:
-        """Get to know a gait before it is met."""
+        """Tabulate a gait before the pattern changes to it."""
         if not any(known is program for known, _ in self._known):
-            self._feedback.learn(program)
+            self.feedback.learn(program)
             self._known = [*self._known, (program, Timetable(program, self._geometry))][-SLOTS:]
 
-    def listen(self, inputs: SensorInput) -> None:
-        """Take what the robot feels from these topics."""
-        self._inputs = inputs
-
-    @property
-    def listening(self) -> bool:
-        """Whether there are topics to listen to."""
-        return self._inputs is not None
-
     def ages(self, now: float) -> dict[str, float]:
-        """Return name -> time since the last message that could be believed, s; inf for none."""
-        return {} if self._inputs is None else {
-            monitor.name: now - monitor.believed for monitor in self._inputs.monitors}
+        """Return name -> time since the last plausible message, s; inf for none."""
+        return {monitor.name: now - monitor.believed for monitor in self._inputs.monitors}
 
     def sense(self, dt: float, now: float) -> None:
-        """Take what has arrived, and have the coming tick of dt corrected by it; s both."""
+        """Read the sensors and correct the coming tick by them; dt and now in s."""
         inputs, pattern = self._inputs, self._pattern
-        if inputs is None or (not self.wanted and self._spent > DIES_OUT):
+        if not self.wanted and self._spent > DIES_OUT:
             if pattern.correct is not None:
                 self._release()
             return
         self._dt = dt
         inputs.take(now, pattern.level > 0.0)
-        self._judge(inputs, now)
+        self._judge(now)
         self.share = self._fade.advance(self.wanted and not self.faults, dt)
         self._spent = 0.0 if self.share else self._spent + dt
         if self._spent > DIES_OUT and self.faults:
-            # Nothing is fed back: what was felt before the gap says nothing after it.
+            # Nothing is fed back: measurements from before the gap mean nothing after it.
             if pattern.correct is not None:
-                self._feedback.reset()
+                self.feedback.reset()
                 self._release()
         else:
             pattern.correct = self._correct
 
-    def _judge(self, inputs: SensorInput, now: float) -> None:
-        """Find out what keeps the feedback out."""
-        found, self.waiting = [], False
+    def _judge(self, now: float) -> None:
+        """Find out what interrupts the feedback."""
+        inputs, found, self.waiting = self._inputs, [], False
         for monitor in inputs.monitors:
             if fault := monitor.fault(now):
                 found.append(f'{monitor.name}: {fault} for {now - monitor.since:.1f} s')
@@ -159,8 +141,7 @@ class FeedbackLoop:
         self.faults = '; '.join(found)
 
     def _correct(self, angles: np.ndarray) -> np.ndarray:
-        pattern, feedback, inputs = self._pattern, self._feedback, self._inputs
-        assert inputs is not None
+        pattern, feedback, inputs = self._pattern, self.feedback, self._inputs
         planned, heading = self._planned, self._planned.heading
         planned.angles[0] = angles
         old, new, planned.mix[0] = pattern.fading
@@ -170,7 +151,7 @@ class FeedbackLoop:
         planned.velocity[0] = forward, left
         yaw = float(inputs.sensor_data.rpy[0, 2])
         if self.share and pattern.level:
-            # The heading is kept where no turn is asked for, and otherwise turns on.
+            # Without a wanted turn the heading is kept; with one it advances.
             ahead = (heading[0] + turn * self._dt - yaw + math.pi) % (2.0 * math.pi) - math.pi
             heading[0] = yaw + min(max(ahead, -FURTHEST), FURTHEST)
         else:
@@ -178,13 +159,14 @@ class FeedbackLoop:
         memory = feedback.memory
         found = feedback.advance(inputs.sensor_data, planned, self._dt, self.share, pattern.level)
         pattern.frequency_scale = float(memory.frequency_scale[0])
+        self.kp_scale = float(memory.kp_scale[0])
         if pattern.drive is not None:
             self._trim[:] = memory.stride[0]
             pattern.drive.trim = self._trim
         return found[0]
 
     def _release(self) -> None:
-        """Leave the pattern to itself."""
-        self._pattern.correct, self._pattern.frequency_scale = None, 1.0
+        """Run the pattern without corrections."""
+        self._pattern.correct, self._pattern.frequency_scale, self.kp_scale = None, 1.0, 1.0
         if self._pattern.drive is not None:
             self._pattern.drive.trim = None

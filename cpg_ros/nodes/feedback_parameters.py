@@ -19,42 +19,38 @@ from typing import Any
 
 from cpg_ros.feedback.gains import GAINS as GAIN_OF
 from cpg_ros.feedback.gains import Gains, LAWS
-from cpg_ros.nodes.parameter_spec import one_of, Spec
+from cpg_ros.nodes.parameter_spec import fixed, one_of, Spec
 from cpg_ros.nodes.sensor_input import CONTACTS
 
 PREFIX = 'feedback.'
 #: The switch, which has been PREFIX without its dot: no name is the beginning of another, or
 #: ``ros2 param dump`` could not nest them.
 ENABLED, FORMER = f'{PREFIX}enabled', PREFIX.rstrip('.')
-#: Where it cannot be, it is off unless asked for.
+#: Its default is false where the feedback cannot be on.
 SWITCH = Spec(True, "correct the gait by the robot's sensors; false by default if the robot file "
               'is not calibrated, or if the generator itself publishes the topic joint_states '
               'that it would measure from')
 
 #: Topics, read when the feedback is first switched on.
-TOPICS = {
+TOPICS = fixed({
     f'{PREFIX}imu_topic': Spec('imu', "topic of the robot's sensor_msgs/Imu, which must have an "
-                               'orientation',
-                               read_only=True),
+                               'orientation'),
     f'{PREFIX}joint_states_topic': Spec('joint_states', "topic of the robot's measured "
-                                        'sensor_msgs/JointState, which must have velocities',
-                                        read_only=True),
+                                        'sensor_msgs/JointState, which must have velocities'),
     f'{PREFIX}contacts': Spec('foot_contacts', 'source of the loads on the feet: one message '
                               'with all of them, a geometry_msgs/WrenchStamped for each leg, or '
-                              'the efforts of the measured joints', read_only=True,
-                              constraints=one_of(CONTACTS)),
+                              'the efforts of the measured joints', constraints=one_of(CONTACTS)),
     f'{PREFIX}contacts_topic': Spec('foot_contacts', 'topic of the std_msgs/Float64MultiArray '
                                     'with the loads on the feet in N; with wrenches, the name of '
-                                    "each leg's own topic, as in lh/foot_contacts",
-                                    read_only=True)}
+                                    "each leg's own topic, as in lh/foot_contacts")})
 #: Switches of the laws and gains, all of which can be set at any time.
 GAINS = {**{f'{PREFIX}{law.name}': Spec(law.on, law.text) for law in LAWS},
          **{f'{PREFIX}{name}': Spec(gain.default, f'{gain.text} [{gain.unit}]' if gain.unit
-                                    else gain.text, 0.0, gain.high)
+                                    else gain.text, gain.low, gain.high)
             for name, gain in GAIN_OF.items()}}
 SPECS = {**TOPICS, **GAINS}
 
 
 def gains(value: Callable[[str], Any]) -> Gains:
-    """Return the gains that the parameters have by name."""
-    return Gains(*(value(f'{PREFIX}{name}') for name in Gains._fields))
+    """Return the gains; ``value`` returns that of a parameter, by its name behind PREFIX."""
+    return Gains(*map(value, Gains._fields))

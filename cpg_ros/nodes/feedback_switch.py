@@ -12,21 +12,23 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Whether the feedback can be on, and on or off as the parameters say."""
+"""Switches the feedback of a generator on and off, as its parameters say."""
 
 from collections.abc import Sequence
 from dataclasses import replace
-import time
 from typing import Any
 
 from cpg_ros.feedback.kinematics import geometry_of
-from cpg_ros.feedback.precompile import precompile
+from cpg_ros.feedback.warm_up import warm_up
 from cpg_ros.motion.pattern import Pattern
 from cpg_ros.motion.plan import GaitPlan
-from cpg_ros.motion.steering import Drive
+from cpg_ros.motion.strides import Drive
 from cpg_ros.nodes import feedback_parameters
 from cpg_ros.nodes.feedback_loop import FeedbackLoop, Motion
 from cpg_ros.nodes.feedback_parameters import ENABLED, PREFIX
+from cpg_ros.nodes.kernels import announced, FEEDBACK
+from cpg_ros.nodes.kp_scale import KpScalePublisher
+from cpg_ros.nodes.node_base import StartError
 from cpg_ros.nodes.parameter_spec import Spec
 from cpg_ros.nodes.sensor_input import SensorInput
 from cpg_ros.robots.robot import Robot
@@ -34,7 +36,7 @@ from rclpy.parameter import Parameter
 
 
 def uncalibrated(robot: Robot) -> str:
-    """Say what a robot file has not that feedback needs, or ''."""
+    """Return what feedback needs and a robot file lacks, or ''."""
     if robot.geometry is None:
         return f"robot file '{robot.name}' has no geometry of the legs (part geometry)"
     if all(motion.efference is None for motion in robot.motions.values()):
@@ -43,7 +45,7 @@ def uncalibrated(robot: Robot) -> str:
 
 
 def shortfalls(robot: Robot) -> list[str]:
-    """Say which legs get only some of the corrections, a line each."""
+    """Return a line for each leg that gets only some of the corrections."""
     known = robot.geometry.legs if robot.geometry is not None else {}
     return [f'feedback moves the leg {leg} forward and up only: it has no hip that abducts'
             if leg in known else
@@ -52,7 +54,7 @@ def shortfalls(robot: Robot) -> list[str]:
 
 
 def usual(node: Any, robot: Robot, combined: str) -> Spec:
-    """Return the switch, on if nothing is in the way.
+    """Return the parameter that enables the feedback, by default true where nothing prevents it.
 
     Args:
         node: that has declared the feedback's topics.
@@ -74,23 +76,29 @@ class FeedbackSwitch:
     """
 
     def __init__(self, node: Any, pattern: Pattern, motion: Motion, own: Sequence[str]) -> None:
-        """Look at the parameters that a node has declared.
+        """Switch the feedback on if the node's parameters say so.
 
         Args:
             node: a StartedNode.
             pattern: to be corrected.
-            motion: what is wanted of the robot.
+            motion: returns the wanted motion of the robot.
             own: topics that the node publishes itself, resolved.
+
+        Raises:
+            StartError: the feedback is enabled, and cannot be on.
 
         """
         self._node, self._pattern, self._motion, self._own = node, pattern, motion, own
         self.loop: FeedbackLoop | None = None
+        if refusal := self.judge([node.get_parameter(ENABLED)]):
+            raise StartError(refusal)
+        self.apply()
 
     def _value(self, name: str) -> Any:
         return self._node.get_parameter(PREFIX + name).value
 
     def obstacle(self) -> str:
-        """Say why it cannot be on, or ''."""
+        """Return why the feedback cannot be on, or ''."""
         if missing := uncalibrated(self._pattern.robot):
             return missing
         topic = self._node.resolve_topic_name(self._value('joint_states_topic'))
@@ -100,65 +108,66 @@ class FeedbackSwitch:
         return ''
 
     def judge(self, parameters: Sequence[Parameter]) -> str:
-        """Say why a batch of changes cannot be, or ''."""
+        """Return why a batch of changes is rejected, or ''."""
         switched_on = any(one.name == ENABLED and one.value is True for one in parameters)
         obstacle = self.obstacle() if switched_on else ''
         return f'no feedback: {obstacle}' if obstacle else ''
 
     def apply(self) -> None:
-        """Do as the parameters say."""
+        """Apply the parameters."""
         wanted = self._node.get_parameter(ENABLED).value and not self.obstacle()
         if wanted and self.loop is None:
             robot, pattern = self._pattern.robot, self._pattern
-            began, geometry = time.monotonic(), geometry_of(robot)
-            precompile(geometry, len(robot.joints))
-            if time.monotonic() - began > 1.0:
-                self._node.get_logger().info('the feedback was compiled in '
-                                             f'{time.monotonic() - began:.1f} s')
-            loop = FeedbackLoop(pattern, geometry, self._motion)
-            loop.listen(SensorInput(
-                self._node, robot, geometry, self._value('imu_topic'),
-                self._value('joint_states_topic'), self._value('contacts'),
-                self._value('contacts_topic')))
+            geometry = geometry_of(robot)
+            with announced(self._node, 'the feedback', FEEDBACK):
+                warm_up(geometry, len(robot.joints))
+            inputs = SensorInput(self._node, robot, geometry, *map(self._value, (
+                'imu_topic', 'joint_states_topic', 'contacts', 'contacts_topic')))
+            loop = FeedbackLoop(pattern, geometry, inputs, self._motion)
             if pattern.drive is None:
                 # Speed and heading are closed by the strides.
                 pattern.attach(Drive(len(robot.legs)))
             for line in shortfalls(robot):
                 self._node.get_logger().warning(line)
+            self._kp_scale = KpScalePublisher(self._node)
             self.loop = loop
         if self.loop is not None:
-            self.loop.gains = feedback_parameters.gains(
-                lambda name: self._node.get_parameter(name).value)
+            self.loop.feedback.gains = feedback_parameters.gains(self._value)
             self.loop.wanted = wanted
 
     def learn(self, program: GaitPlan) -> None:
-        """Get to know a gait before it is met."""
+        """Tabulate a gait before the pattern changes to it."""
         if self.loop is not None:
             self.loop.learn(program)
 
     def sense(self, dt: float, stamp: int) -> None:
-        """Have the coming tick of dt in s, stamped in ns, corrected by what is felt."""
+        """Correct the coming tick by the sensors; dt in s, stamp in ns."""
         if self.loop is not None:
             self.loop.sense(dt, 1e-9 * stamp)
 
+    def publish(self, dt: float) -> None:
+        """Publish the factor of the servos' gains if it is time; dt since the last call, s."""
+        if self.loop is not None:
+            self._kp_scale.publish(dt, self.loop.kp_scale)
+
     def restart(self) -> None:
-        """Begin anew, as where simulated time jumps back."""
+        """Start again, as where simulated time jumps back."""
         if self.loop is not None:
             self.loop.restart()
 
     @property
     def active(self) -> bool:
-        """Whether it corrects the gait now."""
+        """Whether the gait is being corrected."""
         return self.loop is not None and self.loop.share > 0.0
 
     @property
     def out(self) -> str:
-        """What keeps it out though it has been in, or ''."""
+        """What interrupts feedback that has been active, or ''."""
         loop = self.loop
         return loop.faults if loop is not None and loop.wanted and not loop.waiting else ''
 
     def state(self, now: float) -> dict[str, str]:
-        """Return what to tell of it; now in s."""
+        """Return its state and the ages of its inputs, for /diagnostics; now in s."""
         loop = self.loop
         if loop is None or not loop.wanted:
             text = 'off'

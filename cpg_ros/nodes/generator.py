@@ -20,11 +20,9 @@ import time
 
 from cpg_ros.motion.pattern import Pattern
 from cpg_ros.motion.plan import PlanError
-from cpg_ros.motion.steering import Drive
-from cpg_ros.networks.preset_files import PresetError
+from cpg_ros.motion.strides import Drive
 from cpg_ros.networks.registry import find_network, NetworkError
 from cpg_ros.nodes import feedback_parameters
-from cpg_ros.nodes.cells_publisher import CellsPublisher
 from cpg_ros.nodes.cmd_vel import CmdVel
 from cpg_ros.nodes.deadline_thread import Ticker
 from cpg_ros.nodes.diagnostics import Diagnostics
@@ -40,19 +38,18 @@ from cpg_ros.nodes.generator_parameters import (
     presets_of,
     specs,
 )
-from cpg_ros.nodes.joint_publishers import Outputs
+from cpg_ros.nodes.joint_publishers import CellsPublisher, Outputs
 from cpg_ros.nodes.kernels import compile_kernels
 from cpg_ros.nodes.measured_pose import MeasuredPose
-from cpg_ros.nodes.node_base import help_or_error, run, StartedNode, StartError
+from cpg_ros.nodes.node_base import run, StartedNode, StartError
 from cpg_ros.nodes.other_publishers import OtherPublishers
-from cpg_ros.nodes.qos_profiles import latched
-from cpg_ros.nodes.real_time import NoSuchCore, RealTime, SPECS
+from cpg_ros.nodes.qos_profiles import latched, OVERRIDABLE
+from cpg_ros.nodes.real_time import RealTime, SPECS
 from cpg_ros.nodes.sensor_input import CONTACTS
 from cpg_ros.robots.robot import Robot
-from cpg_ros.robots.robot_file import load_robot, RobotError
+from cpg_ros.robots.robot_file import load_robot
 from rcl_interfaces.msg import ParameterType, SetParametersResult
 from rclpy.parameter import Parameter
-from rclpy.qos_overriding_options import QoSOverridingOptions
 from std_msgs.msg import String
 from std_srvs.srv import SetBool
 
@@ -68,10 +65,10 @@ class Generator(StartedNode):
     """Parameters, topics and services around one moving pattern."""
 
     def __init__(self) -> None:
-        """Declare everything, check it, and be ready to start.
+        """Declare the parameters, check them, and prepare to start.
 
         Raises:
-            StartError: a parameter or the robot file cannot be used.
+            CpgError: a parameter or the robot file cannot be used.
 
         """
         super().__init__(NAME)
@@ -79,47 +76,35 @@ class Generator(StartedNode):
         given = {name: one.value for name, one in self._parameter_overrides.items()}
         self._parameter_overrides['network'] = Parameter('network', value=network_for(
             given.get('network', NETWORK.default), given.get('robot')))
-        self._declare('network', NETWORK)
+        self._declare({'network': NETWORK})
         try:
             network = find_network(self._value('network'))
         except NetworkError as error:
             raise StartError(f'network {error}') from error
-        compile_kernels(self._value('network'), self.get_logger())
-        for name, spec in specs(network).items():
-            self._declare(name, spec)
-        self._declare('exclusive', exclusive(self._value('command')))
-        try:
-            presets = presets_of(network, self._value('presets'))
-        except PresetError as error:
-            raise StartError(str(error)) from error
+        compile_kernels(self._value('network'), self)
+        self._declare(specs(network))
+        self._declare({'exclusive': exclusive(self._value('command'))})
+        presets = presets_of(network, self._value('presets'))
         self._one_of('gait', tuple(presets))
-        # Its descriptor lists those of the file, too.
-        descriptor = gait_spec(network, presets).descriptor()
-        descriptor.type = ParameterType.PARAMETER_STRING
-        self.set_descriptor('gait', descriptor)
         self._one_of('command', COMMANDS)
-        try:
-            robot = load_robot(self._value('robot'))
-        except RobotError as error:
-            raise StartError(str(error)) from error
+        robot = load_robot(self._value('robot'))
         if network.name not in robot.networks:
             raise StartError(f"robot file '{robot.name}' is for the network "
                              f"{' or '.join(robot.networks)}, not '{network.name}'")
         self._planner = Planner(network, presets, robot, self._value('cmd_vel'))
-        for name, spec in feedback_parameters.SPECS.items():
-            self._declare(name, spec)
+        # Its descriptor lists those of the file, too.
+        descriptor = gait_spec(network, self._planner.offered).descriptor()
+        descriptor.type = ParameterType.PARAMETER_STRING
+        self.set_descriptor('gait', descriptor)
+        self._declare(feedback_parameters.SPECS)
         if FORMER in self._parameter_overrides:
             raise StartError(f"there is no parameter '{FORMER}': it is '{ENABLED}'")
-        self._declare(ENABLED, usual(self, robot, self._value('combined_topic')))
+        self._declare({ENABLED: usual(self, robot, self._value('combined_topic'))})
         self._one_of('feedback.contacts', CONTACTS)
         for parameter in self._planner.given(self._value('gait'), self._parameter_overrides):
             self._parameter_overrides[parameter.name] = parameter
-        for name, spec in self._planner.specs(self._value('gait')).items():
-            self._declare(name, spec)
-        try:
-            program = self._planner.plan(self._values())
-        except PlanError as error:
-            raise StartError(str(error)) from error
+        self._declare(self._planner.specs(self._value('gait')))
+        program = self._planner.plan(self._values())
         self._planner.prepare()
 
         steered, autostart = self._value('cmd_vel'), self._value('autostart')
@@ -129,22 +114,15 @@ class Generator(StartedNode):
                                lambda: self._value('cmd_vel_timeout'),
                                lambda: self._value('ramp'),
                                lambda: self._feedback.active) if steered else None
-        try:
-            self._outputs = Outputs(self, robot, self._value('combined_topic'),
-                                    self._value('command'))
-        except ValueError as error:
-            raise StartError(str(error)) from error
-        self._feedback = self._switched()
+        self._outputs = Outputs(self, robot, self._value('combined_topic'),
+                                self._value('command'))
+        self._feedback = FeedbackSwitch(self, self.pattern, self._motion, self._outputs.topics)
         self._cells = CellsPublisher(self, network)
         self._measured = self._measured_pose(robot)
-        self._gait = self.create_publisher(
-            String, '~/gait', latched(),
-            qos_overriding_options=QoSOverridingOptions.with_default_policies())
+        self._gait = self.create_publisher(String, '~/gait', latched(),
+                                           qos_overriding_options=OVERRIDABLE)
         self.create_service(SetBool, '~/enable', self._enable)
-        try:
-            real_time = RealTime.of(*map(self._value, SPECS))
-        except NoSuchCore as error:
-            raise StartError(str(error)) from error
+        real_time = RealTime.of(*map(self._value, SPECS))
         self.ticker = Ticker(self, self._value('rate'), self._tick, self._restart, self._fail,
                              self.pattern.resume, partial(real_time.request, self.get_logger()))
         self._others = OtherPublishers(self, self._outputs.topics)
@@ -168,7 +146,7 @@ class Generator(StartedNode):
         return self._planner.complete(super()._complete(parameters), self._values())
 
     def _judge(self, parameters: list[Parameter]) -> SetParametersResult:
-        """Say whether a batch can run as a whole; changes nothing."""
+        """Return whether a batch can run as a whole; change nothing."""
         if any(p.name in self._planner.names for p in parameters):
             try:
                 self._planner.plan(self._values(parameters))
@@ -178,7 +156,7 @@ class Generator(StartedNode):
         return SetParametersResult(successful=not reason, reason=reason)
 
     def _apply(self, parameters: list[Parameter]) -> None:
-        """Act on a batch that has been accepted and stored."""
+        """Apply a batch that has been accepted and stored."""
         for parameter in parameters:
             if parameter.name == 'rate':
                 self.ticker.rate = parameter.value
@@ -195,9 +173,9 @@ class Generator(StartedNode):
     def _announce(self) -> None:
         program = self._planner.plan(self._values())
         self._gait.publish(String(data=program.name))
-        self.get_logger().info(f'{program.name} at {program.frequency:.4g} Hz, period '
-                               f'{program.orbit.period:.6f} model time, symmetry gain '
-                               f'{program.gain:.3g}')
+        self.get_logger().info(f'{program.name} at {program.frequency:.4g} Hz')
+        self.get_logger().debug(f'period {program.orbit.period:.6f} model time, symmetry gain '
+                                f'{program.gain:.3g}')
         enough = program.stability.enough
         if program.gain < enough:
             self.get_logger().warning(
@@ -205,20 +183,6 @@ class Generator(StartedNode):
                 f'({enough:.3g} is enough): the watchdog may have to put it back again and again')
 
     # -- the robot ------------------------------------------------------------------------
-
-    def _switched(self) -> FeedbackSwitch:
-        """Return the feedback, on if it is wanted.
-
-        Raises:
-            StartError: it is asked for, and cannot be.
-
-        """
-        switch = FeedbackSwitch(self, self.pattern, self._motion, self._outputs.topics)
-        obstacle = switch.obstacle()
-        if obstacle and self._value(ENABLED):
-            raise StartError(f'no feedback: {obstacle}')
-        switch.apply()
-        return switch
 
     def _motion(self) -> tuple[float, float, float]:
         """Return the speeds forward and to the left, m/s, and the yaw rate, rad/s, wanted."""
@@ -233,7 +197,7 @@ class Generator(StartedNode):
         return MeasuredPose(self, robot, topic)
 
     def _lead_to_the_stand(self) -> str:
-        """Begin where the joints are, if that is known; return where that is."""
+        """Start from the measured pose, if it is known; return the name of the pose."""
         try:
             pose = self._measured.take() if self._measured else None
         except ValueError as error:
@@ -275,12 +239,13 @@ class Generator(StartedNode):
         self.pattern.advance(dt)
         self._outputs.publish(stamp, dt, self.pattern.position, self.pattern.velocity,
                               self.pattern.phases)
+        self._feedback.publish(dt)
         self._cells.publish(dt, self.pattern.state)
         if self.ticker.stopping and self.pattern.standing:
             self.ticker.stopping = False
 
     def _restart(self) -> None:
-        """Begin anew where simulated time jumped back; diagnostics warn, not the ticks' thread."""
+        """Start again where simulated time jumped back, which the diagnostics log."""
         ramp = self._value('ramp')
         # At the end there is no time for a longer one.
         self.pattern.restart(min(ramp, LAST_RAMP) if self.stop.is_set() else ramp,
@@ -288,7 +253,7 @@ class Generator(StartedNode):
         self._feedback.restart()
 
     def begin(self) -> None:
-        """Start publishing, or wait for being enabled."""
+        """Start publishing, unless that waits for ~/enable."""
         self._announce()
         names = len(self.pattern.robot.joints)
         at = f"{names} joints of '{self.pattern.robot.name}' at {self.ticker.rate:g} Hz"
@@ -319,10 +284,9 @@ def main(args: list[str] | None = None) -> int:
     """Run the node until a signal ends it; return the exit code."""
     known = {'network': NETWORK, **specs(find_network(NETWORK.default)),
              ENABLED: feedback_parameters.SWITCH, **feedback_parameters.TOPICS}
-    code = help_or_error('generator', 'Publishes the joint states of a gait; the parameters of '
-                         "the networks and the feedback's gains are listed by ros2 param "
-                         'describe.', known, args)
-    return run(Generator, NAME, args) if code is None else code
+    return run(Generator, NAME, 'Publishes the joint states of a gait; the parameters of the '
+               "networks and the feedback's gains are listed by ros2 param describe.", known, args,
+               'generator')
 
 
 if __name__ == '__main__':

@@ -12,9 +12,9 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The generator's parameters: descriptors, presets, and what a batch of changes asks for."""
+"""The generator's parameters: descriptors, presets, and the gait of a batch of changes."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 import contextlib
 from dataclasses import dataclass
 import functools
@@ -28,7 +28,7 @@ from cpg_ros.networks.network import Network, Preset
 from cpg_ros.networks.preset_files import read_presets
 from cpg_ros.networks.registry import find_network, NETWORKS, with_legs_of
 from cpg_ros.nodes import real_time
-from cpg_ros.nodes.parameter_spec import as_doubles, one_of, Spec
+from cpg_ros.nodes.parameter_spec import as_doubles, one_of, PRESETS, Spec
 from cpg_ros.robots.robot import Robot
 from cpg_ros.robots.robot_file import load_robot
 from rclpy.parameter import Parameter
@@ -69,15 +69,18 @@ def specs(network: type[Network]) -> dict[str, Spec]:
                           '~/enable is called', read_only=True),
         'cmd_vel': Spec(False, 'follow the commands on cmd_vel; the robot file must have steering '
                         'tables', read_only=True),
+        'stamped_cmd_vel': Spec(False, "type of cmd_vel: geometry_msgs/TwistStamped, as Jazzy's "
+                                'navigation and controllers send it, in place of '
+                                'geometry_msgs/Twist', read_only=True),
         'cmd_vel_timeout': Spec(0.5, 'the robot stops if no cmd_vel arrives for this time [s]',
                                 0.05, 60.0),
         **real_time.SPECS}
 
 
 def network_for(network: Any, robot: Any) -> Any:
-    """Return the name of a network's like for a robot's legs, where its file is for that one.
+    """Return the variant of a network for a robot's legs, if the robot file asks for that one.
 
-    What cannot be found is told when it is looked for.
+    A network or robot that cannot be found is reported when it is loaded.
     """
     if not (isinstance(network, str) and isinstance(robot, str)):
         return network
@@ -99,10 +102,13 @@ def presets_of(network: type[Network], path: str) -> dict[str, Preset]:
     return network.presets() | (read_presets(Path(path).expanduser(), network) if path else {})
 
 
-def gait_spec(network: type[Network], presets: Iterable[str], further: str = '') -> Spec:
-    """Return the parameter that is one of these presets, or of some further ones."""
+def gait_spec(network: type[Network], presets: Mapping[str, Preset], further: str = '') -> Spec:
+    """Return the parameter that names one of these presets; ``further`` is added to their list."""
+    gaits = [name for name, preset in presets.items() if name == preset.gait]
+    others = [name for name in presets if name not in gaits]
+    more = f'{PRESETS}{", ".join(others)}' if others else ''
     return Spec(network.usual_gait, 'gait; setting it loads its preset of network parameters',
-                constraints=one_of(presets, further))
+                constraints=one_of(gaits, more + further))
 
 
 def exclusive(command: str) -> Spec:
@@ -113,7 +119,7 @@ def exclusive(command: str) -> Spec:
 
 @dataclass(frozen=True)
 class GaitSettings:
-    """What a program is planned from; hashable, so that a plan is made once."""
+    """What a plan is made from; hashable, so that each plan is made once."""
 
     gait: str
     network: Network
@@ -124,12 +130,12 @@ class GaitSettings:
 
 
 class Planner:
-    """Turns parameters into programs for one network and one robot.
+    """Turns parameters into plans for one network and one robot.
 
     Attributes:
         network: whose parameters.
         presets: name -> preset, all that ``gait`` can be set to.
-        robot: which the programs are for.
+        robot: which the plans are for.
         steered: whether only gaits that the robot file says how to steer can run.
         names: of the parameters that make up the settings.
 
@@ -143,10 +149,16 @@ class Planner:
                       *(f'{network.name}.{key}' for key in network.parameters()))
         self.program = functools.lru_cache(maxsize=32)(self._program)
 
+    @property
+    def offered(self) -> dict[str, Preset]:
+        """The presets that can run: of a steered robot those that it knows how to steer."""
+        return {name: preset for name, preset in self.presets.items() if not self.steered
+                or self.robot.motion(name, preset.gait).steering is not None}
+
     def prepare(self) -> None:
-        """Solve every preset's gait ahead, so that a switch to it is answered at once."""
+        """Solve every preset's gait ahead, so that a change to it is immediate."""
         for preset in self.presets.values():
-            # What cannot run is refused when it is asked for, with the reason.
+            # A gait that cannot run is rejected, with the reason, when it is set.
             with contextlib.suppress(CpgError):
                 gait_of(preset, preset.network)
 
@@ -168,7 +180,7 @@ class Planner:
         return found
 
     def given(self, gait: str, overrides: Mapping[str, Parameter]) -> list[Parameter]:
-        """Return what is given at start for a gait's specs, a group's value for each member."""
+        """Return the overrides of a gait's parameters, completed as by ``complete``."""
         names, network = set(self.specs(gait)), self.presets[gait].network
         current = {f'{network.name}.{key}': value for key, value in network.as_dict().items()}
         return self.complete(as_doubles([one for one in overrides.values() if one.name in names],
@@ -188,7 +200,7 @@ class Planner:
         """Build settings from all parameters by name.
 
         Raises:
-            Refused: a value of the wrong kind, not finite, or an unknown gait.
+            PlanError: a value of the wrong kind, not finite, or an unknown gait.
 
         """
         for name in self.names:
@@ -206,10 +218,10 @@ class Planner:
                             gain, values['duty'])
 
     def plan(self, values: dict[str, Any]) -> GaitPlan:
-        """Work out the program that all parameters, by name, ask for.
+        """Return the plan for all parameters, by name.
 
         Raises:
-            Refused: it cannot be run.
+            PlanError: it cannot run.
 
         """
         program = self.program(self.settings(values))
@@ -226,22 +238,21 @@ class Planner:
                     settings.duty)
 
     def complete(self, parameters: list[Parameter], current: dict[str, Any]) -> list[Parameter]:
-        """Add to a batch what follows from it.
+        """Add to a batch the changes that follow from it.
 
         The gait's preset, the frequency that the robot file has for it, its own duty, then what a
         group sets, then the means of the groups; single parameters in the batch win over all of
-        them. An unknown gait adds nothing; it is refused later.
+        them. An unknown gait adds nothing; it is rejected later.
         """
         prefix = f'{self.network.name}.'
         given = {p.name: p.value for p in parameters}
         gait = given.get('gait')
-        preset = self.presets.get(gait) if isinstance(gait, str) else None
-        wanted: dict[str, float] = {} if preset is None else {
-            prefix + key: value for key, value in preset.network.as_dict().items()}
-        frequency = None if preset is None else self._frequency(str(gait))
-        if frequency is not None:
-            wanted['frequency'] = frequency
-        if preset is not None:
+        wanted: dict[str, float] = {}
+        if isinstance(gait, str) and gait in self.presets:
+            loaded = self.presets[gait].network.as_dict()
+            wanted = {prefix + key: value for key, value in loaded.items()}
+            if (frequency := self._frequency(gait)) is not None:
+                wanted['frequency'] = frequency
             wanted['duty'] = 0.0
         for group, members in self.network.groups.items():
             if isinstance(given.get(prefix + group), float):

@@ -12,9 +12,9 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The node ``cpg_inversion``: listens to joint states, and fits them when it is asked to.
+"""The node ``cpg_inversion``: records joint states, and fits them on request.
 
-One thread listens and answers; a fit runs in a thread of its own, while more comes in.
+One thread records and responds; a fit runs in a thread of its own meanwhile.
 """
 
 import asyncio
@@ -30,20 +30,20 @@ from cpg_ros.files.plain_text import finite
 from cpg_ros.inversion.parameter_files import write_fitted
 from cpg_ros.inversion.recording_fit import fit_recording, RecordingFit
 from cpg_ros.networks.registry import is_path
-from cpg_ros.nodes import node_base as starting
+from cpg_ros.nodes import node_base
 from cpg_ros.nodes.node_base import StartedNode, StartError
 from cpg_ros.nodes.node_client import CallError, NodeClient, ServiceClients
 from cpg_ros.nodes.parameter_spec import Spec
-from cpg_ros.nodes.qos_profiles import best_effort, latched
+from cpg_ros.nodes.qos_profiles import best_effort, latched, OVERRIDABLE
 from cpg_ros.recordings.live_buffer import Live
 from cpg_ros.recordings.servo import Servo
 from cpg_ros.robots.robot import Robot
 from cpg_ros.robots.robot_file import load_robot
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.callback_groups import ReentrantCallbackGroup
-from rclpy.exceptions import NameValidationException, ParameterException
+from rclpy.exceptions import NameValidationException
+from rclpy.impl.logging_severity import LoggingSeverity
 from rclpy.parameter import Parameter
-from rclpy.qos_overriding_options import QoSOverridingOptions
 from rclpy.task import Future
 from rclpy.timer import Timer
 from rclpy.validate_topic_name import validate_topic_name
@@ -85,8 +85,7 @@ class Inversion(StartedNode):
 
     def __init__(self) -> None:
         super().__init__(NAME)
-        for name, spec in SPECS.items():
-            self._declare(name, spec)
+        self._declare(SPECS)
         name = self._value('robot')
         self._robot: Robot | None = load_robot(name) if name else None
         if not self.get_parameter_or('topics').value:
@@ -96,10 +95,10 @@ class Inversion(StartedNode):
         topics = tuple(self.resolve_topic_name(topic) for topic in self._value('topics'))
         self._live = Live(topics, self._value('window'))
         for topic in topics:
-            # A reader may fall behind while it fits.
+            # The subscription may fall behind during a fit.
             self.create_subscription(
                 JointState, topic, partial(self._hear, topic), best_effort(2000), raw=True,
-                qos_overriding_options=QoSOverridingOptions.with_default_policies())
+                qos_overriding_options=OVERRIDABLE)
         self._result = self.create_publisher(String, '~/result', latched())
         # Another request is answered while one waits for its fit.
         self._group = ReentrantCallbackGroup()
@@ -114,7 +113,7 @@ class Inversion(StartedNode):
         self.get_logger().info(f'listening to {", ".join(topics)}; call ~/fit')
 
     def _allowed(self, parameters: list[Parameter]) -> SetParametersResult:
-        """Refuse to run a Python file that somebody on the graph names; the user may at start."""
+        """Reject a Python file named over the graph; only the user may name one, at the start."""
         refused = any(one.name == 'network' and isinstance(one.value, str) and is_path(one.value)
                       and one.value != self._network for one in parameters)
         return SetParametersResult(successful=not refused, reason=(
@@ -151,27 +150,23 @@ class Inversion(StartedNode):
         return response
 
     async def _done(self) -> tuple[bool, str]:
-        """Fit in a thread; tell whether it went well, and what."""
+        """Fit in a thread; return whether it succeeded, and a summary or the reason."""
         self._busy = True
         try:
             heard, work = self._live.copy(), Future(executor=self.executor)
-            # The executor asks those that wait only when something wakes it, and where no more
-            # joint states come in nothing else would: a callback does.
+            # The executor resumes coroutines only when something wakes it, and without further
+            # joint states nothing else would: a callback does.
             work.add_done_callback(lambda _: None)
             self.thread = threading.Thread(target=self._work, args=(heard, work), daemon=True)
             self.thread.start()
             well, message = await work
         finally:
             self._busy = False
-        # The logger tells its callers by their lines, and wants one severity of each.
-        if well:
-            self.get_logger().info(message)
-        else:
-            self.get_logger().warning(message)
+        self.get_logger().log(message, LoggingSeverity.INFO if well else LoggingSeverity.WARN)
         return well, message
 
     def _work(self, heard: Live, work: Future) -> None:
-        """Fit, write, publish and apply; the outcome is whether it went well, and what to say."""
+        """Fit, write, publish and apply; set success and message as the result of ``work``."""
         try:
             free = tuple(name for name in self._value('free') if name)
             robot = self._robot
@@ -179,7 +174,8 @@ class Inversion(StartedNode):
             kp, kd = self._value('kp'), self._value('kd')
             recording = heard.recording(names, True, Servo(kp, kd) if kp else None)
             found = fit_recording(recording, robot, self._value('network'), self._value('gait'),
-                                  free, self._value('order'), self._value('preset'))
+                                  free=free, order=self._value('order'),
+                                  preset=self._value('preset'))
             message = '; '.join([_summary(found), *self._written(found)])
             self._result.publish(String(data=json.dumps(finite(found.as_dict()))))
             well, applied = self._applied(self._value('apply_to'), found)
@@ -204,7 +200,7 @@ class Inversion(StartedNode):
         return [f'written: {", ".join(map(str, written))}'] if written else []
 
     def _applied(self, target: str, found: RecordingFit) -> tuple[bool, str]:
-        """Set a running generator, if there is a target; return whether it is set, and so."""
+        """Set the parameters of the target, if there is one; return success and what to add."""
         if not target:
             return True, ''
         network, services = found.fit.network, ServiceClients(self)
@@ -216,26 +212,23 @@ class Inversion(StartedNode):
             return False, f'; not applied to {target}: {" ".join(str(error).split())}'
         finally:
             services.forget(target)
-        return True, f'; applied to {target}'
+        # The readout is the robot file's, which a generator reads once.
+        written = self._value('out')
+        return True, (f'; applied to {target}: gait, frequency and network, not the readout; to '
+                      'move as recorded, ' + (f'start it with --params-file {written}' if written
+                      else "set 'out' and start it with the file written there"))
 
 
 def _summary(found: RecordingFit) -> str:
     fit = found.fit
     values = ', '.join(f'{name} {one.value:.4g} +- {one.stderr:.2g}'
                        for name, one in fit.parameters.items())
-    return (f'{fit.gait} at {found.stride.frequency:.4f} Hz, {values}, mean RMS error '
+    named = found.stride.verdict if len(found.stride.alike) > 1 else fit.gait
+    return (f'{named} at {found.stride.frequency:.4f} Hz, {values}, mean RMS error '
             f'{100 * fit.mean_rms_share:.1f} % of range')
-
-
-def _started() -> Inversion:
-    try:
-        return Inversion()
-    except (CpgError, ParameterException, NameValidationException) as error:
-        raise StartError(' '.join(str(error).split())) from error
 
 
 def run(args: list[str] | None = None) -> int:
     """Run the node until a signal ends it; return the exit code."""
-    code = starting.help_or_error('inversion', 'Fits the joint states that it hears.', SPECS,
-                                  args)
-    return starting.run(_started, NAME, args) if code is None else code
+    return node_base.run(Inversion, NAME, 'Fits the joint states that it hears.', SPECS, args,
+                         'inversion')

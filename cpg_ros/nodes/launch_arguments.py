@@ -35,7 +35,7 @@ RENAMED = {'feedback': 'feedback.enabled'}
 
 
 def declared(arguments: Arguments) -> list[DeclareLaunchArgument]:
-    """Return the arguments, and those that every launch file has."""
+    """Return the actions that declare the arguments, and those that every launch file has."""
     known = {**arguments, 'namespace': ('', str, 'namespace of all topics'),
              'panel': ('false', bool, 'serve a browser page at http://127.0.0.1:8080/'),
              'params_file': ('', str, 'parameter file, such as one written by inversion; '
@@ -46,7 +46,7 @@ def declared(arguments: Arguments) -> list[DeclareLaunchArgument]:
 
 
 def value(context: LaunchContext, name: str, kind: type) -> Any:
-    """Return what an argument was given.
+    """Return the value of an argument.
 
     Raises:
         RuntimeError: it is not of this kind; one line for the user.
@@ -65,7 +65,7 @@ def value(context: LaunchContext, name: str, kind: type) -> Any:
 
 
 def page(context: LaunchContext) -> list[Node]:
-    """Return the node that shows it all in a browser, if that was asked for.
+    """Return the node of the browser page, if the argument ``panel`` is true.
 
     Raises:
         RuntimeError: the argument is neither true nor false.
@@ -79,7 +79,7 @@ def page(context: LaunchContext) -> list[Node]:
 
 def started(context: LaunchContext, executable: str, name: str, arguments: Arguments,
             fixed: Mapping[str, Any] | None = None, **options: Any) -> Node:
-    """Return a node of this package with those arguments that are not empty.
+    """Return a node of this package, with those arguments that are not empty as parameters.
 
     Args:
         context: where the arguments have their values.

@@ -14,9 +14,9 @@
 
 """Connections between processes of one user on this computer, one name for each robot.
 
-Sockets of the kind SOCK_SEQPACKET keep messages apart, and the kernel tells which user is at the
-other end of one (SO_PEERCRED, see unix(7)). Anyone on the computer may take a name or connect to
-it; who is connected cannot be another.
+Sockets of the kind SOCK_SEQPACKET keep messages apart, and the kernel reports which user is at
+the other end of one (SO_PEERCRED, see unix(7)). Anyone on the computer may take a name or connect
+to it, but nobody can pretend to be another user.
 """
 
 import os
@@ -28,7 +28,7 @@ from cpg_ros.errors import CpgError
 
 #: Connections that wait to be accepted.
 WAITING = 8
-#: Bytes on their way, small: a process that reads nothing is soon noticed.
+#: Bytes in transit; few, so that a process that does not read is soon noticed.
 BUFFER = 4096
 #: The kernel's struct ucred: process, user, group.
 _CREDENTIALS = struct.Struct('3i')
@@ -77,12 +77,12 @@ def listening(name: str) -> socket.socket:
 
 
 def of_this_user(line: socket.socket) -> bool:
-    """Tell whether a connection leads to a process of this process's user."""
+    """Return whether the process at the other end has the same user."""
     return _peer(line)[1] == os.geteuid()
 
 
 def peer(line: socket.socket) -> str:
-    """Return who is at the other end of a connection."""
+    """Return the process and user at the other end of a connection, for messages."""
     process, user = _peer(line)
     try:
         name = pwd.getpwuid(user).pw_name

@@ -12,39 +12,35 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A thread that lets a simulation and what commands it take turns, no faster than they should."""
+"""A thread in which a simulation and the node that commands it take turns."""
 
 from collections.abc import Callable
-import threading
 import time
 
 from cpg_ros.nodes.command_topics import Commands
+from cpg_ros.nodes.deadline_thread import TickThread
 from rclpy.node import Node
 
-#: How long an answer to an instant is waited for, s: at first, and while none comes.
+#: How long to wait for the commands of an instant, s: at first, and while none come.
 PATIENCE, IMPATIENCE = 1.0, 0.02
-#: Between two looks at whether an answer is there, s.
+#: Interval at which to look for commands, s.
 LOOK = 5e-5
-#: Behind the clock on the wall by no more than this is made up for, s; more makes a slow robot.
+#: A delay behind real time of up to this is made up for, s; a longer one slows the robot down.
 MOST_BEHIND = 0.05
 
 
-class Lockstep(threading.Thread):
-    """Tells the time with ``tell``, waits for the commands of that instant, calls ``tick``.
+class Lockstep(TickThread):
+    """Sets the time with ``tell``, waits for the commands of that instant, calls ``tick``.
 
     Simulated time begins when there is a publisher of every command and a reader of /clock, and
-    the first ``tick`` is at the first command, so that a run can be repeated exactly. Where
-    commands come only every few periods, as from a generator of a lower rate, that is learnt.
+    the first ``tick`` is at the first command, so that a run can be repeated exactly. Commands
+    that come only every few periods, as from a generator of a lower rate, are recognised.
 
-    With a pace, simulated time goes that many times as fast as the clock on the wall, or slower
-    where the machine is.
+    With a pace, simulated time passes that many times as fast as real time, or slower on a slow
+    machine.
 
-    Attributes:
-        ticks: so far.
-        late: those that did not get the command they waited for.
-        dropped: none ever.
-        rate: of the ticks in simulated time, Hz.
-        worst: longest delay behind the pace since it was last read, s.
+    Its rate is in simulated time. A late tick did not get the command that it waited for; no tick
+    is ever dropped.
 
     """
 
@@ -52,31 +48,11 @@ class Lockstep(threading.Thread):
                  tell: Callable[[int], None], ready: Callable[[], bool],
                  tick: Callable[[float, int], None], failed: Callable[[BaseException], None],
                  pace: float = 0.0) -> None:
-        super().__init__(name='lockstep', daemon=True)
-        self.rate = rate
-        self.ticks = self.late = self.dropped = 0
-        self._worst, self._due = 0.0, 0.0
+        super().__init__('lockstep', rate, failed)
+        self._due = 0.0
         self._spacing = 1.0 / (rate * pace) if pace else 0.0
         self._node, self._commands = node, commands
-        self._tell, self._ready, self._tick, self._failed = tell, ready, tick, failed
-        self._ending = threading.Event()
-
-    @property
-    def worst(self) -> float:
-        """Longest delay behind the pace since this was last read, s."""
-        worst, self._worst = self._worst, 0.0
-        return worst
-
-    def end(self) -> None:
-        """Stop after the tick under way."""
-        self._ending.set()
-
-    def run(self) -> None:
-        """Take turns until ended; hand any exception to ``failed``."""
-        try:
-            self._run()
-        except BaseException as error:
-            self._failed(error)
+        self._tell, self._ready, self._tick = tell, ready, tick
 
     def _run(self) -> None:
         logger = self._node.get_logger()
@@ -106,16 +82,20 @@ class Lockstep(threading.Thread):
             elif started:
                 every, patience = since + 1, IMPATIENCE
                 self.late += 1
-                logger.warning(f'no command for the time {1e-9 * now:.3f} s within '
-                               f'{PATIENCE:g} s: going on without; the rate of what commands '
-                               f'should be {self.rate:g} Hz', throttle_duration_sec=10.0)
+                if self._commands.connected:
+                    logger.warning(f'no command came for {1e-9 * now:.3f} s of simulated time: '
+                                   'the robot holds the last one; whatever commands it should '
+                                   f'publish at {self.rate:g} Hz', throttle_duration_sec=10.0)
+                else:
+                    logger.info('nothing commands the robot any more: it holds the last command',
+                                throttle_duration_sec=10.0)
             if started:
                 self._keep_pace()
                 self.ticks += 1
                 self._tick(1.0 / self.rate, now)
 
     def _keep_pace(self) -> None:
-        """Wait until the clock on the wall is where simulated time is."""
+        """Wait until real time has caught up with simulated time."""
         if not self._spacing:
             return
         now = time.monotonic()

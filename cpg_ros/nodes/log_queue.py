@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Logging that never waits for a terminal, a disk or the graph: a queue that a thread writes.
+"""Logging that never waits for a terminal, a disk or the graph: a thread writes from a queue.
 
 rclpy's own logger writes in the thread that logs, and holds the interpreter's lock meanwhile.
 """
@@ -41,11 +41,11 @@ from rclpy.publisher import Publisher
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from rclpy.utilities import ok
 
-#: At the end of a process what is not written yet may take this long, s.
+#: The end of a process waits this long for unwritten records, s.
 PATIENCE = 0.2
-#: Records that wait at most.
+#: Largest number of waiting records.
 CAPACITY = 1000
-#: How a line looks if RCUTILS_CONSOLE_OUTPUT_FORMAT does not say.
+#: Format of a line if RCUTILS_CONSOLE_OUTPUT_FORMAT is not set.
 FORMAT = '[{severity}] [{time}] [{name}]: {message}'
 #: rclpy's own logger, which is left what rcl has to say, writes no file: it would wait for the
 #: disk.
@@ -56,12 +56,12 @@ ROSOUT = QoSProfile(depth=1000, durability=DurabilityPolicy.TRANSIENT_LOCAL,
 #: ANSI colors as rcutils has them.
 COLORS = {LoggingSeverity.DEBUG: 32, LoggingSeverity.INFO: 0, LoggingSeverity.WARN: 33,
           LoggingSeverity.ERROR: 31, LoggingSeverity.FATAL: 31}
-#: Frames of these files are not who logs.
+#: Files whose frames are not the place that logs.
 INNER = __file__, rcutils_logger.__file__
 
 
 def _wanted(kind: str, args: list[str]) -> bool:
-    """Tell whether the arguments of ROS leave a kind of logs on: the last word of them counts."""
+    """Return whether the arguments of ROS enable a kind of logs: the last switch counts."""
     switches = [word for word in args if word in (f'--disable-{kind}-logs',
                                                   f'--enable-{kind}-logs')]
     return not switches or switches[-1].startswith('--enable')
@@ -92,10 +92,10 @@ class Record(NamedTuple):
 
 
 class LogQueue:
-    """Takes records at once, and writes them in a thread of its own that may be blocked.
+    """Takes records without waiting, and writes them in a thread that may be blocked.
 
     Attributes:
-        rosout: whether records are to be published.
+        rosout: whether records are published.
 
     """
 
@@ -114,7 +114,7 @@ class LogQueue:
         """Write to the streams of this process, which never block it from now on, and to a file.
 
         Args:
-            name: what the file's name begins with if --log-file-name does not say.
+            name: prefix of the file's name unless --log-file-name gives one.
             args: of ROS.
 
         Raises:
@@ -144,11 +144,11 @@ class LogQueue:
 
     @property
     def dropped(self) -> int:
-        """Lines that were written nowhere, or not to each place where they were to be."""
+        """Number of lines that were not written to all of their places."""
         return self._dropped + (self._console.lost if self._console else 0)
 
     def put(self, record: Record) -> None:
-        """Take a record, or drop it where too many wait."""
+        """Take a record, or drop it if too many wait."""
         if self._records.qsize() < CAPACITY:
             self._taken += 1
             self._records.put(record)
@@ -185,7 +185,7 @@ class LogQueue:
             self._dropped += ok()
 
     def drain(self, patience: float = PATIENCE) -> None:
-        """Wait until all has been written, for that long at most, s."""
+        """Wait until everything has been written, but no longer than ``patience``, s."""
         end = time.monotonic() + patience
         while self._written < self._taken and time.monotonic() < end:
             time.sleep(0.002)
@@ -193,12 +193,12 @@ class LogQueue:
             self._console.drain(end - time.monotonic())
 
 
-#: Of this process: its streams are.
+#: One for the process, as its streams are.
 QUEUE = LogQueue()
 
 
 class QueuedLogger(rcutils_logger.RcutilsLogger):
-    """rclpy's logger, but what is logged goes to the queue."""
+    """rclpy's logger, which writes to the queue."""
 
     def __init__(self, name: str, rosout: Publisher | None = None) -> None:
         super().__init__(name)

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Where a robot's joints are, as its own driver publishes them."""
+"""The joint angles that the robot's own driver publishes."""
 
 import math
 import time
@@ -24,12 +24,12 @@ import numpy as np
 from rclpy.node import Node
 from sensor_msgs.msg import JointState
 
-#: Joint states older than this tell nothing of where the joints are now, s.
+#: Older joint states say nothing about where the joints are now, s.
 FRESH = 1.0
 
 
 class MeasuredPose:
-    """The newest joint states of a topic, read when they are asked for."""
+    """The newest joint states of a topic, read on demand."""
 
     def __init__(self, node: Node, robot: Robot, topic: str) -> None:
         self._names = [joint.name for joint in robot.joints]

@@ -12,17 +12,18 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Messages that are serialised once; every tick their numbers are written into the bytes."""
+"""Messages that are serialised once, and whose numbers are written into the bytes every tick."""
 
 from array import array
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 from typing import Any
 
+from cpg_ros.nodes.qos_profiles import OVERRIDABLE
 import numpy as np
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
-from rclpy.qos_overriding_options import QoSOverridingOptions
 from rclpy.serialization import deserialize_message, serialize_message
 
 #: What CDR aligns an integer to, and the encapsulation before a message takes, bytes.
@@ -51,8 +52,8 @@ class Template:
     def serialised(self) -> tuple[bytes, np.ndarray, np.ndarray]:
         """Return the bytes, which words of them change, and the block's words that go there.
 
-        Each thing that changes is given a value found nowhere else, and looked for in the bytes:
-        so nothing need be known of the middleware's layout.
+        Everything that changes is given a unique value, which is then searched for in the bytes:
+        nothing need be known of the middleware's layout.
 
         Raises:
             ValueError: something is not found, or not where a word begins.
@@ -73,26 +74,31 @@ class Template:
             marks.append((values.tobytes(), (NUMBERS + 2 * np.asarray(sources)[:, None]
                                              + np.arange(2)).ravel()))
         raw = _exact(self.message)
-        places = []
+        words = []
         for mark, sources in marks:
             at = raw.find(mark)
             if raw.count(mark) != 1 or at % WORD:
                 raise ValueError(f'{type(self.message).__name__}: cannot be filled in place, as '
                                  'this middleware serialises it')
-            places.append(at // WORD + np.arange(len(sources)))
-        return raw, np.concatenate(places), np.concatenate([sources for _, sources in marks])
+            words.append(at // WORD + np.arange(len(sources)))
+        return raw, np.concatenate(words), np.concatenate([sources for _, sources in marks])
+
+
+def places(sizes: Sequence[int]) -> list[np.ndarray]:
+    """Return the indices of each part of a block, given the sizes of the parts."""
+    return [np.arange(*edge) for edge in pairwise(np.cumsum([0, *sizes]))]
 
 
 def each(message: object, fields: str, places: np.ndarray
          ) -> list[tuple[object, str, np.ndarray]]:
-    """Return the numbers of a message whose fields, of one letter, are single ones."""
+    """Return the numbers of a message's scalar fields, each named by one letter."""
     return [(message, field, places[k:k + 1]) for k, field in enumerate(fields)]
 
 
 def _exact(message: Any) -> bytes:
-    """Serialise a message, without the room that rclpy's serialiser may leave at the end.
+    """Serialise a message, without the padding that rclpy's serialiser may leave at the end.
 
-    What is published typed has none, and strict readers of bags refuse it.
+    Typed messages are published without it, and strict readers of bags reject it.
     """
     raw: bytes = serialize_message(message)
     while True:
@@ -105,34 +111,35 @@ def _exact(message: Any) -> bytes:
 
 
 class MessageBlock:
-    """Publishes messages that lie in one block of memory, filled in one assignment.
+    """Publishes messages that lie in one block of memory, filled by one assignment.
 
     Attributes:
-        values: the numbers that the messages are filled from; to be written before ``publish``.
         topics: of the messages, resolved.
 
     """
 
-    def __init__(self, node: Node, count: int, templates: Sequence[tuple[str, Template]]) -> None:
+    def __init__(self, node: Node, sizes: Sequence[int],
+                 templates: Sequence[tuple[str, Template]]) -> None:
         """Make a publisher for each message.
 
         Args:
             node: that publishes.
-            count: how many numbers there are.
+            sizes: how many numbers each part has of those that the messages are filled from.
             templates: topic and message, in the order of publishing.
 
         """
-        self._words = np.zeros(NUMBERS + 2 * count, dtype=np.uint32)
-        self.values = self._words[NUMBERS:].view(float)
+        self._words = np.zeros(NUMBERS + 2 * sum(sizes), dtype=np.uint32)
+        values = self._words[NUMBERS:].view(float)
+        self._parts = [values[slice(*edge)] for edge in pairwise(np.cumsum([0, *sizes]))]
         self.topics: list[str] = []
         self._publish: list[tuple[Any, memoryview]] = []
-        raws, places, sources = zip(*(template.serialised() for _, template in templates),
+        raws, changing, sources = zip(*(template.serialised() for _, template in templates),
                                     strict=True)
         starts = np.cumsum([0, *(-(-len(raw) // WORD) for raw in raws)])
         memory = bytearray(WORD * int(starts[-1]))
         self._block = np.frombuffer(memory, dtype=np.uint32)
         self._places = np.concatenate([start + here for start, here
-                                       in zip(starts[:-1], places, strict=True)])
+                                       in zip(starts[:-1], changing, strict=True)])
         self._sources = np.concatenate(sources)
         for (topic, template), raw, start in zip(templates, raws, WORD * starts[:-1],
                                                  strict=True):
@@ -140,12 +147,21 @@ class MessageBlock:
             part[:] = raw
             publisher = node.create_publisher(
                 type(template.message), topic, QoSProfile(depth=100),
-                qos_overriding_options=QoSOverridingOptions.with_default_policies())
+                qos_overriding_options=OVERRIDABLE)
             self._publish.append((publisher.publish, part))
             self.topics.append(publisher.topic_name)
 
-    def publish(self, stamp: int, duration: int = 0) -> None:
-        """Publish all messages with the values as they are; stamp and duration in ns."""
+    def publish(self, stamp: int, values: Sequence[np.ndarray], duration: int = 0) -> None:
+        """Publish all messages.
+
+        Args:
+            stamp: ns.
+            values: of each part.
+            duration: ns.
+
+        """
+        for part, given in zip(self._parts, values, strict=True):
+            part[:] = given
         words = self._words
         words[0], words[1] = divmod(stamp, 1_000_000_000)
         words[2], words[3] = divmod(duration, 1_000_000_000)

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Types of messages by their names: the class, and the fields."""
+"""Message types by name: the class, and the text of the fields."""
 
 from importlib import import_module
 from pathlib import Path

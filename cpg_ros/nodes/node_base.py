@@ -44,7 +44,7 @@ from rclpy.parameter import Parameter
 from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import remove_ros_args
 
-#: The ports of the domains after it are too high for UDP.
+#: Domains above it have ports that are too high for UDP.
 LAST_DOMAIN = 232
 
 
@@ -53,13 +53,13 @@ class StartError(CpgError):
 
 
 class StartedNode(Node):
-    """A node whose parameters come from specs, and that has a thread of its own at work.
+    """A node with parameters declared by specs, and with a thread of its own.
 
     Attributes:
-        stop: set when the node is to end.
-        failure: what ended the thread, if anything did.
-        thread: one that may be at work when the node ends, and need not come to its end.
-        parameter_service: which has a thread of its own, too.
+        stop: set to end the node.
+        failure: exception that ended the thread, or None.
+        thread: one that may still be at work when the node ends, or None.
+        parameter_service: services of the parameters, which have a thread of their own.
 
     """
 
@@ -77,25 +77,34 @@ class StartedNode(Node):
         self.thread: threading.Thread | None = None
         self.stop = threading.Event()
 
-    def _declare(self, name: str, spec: Spec) -> None:
-        override = self._parameter_overrides.get(name)
-        if isinstance(spec.default, float):
-            self._doubles.add(name)
-            if override is not None and override.type_ == Parameter.Type.INTEGER:
-                self._parameter_overrides[name] = as_doubles([override], {name})[0]
-        elif isinstance(spec.default, list) and override is not None:
-            self._parameter_overrides[name] = as_list(override, spec.default)
-        try:
-            self.declare_parameter(name, spec.default, spec.descriptor())
-        except InvalidParameterTypeException as error:
-            raise StartError(f'parameter {name} must be {kind_of(spec.default)}, not '
-                             f'{self._parameter_overrides[name].value!r}') from error
-        except InvalidParameterValueException as error:
-            raise StartError(f'parameter {name}: {self._parameter_overrides[name].value} is not '
-                             f'from {spec.low:g} to {spec.high:g}') from error
+    def _declare(self, specs: Mapping[str, Spec]) -> None:
+        """Declare parameters by name.
+
+        Raises:
+            StartError: the value that one was given at the start has the wrong type, or is out of
+                range.
+
+        """
+        overrides = self._parameter_overrides
+        for name, spec in specs.items():
+            override = overrides.get(name)
+            if isinstance(spec.default, float):
+                self._doubles.add(name)
+                if override is not None:
+                    overrides[name], = as_doubles([override], {name})
+            elif isinstance(spec.default, list) and override is not None:
+                overrides[name] = as_list(override, spec.default)
+            try:
+                self.declare_parameter(name, spec.default, spec.descriptor())
+            except InvalidParameterTypeException as error:
+                raise StartError(f'parameter {name} must be {kind_of(spec.default)}, not '
+                                 f'{overrides[name].value!r}') from error
+            except InvalidParameterValueException as error:
+                raise StartError(f'parameter {name}: {overrides[name].value} is not from '
+                                 f'{spec.low:g} to {spec.high:g}') from error
 
     def _complete(self, parameters: list[Parameter]) -> list[Parameter]:
-        """Return what a batch of changes stands for."""
+        """Return a batch of changes with the types and the further changes that it implies."""
         return as_doubles(parameters, self._doubles)
 
     def resolve_topic_name(self, topic: str, **options: Any) -> str:
@@ -148,7 +157,7 @@ class StartedNode(Node):
 
 @contextlib.contextmanager
 def _topic(name: str) -> Iterator[None]:
-    """Say of which topic a name or an override of its QoS is wrong."""
+    """Add the topic to an error of its name or of an override of its QoS."""
     try:
         yield
     except (NameValidationException, ParameterException, RuntimeError) as error:
@@ -167,20 +176,11 @@ def _spin(executor: SingleThreadedExecutor, node: StartedNode) -> None:
             node.get_logger().error('a request failed:\n' + traceback.format_exc())
 
 
-def help_or_error(executable: str, text: str, known: Mapping[str, Spec],
-                  args: list[str] | None) -> int | None:
-    """Look at the words that are not for ROS; return the exit code if the node is not to start.
-
-    Args:
-        executable: its name.
-        text: what it does, a sentence.
-        known: the parameters, to be listed.
-        args: from the command line, without the program's name; None for those of the process.
-
-    """
-    given = sys.argv[1:] if args is None else args
+def _help_or_error(executable: str, text: str, known: Mapping[str, Spec],
+                   args: list[str] | None) -> int | None:
+    """Answer ``--help`` and reject unknown arguments; return the exit code, None to start."""
     try:
-        words = remove_ros_args(given)
+        words = remove_ros_args(sys.argv[1:] if args is None else args)
     except RuntimeError as error:
         print(f'{executable}: ROS arguments: {_first(error)}', file=sys.stderr)
         return 2
@@ -199,20 +199,35 @@ def help_or_error(executable: str, text: str, known: Mapping[str, Spec],
 
 
 def _first(error: Exception) -> str:
-    """Return the reason that rclpy gives, on a line; what follows is about its own sources."""
+    """Return the reason of an error of rclpy on one line, without the place in its sources."""
     reason = str(error).replace('. Error: error not set', '').partition(', at /')[0]
     return ' '.join(reason.replace('. Error: ', ': ').split())
 
 
 def _domain() -> str:
-    """Return what is wrong with the domain, or ''; Fast DDS would end the process."""
+    """Return what is wrong with the domain, or ''; with a wrong one Fast DDS aborts."""
     domain = os.environ.get('ROS_DOMAIN_ID', '')
     return (f'ROS_DOMAIN_ID {domain} is not from 0 to {LAST_DOMAIN}'
             if domain.isdecimal() and int(domain) > LAST_DOMAIN else '')
 
 
-def run(make: Callable[[], StartedNode], name: str, args: list[str] | None) -> int:
-    """Run a node until a signal ends it, or until it stops itself; return the exit code."""
+def run(make: Callable[[], StartedNode], name: str, text: str, known: Mapping[str, Spec],
+        args: list[str] | None = None, executable: str = '') -> int:
+    """Run a node until a signal ends it, or until it stops itself; return the exit code.
+
+    Args:
+        make: returns the node; a CpgError that it raises ends the start with one line.
+        name: of the node.
+        text: what it does, a sentence for ``--help``.
+        known: its parameters, listed by ``--help``.
+        args: from the command line, without the program's name; None for those of the process.
+        executable: the program's name, '' if it is that of the node.
+
+    """
+    code = _help_or_error(executable or name, text, known, args)
+    if code is not None:
+        return code
+
     def leave(*_: object) -> None:
         raise SystemExit(0)
 
@@ -240,8 +255,8 @@ def run(make: Callable[[], StartedNode], name: str, args: list[str] | None) -> i
         return 2
     try:
         node = make()
-    except StartError as error:
-        QueuedLogger(name).fatal(str(error))
+    except (CpgError, NameValidationException, ParameterException) as error:
+        QueuedLogger(name).fatal(' '.join(str(error).split()))
         rclpy.shutdown()
         return 1
     # An Event may not be set here: a signal that comes while it is being waited for, or while
@@ -268,5 +283,5 @@ def run(make: Callable[[], StartedNode], name: str, args: list[str] | None) -> i
         signal.signal(number, signal.SIG_IGN)
     executor.shutdown(timeout_sec=0.1)
     rclpy.shutdown()
-    code = 0 if node.failure is None else 1
-    return ended(code, node.thread, node.parameter_service.thread, serving)
+    return ended(0 if node.failure is None else 1, node.thread, node.parameter_service.thread,
+                 serving)

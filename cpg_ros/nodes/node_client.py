@@ -14,11 +14,11 @@
 
 """Services and parameters of other nodes, called from asyncio.
 
-Responses are polled: nothing need spin the node that calls, and an executor that does leaves them.
+Responses are polled: the calling node need not be spun; if it is, its executor ignores them.
 """
 
 import asyncio
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 import contextlib
 import time
 from typing import Any
@@ -39,6 +39,8 @@ from rclpy.parameter import Parameter, parameter_value_to_python
 
 #: How long a service may take to be found, and a node to answer, s.
 PATIENCE = 5.0
+#: How long a node is waited for in silence, s.
+SILENCE = 1.0
 #: How often it is seen whether a service is there or has answered, s.
 POLL = 0.01
 
@@ -69,14 +71,23 @@ class RequestRefused(CallError):
 class ServiceClients:
     """Calls services through one node."""
 
-    def __init__(self, node: Node, total: float | None = None) -> None:
-        """Call through a node; all calls together may take a total time, s, if there is one."""
-        self._node, self._total = node, total
+    def __init__(self, node: Node, total: float | None = None, search: float = PATIENCE,
+                 late: Callable[[], None] | None = None) -> None:
+        """Call through a node.
+
+        Args:
+            node: makes the clients.
+            total: limit of all calls together, s.
+            search: how long a service is looked for, s, where ``total`` sets no limit.
+            late: called once if a service has not been found within ``SILENCE``.
+
+        """
+        self._node, self._total, self._search, self._late = node, total, search, late
         self._end = None if total is None else time.monotonic() + total
         self._clients: dict[str, Client] = {}
 
     async def call(self, kind: Any, name: str, request: Any, patience: float = PATIENCE) -> Any:
-        """Call a service and return its response, which may take so long, s.
+        """Call a service and return its response; ``patience`` is that for the response, s.
 
         Raises:
             NoService: it is not there in time.
@@ -88,11 +99,7 @@ class ServiceClients:
                                                            callback_group=PolledGroup())
         client = self._clients[name]
         try:
-            end = self._end or time.monotonic() + min(patience, PATIENCE)
-            while not client.service_is_ready():
-                if time.monotonic() > end:
-                    raise NoService(name)
-                await asyncio.sleep(POLL)
+            await self._found(client, name)
             end = self._end or time.monotonic() + patience
             answer = client.call_async(request)
             while not answer.done():
@@ -105,14 +112,26 @@ class ServiceClients:
             raise NoService(name) from None
         return answer.result()
 
+    async def _found(self, client: Client, name: str) -> None:
+        began = time.monotonic()
+        end = self._end or began + self._search
+        while not client.service_is_ready():
+            now = time.monotonic()
+            if now > end:
+                raise NoService(name)
+            if self._late is not None and now > began + SILENCE:
+                self._late()
+                self._late = None
+            await asyncio.sleep(POLL)
+
     def forget(self, node: str) -> None:
-        """Let go of a node's services."""
+        """Destroy the clients of a node's services."""
         for name in [name for name in self._clients if name.startswith(f'{node}/')]:
             self._node.destroy_client(self._clients.pop(name))
 
 
 def _take_response(client: Any) -> None:
-    """Take a response, if one has come, for the call that waits for it."""
+    """Take a response, if one has arrived, for the call that waits for it."""
     with client.handle:
         header, response = client.handle.take_response(client.srv_type.Response)
     if header is not None:

@@ -17,23 +17,50 @@
 from collections.abc import Sequence
 import time
 
-from rclpy.clock import Clock
-from rclpy.clock_type import ClockType
+from cpg_ros.nodes.health_publisher import STEADY
 from rclpy.node import Node
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 
-#: How often they are looked for, s.
+#: How often they are searched for, s.
 LOOK = 0.25
-#: What somebody publishes may be known this long before who it is, s.
+#: A publisher may be known this long before the name of its node, s.
 NAMING = 1.0
-#: The graph's name of a node that is not known, and ours.
-UNKNOWN, NAMELESS = '_NODE_NAME_UNKNOWN_', 'a node of unknown name'
+#: What a node is called whose name the graph does not know.
+NAMELESS = 'a node of unknown name'
+#: Names that the graph gives to a node until it learns the name, and to any program without ROS.
+PLACEHOLDERS = {'_NODE_NAME_UNKNOWN_': NAMELESS,
+                '_CREATED_BY_BARE_DDS_APP_': 'a program without ROS'}
 
 
 def node_of(endpoint: TopicEndpointInfo) -> str:
-    """Return the full name of an endpoint's node, NAMELESS if it is not known."""
-    return (NAMELESS if endpoint.node_name == UNKNOWN
-            else f'{endpoint.node_namespace.rstrip("/")}/{endpoint.node_name}')
+    """Return the full name of an endpoint's node, or what to call it if it is not known."""
+    return PLACEHOLDERS.get(endpoint.node_name,
+                            f'{endpoint.node_namespace.rstrip("/")}/{endpoint.node_name}')
+
+
+def others_on(node: Node, topic: str, own: int = 1, tolerated: int = 0, companion: str = ''
+              ) -> str:
+    """Return the names of the others that publish on a topic, or ''.
+
+    Args:
+        node: whose others they are.
+        topic: resolved.
+        own: number of the node's own publishers.
+        tolerated: number of others that may publish, too.
+        companion: full name of a node that may publish, such as a watchdog, '' for none.
+
+    """
+    if node.count_publishers(topic) <= own + tolerated:
+        return ''
+    names = [node_of(one) for one in node.get_publishers_info_by_topic(topic)]
+    expected = [node.get_fully_qualified_name()] * own
+    if companion:
+        # On a busy machine, its name is known later than its publisher.
+        expected.append(companion if companion in names else NAMELESS)
+    for name in expected:
+        if name in names:
+            names.remove(name)
+    return ', '.join(sorted(names)) if len(names) > tolerated else ''
 
 
 class OtherPublishers:
@@ -45,15 +72,14 @@ class OtherPublishers:
     """
 
     def __init__(self, node: Node, topics: Sequence[str]) -> None:
-        """Look after the topics, resolved names on each of which the node publishes once."""
+        """Monitor topics, given by resolved names, on each of which the node publishes once."""
         self._node, self._topics = node, topics
         self.text = self._warned = ''
         self._since = 0.0
-        self._timer = node.create_timer(LOOK, self.look,
-                                        clock=Clock(clock_type=ClockType.STEADY_TIME))
+        self._timer = node.create_timer(LOOK, self.look, clock=STEADY)
 
     def seek(self, seconds: float) -> str:
-        """Look for them until one is found, or for some time in s; return the text."""
+        """Search until one is found, or for some time in s; return the text."""
         end = time.monotonic() + seconds
         while not self.look() and time.monotonic() < end:
             time.sleep(LOOK / 5)
@@ -63,9 +89,9 @@ class OtherPublishers:
         return self.text
 
     def look(self) -> str:
-        """Look for them now; return the text. The warning waits a little for a name."""
+        """Search now; return the text. The warning waits up to NAMING for a name."""
         text = '; '.join(f'{topic} is published by {names}, too'
-                         for topic in self._topics if (names := self._others(topic)))
+                         for topic in self._topics if (names := others_on(self._node, topic)))
         if text != self.text:
             self.text, self._since = text, time.monotonic()
         if text != self._warned and (NAMELESS not in text
@@ -74,13 +100,3 @@ class OtherPublishers:
             if text:
                 self._node.get_logger().warning(text)
         return text
-
-    def _others(self, topic: str) -> str:
-        """Return the names of the others that publish on a topic, or ''."""
-        if self._node.count_publishers(topic) < 2:
-            return ''
-        own = self._node.get_fully_qualified_name()
-        names = [node_of(one) for one in self._node.get_publishers_info_by_topic(topic)]
-        if own in names:
-            names.remove(own)
-        return ', '.join(sorted(names))

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Parameter services that judge requests in a thread of their own and survive malformed ones."""
+"""Parameter services that process requests in a thread of their own and survive malformed ones."""
 
 from collections.abc import Callable, Sequence
 from functools import partial
@@ -34,13 +34,13 @@ from rclpy.parameter_service import ParameterService
 from rclpy.qos import qos_profile_parameters
 from rclpy.service import Service
 
-#: Names or values in a request at most; no node has nearly as many parameters.
+#: Limit of the names or values in a request; no node has nearly as many parameters.
 MOST = 1000
-#: How often it is seen whether the node is to end, ns.
+#: How often to check whether the node ends, ns.
 LOOK = 100_000_000
 
 
-#: What is taken instead of a request.
+#: Stand-ins for the requests, bounded in length.
 _BOUNDED = {kind: bounded(kind, MOST)
             for kind in (srv.SetParameters, srv.SetParametersAtomically)}
 
@@ -54,7 +54,7 @@ def _refused(reason: str) -> SetParametersResult:
 
 
 class _Batch:
-    """Changes that are judged as a whole, and what is told of the outcome."""
+    """Changes that are accepted as a whole or not at all, and what takes the result."""
 
     def __init__(self, parameters: list[Parameter],
                  answer: Callable[[SetParametersResult], None]) -> None:
@@ -63,16 +63,16 @@ class _Batch:
 
 
 class StrictParameterService(ParameterService):
-    """rclpy's services, but what is set is taken, judged and answered by a thread of its own.
+    """rclpy's services, with changes applied in a thread of their own.
 
-    The executor has nothing to do with it and stays free for what must not wait, such as a stop.
-    Of several changes of the same parameters that wait, only the last one is judged. Values of no
-    known type, unknown names and more than MOST of them are refused with a reason: rclpy 7.1 lets
-    the exception of the first out of the executor, so that one request ends the node, and answers
-    the second without the name.
+    The executor stays free for what must not wait, such as a stop. Of several waiting changes of
+    the same parameters, only the last one is applied. Values of no known type, unknown names and
+    more than MOST of them are rejected with a reason: in rclpy 7.1 a value of no known type raises
+    an exception in the executor, so that one request ends the node, and an unknown name is
+    rejected without naming it.
 
     Attributes:
-        thread: judges and applies what is asked for, once it is started.
+        thread: applies the changes, once it is started.
 
     """
 
@@ -99,7 +99,7 @@ class StrictParameterService(ParameterService):
                                    qos_profile=qos_profile_parameters, callback_group=group)
 
     def _counted(self, answer: Callable, request: Any, response: Any) -> Any:
-        """Answer requests for what there is, those of too many names with an empty response."""
+        """Answer a request; return an empty response if it has too many names."""
         names = request.prefixes if hasattr(request, 'prefixes') else request.names
         if len(names) <= MOST:
             return answer(request, response)
@@ -108,7 +108,7 @@ class StrictParameterService(ParameterService):
         return response
 
     def end(self) -> None:
-        """Judge nothing more but what is under way."""
+        """Stop after the change that is being applied."""
         self._ending = True
 
     def _work(self) -> None:
@@ -138,38 +138,27 @@ class StrictParameterService(ParameterService):
             waiting.wait(LOOK)
 
     def _taken(self) -> list[_Batch]:
-        """Take all requests that have come; answer at once what cannot be read."""
+        """Take all requests that have arrived; reject at once those that cannot be read."""
         batches = []
         for service in (self._each, self._together):
-            kind: Any = service.srv_type
+            bounds = _BOUNDED[service.srv_type]
             while True:
                 with service.handle:
-                    request, header = service.handle.service_take_request(_BOUNDED[kind])
+                    request, header = service.handle.service_take_request(bounds)
                 if header is None:
                     break
-                response = kind.Response()
+                respond = partial(_respond, service, header)
                 if isinstance(request, int):
-                    refused = _refused(_too_many(request))
-                    if service is self._together:
-                        response.result = refused
-                    else:
-                        response.results = [refused]
-                    service.send_response(response, header)
+                    respond([_refused(_too_many(request))])
                     continue
-                if service is self._together:
-                    def tell(results: list, response: Any = response) -> None:
-                        response.result, = results
-                    parts = [request.parameters]
-                else:
-                    def tell(results: list, response: Any = response) -> None:
-                        response.results = results
-                    parts = [[one] for one in request.parameters]
-                batches += self._batches(parts, partial(_respond, service, header, response, tell))
+                batches += self._batches(
+                    [request.parameters] if service is self._together else
+                    [[one] for one in request.parameters], respond)
         return batches
 
     def _batches(self, parts: Sequence[Sequence[ParameterMessage]],
                  respond: Callable[[list[SetParametersResult]], None]) -> list[_Batch]:
-        """Read the parts of a request, which is answered when all of them are."""
+        """Read the parts of a request, which is answered once all of them are processed."""
         results: list[Any] = [None] * len(parts)
         left = set(range(len(parts)))
 
@@ -223,18 +212,22 @@ class StrictParameterService(ParameterService):
 
 
 def _untaken(request: object, response: Any) -> Any:
-    """Stand for a callback: the requests are taken by the thread."""
+    """Stand in for a callback: the thread takes the requests."""
     return response
 
 
-def _respond(service: Service, header: object, response: Any, tell: Callable[[list], None],
-             results: list[SetParametersResult]) -> None:
-    tell(results)
+def _respond(service: Service, header: object, results: list[SetParametersResult]) -> None:
+    kind: Any = service.srv_type
+    response = kind.Response()
+    if kind is srv.SetParametersAtomically:
+        response.result, = results
+    else:
+        response.results = results
     service.send_response(response, header)
 
 
 def _thinned(batches: list[_Batch]) -> list[_Batch]:
-    """Refuse those of which a later one sets all parameters; return the others."""
+    """Reject batches whose parameters a later one sets, too; return the others."""
     later: set[frozenset[str]] = set()
     left = []
     for batch in reversed(batches):

@@ -12,9 +12,9 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What a node's parameters are, and the numbers that they are given."""
+"""Descriptions of a node's parameters, and conversions of their values."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 import re
 from typing import Any
@@ -22,25 +22,34 @@ from typing import Any
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
 from rclpy.parameter import Parameter
 
-#: What a value of a type is called.
+#: Name of a value of each type, for messages.
 KINDS = {bool: 'a bool', int: 'an integer', float: 'a double', str: 'a string'}
 
 
+#: In the constraints of a gait: what follows are presets whose names are not those of gaits.
+PRESETS = '; presets: '
+
+
 def one_of(words: Iterable[str], further: str = '') -> str:
-    """Return the constraints of a text that is one of some words, and what else it may be."""
+    """Return the constraints of a parameter that is one of some words; ``further`` is added."""
     return 'one of: ' + ', '.join(words) + further
 
 
 def choices(constraints: str) -> list[str]:
     """Return the words that a descriptor's constraints list, if they are those of one_of."""
     found = re.search(r'one of: (.*)', constraints)
-    words = found[1].split(', ') if found else []
+    words = re.split(f', |{PRESETS}', found[1]) if found else []
     return [word for word in words if re.fullmatch(r'[\w.-]+', word)]
+
+
+def presets_among(constraints: str) -> list[str]:
+    """Return those of the choices that the constraints list as presets with other names."""
+    return choices(f'one of: {constraints.partition(PRESETS)[2]}')
 
 
 @dataclass(frozen=True)
 class Spec:
-    """One parameter: default, what it is, its range if it is a number, whether it is fixed."""
+    """One parameter: default, description, range of a number, whether it is read-only."""
 
     default: Any
     text: str
@@ -48,10 +57,6 @@ class Spec:
     high: float | None = None
     read_only: bool = False
     constraints: str = ''
-
-    def fixed(self) -> 'Spec':
-        """Return the same parameter, to be set at the start only."""
-        return replace(self, read_only=True)
 
     def descriptor(self) -> ParameterDescriptor:
         """Return it as a ROS descriptor."""
@@ -65,6 +70,11 @@ class Spec:
                 made.floating_point_range = [FloatingPointRange(from_value=self.low,
                                                                 to_value=self.high)]
         return made
+
+
+def fixed(specs: Mapping[str, Spec]) -> dict[str, Spec]:
+    """Return the same parameters, which can be set at the start only."""
+    return {name: replace(spec, read_only=True) for name, spec in specs.items()}
 
 
 def as_doubles(parameters: list[Parameter], doubles: set[str]) -> list[Parameter]:
@@ -88,7 +98,7 @@ def as_list(parameter: Parameter, default: list) -> Parameter:
 
 
 def kind_of(default: Any) -> str:
-    """Say what a parameter of a default must be."""
+    """Return what a parameter with a default must be, for messages."""
     if isinstance(default, list):
         return f'a list of {KINDS[type(default[0]) if default else str].split()[1]}s'
     return KINDS[type(default)]

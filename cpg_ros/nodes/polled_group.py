@@ -12,20 +12,19 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Subscriptions, services and clients that no executor serves: what comes waits to be taken.
+"""Subscriptions, services and clients that no executor serves: messages wait to be taken.
 
-Nothing of the process runs when a message comes, however many there are; what comes in between,
-the middleware drops by itself.
+No code of the process runs when a message arrives, however many there are; the middleware drops
+those that are not taken in time.
 """
 
 from collections.abc import Iterator
 from typing import Any
 
-from cpg_ros.nodes.qos_profiles import best_effort
+from cpg_ros.nodes.qos_profiles import best_effort, OVERRIDABLE
 from rclpy.callback_groups import CallbackGroup
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
-from rclpy.qos_overriding_options import QoSOverridingOptions
 
 
 class PolledGroup(CallbackGroup):
@@ -44,7 +43,7 @@ class PolledGroup(CallbackGroup):
 
 
 class PolledSubscription:
-    """A topic whose messages are taken, not called back.
+    """A topic whose messages are taken, without a callback.
 
     Attributes:
         topic: its resolved name.
@@ -67,14 +66,13 @@ class PolledSubscription:
         self._node = node
         self._subscription: Any = node.create_subscription(
             kind, topic, lambda _: None, quality or best_effort(), callback_group=PolledGroup(),
-            raw=raw, qos_overriding_options=QoSOverridingOptions.with_default_policies()
-            if overridable else None)
+            raw=raw, qos_overriding_options=OVERRIDABLE if overridable else None)
         self.topic: str = self._subscription.topic_name
         self._kind, self._raw = kind, raw
         self._depth: int = self._subscription.qos_profile.depth
 
     def take(self) -> Iterator[tuple[Any, int]]:
-        """Take what has arrived: each message, and when it did, ns of system time."""
+        """Take what has arrived: each message, and its time of arrival, ns of system time."""
         handle = self._subscription.handle
         with handle:
             while (found := handle.take_message(self._kind, self._raw)) is not None:
@@ -92,5 +90,5 @@ class PolledSubscription:
         return newest
 
     def close(self) -> None:
-        """Subscribe no more."""
+        """End the subscription."""
         self._node.destroy_subscription(self._subscription)

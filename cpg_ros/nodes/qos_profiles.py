@@ -15,13 +15,22 @@
 """Qualities of service that more than one node uses."""
 
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.qos_overriding_options import QoSOverridingOptions
+
+#: For topics whose QoS can be overridden by parameters of the node.
+OVERRIDABLE = QoSOverridingOptions.with_default_policies()
 
 
 def latched(depth: int = 1) -> QoSProfile:
-    """Return that of a topic whose last messages wait for subscribers that come later."""
+    """Return the QoS of a topic whose last messages wait for later subscribers."""
     return QoSProfile(depth=depth, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 
+def command_qos() -> QoSProfile:
+    """Return the QoS of commands: only the newest one matters."""
+    return QoSProfile(depth=1)
+
+
 def best_effort(depth: int = 1) -> QoSProfile:
-    """Return that of a subscription that matches every publisher and delays none."""
+    """Return the QoS of a subscription that matches every publisher and delays none."""
     return QoSProfile(depth=depth, reliability=ReliabilityPolicy.BEST_EFFORT)

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Where the numbers of messages are that were taken as bytes.
+"""Finds the numbers in messages that were taken as bytes.
 
 The bytes are CDR: four of encapsulation, then the fields, each aligned to its size.
 """
@@ -36,7 +36,7 @@ def stamp_of(data: bytes) -> float | None:
 
 
 def numbers_at(data: bytes, begin: int, count: int) -> np.ndarray:
-    """Return the doubles from some byte on, read-only, shape (count,).
+    """Return the doubles from a byte on, read-only, shape (count,).
 
     Raises:
         ValueError: the message is shorter.
@@ -55,7 +55,7 @@ def last_numbers(data: bytes, count: int) -> np.ndarray:
 
 
 class JointLayout:
-    """Where the joint states of a publisher have what, its names being the same every time.
+    """The layout of a publisher's joint states, the same for all messages with the same names.
 
     Attributes:
         wrong: why the messages cannot be used, or ''.
@@ -73,7 +73,7 @@ class JointLayout:
         self.wrong = f'no joint {missing[0]}, or more than one' if missing else ''
         self.places = np.array([] if missing else [names.index(name) for name in wanted], int)
         self._length, self.count = len(data), len(names)
-        # What tells that another message has the same layout: names and counts.
+        # What shows that another message has the same layout: names and counts.
         self._same: list[tuple[slice, bytes]] = [(slice(1, 2), data[1:2])]
         end = HEADER + 8
 

@@ -22,7 +22,7 @@ import os
 import threading
 
 from cpg_ros.errors import CpgError
-from cpg_ros.nodes.parameter_spec import Spec
+from cpg_ros.nodes.parameter_spec import fixed, Spec
 from rclpy.impl.rcutils_logger import RcutilsLogger
 
 #: With which transport a participant of Fast DDS speaks; the user's own choice goes first.
@@ -31,27 +31,27 @@ TRANSPORT = 'FASTDDS_BUILTIN_TRANSPORTS', 'UDPv4'
 MCL_CURRENT, MCL_FUTURE = 1, 2
 LIMITS = 'in /etc/security/limits.conf, and log in again'
 
-SPECS = {
+SPECS = fixed({
     'thread_priority': Spec(0, 'real-time priority (SCHED_FIFO) of the publishing thread; the '
-                            'other threads then get 1; 0 for none', 0, 99, read_only=True),
+                            'other threads then get 1; 0 for none', 0, 99),
     'cpu_affinity': Spec([-1], 'cores on which the publishing thread may run, one or a list; -1 '
-                         'for any', read_only=True),
+                         'for any'),
     'lock_memory': Spec(False, 'lock all memory of the process in RAM, so that no tick waits for '
-                        'a page', read_only=True)}
+                        'a page')})
 
 
 class NoSuchCore(CpgError):
-    """The process may not run on a core that is asked for."""
+    """The process may not run on a requested core."""
 
 
 @dataclass(frozen=True)
 class RealTime:
-    """What is asked of the scheduler.
+    """What is requested of the scheduler.
 
     Attributes:
         priority: of SCHED_FIFO, 0 for none.
-        cores: that the thread may run on, empty for any.
-        lock: whether the memory of the process is locked.
+        cores: on which the thread may run, empty for any.
+        lock: whether to lock the memory of the process.
 
     Raises:
         NoSuchCore: this process cannot run on one of the cores.
@@ -71,13 +71,13 @@ class RealTime:
 
     @classmethod
     def of(cls, priority: int, cores: Sequence[int], lock: bool) -> 'RealTime':
-        """Take the parameters' values; errors as of the class."""
+        """Return the request of the parameters' values; errors as of the class."""
         return cls(priority, () if list(cores) == [-1] else tuple(cores), lock)
 
     def claim(self) -> tuple[list[str], list[str]]:
-        """Ask the system for it, for the calling thread; return what is granted and what is not.
+        """Request it for the calling thread; return what is granted and what is refused.
 
-        What is refused comes with the reason and with what to set, a line each.
+        Each refusal is one line with the reason and what to set.
         """
         granted, refused = [], []
         if self.lock:
@@ -101,7 +101,7 @@ class RealTime:
         return granted, refused
 
     def request(self, logger: RcutilsLogger) -> None:
-        """Request it for the calling thread; log what is granted, and go on without the rest."""
+        """Request it for the calling thread, log the result, and continue in any case."""
         granted, refused = self.claim()
         for line in refused:
             logger.warning(line)
@@ -110,19 +110,20 @@ class RealTime:
 
 
 def leave_shared_memory() -> None:
-    """Let this process speak by UDP alone, on this computer, too; to be called before rclpy.init.
+    """Make this process use UDP alone, also on this computer; call it before rclpy.init.
 
-    Whoever joins the graph on the same computer has a port of shared memory, and whoever first
-    sends there looks whether it is alive. If its listener is not waiting at that instant, Fast DDS
-    sleeps for a third of healthy_check_timeout_ms, 333 ms, and keeps the lock that every publisher
-    of the process needs: a robot would go without commands for so long. With the discovery range
-    LOCALHOST the middleware of ROS brings shared memory itself; no robot is reached that way.
+    A participant that joins the graph on the same computer has a port of shared memory, and the
+    first to send there checks whether it is alive. If its listener is not waiting at that instant,
+    Fast DDS sleeps for a third of healthy_check_timeout_ms, 333 ms, and keeps the lock that every
+    publisher of the process needs: a robot would be without commands for that time. With the
+    discovery range LOCALHOST the middleware of ROS uses shared memory anyway; no robot is reached
+    that way.
     """
     os.environ.setdefault(*TRANSPORT)
 
 
 def _raise_others() -> None:
-    """Put the other threads of the process before all ordinary processes, and behind this one.
+    """Schedule the other threads before all ordinary processes, and after the calling one.
 
     Any of them may hold the interpreter lock or one of the middleware's, and would keep it while
     an ordinary process runs in its place. Stops are served by one of them, too.

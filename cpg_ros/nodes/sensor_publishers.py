@@ -12,13 +12,12 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What a simulated robot publishes every period."""
+"""The measurements that a simulated robot publishes every period."""
 
 from importlib import import_module, util
-from itertools import pairwise
 
 from cpg_ros.nodes.joint_publishers import joint_state, labelled
-from cpg_ros.nodes.message_block import each, MessageBlock, Template
+from cpg_ros.nodes.message_block import each, MessageBlock, places, Template
 from cpg_ros.simulation.body import Body
 from cpg_ros.simulation.inertial_unit import InertialUnit
 from cpg_ros.simulation.robot_model import legs
@@ -33,19 +32,17 @@ class Measurements:
     """``joint_states``, ``odom``, ``foot_contacts``, ``imu`` and, where tf2 is, ``/tf``."""
 
     def __init__(self, node: Node, body: Body, unit: InertialUnit) -> None:
-        """Publish what a body does, and what an inertial unit on it shows."""
+        """Publish the motion of a body, and the measurements of an inertial unit on it."""
         self._body, self._unit = body, unit
-        names, feet = list(body.robot.order), legs(body.robot)
+        names, feet = body.robot.order, legs(body.robot)
         n = len(names)
         sizes = n, n, n, len(feet), 3, 4, 6
-        edges = np.cumsum([0, *sizes])
-        self._parts = [slice(*edge) for edge in pairwise(edges)]
-        _, _, _, forces, base, quaternion, twist = (np.arange(*edge) for edge in pairwise(edges))
+        *joints, forces, base, quaternion, twist = places(sizes)
         odometry = Odometry(child_frame_id='base')
         odometry.header.frame_id = 'odom'
         pose, moving = odometry.pose.pose, odometry.twist.twist
         messages = [
-            ('joint_states', joint_state(names, np.arange(n), n, 2 * n)),
+            ('joint_states', joint_state(names, *joints)),
             ('odom', Template(odometry, [odometry.header.stamp], numbers=[
                 *each(pose.position, 'xyz', base), *each(pose.orientation, 'wxyz', quaternion),
                 *each(moving.linear, 'xyz', twist[:3]),
@@ -59,24 +56,20 @@ class Measurements:
                 kind(transforms=[transform]), [transform.header.stamp], numbers=[
                     *each(transform.transform.translation, 'xyz', base),
                     *each(transform.transform.rotation, 'wxyz', quaternion)])))
-        self._block = MessageBlock(node, int(edges[-1]), messages)
+        self._block = MessageBlock(node, sizes, messages)
         imu = Imu()
         imu.header.frame_id = 'base'
-        self._imu = MessageBlock(node, 10, [('imu', Template(imu, [imu.header.stamp], numbers=[
+        self._imu = MessageBlock(node, [10], [('imu', Template(imu, [imu.header.stamp], numbers=[
             *each(imu.orientation, 'xyzw', np.arange(4)),
             *each(imu.angular_velocity, 'xyz', np.arange(4, 7)),
             *each(imu.linear_acceleration, 'xyz', np.arange(7, 10))]))])
 
     def publish(self, stamp: int) -> None:
-        """Publish what the body does now; stamp in ns."""
-        # First of all what feedback needs.
+        """Publish the state of the body; stamp in ns."""
+        # What feedback needs comes first.
         arrived = self._unit.measure(stamp)
         if arrived is not None:
-            self._imu.values[:] = arrived[1]
-            self._imu.publish(arrived[0])
-        body, values = self._body, self._block.values
-        for part, given in zip(self._parts, (
-                body.position, body.velocity, body.torque, body.feet, body.base, body.quaternion,
-                body.twist), strict=True):
-            values[part] = given
-        self._block.publish(stamp)
+            self._imu.publish(arrived[0], arrived[1:])
+        body = self._body
+        self._block.publish(stamp, (body.position, body.velocity, body.torque, body.feet,
+                                    body.base, body.quaternion, body.twist))

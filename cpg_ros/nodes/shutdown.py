@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Which signals end a node, and how it ends while one of its threads is still at work."""
+"""The signals that end a node, and the end of the process while a thread is still at work."""
 
 import os
 import signal
@@ -20,12 +20,12 @@ import threading
 
 from cpg_ros.nodes.log_queue import QUEUE
 
-#: Seconds that a thread gets to come to its end.
+#: How long to wait for the end of a thread, s.
 PATIENCE = 0.2
 
 
 def endings() -> list[signal.Signals]:
-    """Return the signals that end a node: that a terminal is gone does not if it began so."""
+    """Return the signals that end a node; SIGHUP does not if it was ignored at the start."""
     return [number for number in (signal.SIGINT, signal.SIGTERM, signal.SIGQUIT, signal.SIGHUP)
             if number != signal.SIGHUP or signal.getsignal(number) != signal.SIG_IGN]
 

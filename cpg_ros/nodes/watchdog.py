@@ -21,16 +21,16 @@ the robot. It accepts connections from processes of its own user only.
 
 import os
 from pathlib import Path
+import pkgutil
 import select
 import signal
 import socket
 import sys
 import time
 
-from cpg_ros.nodes import bridge_interface
-from cpg_ros.nodes.command_publishers import command_qos
 from cpg_ros.nodes.local_socket import address, listening, NameTaken, of_this_user
 from cpg_ros.nodes.log_queue import NO_FILE, QUEUE, QueuedLogger
+from cpg_ros.nodes.qos_profiles import command_qos
 from cpg_ros.nodes.watchdog_link import NAME_TAKEN
 from cpg_ros.safety.robot_state import JointCommand
 from cpg_ros.safety.tick_monitor import TickMonitor
@@ -46,7 +46,7 @@ SPARED = '-1000'
 
 
 def alive(process: int) -> bool:
-    """Tell whether there is a process of this number."""
+    """Return whether a process exists."""
     try:
         os.kill(process, 0)
     except ProcessLookupError:
@@ -55,7 +55,7 @@ def alive(process: int) -> bool:
 
 
 def spared() -> bool:
-    """Ask the kernel to spare this process when memory runs out; tell whether it will."""
+    """Ask the kernel to spare this process when memory runs out; return whether it agrees."""
     try:
         Path('/proc/self/oom_score_adj').write_text(SPARED)
     except OSError:
@@ -118,7 +118,7 @@ def watch(listener: socket.socket, publisher: Publisher, command: JointCommand,
 
 def main(args: list[str]) -> int:
     """Watch until a bridge announces its end; return the exit code."""
-    interface, domain, topic = bridge_interface.load(args[0]), int(args[1]), args[2]
+    interface, domain, topic = pkgutil.resolve_name(args[0]), int(args[1]), args[2]
     period, process = float(args[3]), int(args[4])
     name = interface.watchdog_name()
     # Ctrl-C in the bridge's terminal is the bridge's to handle.

@@ -39,7 +39,7 @@ class ForeignWatchdog(CpgError):
 
 
 class WatchdogLink:
-    """A connection to a process that damps the robot while it receives nothing.
+    """A connection to a process that damps the robot while it receives no ticks.
 
     A watchdog outlives its bridge; the next bridge of its user for the same robot takes it over.
     """

@@ -12,10 +12,10 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A page in the browser that shows, drives and records what is on the graph.
+"""A browser page that shows, drives and records the robots on the graph.
 
-Speaks only ROS: topics, services and parameters of whatever runs. Imports ``nodes`` and what is
-below; nothing but its executable imports it.
+Its server uses topics, services and parameters only. Imports ``nodes`` and the subpackages below;
+only its executable imports it.
 """
 
 from cpg_ros.errors import needed
@@ -23,24 +23,6 @@ from cpg_ros.errors import needed
 # Before any of its modules: one line where the extra is missing, not a traceback.
 needed('websockets', part='websockets.asyncio')
 
-__all__ = [
-           'access_control',
-           'body_shape',
-           'controls',
-           'graph',
-           'lease',
-           'model_shape',
-           'pages',
-           'panel_node',
-           'recorder',
-           'request_handler',
-           'requests',
-           'robot_view',
-           'shape_facts',
-           'shape_source',
-           'steering',
-           'stick_figure',
-           'teleop',
-           'urdf_shape',
-           'web_server',
-]
+__all__ = ['access_control', 'body_shape', 'controls', 'graph', 'lease', 'model_shape', 'pages',
+           'panel_node', 'recorder', 'request_handler', 'requests', 'robot_view', 'shape_source',
+           'start_watch', 'stick_figure', 'teleop', 'urdf_shape', 'web_server']

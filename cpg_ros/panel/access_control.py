@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Who may come in: on loopback pages of this machine, elsewhere those who have the token."""
+"""Access control: pages of this machine on loopback, holders of the token elsewhere."""
 
 from collections import OrderedDict
 import hmac
@@ -23,34 +23,34 @@ from urllib.parse import parse_qs, urlsplit
 from cpg_ros.errors import CpgError
 from cpg_ros.files.loopback import is_loopback
 
-#: In place of a token: make one of 128 bits, and show it in the terminal.
+#: In place of a token: generate one of 128 bits, and show it in the terminal.
 AUTO = 'auto'
-#: Characters of a token, at least: as many as those of one of 128 bits, 6 bits each.
+#: Least number of characters of a token: that of 128 bits, 6 bits each.
 SHORTEST = 22
-#: How to make a token.
+#: How to generate a token.
 RECIPE = 'python3 -c "import secrets; print(secrets.token_urlsafe(16))"'
-#: After a wrong token a peer waits, s; twice as long after each more, up to the last; it is
-#: forgiven after this time without one. So many peers are remembered, and of IPv6 so many bits.
+#: Delay of a peer after a wrong token, s, doubled by each further one, up to the longest; time
+#: without one that resets it, s; number of peers remembered; bits of an IPv6 address that count.
 FIRST_WAIT, LONGEST_WAIT, FORGIVEN, PEERS, PREFIX = 0.25, 4.0, 60.0, 1024, 64
-#: Why a request is refused that guesses.
+#: Reason for rejecting a wrong token.
 WRONG = 'the token is wrong'
 
 
 class AccessError(CpgError):
-    """It would be open to everybody; one line for the user."""
+    """The panel would be open to everybody; one line for the user."""
 
 
 def token_for(host: str, wish: str, terminal: bool) -> str:
-    """Return the token to ask for; '' for none.
+    """Return the token to require; '' for none.
 
     Args:
         host: to listen on.
-        wish: the user's: a token, ``auto`` for a new one, or '' for none.
-        terminal: whether there is one to show a new token in.
+        wish: the user's choice: a token, ``auto`` for a new one, or '' for none.
+        terminal: whether there is a terminal to show a new token in.
 
     Raises:
-        AccessError: others than this machine could come in without a token, or with one that can
-            be guessed; or nobody would see a new one.
+        AccessError: other machines would have access without a token, or with one that can be
+            guessed; or nobody would see a new one.
 
     """
     if wish == AUTO:
@@ -70,17 +70,17 @@ def token_for(host: str, wish: str, terminal: bool) -> str:
 
 
 class AccessControl:
-    """Looks at each request before anything of it is read."""
+    """Checks each request before its contents are read."""
 
     def __init__(self, token: str) -> None:
-        """Be the door of a server; ``token`` as of ``token_for``."""
+        """Require a token, as of ``token_for``."""
         self._token = token.encode()
 
     def refuses(self, path: str, host: str, origin: str) -> str:
-        """Return why a request is refused, '' if it is not.
+        """Return why a request is rejected, or ''.
 
         Args:
-            path: as asked for, with the query.
+            path: of the request, with the query.
             host: header Host.
             origin: header Origin, '' for a program that is not a browser.
 
@@ -101,18 +101,18 @@ class AccessControl:
 
 
 class Delays:
-    """Makes each peer wait after wrong tokens, without a thought for the others."""
+    """Delays each peer after wrong tokens, independently of the others."""
 
     def __init__(self) -> None:
         # Peer -> how long it waits, and until when, both s; who was wrong last comes last.
         self._peers: OrderedDict[str, tuple[float, float]] = OrderedDict()
 
     def waits(self, address: str, now: float) -> bool:
-        """Tell whether a peer waits for an answer: another token of it is not looked at."""
+        """Return whether a peer is being delayed: its tokens are not checked meanwhile."""
         return now < self._peers.get(_peer(address), (0.0, now))[1]
 
     def wrong(self, address: str, now: float) -> float:
-        """Take a wrong token of a peer that does not wait; return for how long it does now, s."""
+        """Count a wrong token of a peer that is not delayed; return its delay, s."""
         wait, until = self._peers.pop(_peer(address), (0.0, now))
         wait = FIRST_WAIT if now - until > FORGIVEN else min(max(2.0 * wait, FIRST_WAIT),
                                                              LONGEST_WAIT)
@@ -123,7 +123,7 @@ class Delays:
 
 
 def _peer(address: str) -> str:
-    """Return whose an address is: whoever has one of IPv6 has all of its network."""
+    """Return the peer of an address: for IPv6 its network, all of which one peer has."""
     try:
         found = ipaddress.ip_address(address.partition('%')[0])
     except ValueError:

@@ -22,28 +22,27 @@ from typing import Any
 from cpg_ros.robots.mesh_files import merged, Mesh
 import numpy as np
 
-#: Corners of a circle.
+#: Number of corners of a circle.
 ROUND = 16
-#: Of what has no colour of its own.
+#: Colour of triangles without one.
 GREY = (0.62, 0.65, 0.70)
-#: Vertices closer than this are made one: a page draws a robot, not its screws, m.
+#: Vertices closer than this are merged, m: a page draws a robot, not its screws.
 GRAIN = 0.008
 
 
 @dataclass
 class Link:
-    """A rigid part, and how it is held by another.
+    """A rigid part, and its joint to its parent.
 
     Attributes:
         name: of it.
-        parent: index of the link that holds it, -1 for the base.
+        parent: index of the parent, -1 for the base.
         joint: name of the joint between them, '' for a fixed one.
-        slides: whether the joint shifts it along its axis, m, and does not turn it, rad.
+        slides: whether the joint is prismatic, m, not revolute, rad.
         axis: of the joint, in the link's own frame.
         place, pose: of the link in its parent at angle 0: m, and a rotation matrix.
         zero: angle of the joint at which the link is where ``pose`` has it, rad.
-        vertices, colours: what it is drawn with: triangles, shape (n, 3, 3), m, and a colour of
-            each, (n, 3), 0 to 1.
+        vertices, colours: its triangles, shape (n, 3, 3), m, and their colours, (n, 3), 0 to 1.
 
     """
 
@@ -71,7 +70,7 @@ class Shape:
     """A robot.
 
     Attributes:
-        source: where it is from, for people.
+        source: of the shape, for people.
         links: a parent before its children, the base first.
         limits: joint -> lower and upper, rad, infinite where there is none.
         feet: leg -> index of the link that stands on the floor, and where on it, m.
@@ -84,7 +83,7 @@ class Shape:
     feet: dict[str, tuple[int, np.ndarray]] = field(default_factory=dict)
 
     def message(self) -> dict[str, Any]:
-        """Return it as a page takes it: triangles as base64 of float32, colours of uint8."""
+        """Return the message for a page: base64 of float32 triangles and uint8 colours."""
         links = []
         for link in self.links:
             corners = (np.concatenate(link.vertices) if link.vertices else np.zeros((0, 3, 3)))
@@ -109,7 +108,7 @@ def _base64(values: np.ndarray) -> str:
 
 
 def coarse(triangles: np.ndarray, grain: float = GRAIN) -> np.ndarray:
-    """Return the triangles left when vertices that lie close together, m, are made one."""
+    """Return the triangles that remain when vertices closer than ``grain``, m, are merged."""
     left = merged(Mesh(triangles.reshape(-1, 3), np.arange(3 * len(triangles)).reshape(-1, 3)),
                   grain)
     # Two that came to lie on one another are one, whichever way round.

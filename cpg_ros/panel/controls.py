@@ -20,7 +20,7 @@ import re
 from typing import Any
 
 from cpg_ros.nodes.node_client import CallError, NodeClient, RequestRefused
-from cpg_ros.nodes.parameter_spec import choices
+from cpg_ros.nodes.parameter_spec import choices, presets_among
 from cpg_ros.panel.requests import RequestError
 from rcl_interfaces.msg import ParameterEvent, ParameterType
 from rclpy.parameter import parameter_value_to_python
@@ -28,8 +28,10 @@ from rclpy.parameter import parameter_value_to_python
 #: Types that a page has a control for.
 KINDS = {ParameterType.PARAMETER_BOOL: 'bool', ParameterType.PARAMETER_INTEGER: 'integer',
          ParameterType.PARAMETER_DOUBLE: 'double', ParameterType.PARAMETER_STRING: 'text'}
-#: What every node of ROS has, which says nothing of this one.
-COMMON = ('qos_overrides.', 'start_type_description_service')
+#: How long a node may take to judge a value, s: it may have to solve for a gait.
+PATIENCE = 30.0
+#: Parameters that every node of ROS has.
+COMMON = ('qos_overrides.', 'start_type_description_service', 'use_sim_time')
 
 
 def unit(text: str) -> str:
@@ -47,14 +49,14 @@ class Controls:
     """
 
     def __init__(self, node: NodeClient, report: Callable[[str], None]) -> None:
-        """Control a node; ``report`` takes a line for each value that it refuses."""
+        """Control a node; ``report`` takes a line for each value that the node rejects."""
         self._node, self._report = node, report
         self.known: dict[str, dict[str, Any]] = {}
         self._waiting: dict[str, Any] = {}
         self._work: asyncio.Task | None = None
 
     async def read(self) -> None:
-        """Ask the node for everything.
+        """Read descriptors and values from the node.
 
         Raises:
             CallError: it does not answer.
@@ -71,12 +73,13 @@ class Controls:
                 'name': name, 'kind': KINDS[about.type], 'text': about.description,
                 'unit': unit(about.description), 'fixed': about.read_only,
                 'choices': choices(about.additional_constraints),
+                'presets': presets_among(about.additional_constraints),
                 'value': value,
                 'low': span.from_value if span else None, 'high': span.to_value if span else None}
         self.known = known
 
     def hear(self, event: ParameterEvent) -> dict[str, Any]:
-        """Take note of what has changed; return name -> value if it is this node's."""
+        """Store the changes of an event; return name -> value if they are this node's."""
         if event.node != self._node.name:
             return {}
         values = {one.name: parameter_value_to_python(one.value)
@@ -90,10 +93,10 @@ class Controls:
         return self.known.get(name, {}).get('value')
 
     def set(self, name: str, value: Any) -> None:  # noqa: A003
-        """Set a parameter soon; of several values that wait the last one is sent.
+        """Set a parameter soon; of several waiting values only the last one is sent.
 
         Raises:
-            RequestError: the node has no such parameter, or it cannot be this.
+            RequestError: the node has no such parameter, or the value is invalid.
 
         """
         about = self.known.get(name)
@@ -110,7 +113,7 @@ class Controls:
             name = next(iter(self._waiting))
             value = self._waiting.pop(name)
             try:
-                await self._node.set_parameters({name: value})
+                await self._node.set_parameters({name: value}, PATIENCE)
             except RequestRefused as error:
                 self._report(f'{name} {value}: {error}')
             except CallError as error:
@@ -118,7 +121,7 @@ class Controls:
 
 
 def _fitting(about: dict[str, Any], value: Any) -> Any:
-    """Return a value as its parameter's kind has it."""
+    """Return a value converted to the kind of its parameter."""
     kind, name = about['kind'], about['name']
     right: Any = {'bool': bool, 'integer': int, 'double': (int, float), 'text': str}[kind]
     if not isinstance(value, right) or (kind != 'bool' and isinstance(value, bool)):

@@ -12,14 +12,14 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What is on the graph that a page can show or use: told by its topics and services alone."""
+"""The nodes and topics that a page can show or use, recognised by topics and services."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
 
 from rclpy.node import Node
 
-#: What a node of a kind has: name below the node's own -> type.
+#: Topics and services of each kind of node: name below the node's own -> type.
 GENERATOR = {'phase': 'std_msgs/msg/Float64MultiArray', 'gait': 'std_msgs/msg/String',
              'enable': 'std_srvs/srv/SetBool'}
 SIMULATION = {'push': 'geometry_msgs/msg/Wrench', 'reset': 'std_srvs/srv/Trigger'}
@@ -47,7 +47,7 @@ def namespace(node: str) -> str:
 
 
 def look(node: Node) -> Graph:
-    """Return what a node sees."""
+    """Return the graph as a node sees it."""
     topics = {(name, kind) for name, kinds in node.get_topic_names_and_types() for kind in kinds}
     services = {(name, kind) for name, kinds in node.get_service_names_and_types()
                 for kind in kinds}

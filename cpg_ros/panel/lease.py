@@ -23,7 +23,7 @@ SILENCE = 2.0
 
 
 class LeaseError(CpgError):
-    """Another holds the robot; one line for whoever sent the command."""
+    """Another page has control of the robot; one line for the sender of the command."""
 
 
 class Lease:
@@ -41,7 +41,7 @@ class Lease:
         self._heard = 0.0
 
     def acquire(self, who: Hashable, now: float) -> None:
-        """Have the lease, if it is free or held by the same; now is in s.
+        """Give the lease to ``who``, if it is free or already theirs; now is in s.
 
         Raises:
             LeaseError: another has it.
@@ -55,10 +55,10 @@ class Lease:
 
     def take_over(self, who: Hashable, now: float,
                   others: frozenset[bytes] = frozenset()) -> Hashable | None:
-        """Have the lease, whoever has it, and steer beside these other publishers.
+        """Give the lease to ``who`` in any case, confirming these other publishers.
 
         Returns:
-            Who has lost it, None if nobody has.
+            The former holder, None if there was no other.
 
         """
         lost = None if self.holder == who else self.holder
@@ -67,12 +67,12 @@ class Lease:
         return lost
 
     def renew(self, who: Hashable, now: float) -> None:
-        """Take note of a sign of life."""
+        """Record a sign of life of the holder."""
         if who == self.holder:
             self._heard = now
 
     def release(self, who: Hashable) -> bool:
-        """Give the lease back; return whether it was held by this one."""
+        """Give the lease back; return whether ``who`` held it."""
         held = self.holder is not None and who == self.holder
         if held:
             self._pass_to(None, frozenset())

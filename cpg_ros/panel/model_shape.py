@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The shape of a robot from the MuJoCo model in which robot_sim moves it."""
+"""The shape of a robot from its MuJoCo model, as robot_sim uses it."""
 
 from typing import Any
 
@@ -34,7 +34,7 @@ def from_model(name: str, robot: Robot) -> Shape:
         robot: whose joints and legs.
 
     Raises:
-        SimulationError: there is no such model, no MuJoCo, or they do not go together.
+        SimulationError: there is no such model or no MuJoCo, or model and robot do not match.
 
     """
     mujoco, model = engine(), load(name, robot, visual=True)

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The pages that are open: what each looks at, what it may ask, and what it is sent."""
+"""The open pages: the robot that each shows, its limits, and what it is sent."""
 
 import asyncio
 from collections.abc import Callable, Iterable
@@ -23,12 +23,12 @@ from typing import Any
 from cpg_ros.files.loopback import is_loopback
 from websockets.asyncio.server import broadcast, ServerConnection
 
-#: Pages at once that see and do everything, and more that can only stop the robot.
+#: Largest number of pages that can do everything, and of further ones that can only stop.
 MOST, MOST_STOPPING = 16, 240
-#: A page may ask this often, by the second and at once.
+#: Limits of a page's requests: per second, and at once.
 RATE, BURST = 60.0, 120.0
-#: What a page has not taken yet, bytes: above the first it gets no frames, above the second,
-#: or above the first for so long, s, it is let go.
+#: Bytes that a page has not received yet: above the first limit it gets no frames; above the
+#: second, or above the first for PATIENCE s, it is disconnected.
 SLOW, LARGEST, PATIENCE = 200_000, 16_000_000, 20.0
 
 
@@ -36,13 +36,13 @@ class Page:
     """One open page.
 
     Attributes:
-        connection: to it.
+        connection: to the page.
         number: of the page, the smallest that is free.
-        stop_only: whether it can do nothing but stop the robot.
-        node: the generator that it looks at, '' for none.
-        round_trip: from the panel to the page and back, at most, s; 0 before it is known.
-        lost_to: who has taken over from it, '' for nobody.
-        refused: the reason that it was shown last for not steering.
+        stop_only: whether it can only stop the robot.
+        node: the generator that it shows, '' for none.
+        round_trip: upper bound from the panel to the page and back, s; 0 before it is known.
+        lost_to: the page that has taken over from it, '' for none.
+        refused: the last reason it was given for not steering.
 
     """
 
@@ -55,29 +55,29 @@ class Page:
         self._fast = time.monotonic()
 
     def __str__(self) -> str:
-        """Return its name for people."""
+        """Return the page's name for people."""
         host = str(self.connection.remote_address[0])
         return f'page {self.number}' + ('' if is_loopback(host) else f' ({host})')
 
     def lease(self, message: dict[str, Any]) -> bool:
-        """Tell whether what is known of the lease is news to it, and keep it."""
+        """Store the state of the lease; return whether the page did not have it yet."""
         new = message != self._lease
         self._lease = message
         return new
 
     def may_ask(self) -> bool:
-        """Tell whether it asks at a rate that people have; counts this once."""
+        """Count a request; return whether the rate of requests is within the limits."""
         now = time.monotonic()
         self._left = min(BURST, self._left + RATE * (now - self._when)) - 1.0
         self._when = now
         return self._left >= 0.0
 
     def waiting(self) -> int:
-        """How much it has been sent and not taken, bytes."""
+        """Return the number of bytes that were sent and not received yet."""
         return self.connection.transport.get_write_buffer_size()
 
     def keeps_up(self) -> bool:
-        """Tell whether frames are of use to it; lets it go if that is hopeless."""
+        """Return whether the page keeps up with frames; disconnect it if it never will."""
         now, waiting = time.monotonic(), self.waiting()
         if waiting < SLOW:
             self._fast = now
@@ -87,11 +87,11 @@ class Page:
 
 
 class Pages:
-    """All of them; belongs to the thread of the event loop.
+    """The open pages; belongs to the thread of the event loop.
 
     Attributes:
-        open: those that see and do everything.
-        stopping: those that came when there were enough, oldest first: they can only stop.
+        open: those that can do everything.
+        stopping: those beyond the limit, oldest first, which can only stop the robot.
 
     """
 
@@ -101,22 +101,22 @@ class Pages:
         self._loop: asyncio.AbstractEventLoop | None = None
 
     def begin(self) -> None:
-        """Be of the loop that runs now."""
+        """Use the running event loop."""
         self._loop = asyncio.get_running_loop()
 
     def later(self, act: Callable[..., None], *values: Any) -> None:
-        """Let the loop do something soon, from whatever thread."""
+        """Call a function from the event loop soon; callable from any thread."""
         if self._loop is not None:
             self._loop.call_soon_threadsafe(act, *values)
 
     @property
     def full(self) -> bool:
-        """Tell whether not even a page that can only stop the robot may come."""
+        """Whether not even a page that can only stop the robot is admitted."""
         return len(self.stopping) >= MOST_STOPPING
 
     @property
     def everyone(self) -> list[Page]:
-        """Return all of them, whatever they can do."""
+        """All pages, whatever they can do."""
         return [*self.open, *self.stopping]
 
     def admit(self, connection: ServerConnection) -> Page:
@@ -144,22 +144,19 @@ class Pages:
         return promoted
 
     def of(self, node: str) -> list[Page]:
-        """Return those that look at a generator."""
+        """Return the pages that show a generator."""
         return [page for page in self.open if page.node == node]
 
     def send(self, pages: Iterable[Page], message: dict[str, Any]) -> None:
-        """Send them a message."""
+        """Send a message to pages."""
         broadcast([page.connection for page in pages], json.dumps(message, allow_nan=False))
 
     def frame(self, pages: Iterable[Page], frame: dict[str, Any], stamp: float) -> None:
-        """Send a frame, of which the next one makes up for the loss, and a stamp to echo.
-
-        An empty frame is not sent: the stamp comes alone.
-        """
+        """Send a frame, which may be lost, and a stamp to echo; without a frame the stamp."""
         ready = [page for page in pages if page.keeps_up()]
         message = {'type': 'frame', **frame} if frame else {'type': 'stamp'}
         self.send(ready, {**message, 'stamp': stamp})
 
     def notify(self, pages: Iterable[Page], text: str, kind: str = 'refused') -> None:
-        """Show a line of text: kind is refused, or told."""
+        """Show a line of text; ``kind`` is refused or told."""
         self.send(pages, {'type': 'said', 'text': text[:1000], 'kind': kind})

@@ -25,68 +25,68 @@ from typing import Any
 
 from cpg_ros.errors import CpgError
 from cpg_ros.files.loopback import is_loopback
-from cpg_ros.nodes.node_base import help_or_error, run, StartedNode, StartError
+from cpg_ros.nodes.node_base import run, StartedNode, StartError
 from cpg_ros.nodes.node_client import ServiceClients
-from cpg_ros.nodes.parameter_spec import Spec
-from cpg_ros.panel import requests, shape_source
-from cpg_ros.panel.access_control import AccessControl, AccessError, token_for
+from cpg_ros.nodes.parameter_spec import fixed, Spec
+from cpg_ros.panel import requests
+from cpg_ros.panel.access_control import AccessControl, token_for
 from cpg_ros.panel.graph import Graph, look
 from cpg_ros.panel.pages import Page, Pages, SLOW
 from cpg_ros.panel.recorder import Recorder
 from cpg_ros.panel.request_handler import RequestHandler
 from cpg_ros.panel.requests import RequestError
 from cpg_ros.panel.robot_view import RobotView
+from cpg_ros.panel.start_watch import StartWatch
 from cpg_ros.panel.web_server import WebServer
+from cpg_ros.robots.urdf import load_urdf
 import rclpy
 from rclpy.node import Node
 
 NAME = 'cpg_panel'
-#: Frames a second, and how often it is seen what is on the graph, s.
+#: Frames per second, and interval of looking at the graph, s.
 FRAMES, LOOK = 30.0, 0.5
 
-SPECS = {
+SPECS = fixed({
     'host': Spec('127.0.0.1', 'address to listen on; an address that other machines can reach '
-                 'needs a token', read_only=True),
-    'port': Spec(8080, 'port to listen on; 0 for any free one', 0, 65535, read_only=True),
+                 'needs a token'),
+    'port': Spec(8080, 'port to listen on; 0 for any free one', 0, 65535),
     'token': Spec('', 'token required in the page address, as ?token=WORD; auto: make one, shown '
-                  'in the terminal; empty: none', read_only=True),
+                  'in the terminal; empty: none'),
     'urdf': Spec('', "URDF file with the robot's shape; if empty, robot_description, the "
-                 "simulation's model if it is shipped, or a stick figure is used", read_only=True),
-    'max_speed': Spec(0.5, 'maximum speed of the steering pad [m/s]', 0.0, 5.0, True),
-    'max_turn': Spec(0.6, 'maximum turning rate of the steering pad [rad/s]', 0.0, 5.0, True),
-    'recordings': Spec('out/recordings', 'folder for recorded bags', read_only=True),
-    'recording_limit': Spec(200.0, 'size at which a recording stops [MB]', 1.0, 2000.0, True)}
+                 "simulation's model if it is shipped, or a stick figure is used"),
+    'max_speed': Spec(0.5, 'maximum speed of the steering pad [m/s]', 0.0, 5.0),
+    'max_turn': Spec(0.6, 'maximum turning rate of the steering pad [rad/s]', 0.0, 5.0),
+    'recordings': Spec('out/recordings', 'folder for recorded bags'),
+    'recording_limit': Spec(200.0, 'size at which a recording stops [MB]', 1.0, 2000.0)})
 
 
 class Panel(StartedNode):
-    """Serves pages from one thread; the executor's does nothing but receive answers."""
+    """Serves pages from one thread; the executor's thread only receives responses."""
 
     def __init__(self) -> None:
-        """Declare everything and check it.
+        """Declare the parameters, check them, and prepare to start.
 
         Raises:
-            StartError: a parameter cannot be used, or the address cannot be had.
+            CpgError: a parameter cannot be used, or the address is not available.
 
         """
         super().__init__(NAME)
-        for name, spec in SPECS.items():
-            self._declare(name, spec)
-        try:
-            self._token = token_for(self._value('host'), self._value('token'),
-                                    sys.stderr.isatty())
-            shape_source.check(self._value('urdf'))
-        except CpgError as error:
-            kind = '' if isinstance(error, AccessError) else 'urdf: '
-            raise StartError(f'{kind}{error}') from error
+        self._declare(SPECS)
+        self._token = token_for(self._value('host'), self._value('token'), sys.stderr.isatty())
+        if urdf := self._value('urdf'):
+            try:
+                load_urdf(Path(urdf).expanduser())
+            except CpgError as error:
+                raise StartError(f'urdf: {error}') from error
         self._free()
-        # Its subscriptions are fetched from, not called back: it is never spun.
+        # Its messages are taken, without callbacks: it is never spun.
         self._watch: Node = rclpy.create_node(
             f'{self.get_name()}_watch', namespace=self.get_namespace(), enable_rosout=False,
             start_parameter_services=False, use_global_arguments=False)
         self._pages = Pages()
         self._calls = ServiceClients(self)
         self._views: dict[str, RobotView] = {}
-        self._graph = Graph()
+        self._graph, self._starting, self._starts = Graph(), '', StartWatch(self._watch)
         self._recorder = Recorder(
             self._watch, Path(self._value('recordings')).expanduser(),
             round(1e6 * self._value('recording_limit')),
@@ -98,13 +98,11 @@ class Panel(StartedNode):
         self._warn_of_unknown()
 
     def _free(self) -> None:
-        """See that the address can be had."""
+        """Check that the address is available."""
         host, port = self._value('host'), self._value('port')
         try:
-            found = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
-            with socket.socket(found[0], socket.SOCK_STREAM) as one:
-                one.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-                one.bind(found[4])
+            family, *_, address = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
+            socket.create_server(address, family=family).close()
         except OSError as error:
             raise StartError(f'{host} port {port}: {error.strerror} (another port: '
                              '-p port:=N, 0 for a free one)') from error
@@ -152,7 +150,7 @@ class Panel(StartedNode):
             due = max(due + 1.0 / FRAMES, loop.time() - 1.0 / FRAMES)
             await asyncio.sleep(max(due - loop.time(), 0.0))
         for view in self._views.values():
-            view.teleop.steering.stop()
+            view.teleop.stop()
             view.teleop.beat(loop.time())
         self._recorder.stop()
         server.close()
@@ -160,8 +158,9 @@ class Panel(StartedNode):
 
     def _look(self) -> None:
         graph = look(self)
-        if graph != self._graph:
-            self._graph = graph
+        starting = self._starts.look(not graph.generators)
+        if (graph, starting) != (self._graph, self._starting):
+            self._graph, self._starting = graph, starting
             self._pages.send(self._pages.everyone, self._state())
         for name in set(self._views) - set(graph.generators):
             self._views.pop(name).close()
@@ -176,7 +175,7 @@ class Panel(StartedNode):
                 self._choose(page, graph.generators[0])
 
     def _lease_news(self) -> None:
-        """Tell each page of its robot's lease, if that is news to it."""
+        """Send each page the state of its robot's lease, if that has changed."""
         for page in self._pages.everyone:
             if (view := self._views.get(page.node)) and page.lease(
                     message := view.teleop.state(page)):
@@ -190,7 +189,7 @@ class Panel(StartedNode):
             lambda message: self._pages.send(self._pages.of(name), message))
 
     def finish(self) -> None:
-        """Stop what the pages steer, end the recording, and serve no more."""
+        """Stop the robots that pages steer, the recording and the server."""
         if self.thread is not None:
             self.thread.join(timeout=3.0)
 
@@ -198,7 +197,8 @@ class Panel(StartedNode):
 
     def _state(self) -> dict[str, Any]:
         graph, recorder = self._graph, self._recorder
-        return {'type': 'state', 'generators': graph.generators, 'beside': {
+        return {'type': 'state', 'generators': graph.generators,
+                'starting': self._starting, 'beside': {
             name: {'simulation': graph.beside(name, graph.simulations),
                    'inversion': graph.beside(name, graph.inversions)}
             for name in graph.generators},
@@ -241,11 +241,11 @@ class Panel(StartedNode):
         except CpgError as error:
             self._pages.notify([page], str(error))
         except Exception:
-            # One request must not end a node that others look through.
+            # One request must not end a node that others use.
             self.get_logger().error('a request failed:\n' + traceback.format_exc())
 
     def _recorded(self, why: str = '') -> None:
-        """Tell of a recording that began or ended, by itself if that has a reason."""
+        """Report that a recording has begun or ended; ``why`` if it ended by itself."""
         if why:
             self._pages.notify(self._pages.open, why)
         self._pages.send(self._pages.everyone, self._state())
@@ -253,9 +253,8 @@ class Panel(StartedNode):
 
 def main(args: list[str] | None = None) -> int:
     """Run the node until a signal ends it; return the exit code."""
-    code = help_or_error('panel', 'Shows, drives and records what is on the graph in a browser.',
-                         SPECS, args)
-    return run(Panel, NAME, args) if code is None else code
+    return run(Panel, NAME, 'Shows, drives and records what is on the graph in a browser.', SPECS,
+               args, 'panel')
 
 
 if __name__ == '__main__':

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Bags of the topics of a robot, one after the other, recorded by a thread of its own."""
+"""Records the topics of a robot into bags, one after another, in a thread of its own."""
 
 from collections.abc import Callable, Iterable
 from pathlib import Path
@@ -27,19 +27,24 @@ from rclpy.node import Node
 
 
 class Recorder:
-    """Records to one bag after the other in a folder.
+    """Records one bag after another into a folder.
 
     Attributes:
-        bag: the newest one, while it is recorded or after that, '' before the first.
+        bag: name of the newest one, '' before the first.
         running: whether it is being recorded.
 
     """
 
     def __init__(self, node: Node, folder: Path, largest: int, ended: Callable[[str], None]
                  ) -> None:
-        """Record to a folder by a node that is not spun, at most so many bytes a bag.
+        """Prepare to record.
 
-        Ended is called, from the thread that records, with why a recording ended by itself.
+        Args:
+            node: that subscribes, and need not be spun.
+            folder: for the bags.
+            largest: size at which a recording ends, bytes.
+            ended: called from the recording thread with why a recording ended by itself.
+
         """
         self._node, self._folder, self._largest, self._ended = node, folder, largest, ended
         self._stop = threading.Event()
@@ -55,7 +60,8 @@ class Recorder:
         """Record topics, (name, type), to a new bag; return its name.
 
         Raises:
-            BagError: one is being recorded, nothing can be recorded, or not there.
+            BagError: another bag is being recorded, there is nothing to record, or the folder
+                cannot be written to.
 
         """
         if self.running:

@@ -12,67 +12,61 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What is done when a page asks for it."""
+"""Carries out the requests of pages."""
 
 import asyncio
 from collections.abc import Callable
 from typing import Any
 
-from cpg_ros.errors import CpgError
 from cpg_ros.nodes.node_client import NodeClient, PATIENCE, ServiceClients
 from cpg_ros.panel.graph import namespace
 from cpg_ros.panel.lease import LeaseError
 from cpg_ros.panel.pages import MOST, Page, Pages
 from cpg_ros.panel.recorder import Recorder
-from cpg_ros.panel.requests import Request
+from cpg_ros.panel.requests import Request, RequestError
 from cpg_ros.panel.robot_view import RobotView
-from cpg_ros.panel.steering import push
 from std_srvs.srv import SetBool, Trigger
 
 #: A fit may take this long, s.
 FIT = 120.0
-#: What moves the robot, apart from steering, may be this old when it comes, s.
+#: Requests that move the robot, apart from steering, may be this old on arrival, s.
 LATE = 2.0
-#: What moves the robot beside steering: it takes the lease.
+#: Requests that move the robot, apart from steering, and so take the lease.
 MOVING = ('set', 'enable', 'push', 'reset', 'take_over')
 #: Recorded whatever the generator's namespace.
 EVERYWHERE = ('/diagnostics', '/tf', '/tf_static', '/clock')
 
 
-class PageRequestError(CpgError):
-    """A request of a page is refused, or cannot be carried out; one line for that page."""
-
-
 class RequestHandler:
-    """Does to the robot of a page, or to the recording, what that page asks for."""
+    """Carries out requests on the robot of a page, or on the recording."""
 
     def __init__(self, pages: Pages, services: ServiceClients, recorder: Recorder,
                  recorded: Callable[[], None]) -> None:
-        """Work with these; recorded is called when a recording has begun or ended."""
+        """Prepare; ``recorded`` is called when a recording has begun or ended."""
         self._pages, self._services, self._recorder = pages, services, recorder
         self._recorded = recorded
 
     async def carry_out(self, page: Page, view: RobotView, request: Request) -> None:
-        """Do what a page asks of the generator that it looks at.
+        """Carry out a request of a page on the generator that it shows.
 
         Raises:
-            CpgError: that was refused; says why.
+            CpgError: it is rejected; the message is the reason.
 
         """
         values, action = request.values, request.action
         now, teleop = asyncio.get_running_loop().time(), view.teleop
         if request.stamp is not None:
             if request.stamp > now:
-                raise PageRequestError(f'{action}: stamp is not one that the panel has sent')
+                raise RequestError(f'{action}: stamp is not one that the panel has sent')
             page.round_trip = now - request.stamp
         teleop.lease.renew(page, now)
         if action == 'stop' or (action == 'enable' and not values['on']):
-            teleop.steering.stop()
+            teleop.stop()
             await self._command(page, view.name, SetBool, 'enable', data=False)
             return
         if page.stop_only and action != 'alive':
-            raise PageRequestError(f'{MOST} pages are open already: this one can only stop the '
-                                 'robot')
+            raise RequestError(f'{MOST} pages are open already: this one can only stop the '
+                               'robot')
         if action in MOVING:
             self._acquire(page, view, request, now)
         if action == 'set':
@@ -84,7 +78,7 @@ class RequestHandler:
         elif action == 'enable':
             await self._command(page, view.name, SetBool, 'enable', data=True)
         elif action == 'push':
-            await asyncio.to_thread(view.push, push(values['force'], values['direction']))
+            await asyncio.to_thread(view.push, values['force'], values['direction'])
         elif action == 'record':
             await self._record(view, values['on'])
         elif action in ('reset', 'fit'):
@@ -92,14 +86,14 @@ class RequestHandler:
                            'fit': (view.graph.inversions, 'inversion node')}[action]
             node = view.graph.beside(view.name, nodes)
             if not node:
-                raise PageRequestError(f'there is no {what} for {view.name}')
+                raise RequestError(f'there is no {what} for {view.name}')
             await self._command(page, node, Trigger, action, FIT)
 
     def _acquire(self, page: Page, view: RobotView, request: Request, now: float) -> None:
-        """Let a page do what moves the robot, if it is fresh and no other page may."""
+        """Give a page the lease, if its request is fresh and no other page has it."""
         if (age := now - _stamp(request)) > LATE:
-            raise PageRequestError(f'{request.action} came up to {age:.1f} s late, and was '
-                                 f'ignored: the limit is {LATE:g} s')
+            raise RequestError(f'{request.action} came up to {age:.1f} s late, and was '
+                               f'ignored: the limit is {LATE:g} s')
         if request.action != 'take_over':
             view.teleop.acquire(page, now)
         elif lost := view.teleop.take_over(page, now):
@@ -107,10 +101,10 @@ class RequestHandler:
                                f'{page} has taken over; this page no longer moves the robot')
 
     def _steer(self, page: Page, view: RobotView, request: Request, now: float) -> None:
-        """Steer; show once why that is refused, unless the loss of the lease has been shown."""
+        """Steer; report a rejection once, unless the page knows that it lost the lease."""
         if view.controls.value('cmd_vel') is not True:
-            raise PageRequestError(f'{view.name} ignores cmd_vel; start it with cmd_vel:=true to '
-                                 f'steer')
+            raise RequestError(f'{view.name} ignores cmd_vel; start it with cmd_vel:=true to '
+                               f'steer')
         try:
             view.teleop.steer(page, _stamp(request), now, request.values['speed'],
                               request.values['turn'])
@@ -140,5 +134,5 @@ class RequestHandler:
 def _stamp(request: Request) -> float:
     """Return the stamp of a request that must have one, s."""
     if request.stamp is None:
-        raise PageRequestError(f'{request.action}: the newest stamp from the panel is missing')
+        raise RequestError(f'{request.action}: the newest stamp from the panel is missing')
     return request.stamp

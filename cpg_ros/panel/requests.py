@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What a page may ask for: every word of it checked before anybody acts on it."""
+"""The requests of a page, checked completely before they are carried out."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -22,19 +22,19 @@ from typing import Any
 
 from cpg_ros.errors import CpgError
 
-#: Longest text that a request may hold, characters.
+#: Longest text in a request, characters.
 LONGEST = 500
 #: Hardest push, N.
 HARDEST = 500.0
 
 
 class RequestError(CpgError):
-    """It is not understood; one line for whoever asked."""
+    """A page's request is invalid, or cannot be carried out; one line for that page."""
 
 
 @dataclass(frozen=True)
 class Request:
-    """What is to be done, and with what; the newest stamp that its page had received, s."""
+    """An action and its values; ``stamp`` is the newest one that the page had received, s."""
 
     action: str
     values: Mapping[str, Any] = field(default_factory=dict)
@@ -64,7 +64,7 @@ def _number(low: float, high: float) -> Callable[[Any], float]:
 
 
 def _setting(value: Any) -> bool | int | float | str:
-    """Take what a parameter can be set to; which kind and range is for its node to judge."""
+    """Return the value for a parameter; its node checks kind and range."""
     if isinstance(value, str):
         return _text(value)
     if isinstance(value, bool):
@@ -76,7 +76,7 @@ def _setting(value: Any) -> bool | int | float | str:
     raise RequestError('must be true or false, text or a finite number')
 
 
-#: Action -> what it needs, and how that is checked. A direction is in degrees to the left.
+#: Action -> its values, and the check of each. A direction is in degrees to the left.
 ACTIONS: dict[str, dict[str, Callable[[Any], Any]]] = {
     'choose': {'node': _text}, 'set': {'name': _text, 'value': _setting},
     'steer': {'speed': _number(-1.0, 1.0), 'turn': _number(-1.0, 1.0)},
@@ -90,10 +90,10 @@ def _constant(name: str) -> float:
 
 
 def read(text: str | bytes) -> Request:
-    """Read what a page sent.
+    """Parse a message of a page.
 
     Raises:
-        RequestError: anything about it is not as it should be.
+        RequestError: anything in it is invalid.
 
     """
     if not isinstance(text, str):

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""One generator and the robot that it moves, as pages see them."""
+"""One generator and its robot, as pages show them."""
 
 import asyncio
 from collections.abc import Callable
@@ -23,7 +23,7 @@ from typing import Any
 from cpg_ros.nodes.node_client import CallError, NodeClient, ServiceClients
 from cpg_ros.nodes.polled_group import PolledSubscription
 from cpg_ros.nodes.qos_profiles import best_effort, latched
-from cpg_ros.panel import shape_facts, shape_source
+from cpg_ros.panel import shape_source
 from cpg_ros.panel.controls import Controls
 from cpg_ros.panel.graph import Graph, namespace
 from cpg_ros.panel.teleop import Teleop
@@ -36,7 +36,7 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray, String
 
 LEVELS = {0: 'ok', 1: 'warn', 2: 'error', 3: 'stale'}
-#: Digits of what is sent: a tenth of a milliradian is less than a pixel.
+#: Decimal places of values: a tenth of a milliradian is less than a pixel.
 DIGITS = 4
 
 
@@ -45,7 +45,7 @@ class RobotView:
 
     Attributes:
         controls: its parameters.
-        teleop: who may move it, and how its ``cmd_vel`` is steered.
+        teleop: its lease and its ``cmd_vel``.
 
     """
 
@@ -55,13 +55,13 @@ class RobotView:
         """View a generator.
 
         Args:
-            node: which is spun, and publishes.
-            watch: which is not, and listens.
-            services: of others.
+            node: that publishes, and is spun.
+            watch: that subscribes, and is not spun.
+            services: clients of other nodes.
             name: the generator's full name.
-            fastest: speed in m/s and turn in rad/s of a whole deflection.
-            report: shows the pages a line.
-            send: sends them a message.
+            fastest: speed in m/s and turn in rad/s at full deflection.
+            report: shows a line on its pages.
+            send: sends its pages a message.
 
         """
         self.name, self._space = name, namespace(name)
@@ -69,7 +69,9 @@ class RobotView:
         self._report, self._send = report, send
         self.controls = Controls(NodeClient(services, name), report)
         self._pushes: Any = None
-        self.teleop = Teleop(node, f'{self._space}/cmd_vel', fastest)
+        self.teleop = Teleop(
+            node, f'{self._space}/cmd_vel', fastest,
+            lambda: self.controls.value('stamped_cmd_vel') is True)
         self.graph = Graph()
         self._topics: dict[str, PolledSubscription] = {}
         self._kept: dict[str, dict[str, Any]] = {}
@@ -80,13 +82,13 @@ class RobotView:
         self._stale = True
         self._sources: tuple[str, ...] = ()
 
-    # -- what there is ----------------------------------------------------------------------
+    # -- parameters and shape ---------------------------------------------------------------
 
     def ready(self) -> None:
-        """Begin to read parameters and shape, if that has not begun or there is more to read."""
+        """Start reading parameters and shape, at first and when their sources have changed."""
         sources = (self.graph.beside(self.name, self.graph.simulations),
                    *sorted(name for name, _ in self.graph.topics
-                           if name in shape_facts.descriptions(self._space)))
+                           if name in shape_source.descriptions(self._space)))
         if self._stale or sources != self._sources:
             self._stale, self._sources = False, sources
             if self._readied is not None:
@@ -98,7 +100,7 @@ class RobotView:
             await self.controls.read()
             self._keep({'type': 'controls', 'node': self.name,
                         'controls': list(self.controls.known.values())})
-            known = await shape_facts.ask(
+            known = await shape_source.ask(
                 self._watch, self._services, self.graph, self.name,
                 str(self.controls.value('robot') or ''), self._urdf)
             doubts: list[str] = []
@@ -111,17 +113,17 @@ class RobotView:
             self._stale = True
 
     def messages(self) -> list[dict[str, Any]]:
-        """Return all that a page must know that comes only now."""
+        """Return the messages that a new page needs."""
         return list(self._kept.values())
 
     def _keep(self, message: dict[str, Any]) -> None:
         self._kept[message['type']] = message
         self._send(message)
 
-    # -- what goes on -----------------------------------------------------------------------
+    # -- topics -----------------------------------------------------------------------------
 
     def listen(self, graph: Graph, wanted: bool) -> None:
-        """Listen to what is on the graph now, or to nothing if no page is open."""
+        """Subscribe to the topics on the graph, or to none if no page shows the generator."""
         self.graph = graph
         space, floats = self._space, 'std_msgs/msg/Float64MultiArray'
         joints = [topic for topic in (f'{space}/joint_states',)
@@ -153,7 +155,7 @@ class RobotView:
         return topic.newest() if topic else None
 
     def frame(self) -> dict[str, Any]:
-        """Return what is new since the last frame, nothing else."""
+        """Return what has changed since the last frame."""
         found: dict[str, Any] = {}
         fresh = False
         for name in [name for name in self._topics if name.endswith('/joint_states')]:
@@ -179,23 +181,23 @@ class RobotView:
             speed = moved.twist.twist
             found['base'] = _short((place.x, place.y, place.z, turn.w, turn.x, turn.y, turn.z))
             found['speed'] = _short((speed.linear.x, speed.linear.y, speed.angular.z))
-        if self.teleop.steering.target != (0.0, 0.0):
-            found['steered'] = _short(self.teleop.steering.target)
+        if self.teleop.target != (0.0, 0.0):
+            found['steered'] = _short(self.teleop.target)
         return found
 
     def _names_message(self, key: str, names: list[str]) -> None:
-        """Tell the pages what the numbers under a key are, if that is new."""
+        """Send the pages the names of the numbers under a key, if they have changed."""
         if self._names.get(key) != names:
             self._names[key] = names
             self._keep({'type': 'names', **self._names})
 
     def news(self) -> None:
-        """Tell the pages of the gait, changed parameters and health."""
+        """Send the pages the gait, changed parameters and health."""
         if (gait := self._newest(f'{self.name}/gait')) is not None:
             self._keep({'type': 'gait', 'gait': gait.data})
         if events := self._topics.get('/parameter_events'):
             for event, _ in events.take():
-                # One of the same name has started anew.
+                # A node of the same name has started again.
                 self._stale |= event.node == self.name and bool(event.new_parameters)
                 if values := self.controls.hear(event):
                     self._send({'type': 'values', 'values': values})
@@ -214,10 +216,10 @@ class RobotView:
             'values': {value.key: value.value for value in status.values}}}
         self._keep({'type': 'health', 'parts': parts})
 
-    # -- what is done -----------------------------------------------------------------------
+    # -- actions ----------------------------------------------------------------------------
 
-    def push(self, message: Wrench) -> None:
-        """Push the robot.
+    def push(self, force: float, direction: float) -> None:
+        """Push the robot with a force, N, in a direction, degrees from ahead to the left.
 
         Raises:
             CallError: it is not simulated.
@@ -231,10 +233,12 @@ class RobotView:
         end = time.monotonic() + 1.0
         while not self._pushes.get_subscription_count() and time.monotonic() < end:
             time.sleep(0.01)
+        message, angle = Wrench(), math.radians(direction)
+        message.force.x, message.force.y = force * math.cos(angle), force * math.sin(angle)
         self._pushes.publish(message)
 
     def close(self) -> None:
-        """Let go of all of it."""
+        """End subscriptions, publishers and clients."""
         self.listen(self.graph, wanted=False)
         self.teleop.close()
         if self._pushes is not None:
@@ -245,5 +249,5 @@ class RobotView:
 
 
 def _short(values: Any) -> list[float | None]:
-    """Round what a page is sent; what is not finite is nothing."""
+    """Return rounded values, None for those that are not finite."""
     return [round(value, DIGITS) if math.isfinite(value) else None for value in values]

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A robot of which nothing is known but its legs and joints, drawn with sticks."""
+"""A stick figure for a robot of which only legs and joints are known."""
 
 from collections.abc import Mapping, Sequence
 

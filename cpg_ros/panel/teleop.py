@@ -14,19 +14,29 @@
 
 """One robot's lease, and the ``cmd_vel`` of the page that has it.
 
+A dead man's switch: the robot walks only as long as the page sends commands.
+
 The panel publishes on ``cmd_vel`` only while a page has the lease, and with a new publisher after
-every take-over. So panels on one graph see one another as they see any other node that steers: a
-publisher that has appeared since the holder took over ends his steering until he confirms it.
+every take-over. So panels on one graph see one another like any other node that steers: a
+publisher that has appeared since the take-over ends the steering until the holder confirms it.
 """
 
+from collections.abc import Callable
+import math
 from typing import Any
 
 from cpg_ros.nodes.other_publishers import node_of
 from cpg_ros.panel.lease import Lease, LeaseError
 from cpg_ros.panel.pages import Page
-from cpg_ros.panel.steering import HOLD, SteeringPublisher
-from geometry_msgs.msg import Twist
+from geometry_msgs.msg import Twist, TwistStamped
 from rclpy.node import Node
+
+#: A command may be this old when it is published, s; an older one counts as zero.
+HOLD = 0.3
+#: A stop is sent this many times: messages are cheap, a robot that walks on is not.
+STOPS = 5
+#: Frame of the commands, as REP 105 names the robot's.
+FRAME = 'base_link'
 
 
 class Teleop:
@@ -34,26 +44,38 @@ class Teleop:
 
     Attributes:
         lease: of the robot.
-        steering: what is published.
+        target: forward speed in m/s and turn in rad/s, (0, 0) where nobody steers.
         others: id -> node, of publishers on the topic that are not this one.
 
     """
 
-    def __init__(self, node: Node, topic: str, fastest: tuple[float, float]) -> None:
-        """Publish on a topic; a whole deflection is this speed in m/s and turn in rad/s."""
-        self._node, self._topic = node, topic
+    def __init__(self, node: Node, topic: str, fastest: tuple[float, float],
+                 stamped: Callable[[], bool]) -> None:
+        """Publish nothing yet.
+
+        Args:
+            node: that publishes.
+            topic: full name.
+            fastest: speed in m/s and turn in rad/s at full deflection.
+            stamped: returns whether the generator takes TwistStamped, not Twist.
+
+        """
+        self._node, self._topic, self._stamped = node, topic, stamped
         self._publisher: Any = None
+        self._kind: Any = Twist
         # Ids of our publisher, and of those of nodes of this name that were there before it.
         self._own: set[bytes] = set()
         self._before: set[bytes] = set()
         self.lease = Lease()
-        self.steering = SteeringPublisher(self._publish, fastest)
+        self._fastest = fastest
+        self._until, self._stops = -math.inf, 0
+        self.target = 0.0, 0.0
         self.others: dict[bytes, str] = {}
 
     # -- the lease --------------------------------------------------------------------------
 
     def acquire(self, page: Page, now: float) -> None:
-        """Let a page move the robot, if no other has the lease.
+        """Give a page the lease, if no other page has it.
 
         Raises:
             LeaseError: another page has it.
@@ -65,9 +87,9 @@ class Teleop:
             self._open()
 
     def take_over(self, page: Page, now: float) -> Page | None:
-        """Let a page move the robot, whoever did; return the page that has lost it."""
-        self.steering.stop()
-        self.steering.beat(now)
+        """Give a page the lease in any case; return the page that has lost it."""
+        self.stop()
+        self._send(now)
         self.look()
         lost: Any = self.lease.take_over(page, now, frozenset(self.others))
         page.lost_to = ''
@@ -81,12 +103,12 @@ class Teleop:
     def release(self, page: Page) -> None:
         """Take the lease from a page that has it."""
         if self.lease.release(page):
-            self.steering.stop()
+            self.stop()
 
     # -- steering ---------------------------------------------------------------------------
 
     def steer(self, page: Page, stamp: float, now: float, speed: float, turn: float) -> None:
-        """Steer with a command that was given after a stamp and has come now, both in s.
+        """Steer, by shares of full deflection given after a stamp and received now, both in s.
 
         Raises:
             LeaseError: another page has the lease, or other nodes steer.
@@ -94,40 +116,62 @@ class Teleop:
         """
         still = speed == 0.0 and turn == 0.0
         if still or now - stamp > HOLD:
-            # To let go takes no lease, and gives none.
+            # Letting go of the pad needs no lease, and gives none.
             if self.lease.holder is page:
-                self.steering.stop()
+                self.stop()
             return
         self.acquire(page, now)
         self.look()
         if not self.confirmed:
-            self.steering.stop()
+            self.stop()
             raise LeaseError(f'{self._topic} is also published by {self.names}: take over to '
                              'steer')
-        self.steering.hold(stamp, speed, turn)
+        self._until, self._stops = stamp + HOLD, STOPS
+        self.target = speed * self._fastest[0], turn * self._fastest[1]
+
+    def stop(self) -> None:
+        """Stop the robot, whichever page steers."""
+        self._until = -math.inf
 
     def beat(self, now: float) -> None:
-        """Publish what is to be published at a time, s."""
-        self.steering.beat(now)
+        """Publish the command for a time, s; stop a page that has been silent for too long."""
+        self._send(now)
         if self.lease.expire(now) is not None:
-            self.steering.stop()
-        if self._publisher is not None and self.lease.holder is None and self.steering.idle:
+            self.stop()
+        if self.lease.holder is None and self._until == -math.inf and not self._stops:
             self.close()
+
+    def _send(self, now: float) -> None:
+        """Publish the target while it is fresh, then zeros, STOPS times."""
+        if now > self._until:
+            self.stop()
+            self.target = 0.0, 0.0
+            if not self._stops:
+                return
+            self._stops -= 1
+        if self._publisher is not None:
+            message = self._kind()
+            twist = message if self._kind is Twist else message.twist
+            twist.linear.x, twist.angular.z = self.target
+            if self._kind is TwistStamped:
+                # No time: the generator's may be simulated. The panel's own limit is HOLD.
+                message.header.frame_id = FRAME
+            self._publisher.publish(message)
 
     # -- the topic --------------------------------------------------------------------------
 
     @property
     def confirmed(self) -> bool:
-        """Tell whether the holder has chosen to steer beside all others that publish."""
+        """Whether the holder has confirmed all other publishers."""
         return self.lease.confirmed.issuperset(self.others)
 
     @property
     def names(self) -> str:
-        """Which nodes the others are."""
+        """Names of the other nodes."""
         return ', '.join(sorted(set(self.others.values())))
 
     def look(self) -> None:
-        """See who else publishes."""
+        """Find the other publishers."""
         if self._publisher is not None and not self._own:
             self._own = self._named() - self._before
         self.others = {
@@ -136,29 +180,26 @@ class Teleop:
 
     def _open(self) -> None:
         self._before = self._named()
-        self._publisher = self._node.create_publisher(Twist, self._topic, 10)
+        self._kind = TwistStamped if self._stamped() else Twist
+        self._publisher = self._node.create_publisher(self._kind, self._topic, 10)
 
     def _named(self) -> set[bytes]:
-        """Return the ids of publishers of nodes of this one's name: others may have it, too."""
+        """Return the ids of publishers of nodes with this name, which others may have, too."""
         return {bytes(one.endpoint_gid)
                 for one in self._node.get_publishers_info_by_topic(self._topic)
                 if (one.node_name, one.node_namespace) == (self._node.get_name(),
                                                            self._node.get_namespace())}
 
     def close(self) -> None:
-        """Publish no more."""
+        """Destroy the publisher."""
         if self._publisher is not None:
             self._node.destroy_publisher(self._publisher)
             self._publisher, self._own = None, set()
 
-    def _publish(self, message: Twist) -> None:
-        if self._publisher is not None:
-            self._publisher.publish(message)
-
-    # -- what pages are shown ---------------------------------------------------------------
+    # -- the state for pages ----------------------------------------------------------------
 
     def state(self, page: Page) -> dict[str, Any]:
-        """Return what a page is to know of the lease."""
+        """Return the state of the lease for a page."""
         holder = self.lease.holder
         return {'type': 'lease', 'page': str(page), 'holder': str(holder or ''),
                 'yours': holder is page, 'lost_to': page.lost_to, 'stop_only': page.stop_only,

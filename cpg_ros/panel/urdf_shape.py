@@ -39,9 +39,9 @@ def from_text(text: str, source: str, report: Callable[[str], None]) -> Shape:
     """Return the shape that a URDF's text on the graph describes.
 
     Args:
-        text: of anybody on the graph: no file is opened that is not of an installed package.
+        text: from anyone on the graph: only files of installed packages are opened.
         source: what to call it.
-        report: is told of each part that cannot be drawn.
+        report: takes a line about each part that cannot be drawn.
 
     Raises:
         DescriptionError: it is no URDF, is too large, or its links are not one tree.
@@ -59,7 +59,7 @@ def from_file(path: Path, report: Callable[[str], None]) -> Shape:
 
     Args:
         path: of the file; meshes are found as ``find_mesh`` says.
-        report: is told of each part that cannot be drawn.
+        report: takes a line about each part that cannot be drawn.
 
     Raises:
         DescriptionError: it is no URDF, or its links are not one tree.

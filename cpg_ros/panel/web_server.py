@@ -31,28 +31,28 @@ from websockets.http11 import Request, Response
 FILES = Path(__file__).parent / 'page'
 TYPES = {'.html': 'text/html', '.css': 'text/css', '.js': 'text/javascript',
          '.svg': 'image/svg+xml'}
-#: A request's size, bytes.
+#: Largest size of a request, bytes.
 LONGEST = 4096
-#: Where recordings are fetched.
+#: Path of recordings.
 BAGS = '/bags/'
-#: What the browser lets the page do: nothing that is not from here.
+#: The browser lets the page load nothing from elsewhere.
 POLICY = ("default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data:; "
           "connect-src 'self' ws: wss:; base-uri 'none'; form-action 'none'; "
           "frame-ancestors 'none'")
-#: What clients do wrong is theirs: the library would fill the log with it.
+#: Errors of clients would fill the log.
 _LOG = logging.getLogger('cpg_ros.panel.socket')
 _LOG.addHandler(logging.NullHandler())
 _LOG.propagate = False
 
 
 class WebServer:
-    """Serves files to whom the door lets in, and tells of pages that come, ask and go."""
+    """Serves files to authorised clients, and reports pages that open, send requests and close."""
 
-    def __init__(self, door: AccessControl, pages: Pages, bag: Callable[[str], bytes],
+    def __init__(self, access: AccessControl, pages: Pages, bag: Callable[[str], bytes],
                  come: Callable[[Page], None],
                  on_request: Callable[[Page, str | bytes], Awaitable[None]],
                  gone: Callable[[Page], None]) -> None:
-        self._door, self._pages, self._bag = door, pages, bag
+        self._access, self._pages, self._bag = access, pages, bag
         self._delays = Delays()
         self._come, self._on_request, self._gone = come, on_request, gone
         self._files = {'/' if file.name == 'index.html' else f'/{file.name}':
@@ -60,10 +60,10 @@ class WebServer:
                        for file in FILES.iterdir() if file.suffix in TYPES}
 
     async def start(self, host: str, port: int) -> tuple[Server, int]:
-        """Begin to serve; return the server and its port.
+        """Start serving; return the server and its port.
 
         Raises:
-            OSError: the address cannot be had.
+            OSError: the address is not available.
 
         """
         server = await serve(self._page, host, port, process_request=self._answer,
@@ -76,9 +76,9 @@ class WebServer:
     async def _answer(self, connection: ServerConnection, request: Request) -> Response | None:
         path = urlsplit(request.path).path
         hosts, origins = (request.headers.get_all(name) for name in ('Host', 'Origin'))
-        refused = self._door.refuses(request.path, hosts[0] if len(hosts) == 1 else '',
+        refused = self._access.refuses(request.path, hosts[0] if len(hosts) == 1 else '',
                                      origins[0] if origins else '')
-        # The page's files tell nothing: with them it can say that a token is wanted.
+        # The page's files are public: with them it can show that a token is missing.
         if path in self._files and (not refused or 'token' in refused):
             body, kind = self._files[path]
             return _response(HTTPStatus.OK, body, f'{kind}; charset=utf-8')
@@ -104,7 +104,7 @@ class WebServer:
 
     async def _page(self, connection: ServerConnection) -> None:
         page = self._pages.admit(connection)
-        # One request may wait for another node; a stop must not wait for that.
+        # One request may wait for another node; a stop must not wait for it.
         under_way: set[asyncio.Task] = set()
         try:
             self._come(page)

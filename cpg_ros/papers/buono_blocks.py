@@ -14,7 +14,7 @@
 
 """Buono & Golubitsky (2001), section 5.2: Tables 5 to 11, formulas against the linearisation.
 
-The formulas stand in ``dynamics.buono_tables`` as printed. They are held against the blocks of the
+The formulas stand in ``papers.buono_tables`` as printed. They are held against the blocks of the
 network's own Jacobian, at one state in which all cells are alike and one set of couplings, both
 drawn at random, so that no formula holds by chance.
 """
@@ -26,7 +26,7 @@ from cpg_ros.dynamics.equilibrium import everywhere
 from cpg_ros.dynamics.isotypic import Block, blocks
 from cpg_ros.networks.quadruped import Quadruped
 from cpg_ros.papers.buono_gaits import AUTHORS
-from cpg_ros.papers.buono_tables import square_root, Tables
+from cpg_ros.papers.buono_tables import square_root, TABLE_7, TABLE_8, Tables
 from cpg_ros.papers.row import Citation, Picture, ReproducedRow
 import numpy as np
 
@@ -42,7 +42,6 @@ TABLE_5 = {(0, 0): ('pronk', '0 0 0 0 0 0 0 0'), (0, 1): ('pace', '0 1/2 0 1/2 0
 TABLE_6 = {'L_00': 'A + (B + C + D)', 'L_01': 'A + (B - C + D)', 'L_20': 'A - (B - C - D)',
            'L_21': 'A - (B + C - D)', 'L_10': 'A - Bi + C - D', 'L_11': 'A - Bi - C - D',
            'L_30': 'A + Bi + C - D', 'L_31': 'A + Bi - C - D'}
-SIGNS = {'L_00': '+++', 'L_01': '+-+', 'L_20': '-++', 'L_21': '--+'}
 TABLE_11 = {'L_00': 'nu + 2(alpha + gamma + xi)', 'L_01': 'nu + 2(alpha - gamma + xi)',
             'L_20': 'nu + 2(-alpha + gamma + xi)', 'L_21': 'nu - 2(alpha + gamma - xi)',
             'L_10': 'nu + 2 gamma - 2 xi', 'L_11': 'nu - 2 gamma - 2 xi'}
@@ -82,7 +81,7 @@ class Sample:
 
 
 def drawn(equal: bool = False) -> Sample:
-    """Draw a sample; with alpha = beta, gamma = delta and xi = eta if asked."""
+    """Draw a sample; with alpha = beta, gamma = delta and xi = eta if equal is set."""
     rng = np.random.default_rng(2001)
     network = Quadruped(*rng.uniform(-0.5, 0.5, 6))
     if equal:
@@ -111,30 +110,28 @@ def phases() -> Iterator[ReproducedRow | Picture]:
                         note='from the eigenvector of the 16 x 16 matrix')
 
 
-def _signed(signs: str, operator: str) -> str:
+def _signed(signs: tuple[int, ...], operator: str) -> str:
     pairs = (('alpha', 'beta'), ('gamma', 'delta'), ('xi', 'eta'))
-    return ' '.join(f'{sign} ({a} {operator} {b})' for sign, (a, b) in zip(signs, pairs,
-                                                                           strict=True))
+    return ' '.join(f'{"+" if sign > 0 else "-"} ({a} {operator} {b})'
+                    for sign, (a, b) in zip(signs, pairs, strict=True))
 
 
 def tables() -> Iterator[ReproducedRow | Picture]:
-    """Tables 6 to 10, and what is said of eigenvalues with them."""
+    """Tables 6 to 10, and the eigenvalues that the paper derives from them."""
     sample = drawn()
     printed, parts = sample.tables, sample.blocks
     for name, text in TABLE_6.items():
         yield Citation(AUTHORS, 'Table 6').formula(name, text, printed.block(*parts[name].mode),
                                                    parts[name].now)
-    for name, signs in SIGNS.items():
-        wrong, n = name == 'L_21', sample.network
-        text = '(a + d) ' + _signed(signs if not wrong else '---', '+')
+    for (j, k), signs in TABLE_7.items():
+        name, trace, n = f'L_{j}{k}', printed.trace(j, k), sample.network
         yield Citation(AUTHORS, 'Table 7').formula(
-            f'trace of {name}', text, (trace := printed.trace(*parts[name].mode)),
-            sample.trace(name).real,
-            erratum=(12, trace + 2.0 * (n.xi + n.eta)) if wrong else None)
-    for name, signs in SIGNS.items():
+            f'trace of {name}', f'(a + d) {_signed(signs, "+")}', trace, sample.trace(name).real,
+            erratum=(12, trace + 2.0 * (n.xi + n.eta)) if name == 'L_21' else None)
+    for (j, k), signs in TABLE_8.items():
         yield Citation(AUTHORS, 'Table 8').formula(
-            f'D of {name}', f'((a - d) {_signed(signs, "-")})^2 + 4bc',
-            printed.discriminant(*parts[name].mode), sample.discriminant(name).real)
+            f'D of L_{j}{k}', f'((a - d) {_signed(signs, "-")})^2 + 4bc',
+            printed.discriminant(j, k), sample.discriminant(f'L_{j}{k}').real)
     for name in ('L_10', 'L_30', 'L_11', 'L_31'):
         mode, whole = parts[name].mode, sample.discriminant(name)
         yield Citation(AUTHORS, 'Table 9').formula(f'Phi of {name}', 'as printed',

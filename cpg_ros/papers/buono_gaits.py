@@ -15,7 +15,7 @@
 """Buono & Golubitsky (2001): the six primary gaits, Tables 1, 2, 4 and 13, section 7, Figure 2.
 
 Phases are measured on simulations of all eight cells that start off the gait and run free of any
-lock; they are not those that a solver was told.
+lock; they are not prescribed to a solver.
 """
 
 from collections.abc import Iterator
@@ -29,15 +29,15 @@ from cpg_ros.networks.quadruped import Quadruped
 from cpg_ros.networks.symmetry import Z4_Z2
 from cpg_ros.papers.cell_constants import cell_constants
 from cpg_ros.papers.figures import trajectories
-from cpg_ros.papers.rhythm import primary_gaits, Rhythm, rhythm
+from cpg_ros.papers.rhythm import disturbed_start, primary_gaits, Rhythm, rhythm
 from cpg_ros.papers.row import Citation, Picture, ReproducedRow
 import numpy as np
 
 AUTHORS = 'Buono & Golubitsky 2001'
-#: Periods that a disturbed gait gets to settle, and size of the disturbance.
-SETTLING, DISTURBANCE = {'jump': 150.0}, 0.01
+#: Periods in which a disturbed gait settles, and those usually enough.
+SETTLING = {'jump': 150.0}
 USUALLY = 60.0
-#: Periods that a wave gets to turn round.
+#: Periods in which a wave turns round.
 REVERSAL = 150.0
 
 #: Table 13: alpha, beta, gamma, delta.
@@ -84,21 +84,17 @@ def settled(name: str) -> SolvedGait:
     """Simulate a gait of Table 13 from near its orbit, with every cell disturbed."""
     network = Quadruped(*(float(value) for value in TABLE_13[name]))
     preset = Quadruped.presets()[name]
-    start = np.array(preset.start)
-    start = start + DISTURBANCE * np.random.default_rng(0).standard_normal(start.size)
     span = SETTLING.get(name, USUALLY) * preset.period
-    return SolvedGait(name, network,
-                      rhythm(network, start, span, Z4_Z2, primary_gaits(variables=2)))
+    return SolvedGait(name, network, rhythm(network, disturbed_start(preset), span, Z4_Z2,
+                                            primary_gaits(variables=2)))
 
 
 def _table_13(gait: SolvedGait) -> Iterator[ReproducedRow]:
     at, name = Citation(AUTHORS, 'Table 13'), gait.name
     yield at.word('gait that is found with the couplings ' + ', '.join(TABLE_13[name]), name,
                   gait.seen.kind, note=f'period {gait.seen.found.period:.4f}; phases measured')
-    found = multipliers(solve_orbit(gait.network, name))
-    yield at.word(f'the {name} that is found', 'stable',
-                  'stable' if found.leading < 1.0 else 'unstable',
-                  note=f'leading Floquet multiplier {found.leading:.3g} a cycle')
+    yield at.stable(f'the {name} that is found',
+                    multipliers(solve_orbit(gait.network, name)).leading)
 
 
 def _table_1(gait: SolvedGait) -> Iterator[ReproducedRow]:

@@ -14,7 +14,7 @@
 
 """Buono & Golubitsky (2001), sections 2.3 and 3: D4, four cells, and which leg each cell moves.
 
-All of it is found by going through all cases.
+All results come from an exhaustive search.
 """
 
 from collections.abc import Iterator
@@ -69,7 +69,7 @@ def conjugate(by: Permutation, subgroup: Subgroup) -> Subgroup:
 
 @cache
 def all_subgroups(group: Subgroup) -> frozenset[Subgroup]:
-    """Every subgroup; those of D4 need two generators at most, and no others are asked for."""
+    """Every subgroup; those of D4 need two generators at most, and no other group is used."""
     return frozenset(generated(a, b) for a in group for b in group)
 
 
@@ -130,6 +130,22 @@ def dihedral() -> Iterator[ReproducedRow | Picture]:
         yield at.phases(f'{_name(k)} in {_name(h)}: phase of RH (cell 5) against LH (cell 1)',
                         phase, [0.0 if HALF in k else 0.5 * (HALF in h)],
                         note='H/K is Z2: what is in H but not in K shifts by half a period')
+
+
+#: Figure 4: the largest subgroups of each, up to conjugation.
+FIGURE_4 = {'D4': 'D2s, D2p, Z4', 'D2s': 'Z2s, Z2', 'D2p': 'Z2p, Z2', 'Z4': 'Z2', 'Z2s': '1',
+            'Z2p': '1', 'Z2': '1'}
+
+
+def lattice() -> Iterator[ReproducedRow | Picture]:
+    """Figure 4: the subgroups of D4, and which contain which."""
+    for name, printed in FIGURE_4.items():
+        below = [one for one in all_subgroups(D4) if one < NAMES[name]]
+        largest = {_name(one) for one in below if not any(one < other for other in below)}
+        yield Citation(AUTHORS, 'Figure 4').word(
+            f'largest subgroups of {name}, up to conjugation', printed,
+            ', '.join([one for one in printed.split(', ') if one in largest]
+                      + sorted(largest - set(printed.split(', ')))))
 
 
 def four_cells() -> Iterator[ReproducedRow | Picture]:

@@ -18,7 +18,7 @@ from collections.abc import Iterator
 from typing import cast
 
 from cpg_ros.dynamics.equilibrium import equilibrium
-from cpg_ros.dynamics.hopf import HopfPoint
+from cpg_ros.dynamics.hopf_point import HopfPoint
 from cpg_ros.dynamics.hopf_search import hopf_at
 from cpg_ros.networks.network import Network
 from cpg_ros.networks.parameter_line import ParameterLine
@@ -53,7 +53,8 @@ THEOREM = (
 FAILING = ('walk', 0.05)
 
 
-def _sample(network: Network) -> Sample:
+def stand_sample(network: Network) -> Sample:
+    """Return the linearisation at the stand of a network."""
     return Sample(cast(Quadruped, network), equilibrium(network))
 
 
@@ -71,11 +72,11 @@ def hopf(network: Quadruped, line: str, gait: str, low: float, high: float) -> H
     along, (j, k) = ParameterLine.parse(line, Quadruped), GAITS[gait]
 
     def largest(value: float) -> float:
-        return _sample(along.at(network, value)).largest(f'L_{j}{k}')
+        return stand_sample(along.at(network, value)).largest(f'L_{j}{k}')
 
     there = along.at(network, float(brentq(largest, low, high, xtol=1e-13)))
     # Of the two senses of a wave the one whose critical eigenvalue turns forward.
-    blocks = _sample(there).blocks
+    blocks = stand_sample(there).blocks
     root, mode = min(((root, (way, k)) for way in {j, -j % 4}
                       for root in blocks[f'L_{way}{k}'].roots(2) if root.imag > 0.0),
                      key=lambda one: abs(one[0].real))
@@ -85,7 +86,7 @@ def hopf(network: Quadruped, line: str, gait: str, low: float, high: float) -> H
 def the_stand() -> Iterator[ReproducedRow | Picture]:
     """Section 6: the stand of the uncoupled cells, and hypothesis 4.6."""
     at = Citation(AUTHORS, 'section 6')
-    sample = _sample(UNCOUPLED)
+    sample = stand_sample(UNCOUPLED)
     for name, printed, value in zip(('v_0', 'w_0'), STAND, sample.state, strict=True):
         yield at.number(f'{name} of the stand', printed, float(value))
     yield at.number('nu_0, the trace of a cell there', NU_0, sample.trace('L_00').real)
@@ -96,7 +97,7 @@ def the_stand() -> Iterator[ReproducedRow | Picture]:
 
 def existence() -> Iterator[ReproducedRow | Picture]:
     """Theorems 4.1 and 4.3: the points of the proofs, where the stand stays in place."""
-    nu = _sample(UNCOUPLED).trace('L_00').real
+    nu = stand_sample(UNCOUPLED).trace('L_00').real
     for place, gait, line, text, value, speed in (
             ('Theorem 4.1', 'walk', 'gamma=delta=-alpha=-beta', 'nu_0/2', nu / 2.0, '-2'),
             ('Theorem 4.1', 'trot', 'xi=eta=-alpha=-beta', '-nu_0/4', -nu / 4.0, None),
@@ -118,7 +119,7 @@ def existence() -> Iterator[ReproducedRow | Picture]:
         point.normal_form.k1.real, note='2 is E_xi at fixed alpha + gamma; along the line E '
         'grows by 4, the real part by 2')
     walk = hopf(UNCOUPLED, 'gamma=delta=-alpha=-beta', 'walk', nu / 2.0 - 0.1, nu / 2.0 + 0.1)
-    sample = _sample(walk.network)
+    sample = stand_sample(walk.network)
     alpha = sample.network.alpha
     at = Citation(AUTHORS, 'Proposition 5.6')
     zero = [name for name in ('L_10', 'L_11') if abs(sample.trace(name).real) < 1e-9]
@@ -142,7 +143,7 @@ def table_12() -> Iterator[ReproducedRow | Picture]:
                         within=APPROXIMATE * abs(float(printed)),
                         note='the table says approximate; the other coupling as printed')
     alpha, gamma, xi = (float(one) for one in TABLE_12['trot'])
-    sample = _sample(Quadruped(alpha, alpha, gamma, gamma, xi, xi))
+    sample = stand_sample(Quadruped(alpha, alpha, gamma, gamma, xi, xi))
     leading = max(sample.largest(name) for name in sample.blocks)
     yield at.number('trot: leading real part of the stand at the couplings printed', '0.00',
                     leading, within=0.1, erratum=(6, '-0.449'))
@@ -179,7 +180,7 @@ def theorem_4_2() -> Iterator[ReproducedRow | Picture]:
             erratum=(23, 'unstable') if (gait, alpha) == FAILING else None,
             note=f'{point.unstable_roots} other eigenvalues with positive real part')
     trot = found['trot']
-    sample = _sample(trot.network)
+    sample = stand_sample(trot.network)
     n = sample.network
     at = Citation(AUTHORS, 'Proposition 5.5')
     for name, text, value in (
@@ -191,7 +192,7 @@ def theorem_4_2() -> Iterator[ReproducedRow | Picture]:
                          value, sample.trace(name).real)
     at = Citation(AUTHORS, 'Proposition 5.7')
     for gait, other, sign in (('jump', 'L_11', -1.0), ('walk', 'L_10', 1.0)):
-        sample = _sample(found[gait].network)
+        sample = stand_sample(found[gait].network)
         gamma = sample.network.gamma
         phi, psi = (part(1, 0) for part in (sample.tables.phi, sample.tables.psi))
         root = np.sqrt((phi + np.hypot(phi, psi)) / 2.0)

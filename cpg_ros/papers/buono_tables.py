@@ -14,8 +14,8 @@
 
 """Tables 6 to 11 of Buono & Golubitsky (2001) exactly as printed, for linear synaptic coupling.
 
-They stand here to be compared with the blocks of the linearisation; what is wrong in them is
-wrong here, too, and is said where it stands. Couplings are alpha, beta, gamma, delta, xi, eta of
+They are compared with the blocks of the linearisation; their errors are kept, and noted where
+they occur. Couplings are alpha, beta, gamma, delta, xi, eta of
 the network, (j, k) the class; j is 0 to 3, or 0 and 2 for the real blocks.
 """
 

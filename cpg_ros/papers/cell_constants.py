@@ -40,7 +40,7 @@ def cell_constants(network: Quadruped | Biped, current: float) -> dict[str, floa
 
     Args:
         network: in which cells that are alike do not feel one another.
-        current: into each cell, which cannot be told from gL vL.
+        current: into each cell, which cannot be distinguished from gL vL.
 
     Returns:
         gCa, vCa, gK, vK, gL, vL, v1 to v4, phi; and tau_far, which is tau at v3 + 10 v4 over

@@ -12,18 +12,18 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What the papers say of Hopf points of their networks, to stand beside what is computed."""
+"""Statements of the papers on Hopf points of their networks, beside the computed ones."""
 
 from typing import Any, cast
 
-from cpg_ros.dynamics.hopf import HopfPoint
+from cpg_ros.dynamics.hopf_point import HopfPoint
 from cpg_ros.networks.quadruped import Quadruped
 from cpg_ros.papers.published_normal_form import published_normal_form
 from cpg_ros.papers.theorem_4_2 import theorem_4_2
 
 
 class Commentary:
-    """Of a network on which no paper says anything.
+    """No statement, for other networks.
 
     Attributes:
         heads: of columns in a table of Hopf points.
@@ -37,11 +37,11 @@ class Commentary:
     title = ''
 
     def numbers(self, point: HopfPoint) -> dict[str, float]:
-        """Return what the columns show, name -> number."""
+        """Return the numbers of the columns, name -> number."""
         return {}
 
     def remark(self, point: HopfPoint) -> tuple[str, dict[str, Any]]:
-        """Return what there is to say in words, and in plain types; nothing."""
+        """Return a statement as text and in plain types; here, none."""
         return '', {}
 
 
@@ -63,7 +63,7 @@ class Theorem(Commentary):
     title = 'Buono & Golubitsky at these points:'
 
     def remark(self, point: HopfPoint) -> tuple[str, dict[str, Any]]:
-        """Return what the theorem says."""
+        """Return the verdict of the theorem."""
         verdict = theorem_4_2(cast(Quadruped, point.network), point.gait)
         return str(verdict), {'theorem_4_2': {
             'applies': verdict.applies, 'stable': verdict.stable, 'says': str(verdict)}}

@@ -14,8 +14,7 @@
 
 """Errata of the three papers, by number. Rows of the report that differ name one of these.
 
-docs/numbers_and_errata.md, section Errata, says how 1 to 8 were verified; the others were found
-while the report was made.
+docs/numbers_and_errata.md, section Errata, lists them with how they were verified.
 """
 
 LIU, BUONO, RASHIDI = 'Liu & Zhang 2024', 'Buono & Golubitsky 2001', 'Rashidi et al. 2016'
@@ -114,4 +113,11 @@ ERRATA: dict[int, tuple[str, str]] = {
          'gamma < 0 that is not stable: L_21 has a real eigenvalue 0.10.'),
     24: (BUONO,
          'Eq. 5.3 holds for Psi >= 0 only: for Psi < 0 its square is Phi - i Psi. Only the '
-         'real part is used, which is right.')}
+         'real part is used, which is right.'),
+    25: (LIU,
+         'Section 2: the third row of F_3 has d phi_3^3(0) for d phi_1^3(0), as F_0 has it. As '
+         'F = F_2/2! + F_3/3!, F_2 lacks the factor 2! and F_3 the factor 3!.'),
+    26: (RASHIDI,
+         'Section 5: the gallop by way of the two-legged jump and the hesitation walk by way of '
+         'the run, which Pinto & Golubitsky predict, could not be reached. Both can, with '
+         'directed weights that keep the symmetry of the gait.')}

@@ -48,8 +48,7 @@ def trajectories(title: str, t: np.ndarray, x: np.ndarray, names: Sequence[str],
         axes.set_ylabel(names[cell], rotation=0, ha='right', va='center', fontsize=9)
         axes.tick_params(labelsize=8)
         axes.grid(linewidth=0.3)
-        for side in ('top', 'right'):
-            axes.spines[side].set_visible(False)
+        axes.spines[['top', 'right']].set_visible(False)
     grid[-1].set_xlim(float(t[0]), float(t[-1]))
     grid[-1].set_xlabel('time [model time]', fontsize=9)
     figure.supylabel(f'{variable} [1]', fontsize=9)

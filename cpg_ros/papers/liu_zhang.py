@@ -18,7 +18,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 from cpg_ros.dynamics.floquet import multipliers
-from cpg_ros.dynamics.hopf import first_hopf, HopfPoint
+from cpg_ros.dynamics.hopf_point import first_hopf, HopfPoint
 from cpg_ros.dynamics.orbit import solve_orbit
 from cpg_ros.dynamics.periodic import NoOrbit
 from cpg_ros.inversion.cycle_fit import cycle_samples, CycleFit, fit_cycle
@@ -28,6 +28,7 @@ from cpg_ros.papers.figures import trajectories
 from cpg_ros.papers.published_normal_form import published_normal_form
 from cpg_ros.papers.rhythm import primary_gaits, rhythm
 from cpg_ros.papers.row import Citation, Paper, Picture, ReproducedRow
+from cpg_ros.papers.taylor_terms import taylor_terms
 import numpy as np
 
 AUTHORS = 'Liu & Zhang 2024'
@@ -44,7 +45,7 @@ class Example:
 
     Attributes:
         place: in the paper.
-        gait: that it is said to be.
+        gait: according to the paper.
         network: the parameters.
         start: values under its figure.
         figure: number.
@@ -147,16 +148,11 @@ def _example(example: Example) -> Iterator[ReproducedRow | Picture]:
         'unstable' if roots else 'stable', erratum=(3, 'unstable'),
         note=f'roots of the rest state with positive real part outside the class of the gait: '
              f'{roots}')
-    orbit = solve_orbit(network, gait)
-    found = multipliers(orbit)
-    yield at.word(
-        f'{gait} at tau {network.tau:g}, within its symmetry class', 'stable',
-        'stable' if found.leading_within < 1.0 else 'unstable',
-        note=f'leading Floquet multiplier {found.leading_within:.3g} a cycle')
-    yield at.word(
-        f'{gait} at tau {network.tau:g}, in the full network', 'stable',
-        'stable' if found.leading_transverse < 1.0 else 'unstable', erratum=(3, 'unstable'),
-        note=f'leading transverse Floquet multiplier {found.leading_transverse:.3g} a cycle')
+    found = multipliers(solve_orbit(network, gait))
+    yield at.stable(f'{gait} at tau {network.tau:g}, within its symmetry class',
+                    found.leading_within)
+    yield at.stable(f'{gait} at tau {network.tau:g}, in the full network',
+                    found.leading_transverse, erratum=3, which='leading transverse')
     yield from _simulated(example)
 
 
@@ -188,7 +184,7 @@ def _simulated(example: Example) -> Iterator[ReproducedRow | Picture]:
 
 
 def conditions() -> Iterator[ReproducedRow | Picture]:
-    """(H1) and (H2), under which the bifurcations are there."""
+    """(H1) and (H2), the conditions of the bifurcations."""
     for place, name, key, sign in (('Example 1', 'H1', 'walk', 1.0),
                                    ('Example 2', 'H2', 'pace', -1.0)):
         a, b, c, d, _ = EXAMPLES[key].network.as_dict().values()
@@ -198,17 +194,17 @@ def conditions() -> Iterator[ReproducedRow | Picture]:
 
 
 def walk() -> Iterator[ReproducedRow | Picture]:
-    """Return what is said of Example 1, the walk."""
+    """Return the rows of Example 1, the walk."""
     return _example(EXAMPLES['walk'])
 
 
 def trot() -> Iterator[ReproducedRow | Picture]:
-    """Return what is said of Example 1, the trot."""
+    """Return the rows of Example 1, the trot."""
     return _example(EXAMPLES['trot'])
 
 
 def pace() -> Iterator[ReproducedRow | Picture]:
-    """Return what is said of Example 2."""
+    """Return the rows of Example 2."""
     return _example(EXAMPLES['pace'])
 
 
@@ -276,4 +272,4 @@ def table_2() -> Iterator[ReproducedRow | Picture]:
 
 PAPER = Paper('liu_zhang', AUTHORS,
               'L. Liu, C. Zhang: A neural network model for goat gait (2024)',
-              (conditions, walk, trot, pace, goat_trot, goat_walk, table_1, table_2))
+              (conditions, taylor_terms, walk, trot, pace, goat_trot, goat_walk, table_1, table_2))

@@ -14,8 +14,8 @@
 
 """Oscillators of legs: Ijspeert et al. (2007), Righetti & Ijspeert (2008), Matsuoka (1985, 2011).
 
-What these papers state of their oscillators in general, held against our orbits: formulas and
-statements, not the figures of their robots.
+The formulas and statements on the oscillators in these papers, compared with the orbits; not the
+figures of their robots.
 """
 
 from collections.abc import Iterator
@@ -123,7 +123,7 @@ def frequency() -> Iterator[ReproducedRow]:
 
 
 def _alone(network: Any) -> Any:
-    """Return a network whose legs do not hear one another."""
+    """Return the network with uncoupled legs."""
     return replace(network, **dict.fromkeys(network.couplings, 0.0))
 
 

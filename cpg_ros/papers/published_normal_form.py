@@ -16,7 +16,7 @@
 
 import cmath
 
-from cpg_ros.dynamics.hopf import HopfPoint
+from cpg_ros.dynamics.hopf_point import HopfPoint
 from cpg_ros.dynamics.normal_form import NormalForm
 
 

@@ -42,12 +42,12 @@ class Drawn:
 
 @dataclass(frozen=True)
 class Reproduction:
-    """What came out.
+    """The rows and figures of some papers.
 
     Attributes:
-        papers: that were asked for.
+        papers: whose they are.
         rows: in the order of the papers.
-        figures: likewise; none if they were not asked for.
+        figures: likewise; none if they were not drawn.
 
     """
 
@@ -111,7 +111,7 @@ def reproduce(names: Sequence[str], jobs: int = 1, draw: bool = True,
         names: of the papers, from ``registry.PAPERS``.
         jobs: processes to share the work; 1 does it in this one.
         draw: whether to draw the figures.
-        progress: told how many parts are done, out of ``parts(names)``.
+        progress: takes the number of parts done, out of ``parts(names)``.
 
     """
     papers = tuple(PAPERS[name] for name in names)
@@ -141,5 +141,5 @@ def reproduce(names: Sequence[str], jobs: int = 1, draw: bool = True,
 
 
 def parts(names: Sequence[str]) -> int:
-    """How many parts the papers have."""
+    """Return the number of parts of the papers."""
     return sum(len(PAPERS[name].sections) for name in names)

@@ -20,7 +20,7 @@ from fractions import Fraction
 
 from cpg_ros.gaits.recognition import recognise, Recognition
 from cpg_ros.integration.simulate import simulate, Trajectory
-from cpg_ros.networks.network import Network
+from cpg_ros.networks.network import Network, Preset
 from cpg_ros.networks.symmetry import Group, Symmetry, Z4_Z2
 import numpy as np
 
@@ -28,6 +28,8 @@ import numpy as np
 SETTLED = 0.15
 #: Samples a cycle needs to tell its waveforms; more only take time.
 SAMPLES = 4000
+#: Standard deviation of a disturbed start, in the units of the cells.
+DISTURBANCE = 0.01
 
 
 def primary_gaits(variables: int) -> dict[str, Symmetry]:
@@ -41,6 +43,12 @@ def primary_gaits(variables: int) -> dict[str, Symmetry]:
               'jump+': (1, 0), 'jump-': (3, 0), 'walk+': (1, 1), 'walk-': (3, 1)}
     return {name: Symmetry.of(Z4_Z2, {'omega': Fraction(j, 4), 'kappa': Fraction(k, 2)},
                               variables) for name, (j, k) in shifts.items()}
+
+
+def disturbed_start(preset: Preset) -> np.ndarray:
+    """Return a state near a preset's orbit, every variable disturbed, shape (components,)."""
+    start = np.array(preset.start)
+    return start + DISTURBANCE * np.random.default_rng(0).standard_normal(start.size)
 
 
 @dataclass(frozen=True)
@@ -73,13 +81,13 @@ def rhythm(network: Network, start: Sequence[float] | np.ndarray, t_end: float, 
 
     Args:
         network: parameters.
-        start: a state; with a delay, the network was in it ever before.
+        start: a state; with a delay, also the whole history.
         t_end: model time to simulate.
         group: of the network.
-        gaits: that are told apart.
+        gaits: to choose from.
 
     Raises:
-        InputError: it comes to rest, or repeats nothing.
+        InputError: it comes to rest, or is not periodic.
 
     """
     run = simulate(network, np.asarray(start, dtype=float), t_end, network.step, progress=False)

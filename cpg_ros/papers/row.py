@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A quantity as a paper prints it, what our numerics give for it, and whether the two agree."""
+"""A quantity as a paper prints it, its computed value, and whether the two agree."""
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
@@ -35,16 +35,16 @@ class ReproducedRow:
     Attributes:
         paper: authors and year.
         place: section, table, equation or figure of it.
-        quantity: what is meant.
+        quantity: what it is.
         published: as the paper prints it.
-        computed: what our numerics give, written alike.
+        computed: its value, written alike.
         agrees: whether the two do.
         compared: how, in words.
         value: the computed number; None where it is a word or has several numbers.
         erratum: number of the one that covers this row (see ``errata``), or None.
         corrected: what is right according to the erratum, or ''.
         explained: whether the computed one is that.
-        note: what else a reader should know, or ''.
+        note: for the reader, or ''.
 
     """
 
@@ -105,9 +105,9 @@ class Paper:
 
 @dataclass(frozen=True)
 class Citation:
-    """A place in a paper, from where rows are quoted.
+    """A place in a paper, from which rows are quoted.
 
-    An erratum is given with what it says is right: a computed value that is neither that nor the
+    An erratum comes with the correct value: a computed value that is neither that nor the
     published one fails.
     """
 
@@ -117,10 +117,10 @@ class Citation:
     def _row(self, quantity: str, published: str, shown: str, same: Callable[[str], bool],
              how: str, value: float | None, erratum: tuple[int, str] | None,
              note: str) -> ReproducedRow:
-        number, corrected = (None, '') if erratum is None else erratum
+        number, corrected = erratum or (None, '')
         return ReproducedRow(self.paper, self.place, quantity, published, shown, same(published),
-                             how, value,
-                             number, corrected, erratum is not None and same(corrected), note)
+                             how, value, number, corrected, bool(erratum) and same(corrected),
+                             note)
 
     def number(self, quantity: str, published: str, computed: float, *,
                within: float | None = None, erratum: tuple[int, str] | None = None,
@@ -128,11 +128,11 @@ class Citation:
         """Quote a number with the digits printed.
 
         Args:
-            quantity: what is meant.
-            published: as printed; its last digit tells how exact it is.
+            quantity: what it is.
+            published: as printed; its last digit gives its precision.
             computed: ours.
             within: largest difference; by default half a unit of the last digit printed.
-            erratum: that covers a difference, and the right number; its last digit tells, too.
+            erratum: that covers a difference, and the right number with its precision.
             note: for the reader.
 
         """
@@ -176,6 +176,13 @@ class Citation:
         return self.word(quantity, 'true', str(bool(computed)).lower(), note=note,
                          erratum=None if erratum is None else (erratum, 'false'))
 
+    def stable(self, quantity: str, multiplier: float, *, erratum: int | None = None,
+               which: str = 'leading') -> ReproducedRow:
+        """Quote that a gait is stable, judged by a Floquet multiplier; an erratum: it is not."""
+        return self.word(quantity, 'stable', 'stable' if multiplier < 1.0 else 'unstable',
+                         erratum=None if erratum is None else (erratum, 'unstable'),
+                         note=f'{which} Floquet multiplier {multiplier:.3g} a cycle')
+
     def formula(self, quantity: str, published: str, value: Value, computed: Value, *,
                 erratum: tuple[int, Value] | None = None, note: str = '') -> ReproducedRow:
         """Quote a formula by its value at some arguments, compared with ours at the same."""
@@ -187,11 +194,11 @@ class Citation:
             return theirs.shape == ours.shape and bool((np.abs(theirs - ours) <= limit).all())
 
         single = float(ours[0].real) if ours.size == 1 and not np.iscomplexobj(ours) else None
-        number, corrected = (None, '') if erratum is None else (erratum[0], _shown(erratum[1]))
+        number, right = erratum or (None, None)
         return ReproducedRow(self.paper, self.place, quantity, f'{published} = {_shown(value)}',
                              _shown(ours), same(value), f'at one set of couplings, to {FORMULA:g}',
-                             single,
-                             number, corrected, erratum is not None and same(erratum[1]), note)
+                             single, number, '' if right is None else _shown(right),
+                             right is not None and same(right), note)
 
 
 def _exponent(text: str) -> int:

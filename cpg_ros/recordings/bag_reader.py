@@ -37,8 +37,8 @@ def read_bag(path: str | Path, topics: Sequence[str] = (), joints: Sequence[str]
 
     See `recorded` for joints that are on several topics, and for stamps.
 
-    A recorder that died leaves mcap files without an end and no metadata.yaml. What is whole of
-    such files is read; a note says so. A cut sqlite3 file is refused.
+    A recorder that died leaves mcap files without an end and no metadata.yaml. The complete part
+    of such files is read, and a note reports it. A truncated sqlite3 file is an error.
 
     Args:
         path: the bag's folder, or one of its storage files (.mcap, .db3).

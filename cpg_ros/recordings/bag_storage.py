@@ -69,7 +69,7 @@ class Bag:
         return list(dict.fromkeys(chosen)) or fitting
 
     def expected(self) -> Counter[str]:
-        """Count the messages of each topic, as the bag says."""
+        """Return the number of messages of each topic in the bag's metadata."""
         counts: Counter[str] = Counter()
         for one in self.connections:
             counts[one.topic] += one.msgcount
@@ -128,7 +128,7 @@ def opened(path: Path) -> Iterator[Bag]:
 
 
 def _check(file: Path) -> None:
-    """Refuse pipes and devices, which hold the library up; bags of any size are read in pieces."""
+    """Reject pipes and devices, which would block the library."""
     largest = LARGEST_METADATA if file.name == METADATA else math.inf
     with regular_file.opened(file, RecordingError, largest=largest):
         pass
@@ -170,7 +170,7 @@ def files_of_bag(folder: Path) -> list[Path]:
 
 
 def _culprit(path: Path, files: list[Path], error: Exception) -> str:
-    """Say what of a bag that could not be opened is damaged."""
+    """Name the damaged part of a bag that could not be opened."""
     if path.is_file():
         return str(path)
     for file in files:

@@ -56,7 +56,7 @@ class SerializedBlock(ShortRepr):
         stamps: of the headers, ns, shape (n,), int64.
         names: of the joints, as in the messages.
         positions: shape (n, positions); a message may have more or fewer than names.
-        velocities, efforts: likewise, rad/s and N m; none where they were not asked for.
+        velocities, efforts: likewise, rad/s and N m; of width 0 where they were not requested.
 
     """
 
@@ -73,7 +73,7 @@ def decode(messages: Sequence[bytes], efforts: bool = False) -> Iterator[Seriali
 
     Args:
         messages: as they were received.
-        efforts: whether velocities and efforts are wanted, too.
+        efforts: whether to decode velocities and efforts, too.
 
     Raises:
         UndecodableError: a message is damaged or of another type.
@@ -190,7 +190,7 @@ class _Layout:
         return ((words & self.mask) == self.value).all(axis=1)
 
     def read(self, joined: bytes, fields: Sequence[str]) -> tuple[np.ndarray, list[np.ndarray]]:
-        """Return stamps and the numbers of all fields, copied; none of a field not asked for."""
+        """Return stamps and the numbers of all fields, copied; of width 0 if not requested."""
         seconds = self._array(joined, self.order + 'i4', HEADER, 1)[:, 0].astype(np.int64)
         nanoseconds = self._array(joined, self.order + 'u4', HEADER + 4, 1)[:, 0]
         return seconds * 10**9 + nanoseconds, [

@@ -127,16 +127,15 @@ class Stream:
             self.joints.update(dict.fromkeys(names))
             self.unstamped += int((stamps == 0).sum())
             self.dated = self.dated or bool((stamps > DATED).any())
-            if self.wanted and not self.wanted.issuperset(names):
-                columns = [k for k, name in enumerate(names) if name in self.wanted]
-                names, positions = tuple(names[k] for k in columns), positions[:, columns]
+            if self.wanted:
+                names, positions = _of_joints(self.wanted, names, positions)
             self.parts.append((stamps, received, names, positions))
             self._size += len(stamps)
             if self._size >= LONG:
                 self._thin()
 
     def _thin(self) -> None:
-        """Hand what has come in to what makes less of it, both clocks side by side."""
+        """Downsample the samples at hand, with both clocks side by side."""
         if not self._thinned:
             self._by_headers = self.stamped_so_far
         for stamps, received, names, positions in self.parts:
@@ -152,7 +151,7 @@ class Stream:
         self.parts, self._size = [], LONG
 
     def notes(self, headers: bool) -> list[str]:
-        """Say what is left out."""
+        """List what is left out, one line each."""
         counts = ((self.mute, 'without positions'),
                   (self.odd, 'with more or fewer positions than names'),
                   (self.slack, f'without {self.servo.needs} of each joint' if self.servo else ''),
@@ -176,14 +175,21 @@ class Stream:
             if headers and self.dated and not stamps.all():
                 there = stamps != 0
                 stamps, positions = stamps[there], positions[there]
-            if not self.taken.issuperset(names):
-                columns = [k for k, name in enumerate(names) if name in self.taken]
-                names, positions = tuple(names[k] for k in columns), positions[:, columns]
+            names, positions = _of_joints(self.taken, names, positions)
             yield stamps if headers else received, names, positions
 
 
+def _of_joints(wanted: set[str], names: tuple[str, ...], positions: np.ndarray
+               ) -> tuple[tuple[str, ...], np.ndarray]:
+    """Keep the names and positions of the joints wanted, copied only where others are there."""
+    if wanted.issuperset(names):
+        return names, positions
+    columns = [k for k, name in enumerate(names) if name in wanted]
+    return tuple(names[k] for k in columns), positions[:, columns]
+
+
 def _once_each(streams: list[Stream], wanted: Sequence[str]) -> list[str]:
-    """Choose one topic for every joint that is on several, and say which."""
+    """Choose one topic for every joint that is on several; return a note for each."""
     order = sorted(streams, key=lambda one: (
         -len(one.joints), one.topic.rsplit('/')[-1] != 'joint_states', -one.count))
     owner = {name: stream for stream in reversed(order) for name in stream.joints}
@@ -199,7 +205,7 @@ def _once_each(streams: list[Stream], wanted: Sequence[str]) -> list[str]:
 
 
 def _refuse_lacking(where: str, what: str, joints: list[str]) -> None:
-    """Refuse joints whose servo cannot be undone."""
+    """Reject joints whose servo cannot be inverted."""
     if joints:
         raise RecordingError(f'{where}: no {what} of {named(joints)}, and kp needs it; name the '
                              'joints to take to do without')

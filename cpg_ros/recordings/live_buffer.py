@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Joint states as they come in, kept as bytes until they are asked for."""
+"""Joint states as they arrive, kept as bytes until a recording is requested."""
 
 from collections import deque
 from collections.abc import Sequence

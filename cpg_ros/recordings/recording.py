@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Joint angles over time, wherever they were recorded, and what had to be mended in them.
+"""Joint angles over time, from whatever source, and what had to be repaired in them.
 
 Bags, tables and live topics all deliver chunks of samples; `merged` makes one recording of them.
 """
@@ -56,7 +56,7 @@ class Recording(ShortRepr):
         positions: rad, shape (n, joints); nan where a joint has no sample.
         source: what to call it in messages, such as 'walk_bag, /joint_states'.
         start: stamp at times = 0, s.
-        notes: what had to be mended or left out, one line each.
+        notes: what was repaired or left out, one line each.
 
     Raises:
         RecordingError: fewer than two samples, times that do not rise from 0, or shapes that
@@ -99,7 +99,12 @@ class Recording(ShortRepr):
 
 
 def require(names: Sequence[str], there: Sequence[str], source: str) -> None:
-    """Refuse names of joints that are not there, or are given twice."""
+    """Check that joints are there, and that none is named twice.
+
+    Raises:
+        RecordingError: one is missing or named twice.
+
+    """
     unknown = [name for name in names if name not in there]
     if unknown:
         raise RecordingError(f'{source}: no {named(unknown)}; there are {few(there, 40)}')
@@ -159,7 +164,7 @@ def merged(chunks: Iterable[Chunk], source: str, joints: Sequence[str] = ()) -> 
     late = again = received = 0
     for stamps, columns, positions in found:
         received += len(stamps)
-        # Duplicates are told in float64, where two stamps can be one a week into a recording.
+        # Duplicates are found in float64, where two stamps can be one a week into a recording.
         times = (stamps - origin) / 1e9
         steps = np.diff(times)
         if (steps < 0.0).any():
@@ -250,7 +255,7 @@ def _one_table(parts: list[Part], width: int
 
 
 def _missing(joints: tuple[str, ...], there: np.ndarray) -> list[str]:
-    """Say which joints have fewer samples than others."""
+    """Name the joints that have fewer samples than others."""
     counts = there.sum(axis=0)
     most = counts.max()
     return [f'{named([joints[k] for k in np.flatnonzero(counts == count)])}: '
@@ -259,7 +264,7 @@ def _missing(joints: tuple[str, ...], there: np.ndarray) -> list[str]:
 
 
 def _intervals(joints: tuple[str, ...], times: np.ndarray, there: np.ndarray) -> list[str]:
-    """Say where samples drop out and how many intervals jitter, for joints that go together."""
+    """Report dropouts and jitter of the intervals, for joints sampled together."""
     together: dict[bytes, list[int]] = {}
     if there.all():
         together[b''] = list(range(len(joints)))

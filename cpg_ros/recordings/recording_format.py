@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What a format of recordings says of itself; each format is one file that ends in one of these.
+"""The declaration of a format of recordings; each format is one file that ends in one of these.
 
 A reader takes the path and its options by name, makes chunks of samples, and joins them by
 `merged`; whatever is wrong with a file it raises as a RecordingError.

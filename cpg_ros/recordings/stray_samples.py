@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Samples that cannot be what they say: stamps far from all others, angles no joint can have."""
+"""Implausible samples: stamps far from all others, angles that no joint can have."""
 
 import numpy as np
 
@@ -31,7 +31,7 @@ def counted(count: int, what: str) -> str:
 
 
 def without_astray(parts: list[Part]) -> tuple[list[Part], list[str]]:
-    """Keep the most samples without a gap that dwarfs them, and say what is left out."""
+    """Keep the longest run of samples without a huge gap; return it, and notes on the rest."""
     stamps = np.sort(np.concatenate([stamps for stamps, _, _ in parts]))
     steps = np.diff(stamps)
     usual = np.median(steps[steps > 0]) if (steps > 0).any() else 0.0

@@ -121,6 +121,6 @@ def units_of(cells: Sequence[str]) -> list[str] | None:
 
 
 def decimal_commas(line: str, delimiter: str) -> bool:
-    """Tell whether the numbers of a line have decimal commas, and nothing else tells otherwise."""
+    """Tell whether the numbers of a line have decimal commas, and no decimal points."""
     return (delimiter != ',' and '.' not in line
             and any(COMMA.fullmatch(cell) for cell in line.strip().split(delimiter)))

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What is whole of an mcap file whose recorder never finished it.
+"""The complete part of an mcap file whose recorder never finished it.
 
 A recorder that dies leaves no index and no footer at the end of the file, and the library then
 refuses all of it. Here the file is shown to the library as far as its records are whole, with a

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What a robot file says of the robot's body, for feedback: leg geometry and efference tables.
+"""The robot's body in a robot file, for feedback: leg geometry and efference tables.
 
 Part ``geometry`` has the lengths and axes of legs that feedback can displace, ``efference`` of a
 gait what the base does by itself in it.
@@ -20,7 +20,7 @@ gait what the base does by itself in it.
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 from cpg_ros.files.yaml_reader import shown, YamlReader
 from cpg_ros.short_repr import ShortRepr
@@ -56,7 +56,7 @@ class LegGeometry:
 
 @dataclass(frozen=True, repr=False)
 class BodyGeometry(ShortRepr):
-    """What feedback needs to know of a body.
+    """Geometry of a body, as feedback needs it.
 
     Attributes:
         mass: of the robot, kg.
@@ -72,7 +72,7 @@ class BodyGeometry(ShortRepr):
 
 @dataclass(frozen=True, repr=False)
 class EfferenceTable(ShortRepr):
-    """What the base does by itself in a gait, by speed and by the phase of the first leg.
+    """Motion of the base in an undisturbed gait, by speed and by the phase of the first leg.
 
     Attributes:
         speeds: m/s, rising, at most SPEEDS.
@@ -85,17 +85,42 @@ class EfferenceTable(ShortRepr):
     rows: dict[str, tuple[tuple[float, ...], ...]]
 
 
-def leg_of(joints: Sequence[str], axes: np.ndarray, anchors: np.ndarray, foot: np.ndarray
-           ) -> LegGeometry | None:
-    """Return a leg's geometry, None if it is not a hip about x, if any, then two joints about y.
+class LegChain(NamedTuple):
+    """A leg as a model of the robot has it, with all joints at 0, in the frame of the base.
 
-    Args:
+    Attributes:
         joints: names down the leg.
-        axes: of the joints with all of them at 0, unit vectors, shape (joints, 3).
+        axes: of the joints, unit vectors, shape (joints, 3).
         anchors: points on them, m, the same.
         foot: the middle of the foot, m, shape (3,).
+        radius: of the foot, m.
 
     """
+
+    joints: Sequence[str]
+    axes: np.ndarray
+    anchors: np.ndarray
+    foot: np.ndarray
+    radius: float
+
+
+def body_geometry(mass: float, chains: Mapping[str, LegChain]) -> BodyGeometry:
+    """Return the geometry of a body.
+
+    Legs are left out that are not a hip about x, if any, then two joints about y.
+
+    Args:
+        mass: of the robot, kg.
+        chains: its legs, by name.
+
+    """
+    legs = {leg: found for leg, chain in chains.items() if (found := _leg_geometry(*chain[:4]))}
+    radius = float(np.mean([chains[leg].radius for leg in legs] or 0.0))
+    return BodyGeometry(round(mass, 6), round(radius, 6), legs)
+
+
+def _leg_geometry(joints: Sequence[str], axes: np.ndarray, anchors: np.ndarray, foot: np.ndarray
+                  ) -> LegGeometry | None:
     wanted = np.eye(3)[[0, 1, 1][-len(joints):]]
     if len(joints) not in (2, 3) or np.abs(np.abs(axes) - wanted).max() > 0.01:
         return None
@@ -131,35 +156,24 @@ def _leg(reader: YamlReader, tree: Any, where: str, known: set[str]) -> LegGeome
     for k, name in enumerate(joints):
         if name not in known:
             raise reader.fail(f'{where}.joints[{k}]', f"'{name}' is not a joint of this leg")
-    turns = _numbers(reader, tree['turns'], f'{where}.turns', len(joints))
+    turns = reader.numbers(tree['turns'], f'{where}.turns', len(joints))
     for k, turn in enumerate(turns):
         if turn not in (1.0, -1.0):
             raise reader.fail(f'{where}.turns[{k}]', f'{turn:g} must be 1 or -1')
-    found = [_numbers(reader, tree[key], f'{where}.{key}', 3) for key in places]
+    found = [reader.numbers(tree[key], f'{where}.{key}', 3) for key in places]
     for key, (x, _, z) in zip(places[2:], found[2:], strict=True):
         if x == z == 0.0:
             raise reader.fail(f'{where}.{key}', 'has no length in the plane of the leg')
     return LegGeometry(joints, turns, *found)
 
 
-def _numbers(reader: YamlReader, value: Any, where: str, count: int) -> tuple[float, ...]:
-    listed = reader.items(value, where)
-    if len(listed) != count:
-        raise reader.fail(where, f'takes {count} numbers, not {len(listed)}')
-    return tuple(reader.number(entry, f'{where}[{k}]') for k, entry in enumerate(listed))
-
-
 def read_efference(reader: YamlReader, tree: Any, where: str) -> EfferenceTable:
     """Take the part ``efference`` of a gait, rows of numbers with spaces between them."""
     tree = reader.keys(tree, where, {'speeds', *SIGNALS})
-    speeds = tuple(reader.number(entry, f'{where}.speeds[{k}]') for k, entry
-                   in enumerate(reader.items(tree['speeds'], f'{where}.speeds')))
+    speeds = reader.numbers(tree['speeds'], f'{where}.speeds')
     if len(speeds) > SPEEDS:
         raise reader.fail(f'{where}.speeds', f'has {len(speeds)} speeds; at most {SPEEDS} fit')
-    for k in range(1, len(speeds)):
-        if not speeds[k - 1] < speeds[k]:
-            raise reader.fail(f'{where}.speeds[{k}]', f'{speeds[k]:g} is not above '
-                              f'{speeds[k - 1]:g}')
+    reader.check_rising(speeds, f'{where}.speeds')
     rows = {}
     for key in SIGNALS:
         listed = reader.items(tree[key], f'{where}.{key}')

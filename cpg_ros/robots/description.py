@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What a model file says of a robot: its joints, links and where they are, in any format.
+"""Description of a robot by a model file of any format: joints, links and where they are.
 
 ``urdf`` reads it from URDF, ``simulation.mjcf_description`` from MJCF.
 """

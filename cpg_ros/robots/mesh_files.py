@@ -26,7 +26,7 @@ import numpy as np
 
 
 class MeshError(CpgError):
-    """A mesh cannot be found or read; the message names it and says why."""
+    """A mesh cannot be found or read; the message names it and gives the reason."""
 
 
 class Mesh(NamedTuple):

@@ -26,11 +26,12 @@ from dataclasses import dataclass, field
 
 from cpg_ros.errors import InputError
 from cpg_ros.networks.registry import NETWORKS
+from cpg_ros.robots.biped_keys import BipedBody
 from cpg_ros.robots.body_keys import BodyGeometry, EfferenceTable
 from cpg_ros.short_repr import ShortRepr, shown
 import numpy as np
 
-#: Harmonics of a Morris-Lecar cell that joints follow, if the file does not say.
+#: Default number of harmonics of a Morris-Lecar cell that joints follow.
 HARMONICS = 3
 
 #: How many weights each readout order takes; the bare scale is an order of its own.
@@ -57,7 +58,7 @@ class Joint:
 
 @dataclass(frozen=True)
 class SteeringTable:
-    """How fast a robot goes and turns, measured: what to ask of its legs for a wanted speed.
+    """Measured speed and yaw rate of a robot by stride: the strides for a commanded speed.
 
     Four columns of one table, its rows by rising speed.
 
@@ -92,7 +93,7 @@ class SteeringTable:
 
 @dataclass(frozen=True)
 class JointMotion:
-    """What a gait makes of a joint: offset, weights, and weights at a stride of 0, rad."""
+    """A joint in one gait: offset, weights, and weights at a stride of 0, rad."""
 
     offset: float
     weights: tuple[float, ...]
@@ -101,11 +102,11 @@ class JointMotion:
 
 @dataclass(frozen=True, repr=False)
 class Motion(ShortRepr):
-    """What a gait makes of a robot, where that differs from what its joints say.
+    """A robot in one gait, where that differs from the robot's joints.
 
     Attributes:
         frequency: strides per second that it was made for, Hz; None if it does not matter.
-        joints: name -> what the gait makes of that joint.
+        joints: by name.
         steering: None if it has not been measured.
         duty: share of the stride that legs are to stand, None for what they do by themselves.
         stance: phase of a leg's cell at which it begins to stand by the weights there are, and
@@ -137,6 +138,7 @@ class Robot(ShortRepr):
         sides: leg -> left or right, as the file or else a network says.
         girdles: leg -> fore or hind, the same.
         geometry: of its legs, None if the file does not have it.
+        biped: links, soles and servos of a biped that stands on soles, or None.
 
     """
 
@@ -150,6 +152,7 @@ class Robot(ShortRepr):
     sides: dict[str, str] = field(default_factory=dict)
     girdles: dict[str, str] = field(default_factory=dict)
     geometry: BodyGeometry | None = None
+    biped: BipedBody | None = None
 
     def __post_init__(self) -> None:
         for key in ('sides', 'girdles'):
@@ -179,6 +182,11 @@ class Robot(ShortRepr):
     def joints(self) -> tuple[Joint, ...]:
         """All joints, leg by leg."""
         return tuple(joint for leg in self.legs.values() for joint in leg)
+
+    @property
+    def held(self) -> dict[str, float]:
+        """Joints that are no leg's but are held, and where, rad."""
+        return {} if self.biped is None else self.biped.held
 
     @property
     def places(self) -> np.ndarray:

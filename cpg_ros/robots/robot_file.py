@@ -12,14 +12,14 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Robot files: YAML that people write, read with every mistake named, and written.
+"""Robot files: reading YAML with every mistake named, and writing it.
 
-The first part says which cell drives each joint and how, and the joints' limits; the optional
-part ``gaits`` says what a gait does otherwise, and how to steer it.
+The first part gives the cell that drives each joint, its weights and its limits; the optional
+part ``gaits`` gives what differs in a gait, and how to steer it.
 """
 
-from collections.abc import Mapping
-from itertools import pairwise
+from collections.abc import Callable, Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -29,6 +29,7 @@ from cpg_ros.files.shared_resources import share
 from cpg_ros.files.yaml_reader import shown, YamlReader
 from cpg_ros.networks.leg_numbers import GIRDLES
 from cpg_ros.networks.registry import find_network, NetworkError, NETWORKS, reference
+from cpg_ros.robots.biped_keys import biped_tree, read_biped
 from cpg_ros.robots.body_keys import (
     efference_tree,
     geometry_tree,
@@ -71,7 +72,7 @@ class _Reader(YamlReader):
 
     def place(self, tree: Mapping[str, Any], where: str, key: str, words: tuple[str, ...],
               stated: str | None) -> dict[str, str]:
-        """Return leg -> word where the file says it; what a network states must be the same."""
+        """Return leg -> word if the file has it; it must agree with the network."""
         if key not in tree:
             return {}
         word = self.text(tree[key], f'{where}.{key}')
@@ -95,9 +96,7 @@ class _Reader(YamlReader):
         if not values['lower'] < values['upper']:
             raise self.fail(f'{where}.lower', f'{values["lower"]:g} is not below upper '
                             f'{values["upper"]:g}')
-        if not values['lower'] <= values['offset'] <= values['upper']:
-            raise self.fail(f'{where}.offset', f'{values["offset"]:g} is outside the limits '
-                            f'{values["lower"]:g} to {values["upper"]:g}')
+        self.check_limits(values['offset'], f'{where}.offset', values['lower'], values['upper'])
         if values['velocity'] <= 0.0:
             raise self.fail(f'{where}.velocity', f'{values["velocity"]:g} must be positive')
         invented: tuple[str, ...] = ()
@@ -105,6 +104,17 @@ class _Reader(YamlReader):
             invented = self.guessed(tree['invented'], f'{where}.invented')
         return Joint(name=name, leg=leg, cell=tree['cell'], weights=weights, **values,
                      invented=invented)
+
+    def check_limits(self, offset: float, where: str, lower: float, upper: float) -> None:
+        if not lower <= offset <= upper:
+            raise self.fail(where, f'{offset:g} is outside the limits {lower:g} to {upper:g}')
+
+    def within(self, value: Any, where: str, low: float, high: float, span: str) -> float:
+        """Return a number from low to high, which the message calls ``span``."""
+        number = self.number(value, where)
+        if not low <= number <= high:
+            raise self.fail(where, f'{number:g} is not from {span}')
+        return number
 
     def guessed(self, value: Any, where: str) -> tuple[str, ...]:
         """Return which limits are guesses."""
@@ -123,25 +133,20 @@ class _Reader(YamlReader):
         return self.weights(tree['weights'], f'{where}.weights')
 
     def weights(self, value: Any, where: str) -> tuple[float, ...]:
-        listed = self.items(value, where)
-        if len(listed) not in WEIGHTS:
+        if len(self.items(value, where)) not in WEIGHTS:
             raise self.fail(where, f'takes 1, 2, 4 or 6 numbers (x, y, x^2, x y, x^3, x^2 y), '
-                            f'not {len(listed)}')
-        return self.numbers(listed, where)
-
-    def numbers(self, value: Any, where: str) -> tuple[float, ...]:
-        return tuple(self.number(entry, f'{where}[{k}]')
-                     for k, entry in enumerate(self.items(value, where)))
+                            f'not {len(value)}')
+        return self.numbers(value, where)
 
     def motion(self, tree: Any, where: str, joints: Mapping[str, Joint]) -> Motion:
-        """Return what a gait makes of the robot with these joints."""
+        """Return the motion of these joints in a gait."""
         tree = self.keys(tree, where, set(),
                          {'frequency', 'duty', 'stance', 'joints', 'steering', 'efference'})
-        frequency = None
-        if 'frequency' in tree:
-            frequency = self.number(tree['frequency'], f'{where}.frequency')
-            if not 0.01 <= frequency <= 10.0:
-                raise self.fail(f'{where}.frequency', f'{frequency:g} is not from 0.01 to 10 Hz')
+
+        def given(key: str, read: Callable[..., Any], *arguments: Any) -> Any:
+            return read(tree[key], f'{where}.{key}', *arguments) if key in tree else None
+
+        frequency = given('frequency', self.within, 0.01, 10.0, '0.01 to 10 Hz')
         moved = {}
         listed = self.keys(tree.get('joints', {}), f'{where}.joints', set(), set(joints))
         for name in listed:
@@ -149,9 +154,7 @@ class _Reader(YamlReader):
             entry = self.keys(listed[name], place, set(),
                               {'offset', 'amplitude', 'weights', 'in_place'})
             offset = self.number(entry.get('offset', joint.offset), f'{place}.offset')
-            if not joint.lower <= offset <= joint.upper:
-                raise self.fail(f'{place}.offset', f'{offset:g} is outside the limits '
-                                f'{joint.lower:g} to {joint.upper:g}')
+            self.check_limits(offset, f'{place}.offset', joint.lower, joint.upper)
             weights = joint.weights
             if 'amplitude' in entry or 'weights' in entry:
                 weights = self.readout(entry, place)
@@ -159,25 +162,17 @@ class _Reader(YamlReader):
             if 'in_place' in entry:
                 in_place = self.weights(entry['in_place'], f'{place}.in_place')
             moved[name] = JointMotion(offset, weights, in_place)
-        steering = None
-        if 'steering' in tree:
-            steering = self.steering(tree['steering'], f'{where}.steering', frequency)
-        efference = None
-        if 'efference' in tree:
-            efference = read_efference(self, tree['efference'], f'{where}.efference')
-        duty = None
-        if 'duty' in tree:
-            duty = self.number(tree['duty'], f'{where}.duty')
-            if not 0.3 <= duty <= 0.9:
-                raise self.fail(f'{where}.duty', f'{duty:g} is not from 0.3 to 0.9')
-        stance = None
-        if 'stance' in tree:
-            found = self.numbers(tree['stance'], f'{where}.stance')
-            if len(found) != 2 or not (-1.0 <= found[0] <= 1.0 and 0.05 <= found[1] <= 0.95):
-                raise self.fail(f'{where}.stance', 'takes a phase from -1 to 1 and a share of '
-                                'the stride from 0.05 to 0.95')
-            stance = found[0], found[1]
-        return Motion(frequency, moved, steering, efference, duty, stance)
+        return Motion(frequency, moved, given('steering', self.steering, frequency),
+                      given('efference', partial(read_efference, self)),
+                      given('duty', self.within, 0.3, 0.9, '0.3 to 0.9'),
+                      given('stance', self.stance))
+
+    def stance(self, value: Any, where: str) -> tuple[float, ...]:
+        found = self.numbers(value, where)
+        if len(found) != 2 or not (-1.0 <= found[0] <= 1.0 and 0.05 <= found[1] <= 0.95):
+            raise self.fail(where, 'takes a phase from -1 to 1 and a share of the stride from '
+                            '0.05 to 0.95')
+        return found
 
     def steering(self, tree: Any, where: str, fastest: float | None) -> SteeringTable:
         if fastest is None:
@@ -193,11 +188,8 @@ class _Reader(YamlReader):
                    'frequency': (0.01, fastest, f"0.01 to the gait's {fastest:g} Hz")}
         for key, (low, high, text) in allowed.items():
             for k, value in enumerate(rows[key]):
-                if not low <= value <= high:
-                    raise self.fail(f'{where}.{key}[{k}]', f'{value:g} is not from {text}')
-        for k, (before, after) in enumerate(pairwise(rows['speed'])):
-            if not before < after:
-                raise self.fail(f'{where}.speed[{k + 1}]', f'{after:g} is not above {before:g}')
+                self.within(value, f'{where}.{key}[{k}]', low, high, text)
+        self.check_rising(rows['speed'], f'{where}.speed')
         return SteeringTable(**rows)
 
 
@@ -212,7 +204,7 @@ def read_robot(path: str | Path) -> Robot:
     path = Path(path)
     reader = _Reader(path, 'robot file', RobotError, LARGEST)
     tree = reader.keys(reader.tree(), 'file', {'network', 'legs'},
-                       {'joint_order', 'assignment', 'harmonics', 'geometry', 'gaits'})
+                       {'joint_order', 'assignment', 'harmonics', 'geometry', 'biped', 'gaits'})
     networks = reader.networks(tree['network'])
     first = NETWORKS[networks[0]]
     assignment = reader.text(tree.get('assignment', next(iter(first.legs))), 'assignment')
@@ -264,10 +256,9 @@ def read_robot(path: str | Path) -> Robot:
         for name, place in seen.items():
             if name not in order:
                 raise reader.fail('joint_order', f"joint '{name}' of {place} is missing")
-    geometry = None
-    if 'geometry' in tree:
-        geometry = read_geometry(reader, tree['geometry'], {
-            leg: [joint.name for joint in joints] for leg, joints in legs.items()})
+    names = {leg: [joint.name for joint in joints] for leg, joints in legs.items()}
+    geometry = (read_geometry(reader, tree['geometry'], names) if 'geometry' in tree else None)
+    biped = read_biped(reader, tree['biped'], names) if 'biped' in tree else None
     motions = {}
     if 'gaits' in tree:
         known = {name for network in networks for name in NETWORKS[network].presets()}
@@ -275,7 +266,7 @@ def read_robot(path: str | Path) -> Robot:
         motions = {name: reader.motion(entry, f'gaits.{name}', joints_by_name) for name, entry
                    in reader.keys(tree['gaits'], 'gaits', set(), known).items()}
     robot = Robot(path.stem, networks, assignment, harmonics, legs, tuple(order), motions, sides,
-                  girdles, geometry)
+                  girdles, geometry, biped)
     if any(motion.steering for motion in motions.values()):
         for leg in legs:
             if leg not in robot.sides:
@@ -323,6 +314,8 @@ def write_robot(path: str | Path, robot: Robot, comment: str = '') -> None:
                 tree['legs'][leg][key] = places[leg]
     if robot.geometry is not None:
         tree['geometry'] = geometry_tree(robot.geometry)
+    if robot.biped is not None:
+        tree['biped'] = biped_tree(robot.biped)
     if robot.motions:
         tree['gaits'] = {name: _motion_tree(motion) for name, motion in robot.motions.items()}
     lines = ''.join(f'# {line}\n' for line in comment.splitlines())
@@ -331,11 +324,8 @@ def write_robot(path: str | Path, robot: Robot, comment: str = '') -> None:
 
 
 def _motion_tree(motion: Motion) -> dict[str, Any]:
-    tree: dict[str, Any] = {}
-    if motion.frequency is not None:
-        tree['frequency'] = motion.frequency
-    if motion.duty is not None:
-        tree['duty'] = motion.duty
+    tree: dict[str, Any] = {key: value for key in ('frequency', 'duty')
+                            if (value := getattr(motion, key)) is not None}
     if motion.stance is not None:
         tree['stance'] = list(motion.stance)
     if motion.joints:

@@ -85,7 +85,7 @@ def describe(tree: Element, source: str) -> RobotDescription:
 
 
 def mesh_folder(tree: Element) -> str:
-    """Return where a URDF says that its meshes are (MuJoCo's extension), '' if it does not."""
+    """Return the mesh folder that a URDF names (MuJoCo's extension), '' if it names none."""
     compiler = tree.find('mujoco/compiler')
     return '' if compiler is None else compiler.get('meshdir', '')
 

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What a bridge must know of a robot: joints, gains, poses, limits and times."""
+"""Settings of a bridge: the robot's joints, gains, poses, limits and times."""
 
 from dataclasses import dataclass
 import math
@@ -37,6 +37,7 @@ class BridgeSettings(ShortRepr):
         velocity: largest speeds of commanded angles, rad/s.
         stand: pose to rise to, rad.
         lying: pose to sit down to, rad.
+        most_kp: up to which a generator's feedback may scale kp, N m / rad.
         period: between two commands, s.
         damping: kd with which joints are only damped, N m s / rad.
         rise: time from the measured pose to the stand, s.
@@ -64,6 +65,7 @@ class BridgeSettings(ShortRepr):
     velocity: np.ndarray
     stand: np.ndarray
     lying: np.ndarray
+    most_kp: float = math.inf
     period: float = 0.002
     damping: float = 5.0
     rise: float = 2.0

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What a bridge reads from its robot and sends to it; each robot has subclasses of its own."""
+"""State that a bridge reads from its robot, and command that it sends; subclassed by robot."""
 
 from typing import Any
 

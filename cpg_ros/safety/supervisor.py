@@ -64,6 +64,7 @@ class Supervisor:
         targets: of a generator.
         state: of the bridge.
         reason: why it is in this state.
+        kp_scale: factor of kp while the robot follows targets, up to the settings' most_kp.
 
     """
 
@@ -83,7 +84,7 @@ class Supervisor:
         self.targets = Targets(settings.names, settings.lower, settings.upper,
                                settings.velocity, settings.period)
         self._checks = SafetyChecks(settings, robot)
-        self.state, self.reason = BridgeState.IDLE, ''
+        self.state, self.reason, self.kp_scale = BridgeState.IDLE, '', 1.0
         self._at = self._from = settings.stand
         self._began = self._before = 0.0
         self._fades, self._gathered = False, 0.0
@@ -246,10 +247,12 @@ class Supervisor:
     def _hold(self) -> None:
         """Command angles, limited so that no joint's torque exceeds its limit."""
         settings, command, robot = self._settings, self.command, self.robot
-        kp, kd = np.maximum(settings.kp, 1e-9), self._limited(settings.kd)
-        braking = kd * robot.dq
-        least = robot.q + (braking - settings.torque) / kp
-        most = robot.q + (braking + settings.torque) / kp
+        kp, kd = settings.kp, self._limited(settings.kd)
+        if self.kp_scale != 1.0 and self.state is BridgeState.FOLLOWING:
+            kp = np.maximum(kp, np.minimum(self.kp_scale * kp, settings.most_kp))
+        braking, stiffness = kd * robot.dq, np.maximum(kp, 1e-9)
+        least = robot.q + (braking - settings.torque) / stiffness
+        most = robot.q + (braking + settings.torque) / stiffness
         command.q[:] = np.minimum(np.maximum(self._at, least), most)
         command.dq[:] = command.tau[:] = 0.0
-        command.kp[:], command.kd[:] = settings.kp, kd
+        command.kp[:], command.kd[:] = kp, kd

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What a watchdog knows of the process that it monitors: whether its ticks are missing."""
+"""Monitoring of a process's ticks by its watchdog."""
 
 import numpy as np
 
@@ -21,7 +21,7 @@ MISSING = 2.5
 
 
 class TickMonitor:
-    """Measures the time since the last tick, and says when the joints are to be damped.
+    """Measures the time since the last tick, and decides when to damp the joints.
 
     Attributes:
         kd: gains for damping, N m s / rad, as sent with the last tick.
@@ -45,7 +45,7 @@ class TickMonitor:
 
     #: Message of a process that ends.
     END = b'end'
-    #: Message that asks only whether a watchdog is connected.
+    #: Message that only checks whether a watchdog is connected.
     HELLO = b'hello'
 
     def receive(self, message: bytes, now: float) -> None:

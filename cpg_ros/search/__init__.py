@@ -12,10 +12,10 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Weights that give a network a gait, found by NSGA-II.
+"""Weights that give a network a gait, found by NSGA-II; the basins of gaits.
 
 Imports ``gaits``, ``dynamics`` and what is below; knows nothing of ROS.
 """
 
-__all__ = ['islands', 'nsga2', 'objectives', 'pareto_front', 'search_space', 'settled_cycle',
-           'verification']
+__all__ = ['basin', 'islands', 'nsga2', 'objectives', 'pareto_front', 'search_space',
+           'settled_cycle', 'verification']

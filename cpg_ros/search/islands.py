@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Islands: populations that evolve apart, and send their best to a neighbour now and then.
+"""Islands: populations that evolve separately, and periodically send their best to a neighbour.
 
 Each island is an NSGA-II of its own with random numbers of its own, derived from the seed, its
 number and the epoch. What is found depends on the number of islands, never on who computes them.
@@ -22,9 +22,9 @@ from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass
 
-from cpg_ros.errors import CpgError
+from cpg_ros.errors import MissingLibraryError
 from cpg_ros.networks.network import Network
-from cpg_ros.search.objectives import evaluate, pairs, Score
+from cpg_ros.search.objectives import evaluate, objective_names, Score
 from cpg_ros.search.search_space import search_space, Space
 from cpg_ros.short_repr import ShortRepr
 import numpy as np
@@ -33,13 +33,9 @@ import numpy as np
 EPOCH, MIGRANTS = 3, 0.1
 
 
-class PymooMissing(CpgError):
-    """The optional dependency is missing; the message says how to get it."""
-
-
 @dataclass(frozen=True)
 class SearchSetup:
-    """Where all islands look, in words that travel: as the arguments of search_space."""
+    """What all islands search, as the arguments of search_space, which can be pickled."""
 
     network: str
     gait: str
@@ -78,19 +74,19 @@ class Epoch(ShortRepr):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class EpochResult(ShortRepr):
-    """What came of a stay: the last generation, best first, and all sets that were judged."""
+    """An island after an epoch: its last generation, best first, and all sets it has judged."""
 
     values: np.ndarray
     scores: tuple[Score, ...]
     tried: tuple[Score, ...]
 
 
-def evolve(epoch_of_island: Epoch,
+def evolve(epoch: Epoch,
            progress: Callable[[int], None] = lambda generation: None) -> EpochResult:
-    """Let NSGA-II run on an island.
+    """Run NSGA-II on an island for an epoch.
 
     Raises:
-        DaskMissing: pymoo is missing.
+        MissingLibraryError: pymoo is missing.
 
     """
     try:
@@ -99,22 +95,23 @@ def evolve(epoch_of_island: Epoch,
         from pymoo.core.problem import Problem
         from pymoo.problems.static import StaticProblem
     except ImportError as error:
-        raise PymooMissing('optimize needs pymoo: pip install cpg-ros[optimize]') from error
-    space = epoch_of_island.setup.space
-    problem = Problem(n_var=len(space.free), n_obj=objective_count(space), n_ieq_constr=1,
+        raise MissingLibraryError('optimize needs pymoo: pip install pymoo'
+                                  ) from error
+    space = epoch.setup.space
+    problem = Problem(n_var=len(space.free), n_obj=len(objective_names(space.symmetry)),
+                      n_ieq_constr=1,
                       xl=np.array([variable.low for variable in space.free]),
                       xu=np.array([variable.high for variable in space.free]))
-    algorithm = (NSGA2(pop_size=epoch_of_island.population) if epoch_of_island.start is None
-                 else NSGA2(pop_size=epoch_of_island.population, sampling=epoch_of_island.start))
-    algorithm.setup(problem, termination=('n_gen', epoch_of_island.generations),
-                    seed=epoch_of_island.random)
-    tried: dict[Network, Score] = {one.network: one for one in epoch_of_island.known}
-    for generation in range(epoch_of_island.generations):
+    algorithm = (NSGA2(pop_size=epoch.population) if epoch.start is None
+                 else NSGA2(pop_size=epoch.population, sampling=epoch.start))
+    algorithm.setup(problem, termination=('n_gen', epoch.generations), seed=epoch.random)
+    tried: dict[Network, Score] = {one.network: one for one in epoch.known}
+    for generation in range(epoch.generations):
         population = algorithm.ask()
         networks = [space.build(values) for values in population.get('X')]
         new = list(dict.fromkeys(one for one in networks if one not in tried))
         if new:
-            tried.update(zip(new, evaluate(new, space.gait, epoch_of_island.seed), strict=True))
+            tried.update(zip(new, evaluate(new, space.gait, epoch.seed), strict=True))
         scores = [tried[one] for one in networks]
         # Bounds as the algorithm has them; waveforms that miss what is asked of them come
         # after all others, whatever their phases.
@@ -128,12 +125,6 @@ def evolve(epoch_of_island: Epoch,
     best = sorted(range(len(last)), key=lambda k: (
         last[k].shortfall, float(last[k].errors.max()), last[k].stability, tuple(values[k])))
     return EpochResult(values[best], tuple(last[k] for k in best), tuple(tried.values()))
-
-
-def objective_count(space: Space) -> int:
-    """Number of objectives: phase errors, stability and, with two waveforms, their difference."""
-    symmetry = space.build(np.array([v.low for v in space.free])).symmetry(space.gait)
-    return len(pairs(symmetry)) + 1 + bool(symmetry.waves.max())
 
 
 def _random(seed: int, island: int, epoch: int) -> int:
@@ -162,9 +153,9 @@ def archipelago(setup: SearchSetup, population: int, generations: int, seed: int
     for epoch, begun in enumerate(range(0, generations, EPOCH)):
         count = min(EPOCH, generations - begun)
         # The generation that an epoch begins with is the last one of that before.
-        stays = [Epoch(setup, population, count + (epoch > 0), _random(seed, island, epoch), seed,
-                       starts[island], known[island]) for island in range(islands)]
-        found = list(map(evolve, stays) if executor is None else executor.map(evolve, stays))
+        epochs = [Epoch(setup, population, count + (epoch > 0), _random(seed, island, epoch), seed,
+                        starts[island], known[island]) for island in range(islands)]
+        found = list(map(evolve, epochs) if executor is None else executor.map(evolve, epochs))
         for one in found:
             for score in one.tried:
                 if score.network not in tried or score.exact > tried[score.network].exact:

@@ -14,8 +14,8 @@
 
 """Weights that give a network a gait, found by NSGA-II (Deb et al. 2000).
 
-As in Rashidi et al. (2016), section 4, with what the paper leaves to luck asked for: that the
-gait is stable, and that two waveforms are two. A generation is simulated in one batch, sets that
+As in Rashidi et al. (2016), section 4, with two more requirements: that the gait is
+stable, and that two waveforms differ. A generation is simulated in one batch, sets that
 end near the gait are judged by their exact orbit, and the chosen one is proven.
 """
 
@@ -26,7 +26,7 @@ from dataclasses import dataclass
 from cpg_ros.errors import CpgError, InputError
 from cpg_ros.files.progress_bar import progress_bar
 from cpg_ros.search.islands import archipelago, Epoch, evolve, SearchSetup
-from cpg_ros.search.objectives import pairs, Score
+from cpg_ros.search.objectives import Score
 from cpg_ros.search.search_space import search_space, Space
 from cpg_ros.search.verification import Chosen, NotVerified, polish
 import numpy as np
@@ -61,19 +61,7 @@ class Front:
     chosen: Chosen
 
 
-def objective_names(space: Space) -> tuple[str, ...]:
-    """Names of the objectives with their units, in the order of Score.objectives."""
-    symmetry = space.build(np.array([v.low for v in space.free])).symmetry(space.gait)
-    names = []
-    for group in pairs(symmetry):
-        cells = sorted(cell + 1 for cell, _ in group)
-        which = str(cells[0]) if len(cells) == 1 else f'{cells[0]} to {cells[-1]}'
-        names.append(f'phase error of cell {which} [deg]')
-    return (*names, 'leading multiplier [1]',
-            *(['minus difference of waveforms [1]'] if symmetry.waves.max() else []))
-
-
-def optimise(network_name: str, gait: str, population: int = 60, generations: int = 12,
+def optimise(network_name: str, gait: str, *, population: int = 60, generations: int = 12,
              seed: int = 0, bounds: Mapping[str, tuple[float, float]] | None = None,
              fixed: Mapping[str, float] | None = None, progress: bool = True,
              islands: int = 1, executor: Executor | None = None) -> Front:
@@ -94,7 +82,7 @@ def optimise(network_name: str, gait: str, population: int = 60, generations: in
 
     Raises:
         InputError: an unknown network, gait or variable, or a bound that cannot be used.
-        DaskMissing: pymoo is missing.
+        MissingLibraryError: pymoo is missing.
         NoGaitFound: no set passed.
 
     """
@@ -109,9 +97,9 @@ def optimise(network_name: str, gait: str, population: int = 60, generations: in
     setup = SearchSetup(network_name, gait, dict(bounds or {}), dict(fixed or {}))
     with progress_bar(f'optimising the {gait}', generations, enabled=progress) as bar:
         if islands == 1:
-            stay = Epoch(setup, population, generations, seed, seed)
-            tried = (evolve(stay, bar) if executor is None
-                     else executor.submit(evolve, stay).result()).tried
+            epoch = Epoch(setup, population, generations, seed, seed)
+            tried = (evolve(epoch, bar) if executor is None
+                     else executor.submit(evolve, epoch).result()).tried
         else:
             tried = archipelago(setup, population, generations, seed, islands, executor, bar)
     return _front(space, tried, seed)

@@ -61,14 +61,14 @@ WORST, DEAD, APERIODIC = 180.0, 2.0, 1.5
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Score(ShortRepr):
-    """A parameter set, what it is worth, and where its gait can be found.
+    """A parameter set with its objectives, and a state on its gait.
 
     Attributes:
         network: the parameters.
         errors: phase errors in degrees, shape (3,) or (2,); see ``pairs``.
         stability: leading Floquet multiplier; an estimate where ``exact`` is not set.
         difference: in shape of the gait's two waveforms; None for a gait with one.
-        shortfall: by how much waveforms miss what is asked of them, 0 if they do not.
+        shortfall: by how much waveforms miss their requirements, 0 if they do not.
         exact: whether the orbit was solved for.
         state: one on the exact orbit, shape (components,).
         period: of that, model time.
@@ -101,6 +101,17 @@ def pairs(symmetry: Symmetry) -> list[list[tuple[int, int]]]:
     return [[pair] for pair in found[:2]] + ([found[2:]] if found[2:] else [])
 
 
+def objective_names(symmetry: Symmetry) -> tuple[str, ...]:
+    """Names of the objectives with their units, in the order of Score.objectives."""
+    names = []
+    for group in pairs(symmetry):
+        cells = sorted(cell + 1 for cell, _ in group)
+        which = str(cells[0]) if len(cells) == 1 else f'{cells[0]} to {cells[-1]}'
+        names.append(f'phase error of cell {which} [deg]')
+    return (*names, 'leading multiplier [1]',
+            *(['minus difference of waveforms [1]'] if symmetry.waves.max() else []))
+
+
 def _mismatch(signals: np.ndarray, symmetry: Symmetry) -> float:
     """How far signals are from the gait's symmetry: largest RMS over pairs, over the signal's."""
     largest = 0.0
@@ -131,7 +142,7 @@ def phase_errors(signals: np.ndarray, symmetry: Symmetry) -> np.ndarray:
 
 
 def waveform_shortfall(signals: np.ndarray, symmetry: Symmetry, margin: float = 1.0) -> float:
-    """By how much waveforms miss what is asked of them, in shares of it; 0 if they do not.
+    """Return by how much waveforms miss their requirements, relative to them; 0 if they do not.
 
     Every cell has a range and turns steadily, so that its phase can be read in spite of noise;
     two waveforms differ in shape.
@@ -142,7 +153,7 @@ def waveform_shortfall(signals: np.ndarray, symmetry: Symmetry, margin: float = 
              for one in first]
     if len(first) == 2:
         have.append((shape_difference(*signals[:, first].T), LEAST_DIFFERENCE))
-    return float(sum(max(0.0, margin - max(0.0, value / asked)) for value, asked in have))
+    return float(sum(max(0.0, margin - max(0.0, value / least)) for value, least in have))
 
 
 def _simulated(network: Network, gait: str, run: Trajectory) -> tuple[Score, SettledCycle | None]:

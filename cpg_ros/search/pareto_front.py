@@ -20,8 +20,8 @@ from pathlib import Path
 from typing import Any
 
 from cpg_ros.files.atomic_write import write_atomically
-from cpg_ros.search.nsga2 import Front, objective_names
-from cpg_ros.search.objectives import APERIODIC, RESOLUTION
+from cpg_ros.search.nsga2 import Front
+from cpg_ros.search.objectives import APERIODIC, objective_names, RESOLUTION
 from cpg_ros.search.verification import orbit_signals
 import matplotlib
 from matplotlib.axes import Axes
@@ -37,7 +37,7 @@ def write_front(path: Path, front: Front) -> None:
     """Write the front, best set first: variables, objectives and periods, units in the names."""
     names = [variable.name for variable in front.space.variables]
     two = front.scores[0].difference is not None
-    errors = [name for name in objective_names(front.space) if name.startswith('phase')]
+    errors = [name for name in objective_names(front.space.symmetry) if name.startswith('phase')]
     text = io.StringIO(newline='')
     rows = csv.writer(text)
     rows.writerow([*(f'{name} [1]' for name in names), *errors, 'leading multiplier [1]',
@@ -111,7 +111,7 @@ def draw_front(path: Path, front: Front) -> None:
     """Draw objectives against each other, and the chosen set's signals."""
     matplotlib.use('Agg')
     from matplotlib import pyplot
-    names = list(objective_names(front.space))
+    names = objective_names(front.space.symmetry)
     values = dict(zip(names, np.array([one.objectives for one in front.tried]).T, strict=True))
     multiplier = 'leading multiplier a cycle [1]'
     stability = values.pop('leading multiplier [1]')
@@ -135,14 +135,12 @@ def draw_front(path: Path, front: Front) -> None:
     for axes, (x, y) in zip(upper.subplots(1, len(panels)), panels, strict=True):
         _scatter(axes, front, x, y, values)
         axes.grid(linewidth=0.3)
-        for side in ('top', 'right'):
-            axes.spines[side].set_visible(False)
+        axes.spines[['top', 'right']].set_visible(False)
     upper.legend(*axes.get_legend_handles_labels(), fontsize=9, loc='outside lower center',
                  ncols=4, frameon=False)
     axes = lower.subplots()
     _signals(axes, front)
-    for side in ('top', 'right', 'left'):
-        axes.spines[side].set_visible(False)
+    axes.spines[['top', 'right', 'left']].set_visible(False)
     axes.tick_params(left=False)
     orbit = front.chosen.orbit
     figure.suptitle(f'{front.space.gait.replace("_", " ")} of the {front.space.network.name}: '

@@ -25,6 +25,7 @@ from dataclasses import dataclass
 from cpg_ros.errors import InputError
 from cpg_ros.networks.network import known, Network
 from cpg_ros.networks.registry import find_network, is_path, NETWORKS, SHIPPED
+from cpg_ros.networks.symmetry import Symmetry
 import numpy as np
 
 #: Shipped networks whose weights can be looked for.
@@ -36,7 +37,7 @@ DECIMALS = 4
 
 @dataclass(frozen=True)
 class Variable:
-    """A number that is looked for, or given where ``low`` and ``high`` agree.
+    """A number to search for, or a given one where ``low`` and ``high`` agree.
 
     Attributes:
         name: by which it is fixed or bounded.
@@ -52,7 +53,7 @@ class Variable:
 
     @property
     def free(self) -> bool:
-        """Whether there is anything to look for."""
+        """Whether it has a range."""
         return self.low < self.high
 
 
@@ -73,8 +74,13 @@ class Space:
 
     @property
     def free(self) -> tuple[Variable, ...]:
-        """The variables that are looked for."""
+        """The variables to search for."""
         return tuple(variable for variable in self.variables if variable.free)
+
+    @property
+    def symmetry(self) -> Symmetry:
+        """Symmetry of the gait, which all sets have."""
+        return self.build(np.array([one.low for one in self.free])).symmetry(self.gait)
 
     def build(self, values: np.ndarray) -> Network:
         """Return the network with values for the free variables, rounded to 4 decimals."""
@@ -104,7 +110,7 @@ def _variables(network: type[Network], gait: str) -> list[Variable]:
 
 def search_space(network_name: str, gait: str, bounds: Mapping[str, tuple[float, float]],
                  fixed: Mapping[str, float]) -> Space:
-    """Return the parameter sets among which a gait is looked for.
+    """Return the parameter sets in which to search for a gait.
 
     Args:
         network_name: of a network that states what may be looked for, or its file.

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What networks do in the end: many are simulated at once, and the cycle of each is found."""
+"""The settled cycles of networks, many of which are simulated at once."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -39,7 +39,7 @@ RETURNED = 0.1
 
 @dataclass(frozen=True, eq=False, repr=False)
 class SettledCycle(ShortRepr):
-    """What a network does in the end, from a simulation.
+    """The cycle in which a network settles, from a simulation.
 
     Attributes:
         run: the simulation.

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The last word on a parameter set: its exact orbit, its multipliers, and how it stands noise."""
+"""The verification of a parameter set: its exact orbit, its multipliers, and runs with noise."""
 
 from dataclasses import dataclass
 
@@ -42,7 +42,7 @@ POINTS, DIGITS = 1024, 10
 
 
 class NotVerified(CpgError):
-    """A parameter set does not stand up to scrutiny; the message says why."""
+    """A parameter set fails the verification; the message says why."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -89,7 +89,7 @@ def exact_preset(preset: Preset) -> tuple[Preset, Orbit]:
 
 
 def survives(orbit: Orbit, seed: int = 0) -> bool:
-    """Tell whether a gait lasts in its free network under noise, started from its orbit."""
+    """Return whether a gait survives noise without a lock, started from its orbit."""
     network, symmetry = orbit.network, orbit.symmetry
     starts = np.repeat(orbit(np.zeros(1)), RUNS, axis=0)
     step = COARSER * network.step
@@ -125,16 +125,16 @@ def _folded(signals: np.ndarray) -> np.ndarray:
 
 
 def polish(score: Score, gait: str, seed: int = 0) -> Chosen:
-    """Solve for the orbit of a set that was found and judge it.
+    """Solve for the orbit of a set and verify it.
 
     Args:
         score: of the set.
-        gait: which it is to have.
+        gait: that it must have.
         seed: of the noise.
 
     Raises:
-        NotVerified: it has no stable orbit of the gait, its waveforms are not what is asked, or it
-            does not outlast noise.
+        NotVerified: it has no stable orbit of the gait, its waveforms miss their requirements, or
+            it does not survive noise.
 
     """
     if not score.exact:

@@ -19,10 +19,10 @@ Nothing is fed back, so that all of a run's targets are known beforehand.
 
 from collections.abc import Callable, Sequence
 
-from cpg_ros.feedback.timetable import periodic
+from cpg_ros.feedback.interpolation import periodic
 from cpg_ros.motion.pattern import Pattern
 from cpg_ros.motion.plan import GaitPlan
-from cpg_ros.motion.steering import Drive
+from cpg_ros.motion.strides import Drive
 from cpg_ros.robots.robot import Robot
 from cpg_ros.simulation.bodies import Bodies
 from cpg_ros.simulation.body import Body

@@ -31,7 +31,7 @@ import numpy as np
 
 
 class Bodies:
-    """As many bodies as are asked for, all of which begin in the stand.
+    """Any number of bodies, all of which begin in the stand.
 
     Attributes:
         body: one of them, for its model and its stand.
@@ -50,7 +50,7 @@ class Bodies:
                               else os.cpu_count() or 1)
         self._data = [mujoco.MjData(body.model) for _ in range(threads)]
         self._pool = rollout.Rollout(nthread=threads)
-        self._models: dict[tuple[float, float, Terrain | None], Any] = {}
+        self._models: dict[tuple[float, float, Terrain | None, float], Any] = {}
         self._spec = int(mujoco.mjtState.mjSTATE_CTRL | mujoco.mjtState.mjSTATE_XFRC_APPLIED)
         full = mujoco.mjtState.mjSTATE_FULLPHYSICS
         body.reset()
@@ -77,12 +77,14 @@ class Bodies:
         return self._pool.rollout(models, self._data, state, control, control_spec=self._spec,
                                   initial_warmstart=warmstart)
 
-    def model(self, scenario: Scenario) -> Any:
-        """Return the model of a body that meets a scenario."""
-        key = (scenario.friction, scenario.mass, scenario.terrain)
+    def model(self, scenario: Scenario, kp_scale: float = 1.0) -> Any:
+        """Return the model of a body that meets a scenario, its servos' kp scaled."""
+        key = (scenario.friction, scenario.mass, scenario.terrain, kp_scale)
         if key not in self._models:
             mujoco, model = engine(), copy.copy(self.body.model)
             set_friction(model, scenario.friction)
+            model.actuator_gainprm[:, 0] *= kp_scale
+            model.actuator_biasprm[:, 1] *= kp_scale
             if scenario.mass != 1.0:
                 model.body_mass[:] *= scenario.mass
                 model.body_inertia[:] *= scenario.mass

@@ -61,17 +61,20 @@ class Body:
         self.data: Any = mujoco.MjData(self.model)
         self._step = mujoco.mj_step
         self.stand = robot.column('offset')[robot.places]
-        joints = self.model.actuator_trnid[:, 0]
+        self._kp, self._kp_scale = self.model.actuator_gainprm[:, 0].copy(), 1.0
+        count, n = len(legs(robot)), len(robot.order)
+        joints = self.model.actuator_trnid[:n, 0]
+        self._held = list(robot.held.values())
+        self._held_angles = self.model.jnt_qposadr[self.model.actuator_trnid[n:, 0]]
         self._angles = self.model.jnt_qposadr[joints]
         self._speeds = self.model.jnt_dofadr[joints]
         self._base = int(self.model.body_rootid[self.model.jnt_bodyid[joints[0]]])
         free = self.model.body_jntadr[self._base]
         self._at = slice(self.model.jnt_qposadr[free], self.model.jnt_qposadr[free] + 7)
         self._moving = slice(self.model.jnt_dofadr[free], self.model.jnt_dofadr[free] + 6)
-        self._control = self.data.ctrl
+        self._control = self.data.ctrl[:n]
         self._pose, self._rates = self.data.qpos[self._at], self.data.qvel[self._moving]
         self._pushed = 0
-        count, n = len(legs(robot)), len(robot.order)
         self._forces = self.data.sensordata[:3 * count].reshape(count, 3)[:, 2]
         self._trunk = self.data.sensordata[3 * count:]
         self._feet = np.zeros(count)
@@ -93,6 +96,7 @@ class Body:
         mujoco.mj_resetData(self.model, data)
         self._pushed = 0
         data.qpos[self._angles] = self.stand
+        data.qpos[self._held_angles] = data.ctrl[len(self.stand):] = self._held
         self._pose[:] = 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0
         if self._height is None:
             mujoco.mj_kinematics(self.model, data)
@@ -119,6 +123,13 @@ class Body:
     def command(self, angles: np.ndarray) -> None:
         """Let the joints be driven to these angles, rad, shape (joints,), from now on."""
         self._control[:] = angles
+
+    def scale_kp(self, scale: float) -> None:
+        """Let the joints have their proportional gain times this."""
+        if scale != self._kp_scale:
+            self._kp_scale = scale
+            self.model.actuator_gainprm[:, 0] = scale * self._kp
+            self.model.actuator_biasprm[:, 1] = -scale * self._kp
 
     def load(self, mass: float) -> None:
         """Put a mass in kg on the base, where its own is."""

@@ -14,8 +14,8 @@
 
 """Many bodies at once with feedback, or without it: pushed, on rough ground, on slopes.
 
-All of them take a step of physics together, a ``rollout`` of one step, and what they feel goes
-through one ``Feedback`` of as many runs. A run that has ended takes no more steps.
+All of them take a step of physics together, a ``rollout`` of one step, and one ``Feedback`` of as
+many runs takes their sensor data. A run that has ended takes no more steps.
 """
 
 from collections.abc import Mapping, Sequence
@@ -26,7 +26,6 @@ from cpg_ros.feedback.estimate import BodyState, SensorData
 from cpg_ros.feedback.feedback import Feedback
 from cpg_ros.feedback.gains import Gains
 from cpg_ros.feedback.kinematics import geometry_of
-from cpg_ros.feedback.tick import PlannedMotion
 from cpg_ros.feedback.timetable import Timetable
 from cpg_ros.motion.plan import GaitPlan
 from cpg_ros.simulation.bodies import Bodies
@@ -41,7 +40,7 @@ import numpy as np
 
 
 class ClosedLoop(Bodies):
-    """Bodies of one robot that feel what they do.
+    """Bodies of one robot with feedback from their sensors.
 
     Attributes:
         programs: the gaits that they know, by name; runs begin with the first.
@@ -50,15 +49,15 @@ class ClosedLoop(Bodies):
     """
 
     def __init__(self, name: str, *programs: GaitPlan, timestep: float = 0.002,
-                 threads: int = 1) -> None:
-        """Load the model of the programs' robot; the name as of ``model.load``.
+                 threads: int = 1, kp: float | None = None, kd: float | None = None) -> None:
+        """Load the model of the programs' robot; name, kp and kd as of ``robot_model.load``.
 
         Raises:
             SimulationError: MuJoCo is missing, or the model cannot be used.
 
         """
         self._robot = programs[0].robot
-        super().__init__(Body(name, self._robot, timestep=timestep, add=add_ground), threads)
+        super().__init__(Body(name, self._robot, kp, kd, timestep, add_ground), threads)
         self.programs = {program.name: program for program in programs}
         self.geometry = geometry_of(self._robot, self._robot.geometry
                                     or read_geometry(self.body, self.parts))
@@ -95,6 +94,8 @@ class ClosedLoop(Bodies):
         estimated = memory.velocity if gains is not None else state_of.velocity
         pattern = PatternBatch(self.programs, self._tables, scenarios, dt)
         models = [self.model(one) for one in scenarios]
+        stiff = [] if gains is None or not gains.stiffen else [
+            self.model(one, gains.stiffen_kp) for one in scenarios]
         control, joints, force = self.controls(runs, 1)
         forces = np.stack([one.forces(steps, dt) for one in scenarios], axis=1)
         order, places = np.argsort(self._robot.places), self._robot.places
@@ -111,8 +112,8 @@ class ClosedLoop(Bodies):
         fell, arrived = np.full((2, runs), np.inf)
         going, some, all_models = np.arange(runs), slice(None), models
         record = {key: np.zeros((steps, runs, size)) for key, size in
-                  (('place', 2), ('lean', 3), ('velocity', 3), ('estimated', 3), ('turning', 3),
-                   ('phase', 1))}
+                  (('place', 2), ('rpy', 3), ('velocity', 3), ('estimated', 3),
+                   ('angular_velocity', 3), ('phase', 1), ('kp_scale', 1))}
         none, calm = np.zeros((runs, legs)), np.ones(runs)
         for k in range(steps):
             pattern.advance(*(none, calm) if gains is None
@@ -124,23 +125,26 @@ class ClosedLoop(Bodies):
                              velocity)
             noticed = senses if noisy is None else noisy(senses)
             if gains is not None:
-                planned = PlannedMotion(pattern.planned, pattern.phase, pattern.gaits, pattern.mix,
-                                        pattern.wanted, pattern.course)
-                angles = feedback.advance(noticed, planned, dt, 1.0, pattern.level)
+                angles = feedback.advance(noticed, pattern.planned, dt, 1.0, pattern.level)
             else:
-                angles = pattern.planned
+                angles = pattern.planned.angles
                 state_of.update(noticed, dt)
             angles = pattern.confine(angles)
             joints[:, 0], force[:, 0] = angles[:, places], forces[k]
-            for key, value in (('place', state[:, 1 + parts.pose[:2]]), ('lean', senses.rpy),
+            for key, value in (('place', state[:, 1 + parts.pose[:2]]), ('rpy', senses.rpy),
                                ('velocity', velocity), ('estimated', estimated),
-                               ('turning', senses.angular_velocity),
-                               ('phase', pattern.phase[:, None])):
+                               ('angular_velocity', senses.angular_velocity),
+                               ('phase', pattern.planned.phase[:, None]),
+                               ('kp_scale', memory.kp_scale[:, None])):
                 record[key][k] = value
             speeds = senses.joint_velocities[:, places]
-            _, applied = torques(model, joints[:, 0], senses.joint_positions[:, places], speeds)
+            _, applied = torques(model, joints[:, 0], senses.joint_positions[:, places], speeds,
+                                 memory.kp_scale)
             work[k] = np.maximum(applied * speeds, 0.0).sum(axis=1)
             earlier, before = state[:, base].copy(), state[some, moving]
+            if stiff:
+                models = [(stiff if memory.kp_scale[run] > 1.0 else all_models)[run]
+                          for run in going]
             after, sensed = self.rollout(models, state[some], control[some], warm[some])
             state[some], sensors[some] = after[:, 0], sensed[:, 0]
             warm[some] = (state[some, moving] - before) / dt
@@ -162,6 +166,7 @@ class ClosedLoop(Bodies):
         way = np.abs(record['velocity'][late, :, 0].sum(axis=0) * dt)
         done = work[late].sum(axis=0) * dt
         found = {key: rows.swapaxes(0, 1) for key, rows in record.items()}
-        found['phase'] = found['phase'][:, :, 0]
+        for key in ('phase', 'kp_scale'):
+            found[key] = found[key][:, :, 0]
         return Outcome(fell=fell, arrived=arrived,
                        cost=done / (self.geometry.weight * np.maximum(way, 1e-3)), **found)

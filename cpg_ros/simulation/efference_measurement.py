@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A gait's efference copy, measured: what its body does on flat ground with nothing fed back."""
+"""Measurement of a gait's efference copy: the body's motion on flat ground without feedback."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -26,28 +26,28 @@ from cpg_ros.simulation.leg_geometry import read_geometry
 from cpg_ros.simulation.scenario import Scenario
 import numpy as np
 
-#: Length of a run, and what of it says nothing about the gait itself, s.
+#: Length of a run, and of its beginning, which is left out, s.
 DURATION, BEGINNING = 10.0, 3.0
 
 
 def measure_efference(loop: ClosedLoop, speeds: Sequence[float] | None = None) -> EfferenceCopy:
-    """Measure what a gait makes the body do at several wanted speeds.
+    """Measure the motion of the body in a gait at several commanded speeds.
 
     Args:
         loop: bodies, whose first gait it is.
-        speeds: to be asked for, m/s, or else as many as a table takes, from 0 to the fastest; a
-            gait that cannot be steered has but its own.
+        speeds: commanded, m/s; by default as many as a table takes, from the slowest, which may
+            be backward, to the fastest. A gait that cannot be steered has only its own.
 
     """
     commanded: Sequence[float] | np.ndarray = [0.0]
     if loop.program.motion.steering is not None:
-        commanded = np.linspace(0.0, loop.program.speeds[1], SPEEDS) if speeds is None else speeds
+        commanded = np.linspace(*loop.program.speeds, SPEEDS) if speeds is None else speeds
     ran = loop.run([Scenario(speed=speed) for speed in commanded], DURATION)
     first = round(BEGINNING / loop.timestep)
-    # The velocity is what the robot makes of what it feels: an estimate that is a little wrong at
-    # every stride is no disturbance.
-    signals = np.concatenate([ran.estimated[:, :, :2], ran.turning[:, :, :2],
-                              ran.lean[:, :, :2]], axis=2)
+    # The velocity is the robot's own estimate: an error that it makes at every stride is no
+    # disturbance.
+    signals = np.concatenate([ran.estimated[:, :, :2], ran.angular_velocity[:, :, :2],
+                              ran.rpy[:, :, :2]], axis=2)
     tables = [fold(phase[first:], one[first:])
               for phase, one in zip(ran.phase, signals, strict=True)]
     found = ran.velocity[:, first:, 0].mean(axis=1)
@@ -56,7 +56,8 @@ def measure_efference(loop: ClosedLoop, speeds: Sequence[float] | None = None) -
 
 
 def calibrated(robot: Robot, model: str, gaits: Sequence[str],
-               update: Callable[[str], None] = lambda gait: None) -> Robot:
+               update: Callable[[str], None] = lambda gait: None, *, kp: float | None = None,
+               kd: float | None = None) -> Robot:
     """Return a robot with the geometry of a model, and with efference copies measured on it.
 
     Where feedback can displace none of its legs, as none of a hexapod's, it stays as it is.
@@ -66,6 +67,8 @@ def calibrated(robot: Robot, model: str, gaits: Sequence[str],
         model: as of ``robot_model.load``.
         gaits: that are measured; others keep theirs.
         update: called with each gait when it has been measured.
+        kp: proportional gain of the joints, N m / rad; None for what is usual.
+        kd: damping gain of the joints, N m s / rad; the same.
 
     Raises:
         SimulationError: the model cannot be used.
@@ -77,7 +80,7 @@ def calibrated(robot: Robot, model: str, gaits: Sequence[str],
     for gait in gaits:
         preset, motion = presets[gait], robot.motion(gait, gait)
         program = plan(robot, gait, preset, preset.network, motion.frequency or 0.0)
-        loop = ClosedLoop(model, program)
+        loop = ClosedLoop(model, program, kp=kp, kd=kd)
         geometry = read_geometry(loop.body, loop.parts)
         if not geometry.legs:
             return robot

@@ -24,18 +24,19 @@ from dataclasses import dataclass, replace
 import math
 
 from cpg_ros.dynamics.periodic import Orbit
-from cpg_ros.feedback.timetable import periodic
+from cpg_ros.feedback.interpolation import periodic
+from cpg_ros.feedback.kinematics import bend_of
 from cpg_ros.motion.duty import Duty
 from cpg_ros.motion.joint_readout import joint_readout, standing
 from cpg_ros.robots.robot import Joint, JointMotion
 from cpg_ros.simulation.body import Body
-from cpg_ros.simulation.leg_geometry import at_zero, bend_of, chain_of, two_link_angles
+from cpg_ros.simulation.leg_geometry import at_zero, chain_of, two_link_angles, wrapped
 from cpg_ros.simulation.model_indices import Anatomy
 from cpg_ros.simulation.robot_model import legs, SimulationError
 from cpg_ros.simulation.sprawled_leg import SprawledLeg, sprawls
 import numpy as np
 
-#: Points of a cycle that the fit looks at.
+#: Points of a cycle at which curves are fitted.
 POINTS = 128
 #: Share of the cycle that weights make a leg stand by themselves.
 OWN = 0.5
@@ -55,7 +56,7 @@ class Path:
         ahead: of the joint, middle of the way on the floor.
         push: by how much more the leg is stretched at most while it is on the floor.
         late: 1 if that is in the middle of this time, more if later.
-        lead: by how much the joints are told earlier than the foot is to be there, cycles.
+        lead: by how much the command leads the foot, cycles.
 
     """
 
@@ -130,11 +131,7 @@ class LegPath:
         A place out of reach is taken to the nearest one along its line to the joint.
         """
         thigh, calf = two_link_angles(self._upper, self._lower, self._bend, z + 1j * x)
-        return self._turns[0] * thigh, self._wrapped(self._turns[1] * calf)
-
-    @staticmethod
-    def _wrapped(angle: np.ndarray) -> np.ndarray:
-        return (angle + math.pi) % (2.0 * math.pi) - math.pi
+        return self._turns[0] * thigh, wrapped(self._turns[1] * calf)
 
 
 def basis(orbit: Orbit, cell: int, harmonics: int, path: Path) -> np.ndarray:
@@ -177,7 +174,7 @@ def fit(curves: np.ndarray, psi: np.ndarray) -> tuple[float, np.ndarray, np.ndar
 
 
 class Feet:
-    """The feet of a robot: what its joints have to do for given paths."""
+    """The feet of a robot: the joint motions for given paths."""
 
     def __init__(self, body: Body, parts: Anatomy) -> None:
         """Look at all legs; errors as of Leg."""
@@ -192,7 +189,7 @@ class Feet:
         return float(np.mean([leg.length for leg in self.legs.values()]))
 
     def joints(self, orbit: Orbit, paths: dict[str, Path]) -> dict[str, JointMotion]:
-        """Return what a gait makes of the joints that move the feet.
+        """Return the motion of the joints that move the feet in a gait.
 
         Args:
             orbit: of the gait.

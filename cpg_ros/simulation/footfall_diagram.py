@@ -21,6 +21,7 @@ from pathlib import Path
 from cpg_ros.files.atomic_write import write_atomically
 from cpg_ros.gaits.steady_stretch import true_runs
 from matplotlib import rcParams
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 import numpy as np
 
@@ -32,22 +33,39 @@ SMOOTHING = 0.5
 FORMATS = ('.png', '.svg', '.pdf')
 
 
-def stances(time: np.ndarray, force: np.ndarray, least: float) -> list[tuple[float, float]]:
-    """Return the start and length (s) of each time that one foot bears more than ``least`` N.
+def stances(time: np.ndarray, standing: np.ndarray) -> list[tuple[float, float]]:
+    """Return the start and length of each stretch in which a foot stands, the bars of a diagram.
 
     Args:
-        time: of the samples, s, shape (n,), evenly spaced.
-        force: at them, N, shape (n,).
-        least: force from which on it stands, N.
+        time: of the samples, s or strides, shape (n,), evenly spaced.
+        standing: whether the foot stands at them, shape (n,).
 
     """
     step = _spacing(time)
     return [(float(time[first]), float((last + 1 - first) * step))
-            for first, last in true_runs(force > least)]
+            for first, last in true_runs(standing)]
+
+
+def draw_stances(axes: Axes, names: Sequence[str], bars: Sequence[list[tuple[float, float]]],
+                 colours: Sequence[str], alpha: float = 1.0) -> None:
+    """Draw the stances of legs as rows of bars, the first row on top.
+
+    Args:
+        axes: drawn into.
+        names: of the rows.
+        bars: of each row, as ``stances`` returns them.
+        colours: of each row.
+        alpha: opacity of the bars, 0 to 1.
+
+    """
+    for row, (own, colour) in enumerate(zip(bars, colours, strict=True)):
+        axes.broken_barh(own, (row - 0.36, 0.72), color=colour, alpha=alpha)
+    axes.set_yticks(range(len(names)), names)
+    axes.set_ylim(len(names) - 0.45, -0.55)
 
 
 def _spacing(time: np.ndarray) -> float:
-    """Return the mean time between samples, s: those of a clock of another rate are not even."""
+    """Return the mean time between samples: those of a clock of another rate are not even."""
     return float(time[-1] - time[0]) / (len(time) - 1) if len(time) > 1 else 0.0
 
 
@@ -85,14 +103,13 @@ def plot_footfalls(path: Path, legs: Sequence[str], time: np.ndarray, forces: np
     figure = Figure(figsize=(max(7.0, min(24.0, 0.8 * (time[-1] - time[0]))), 4.4),
                     layout='constrained')
     above, below = figure.subplots(2, 1, sharex=True, height_ratios=[3, 2])
-    for row in range(len(legs)):
-        bars = stances(time, forces[:, row], least)
-        above.broken_barh(bars, (row - 0.36, 0.72), facecolor=rcParams['text.color'])
-        share = sum(length for _, length in bars) / (time[-1] - time[0])
+    bars = [stances(time, column > least) for column in forces.T]
+    draw_stances(above, [leg.upper() for leg in legs], bars, [rcParams['text.color']] * len(legs))
+    for row, own in enumerate(bars):
+        share = sum(length for _, length in own) / (time[-1] - time[0])
         above.annotate(f'{share:.0%}', (1.0, row), xycoords=('axes fraction', 'data'),
                        xytext=(4, 0), textcoords='offset points', va='center', fontsize=8)
-    above.set(yticks=range(len(legs)), yticklabels=[leg.upper() for leg in legs],
-              ylim=(len(legs) - 0.4, -0.6), ylabel='foot on the floor',
+    above.set(ylabel='foot on the floor',
               title='Footfalls (right: share of the time on the floor)')
     below.plot(time, speed(time, position), color='tab:blue', linewidth=1.2)
     below.set(xlabel='time [s]', ylabel='speed [m/s]', xlim=(time[0], time[-1]))

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A gait in a few numbers, and what each gait of a robot about knee high is to reach.
+"""The design of a gait in a few numbers, and the target of each gait for a knee-high robot.
 
 All figures are for a leg of LENGTH from thigh joint to foot in the stand; for other robots lengths
 go with that length, times and speeds with its square root, as for pendulums.
@@ -29,7 +29,7 @@ import numpy as np
 LENGTH = 0.2664
 #: Share by which strides of the gentlest start are shorter.
 SHORTER = 0.5
-#: Height that feet are to have for a tenth of the time, m.
+#: Height that feet should exceed for a tenth of the time, m.
 CLEAR = 0.02
 
 
@@ -69,7 +69,7 @@ class Design:
 
 @dataclass(frozen=True)
 class Aim:
-    """What a gait is to reach, and where to look for it.
+    """The target of a gait, and where to search for its design.
 
     Attributes:
         speed: steady, m/s; more is worth nothing, and much more is a fault.
@@ -90,7 +90,7 @@ class Aim:
         return Design(*(float(value) for value in low + place * (high - low)))
 
     def gentler(self, share: float) -> 'Aim':
-        """Return the same with a start that asks less of the joints; a share of 1: least."""
+        """Return the same with a start that demands less of the joints, least at a share of 1."""
         start, low = self.start, self.low
         return replace(self, start=replace(
             start, frequency=start.frequency + share * (low.frequency - start.frequency),
@@ -152,11 +152,11 @@ AIMS |= {f'reverse_{gait}': AIMS[gait] for gait in ('ripple', 'wave')}
 
 
 def price(trial: RunMetrics, aim: Aim, duration: float, scale: float = 1.0) -> float:
-    """Weigh a run's figures; 0 would be perfect.
+    """Return the cost of a run by its figures; 0 would be perfect.
 
     Slower or much faster than wanted, fewer hops or, where none are wanted, bobbing, turning,
-    leaning, dragging feet, drifting, sliding, torques at their limit and work all cost; a fall
-    costs most. Lengths are weighed by the robot's scale.
+    leaning, dragging feet, drifting, sliding, torques at their limit and work all add to it; a
+    fall adds most. Lengths are divided by the robot's scale.
     """
     fall = 0.0 if trial.upright else 15.0 + 25.0 * (1.0 - trial.fell / duration)
     share = trial.speed / aim.speed

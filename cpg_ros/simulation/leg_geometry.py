@@ -17,7 +17,7 @@
 import math
 from typing import Any
 
-from cpg_ros.robots.body_keys import BodyGeometry, leg_of
+from cpg_ros.robots.body_keys import body_geometry, BodyGeometry, LegChain
 from cpg_ros.robots.robot import Joint
 from cpg_ros.simulation.body import Body
 from cpg_ros.simulation.model_indices import Anatomy
@@ -58,23 +58,18 @@ def two_link_angles(upper: complex, lower: complex, bend: float, place: np.ndarr
     return np.angle(place / (upper + lower * np.exp(1j * second))), second
 
 
-def bend_of(upper: complex, lower: complex, second: float) -> float:
-    """Return to which side the second of two links is bent at an angle, rad: 1 or -1."""
-    return math.copysign(1.0, math.remainder(second + np.angle(lower / upper), 2.0 * math.pi))
+def wrapped(angle: np.ndarray) -> np.ndarray:
+    """Return angles from -pi to pi, rad."""
+    return (angle + math.pi) % (2.0 * math.pi) - math.pi
 
 
 def read_geometry(body: Body, parts: Anatomy) -> BodyGeometry:
-    """Look at all legs with all joints at 0.
-
-    Legs are left out that are not a hip about x, if any, then two joints about y.
-    """
-    model, data = body.model, at_zero(body)
-    base, shapes = data.xpos[parts.base], {}
+    """Read the geometry of the legs that feedback can displace off a model."""
+    data, chains = at_zero(body), {}
+    base = data.xpos[parts.base]
     for foot, leg in zip(parts.feet, legs(body.robot), strict=True):
         chain, ids = chain_of(body, leg)
-        found = leg_of([joint.name for joint in chain], data.xaxis[ids],
-                       data.xanchor[ids] - base, data.geom_xpos[foot] - base)
-        if found is not None:
-            shapes[leg] = found
-    return BodyGeometry(round(float(model.body_mass.sum()), 6),
-                        float(model.geom_size[parts.feet[0], 0]), shapes)
+        chains[leg] = LegChain([joint.name for joint in chain], data.xaxis[ids],
+                               data.xanchor[ids] - base, data.geom_xpos[foot] - base,
+                               body.model.geom_size[foot, 0])
+    return body_geometry(body.mass, chains)

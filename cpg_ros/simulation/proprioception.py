@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What bodies feel, from the true state of the physics, and with the noise of sensors."""
+"""Sensor data of simulated bodies, from the true state of the physics and with sensor noise."""
 
 import math
 
@@ -24,32 +24,11 @@ import numpy as np
 
 
 @entry
-def _feel(quaternions, moving, before, dt, lean, turning, push, velocity):
-    """Fill what the base feels and its true velocity; see felt."""
-    for k in range(len(quaternions)):
-        w, x, y, z = quaternions[k]
-        lean[k, 0] = math.atan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y))
-        lean[k, 1] = math.asin(min(max(2.0 * (w * y - z * x), -1.0), 1.0))
-        lean[k, 2] = math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
-        axes = ((1 - 2 * (y * y + z * z), 2 * (x * y + w * z), 2 * (x * z - w * y)),
-                (2 * (x * y - w * z), 1 - 2 * (x * x + z * z), 2 * (y * z + w * x)),
-                (2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)))
-        faster = ((moving[k, 0] - before[k, 0]) / dt, (moving[k, 1] - before[k, 1]) / dt,
-                  (moving[k, 2] - before[k, 2]) / dt + GRAVITY)
-        for axis in range(3):
-            turning[k, axis] = moving[k, 3 + axis]
-            push[k, axis] = velocity[k, axis] = 0.0
-            for world in range(3):
-                push[k, axis] += axes[axis][world] * faster[world]
-                velocity[k, axis] += axes[axis][world] * moving[k, world]
-
-
-def fill_sensor_data(senses: SensorData, quaternions: np.ndarray, moving: np.ndarray,
-                     before: np.ndarray, dt: float, velocity: np.ndarray) -> None:
-    """Fill in what the base feels, and its true velocity in its own frame, m/s, (runs, 3).
+def fill_sensor_data(senses, quaternions, moving, before, dt, velocity):
+    """Fill what the base measures, and its true velocity in its own frame, m/s, (runs, 3).
 
     Args:
-        senses: rpy, angular_velocity and acceleration are filled.
+        senses: SensorData, whose rpy, angular_velocity and acceleration are filled.
         quaternions: of the bases, w x y z, shape (runs, 4).
         moving: velocity in the world's frame, m/s, then angular velocity in the base's, rad/s,
             shape (runs, 6).
@@ -58,32 +37,47 @@ def fill_sensor_data(senses: SensorData, quaternions: np.ndarray, moving: np.nda
         velocity: filled.
 
     """
-    _feel(quaternions, moving, before, dt, senses.rpy, senses.angular_velocity,
-          senses.acceleration, velocity)
+    rpy, acceleration = senses.rpy, senses.acceleration
+    for k in range(len(quaternions)):
+        w, x, y, z = quaternions[k]
+        rpy[k, 0] = math.atan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y))
+        rpy[k, 1] = math.asin(min(max(2.0 * (w * y - z * x), -1.0), 1.0))
+        rpy[k, 2] = math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
+        axes = ((1 - 2 * (y * y + z * z), 2 * (x * y + w * z), 2 * (x * z - w * y)),
+                (2 * (x * y - w * z), 1 - 2 * (x * x + z * z), 2 * (y * z + w * x)),
+                (2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)))
+        faster = ((moving[k, 0] - before[k, 0]) / dt, (moving[k, 1] - before[k, 1]) / dt,
+                  (moving[k, 2] - before[k, 2]) / dt + GRAVITY)
+        for axis in range(3):
+            senses.angular_velocity[k, axis] = moving[k, 3 + axis]
+            acceleration[k, axis] = velocity[k, axis] = 0.0
+            for world in range(3):
+                acceleration[k, axis] += axes[axis][world] * faster[world]
+                velocity[k, axis] += axes[axis][world] * moving[k, world]
 
 
 class NoisySenses:
-    """What many bodies feel with the noise and the delay of sensors."""
+    """Sensor data of many bodies with the noise and the delay of sensors."""
 
     def __init__(self, noise: SensorNoise, runs: int, legs: int, dt: float) -> None:
         self._noise, self._rng = noise, np.random.default_rng(noise.seed)
         self._later = round(noise.delay / dt)
         self._waiting: list[SensorData] = []
         self._factor = 1.0 + noise.force_bias * self._rng.uniform(-1.0, 1.0, (runs, legs))
-        self._lean = noise.orientation_bias * self._rng.choice([-1.0, 1.0], (runs, 2))
+        self._tilt = noise.orientation_bias * self._rng.choice([-1.0, 1.0], (runs, 2))
 
     def __call__(self, true: SensorData) -> SensorData:
-        """Return what is noticed now."""
+        """Return the data that arrives now."""
         rng, noise = self._rng, self._noise
         loads = true.foot_forces * (self._factor + noise.force_noise * rng.normal(
             size=true.foot_forces.shape))
-        lean = true.rpy.copy()
-        lean[:, :2] += self._lean
-        turning = (true.angular_velocity + noise.gyroscope_bias
-                   + noise.gyroscope_noise * rng.normal(size=true.angular_velocity.shape))
-        push = true.acceleration + noise.accelerometer_bias
+        rpy = true.rpy.copy()
+        rpy[:, :2] += self._tilt
+        angular_velocity = (true.angular_velocity + noise.gyroscope_bias
+                            + noise.gyroscope_noise * rng.normal(size=rpy.shape))
+        acceleration = true.acceleration + noise.accelerometer_bias
         if noise.accelerometer_noise:
-            push += noise.accelerometer_noise * rng.normal(size=push.shape)
+            acceleration += noise.accelerometer_noise * rng.normal(size=rpy.shape)
         self._waiting.append(SensorData(true.joint_positions.copy(), true.joint_velocities.copy(),
-                                        loads, lean, turning, push))
+                                        loads, rpy, angular_velocity, acceleration))
         return self._waiting[0] if len(self._waiting) <= self._later else self._waiting.pop(0)

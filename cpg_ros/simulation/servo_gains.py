@@ -12,14 +12,16 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Gains of joints where nobody says them: those of a Unitree Go2, for a robot of another mass.
+"""Default gains of joints: those of a Unitree Go2, scaled to the mass of the robot.
 
 Of robots of one shape, lengths go with the cube root of the mass m. To bend as far under its
 weight a larger one needs kp ~ m length, and to be damped as well kd ~ m length^1.5.
 """
 
+from collections.abc import Mapping
 from typing import Any
 
+from cpg_ros.robots.biped_keys import BipedLink
 import numpy as np
 
 #: Gains of the Go2's joints, N m / rad and N m s / rad, and the mass on each of its legs, kg.
@@ -58,3 +60,24 @@ def set_gains(model: Any, kp: float | None, kd: float | None, legs: int) -> None
     armature = model.dof_armature[driven]
     model.dof_armature[driven] = np.where(
         armature > 0.0, armature, STEADY * stiff * model.opt.timestep**2)
+
+
+def set_servos(model: Any, links: Mapping[str, BipedLink], kp: float | None,
+               kd: float | None) -> None:
+    """Give each actuator the gains and the rotor of its joint's own servo, where none are given.
+
+    Args:
+        model: a ``mujoco.MjModel`` whose actuators have the names of joints.
+        links: by the names of their joints.
+        kp: N m / rad, of all instead; None takes each link's.
+        kd: N m s / rad; the same.
+
+    """
+    for k in range(model.nu):
+        link = links[model.actuator(k).name]
+        if kp is None:
+            model.actuator_gainprm[k, 0], model.actuator_biasprm[k, 1] = link.kp, -link.kp
+        if kd is None:
+            model.actuator_biasprm[k, 2] = -link.kd
+        if link.armature:
+            model.dof_armature[model.jnt_dofadr[model.actuator_trnid[k, 0]]] = link.armature

@@ -20,9 +20,10 @@ The foot goes along the body at the distance from it that it has in the stand.
 
 import math
 
+from cpg_ros.feedback.kinematics import bend_of
 from cpg_ros.robots.robot import Joint
 from cpg_ros.simulation.body import Body
-from cpg_ros.simulation.leg_geometry import at_zero, bend_of, chain_of, two_link_angles
+from cpg_ros.simulation.leg_geometry import at_zero, chain_of, two_link_angles, wrapped
 from cpg_ros.simulation.model_indices import Anatomy
 from cpg_ros.simulation.robot_model import legs, SimulationError
 import numpy as np
@@ -100,5 +101,5 @@ class SprawledLeg:
         way = np.arctan2(self._y, x)
         place = np.hypot(x, self._y) - self._coxa.real + 1j * z
         femur, tibia = two_link_angles(self._upper, self._lower, self._bend, place)
-        return tuple((turn * angle + math.pi) % (2.0 * math.pi) - math.pi for turn, angle in zip(
+        return tuple(wrapped(turn * angle) for turn, angle in zip(
             self._turns, (way - self._heading, femur, tibia), strict=True))

@@ -143,7 +143,7 @@ def add_ground(spec: Any) -> None:
 
 
 def lay(model: Any, terrain: Terrain) -> None:
-    """Put ground in place of the floor of a model that has had it added."""
+    """Replace the floor by a terrain, in a model that ``add_ground`` has prepared."""
     mujoco = engine()
     # The tree of bounding boxes, and marks of what is where its body is, no longer hold.
     model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_MIDPHASE
@@ -169,7 +169,7 @@ def lay(model: Any, terrain: Terrain) -> None:
 
 
 def set_friction(model: Any, friction: float) -> None:
-    """Let nothing slide with more than this friction, and the ground with just as much."""
+    """Limit the friction of everything to this, and give the ground exactly this."""
     # Of two geoms in contact the larger friction counts.
     ground, sliding = model.geom_bodyid == 0, model.geom_friction[:, 0]
     sliding[:] = np.where(ground, friction, np.minimum(sliding, friction))

@@ -42,7 +42,7 @@ import numpy as np
 
 #: Length of the runs that designs are compared by, and of the one that figures are of, s.
 SHORT, LONG = 6.0, 10.0
-#: What designs meet: good floors, and slippery ones with more and less load and with pushes.
+#: Conditions of the runs: good floors, and slippery ones with other loads and with pushes.
 SCENARIOS = (Scenario(), Scenario(0.9),
              Scenario(0.6, 1.05, ((2.5, 0.0, 50.0), (4.2, 50.0, 0.0))),
              Scenario(0.8, 0.95, ((3.0, -50.0, 0.0), (4.5, 0.0, -50.0))))
@@ -61,7 +61,7 @@ GENTLE = (0.0, 0.25, 0.5, 0.75, 1.0)
 
 
 class NoDesign(SimulationError):
-    """None of a gait's designs can be run; the message says what is in the way."""
+    """None of a gait's designs can be run; the message gives the reason."""
 
     exit_code = 1
 
@@ -134,7 +134,7 @@ class Tuner:
             for one in SCENARIOS)
 
     def motion(self, gait: str, design: Design) -> Motion:
-        """Return what a design makes of the robot."""
+        """Return the robot's motion by a design."""
         preset = NETWORKS[self.robot.networks[0]].presets()[gait]
         design = replace(design, duty=round(design.duty, 3), lead=round(design.lead, 3))
         paths = {leg: design.path(self.robot.girdles.get(leg, ''), self.scale)
@@ -228,7 +228,7 @@ class Tuner:
 
 @dataclass(frozen=True)
 class DesignTrial:
-    """A gait of a robot that is to be tuned from a seed: as the arguments of tune."""
+    """One search: a gait of a robot, tuned from one seed; attributes as the arguments of tune."""
 
     robot: Robot
     model: str
@@ -266,7 +266,7 @@ def _here(tuner: Tuner, trials: Sequence[DesignTrial]) -> Iterator[Tuned | NoDes
             yield trial.search(tuner, lambda done, k=k: bar(k * each + done))  # type: ignore[misc]
 
 
-def tune(robot: Robot, model: str, gaits: Sequence[str], evaluations: int, seed: int,
+def tune(robot: Robot, model: str, gaits: Sequence[str], evaluations: int, seed: int, *,
          executor: Executor | None = None, seeds: int = 1, kp: float | None = None,
          kd: float | None = None, threads: int = 0,
          say: Callable[[str], None] = lambda line: None
@@ -284,7 +284,7 @@ def tune(robot: Robot, model: str, gaits: Sequence[str], evaluations: int, seed:
         kp: gain of the joints, as of Batch.
         kd: the same.
         threads: of each search; 0 for all cores.
-        say: is told what the model lacks.
+        say: takes a line for each thing that the model lacks.
 
     Returns:
         The robot with these motions, its others kept, what was found, gait by gait, and for each
@@ -320,19 +320,20 @@ def tune(robot: Robot, model: str, gaits: Sequence[str], evaluations: int, seed:
             continue
         motions[gait] = best.motion
         found.append(best)
-    # The last word of what tells how far they are.
+    # Let the progress bar end.
     next(results, None)
     if not found:
         raise NoDesign('; '.join(missing))
-    # What feedback wants to know, too.
+    # Feedback needs the efference copies, too.
     measured = [one.gait for one in found]
-    return calibrated(replace(robot, motions=motions), model, measured), found, missing
+    robot = calibrated(replace(robot, motions=motions), model, measured, kp=kp, kd=kd)
+    return robot, found, missing
 
 
 def _search() -> ModuleType:
     try:
         import cma
     except ImportError as error:
-        raise SimulationError("tuning needs CMA-ES (pip install 'cpg-ros[sim]'): "
+        raise SimulationError('tuning needs CMA-ES (pip install cma): '
                               f'{error}') from error
     return cma

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""URDF files as ROS has them, made ones that MuJoCo takes; every change is told.
+"""Conversion of ROS URDF files into ones that MuJoCo accepts; every change is reported.
 
 A URDF may name meshes by package, in formats that MuJoCo does not read, and have links without
 mass or with inertias that no body has. Links that joints move need both; frames that hang on
@@ -111,7 +111,7 @@ def part_touching(spec: Any, stand: Mapping[str, float]) -> None:
 
 
 class _Meshes:
-    """Looks for meshes, and does something about those that are of no use.
+    """Finds meshes, and replaces or removes those that MuJoCo cannot use.
 
     Attributes:
         assets: files that exist in memory only, by name.
@@ -151,7 +151,7 @@ class _Meshes:
                 for said, meshes in self._changes.items()]
 
     def _usable(self, reference: str, kind: str) -> tuple[str, str]:
-        """Return a name for MuJoCo, '' where there is none, and what to say of it."""
+        """Return a name for MuJoCo, '' where there is none, and the change to report."""
         lost = 'nothing can touch' if kind == 'collision' else 'pictures go without'
         try:
             path = find_mesh(reference, self._path, self._folder)
@@ -186,7 +186,7 @@ def _hold(robot: ElementTree.Element, driven: Collection[str], say: Say) -> None
 
 
 def _weigh(robot: ElementTree.Element, say: Say) -> float:
-    """Give each link a mass and an inertia that a body can have; return the mass that it had."""
+    """Give each link a mass and an inertia that a body can have; return the total before."""
     moved = {child.get('link') for joint in robot.findall('joint')
              if joint.get('type') != HELD and (child := joint.find('child')) is not None}
     links = {link.get('name', ''): link for link in robot.findall('link')}

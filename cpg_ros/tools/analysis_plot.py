@@ -22,7 +22,7 @@ from typing import Literal
 from cpg_ros.dynamics.bifurcation import bifurcations
 from cpg_ros.dynamics.continuation import Branch, continue_from_hopf, continue_orbit
 from cpg_ros.dynamics.floquet import ATTRACTS, multipliers
-from cpg_ros.dynamics.hopf import HopfPoint
+from cpg_ros.dynamics.hopf_point import HopfPoint
 from cpg_ros.dynamics.orbit import NoOrbit, Orbit
 from cpg_ros.errors import InputError
 from cpg_ros.files.progress_bar import progress_bar
@@ -244,6 +244,22 @@ def _draw_trajectories(axes: Axes, analysis: Analysis) -> None:
     axes.set_title('Trajectories', loc='left', fontsize=10)
 
 
+def check_suffix(option: str, suffix: str) -> None:
+    """Raise an InputError unless matplotlib writes files of a suffix, such as '.png'."""
+    if suffix.lstrip('.') not in Figure().canvas.get_supported_filetypes():
+        raise InputError(f"{option}: '{suffix}' is not a kind of picture that can be written, "
+                         'such as .png, .pdf or .svg')
+
+
+def written(figure: Figure, suffix: str) -> bytes:
+    """Return a figure as the contents of a file of that suffix, and close it."""
+    from matplotlib import pyplot
+    out = io.BytesIO()
+    figure.savefig(out, format=suffix.lstrip('.'), dpi=130)
+    pyplot.close(figure)
+    return out.getvalue()
+
+
 def picture(analysis: Analysis, suffix: str) -> bytes:
     """Draw an analysis.
 
@@ -251,14 +267,8 @@ def picture(analysis: Analysis, suffix: str) -> bytes:
         analysis: of a parameter set.
         suffix: of the file, such as '.png'.
 
-    Raises:
-        InputError: matplotlib does not write such files.
-
     """
     matplotlib.use('Agg')
-    if suffix.lstrip('.') not in Figure().canvas.get_supported_filetypes():
-        raise InputError(f"--plot: '{suffix}' is not a kind of picture that can be written, such "
-                         'as .png, .pdf or .svg')
     from matplotlib import pyplot
     count = max(1, len(analysis.existing))
     figure = pyplot.figure(figsize=(12.0, 7.4 + 1.7 * max(0, count - 3)), layout='constrained')
@@ -274,7 +284,4 @@ def picture(analysis: Analysis, suffix: str) -> bytes:
         if row == count - 1:
             axes.set_xlabel('time [strides]')
     figure.suptitle(f'{analysis.network.name}: {analysis.parameters}', fontsize=11)
-    out = io.BytesIO()
-    figure.savefig(out, format=suffix.lstrip('.'), dpi=130)
-    pyplot.close(figure)
-    return out.getvalue()
+    return written(figure, suffix)

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What ``analyze`` has to say about a parameter set: as text, and as JSON."""
+"""The report of ``analyze`` on a parameter set: as text, and as JSON."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -22,7 +22,7 @@ from typing import Any
 
 from cpg_ros.dynamics.equilibrium import equilibrium, named, odd
 from cpg_ros.dynamics.gait_assessment import GaitAssessment, nearest_threshold
-from cpg_ros.dynamics.hopf import HopfPoint
+from cpg_ros.dynamics.hopf_point import HopfPoint
 from cpg_ros.dynamics.hopf_search import hopf_points
 from cpg_ros.dynamics.isotypic import Block, blocks
 from cpg_ros.errors import CpgError
@@ -33,7 +33,7 @@ from cpg_ros.papers.commentary import COMMENTARIES, Commentary
 from cpg_ros.short_repr import ShortRepr
 import numpy as np
 
-#: From this error of the multiplier along the orbit on, it is said.
+#: Error of the multiplier along the orbit from which the report mentions it.
 UNSURE = 1e-6
 #: A variable so close to 0 at the stand is on the kink there.
 ON_KINK = 1e-12
@@ -54,8 +54,16 @@ def _yes(value: bool) -> str:
     return 'yes' if value else 'no'
 
 
+def _which(verdict: GaitAssessment, chosen: GaitAssessment) -> str:
+    """Return which of a gait's orbits is meant where it is not the first."""
+    if chosen is verdict:
+        return ''
+    assert chosen.orbit is not None
+    return f' (the orbit of period {chosen.orbit.period:.6f})'
+
+
 def _kind(point: HopfPoint) -> tuple[str, str]:
-    """Type of a Hopf point, and on which side of it its orbits lie."""
+    """Return the type of a Hopf point, and on which side of it its orbits lie."""
     if point.normal_form.degenerate:
         return 'degenerate', '-'
     return ('supercritical' if point.supercritical else 'subcritical',
@@ -63,7 +71,7 @@ def _kind(point: HopfPoint) -> tuple[str, str]:
 
 
 def _degenerate(network: Network) -> list[str]:
-    """Why there is no normal form, in lines."""
+    """Return why there is no normal form, in lines."""
     if not network.kinks:
         return ['degenerate: the term of third order vanishes, so the normal form does not tell '
                 'on which side', 'orbits lie, nor whether they attract.']
@@ -82,9 +90,9 @@ class Analysis(ShortRepr):
     Attributes:
         network: the parameters.
         gaits: gait -> verdict.
-        along: parameters that move for branches, and for Hopf points without a delay.
-        span: from where to where.
-        longest: bound of the delay for Hopf points, model time.
+        along: parameters that vary along branches, and for Hopf points without a delay.
+        span: their first and last value.
+        longest: largest delay at which Hopf points are found, model time.
 
     """
 
@@ -96,7 +104,7 @@ class Analysis(ShortRepr):
 
     @cached_property
     def _found(self) -> tuple[list[HopfPoint], tuple[Block, ...], np.ndarray, str]:
-        """Hopf points, blocks and equilibrium; or why there are none."""
+        """Return Hopf points, blocks and equilibrium, or why there are none."""
         try:
             rest = equilibrium(self.network)
             on = [name for name in self.network.kinks
@@ -119,7 +127,7 @@ class Analysis(ShortRepr):
 
     @property
     def line(self) -> ParameterLine:
-        """Parameters that move for Hopf points."""
+        """Parameters that vary for Hopf points."""
         return ParameterLine((self.delay,), (1.0,)) if self.delay else self.along
 
     @property
@@ -138,7 +146,7 @@ class Analysis(ShortRepr):
 
     @property
     def existing(self) -> list[GaitAssessment]:
-        """Gaits that there are."""
+        """Gaits that exist at these parameters."""
         return [verdict for verdict in self.gaits.values() if verdict.orbit is not None]
 
     @property
@@ -156,7 +164,7 @@ class Analysis(ShortRepr):
         rows: list[tuple[str, ...]] = [(
             'gait', 'period', 'amplitude', *names, 'in class', 'transverse', 'stable',
             'gain needed', 'default', 'stable then')]
-        for verdict in self.existing:
+        for verdict in (one for whole in self.existing for one in whole.orbits):
             assert verdict.orbit is not None
             rows.append((
                 verdict.gait, f'{verdict.orbit.period:.6f}', f'{verdict.amplitude:.6f}',
@@ -174,28 +182,33 @@ class Analysis(ShortRepr):
             lines = ['No gait at these parameters.']
         lines += [f'  {one.gait}: the multiplier along the orbit comes out as '
                   f'{abs(one.multipliers.trivial):.6g} instead of 1; the others are no better'
-                  for one in self.existing if one.multipliers.error > UNSURE]
+                  for whole in self.existing for one in whole.orbits
+                  if one.multipliers.error > UNSURE]
         missing = [verdict for verdict in self.gaits.values() if verdict.orbit is None]
         return lines + [f'  no {verdict.gait}: {self._reason(verdict)}' for verdict in missing]
 
     @staticmethod
     def _reason(verdict: GaitAssessment) -> str:
-        """Why there is no such gait, without the list of all parameters."""
+        """Return why a gait does not exist, without the list of all parameters."""
         text = verdict.why.removeprefix(f'no {verdict.gait} ')
-        head, way, _ = text.partition(' of the way, to ')
-        return f'{head} of the way, no further' if way else text
+        head, way, rest = text.partition(' of the way, to ')
+        return f'{head} of the way, no further{rest.partition("no further")[2]}' if way else text
 
     def _conclusion(self) -> str:
-        """Return the whole in a sentence or two."""
+        """Return a summary in a sentence or two."""
         if not self.existing:
             nearest = f'; {nearest_threshold(self.network)}' if self.delay else ''
             return f'This set gives no gait{nearest}.'
-        by_itself = [verdict.gait for verdict in self.existing if verdict.stable]
-        locked = [verdict.gait for verdict in self.existing
-                  if not verdict.stable and verdict.stable_with_default_gain]
-        never = [verdict.gait for verdict in self.existing if not (
-            verdict.stable or verdict.stable_with_default_gain)]
-        text = []
+        by_itself, locked, never, text = [], [], [], []
+        for verdict in self.existing:
+            if stable := [one for one in verdict.orbits if one.stable]:
+                by_itself.append(verdict.gait + _which(verdict, stable[0]))
+            elif held := [one for one in verdict.orbits if one.stable_with_default_gain]:
+                locked.append(verdict.gait + _which(verdict, held[0]))
+            else:
+                count = len(verdict.orbits)
+                orbits = 'one orbit' if count == 1 else f'{count} orbits'
+                never.append(f'{verdict.gait} ({orbits}, {verdict.searched})')
         if by_itself:
             text.append(f'{", ".join(by_itself)}: stable.')
         if locked:
@@ -206,12 +219,12 @@ class Analysis(ShortRepr):
         return ' '.join(text)
 
     def text(self) -> str:
-        """Tables for people."""
+        """Return the report as text."""
         return '\n'.join([f'{self.network.name}: {self.parameters}', '', *self._rest(), '',
                           *self._gaits(), '', self._conclusion()])
 
     def _rest(self) -> list[str]:
-        """Lines on the equilibrium and its Hopf points."""
+        """Return lines on the equilibrium and its Hopf points."""
         _, parts, rest, why = self._found
         if why:
             return [f'Stand: {why}.']
@@ -221,7 +234,7 @@ class Analysis(ShortRepr):
         return [*lines, *(self._points(where) if self.hopf else [f'No Hopf point {where}.'])]
 
     def _roots(self, parts: tuple[Block, ...], rest: np.ndarray) -> list[str]:
-        """With a delay: how many of all roots are to the right, and the rightmost."""
+        """Return, with a delay, how many roots lie to the right, and the rightmost."""
         unstable = sum(len(block.right_of(0.0)) for block in parts)
         block = max(parts, key=lambda one: one.leading.real)
         count = f'{unstable or "no"} root{"s" if unstable != 1 else ""}'
@@ -237,7 +250,7 @@ class Analysis(ShortRepr):
                 'class:', *(f'  {line}' for line in table(rows))]
 
     def _points(self, where: str) -> list[str]:
-        """Table of the Hopf points."""
+        """Return a table of the Hopf points."""
         text, heads = self._commentary, () if self.delay else ('l1',)
         rows: list[tuple[str, ...]] = [(
             'gait', 'wave', str(self.line), 'omega', 'period', 'k1', 'k2', *heads, *text.heads,
@@ -265,7 +278,7 @@ class Analysis(ShortRepr):
         return [*lines, '', text.title, *remarks] if remarks else lines
 
     def _form(self, point: HopfPoint) -> dict[str, float | None]:
-        """Coefficients of the normal form; with a delay in time over the delay."""
+        """Return the coefficients of the normal form; with a delay, in units of the delay."""
         form, none = point.normal_form, point.normal_form.degenerate
         if self.delay:
             form = point.in_delays
@@ -274,7 +287,7 @@ class Analysis(ShortRepr):
                 'lyapunov': None if none else point.lyapunov}
 
     def as_dict(self) -> dict[str, Any]:
-        """Everything in plain types."""
+        """Return everything in plain types."""
         _, parts, rest, why = self._found
         text: dict[str, Any] = {
             'network': self.network.name, 'params': self.network.as_dict(),

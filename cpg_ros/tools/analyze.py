@@ -21,10 +21,12 @@ centre manifold, in the full network, and with the symmetry lock.
 
 from argparse import Namespace
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 import sys
 
 from cpg_ros.dynamics.gait_assessment import verdicts
+from cpg_ros.dynamics.orbit import NoOrbit, solve_preset
 from cpg_ros.errors import InputError
 from cpg_ros.files.atomic_write import write_atomically
 from cpg_ros.files.plain_text import as_json
@@ -34,7 +36,7 @@ from cpg_ros.networks.registry import SHIPPED
 from cpg_ros.tools.analysis_report import Analysis
 from cpg_ros.tools.arguments import interval, number
 from cpg_ros.tools.command_line import Parser, run, say
-from cpg_ros.tools.network_options import add_network_options, chosen_network
+from cpg_ros.tools.network_options import add_network_options, chosen_preset
 import numpy as np
 
 DESCRIPTION = """\
@@ -46,10 +48,15 @@ examples:
   analyze --network delayed --set a=-4.5 b=1 c=6.5 d=-2 tau=0.4 --plot branches.png
   analyze --network quadruped --preset pace --along gamma=delta --range -0.6:0.2
   analyze --network biped --set w_a=0.2 current=0.25 --json
+  analyze --presets optimized/preset.yaml --all-orbits
+  analyze --network quadruped --preset trot --prc trot_prc.png
+  analyze --network biped --preset run --basin 200 --seed 1
 
 exit codes: 0 analysed (even if no gait was found), 2 invalid arguments."""
 #: Delays beyond which no Hopf points are looked for, model time.
 LONGEST = 100.0
+#: Random states of a basin, at most.
+MOST_STATES = 1_000_000
 
 
 def _parser() -> Parser:
@@ -66,16 +73,31 @@ def _parser() -> Parser:
                         '(default: ' + ', '.join(
                             f'{name} {kind.span[0]:g}:{kind.span[1]:g}'
                             for name, kind in SHIPPED.items() if kind.span) + ')')
+    parser.add_argument('--all-orbits', action='store_true', help='look for all coexisting orbits '
+                        'of every gait, from more starts, on the branches of its Hopf points '
+                        'and by deflation; takes 1 to 3 s a gait')
     parser.add_argument('--json', action='store_true', help='print JSON instead of tables')
     parser.add_argument('--plot', type=Path, metavar='FILE', help='draw the branches, the roots, '
                         'trajectories and footfalls (.png, .pdf or .svg)')
+    parser.add_argument('--prc', type=Path, nargs='?', const=Path(), metavar='FILE',
+                        help='also print the phase response of each gait to inputs to one cell, '
+                        'and, given a FILE, draw its curves (.png, .pdf or .svg)')
+    parser.add_argument('--basin', type=int, metavar='N', help='also run the network from N '
+                        'random states for each gait and report the share that returns to it')
+    parser.add_argument('--seed', type=int, metavar='S', help='of the random states of --basin '
+                        '(default: 0)')
     return parser
 
 
 def _analysed(chosen: Namespace) -> Analysis:
-    if chosen.plot is not None and not chosen.plot.absolute().parent.is_dir():
-        raise InputError(f'--plot: there is no folder {chosen.plot.parent}')
-    network = chosen_network(chosen)
+    for option, file in (('--plot', chosen.plot), ('--prc', chosen.prc)):
+        if file is not None and not file.absolute().parent.is_dir():
+            raise InputError(f'{option}: there is no folder {file.parent}')
+    if chosen.basin is not None and not 1 <= chosen.basin <= MOST_STATES:
+        raise InputError(f'--basin: {chosen.basin} is not from 1 to {MOST_STATES}')
+    if chosen.seed is not None and (chosen.basin is None or chosen.seed < 0):
+        raise InputError('--seed: it must be 0 or more, and goes with --basin')
+    preset, network = chosen_preset(chosen)
     longest = 2.0 * network.delay if chosen.longest_delay is None else chosen.longest_delay
     if not 0.0 <= longest <= LONGEST:
         raise InputError(f'--longest-delay: {longest:g} is not from 0 to {LONGEST:g}')
@@ -90,18 +112,44 @@ def _analysed(chosen: Namespace) -> Analysis:
         raise InputError(f'--along: {along} needs a --range')
     if not np.isfinite(span).all() or span[0] >= span[1]:
         raise InputError(f'--range: {span[0]:g}:{span[1]:g} is not from low to high')
+    near = None
+    if chosen.presets and preset.start is not None:
+        # A start that leads nowhere is no worse than none.
+        with suppress(NoOrbit):
+            near = solve_preset(preset)
     with progress_bar('gaits', len(network.gaits())) as bar:
-        found = verdicts(network, bar)
+        found = verdicts(network, bar, near, chosen.all_orbits)
     return Analysis(network, found, along, span, longest)
 
 
 def _analyze(chosen: Namespace) -> int:
+    # --prc may stand without a file.
+    curves = None if chosen.prc == Path() else chosen.prc
+    for option, path in (('--plot', chosen.plot), ('--prc', curves)):
+        if path is not None:
+            # matplotlib takes half a second, and only pictures need it.
+            from cpg_ros.tools.analysis_plot import check_suffix
+            check_suffix(option, path.suffix)
     found = _analysed(chosen)
     if chosen.plot is not None:
-        # matplotlib takes half a second, and only pictures need it.
         from cpg_ros.tools.analysis_plot import picture
         write_atomically(chosen.plot, picture(found, chosen.plot.suffix))
-    say(as_json(found.as_dict()) if chosen.json else found.text())
+    answer, text = found.as_dict() if chosen.json else {}, [] if chosen.json else [found.text()]
+    if chosen.prc is not None:
+        from cpg_ros.tools.phase_report import PhaseReport
+        response = PhaseReport.of(found)
+        if curves is not None:
+            from cpg_ros.tools import phase_plot
+            write_atomically(curves, phase_plot.picture(response, curves.suffix))
+        answer['phase_response'] = response.as_dict()
+        text += ['', response.text()]
+    if chosen.basin is not None:
+        # What it needs takes a while to load.
+        from cpg_ros.tools import basin_report
+        basins = basin_report.basins(found, chosen.basin, chosen.seed or 0)
+        answer['basins'] = basin_report.as_dict(basins)
+        text += ['', basin_report.text(basins)]
+    say(as_json(answer) if chosen.json else '\n'.join(text))
     return 0
 
 

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What the tools' options take: numbers, name=value, low:high, names without repetition."""
+"""Types of the tools' options: numbers, name=value, low:high, names without repetition."""
 
 import argparse
 from collections.abc import Sequence
@@ -77,7 +77,7 @@ def named_interval(text: str, name: str = 'name') -> tuple[str, tuple[float, flo
 
 
 def refuse_repeated(option: str, names: Sequence[str]) -> None:
-    """Refuse names that an option has twice.
+    """Refuse names that an option gives twice.
 
     Raises:
         InputError: one is; the message begins with the option.

@@ -28,18 +28,19 @@ from typing import Any
 
 from cpg_ros.atlas.chart import Chart, chart_of
 from cpg_ros.atlas.fold_curves import fold_curves, lost_edges
-from cpg_ros.atlas.hopf_curves import Boundary, hopf_curves
+from cpg_ros.atlas.grid_refinement import refine, Sheet, uncrossed_edges
+from cpg_ros.atlas.hopf_curves import Boundary, curves_from, hopf_curves
+from cpg_ros.atlas.hopf_starts import hopf_starts
 from cpg_ros.atlas.map_picture import draw_map
 from cpg_ros.atlas.orbit_curves import edges, orbit_curves
-from cpg_ros.atlas.refinement import refine, Sheet
 from cpg_ros.atlas.row_job import assess_row, AtlasRow
 from cpg_ros.atlas.stored import AtlasFolder
-from cpg_ros.fleet.executors import Fleet
 from cpg_ros.fleet.options import add_options, KEPT, working
-from cpg_ros.fleet.outcomes import outcomes
+from cpg_ros.fleet.outcomes import Fleet, outcomes
 from cpg_ros.fleet.results_table import library
 from cpg_ros.fleet.tally import Tally
 from cpg_ros.networks.network import known
+from cpg_ros.networks.registry import reference
 from cpg_ros.tools.arguments import named_interval, refuse_repeated
 from cpg_ros.tools.command_line import note, Parser, run, say
 from cpg_ros.tools.network_options import add_network_options, chosen_network
@@ -85,7 +86,7 @@ def _planned(chosen: argparse.Namespace) -> tuple[Chart, tuple[str, ...]]:
     base = chosen_network(chosen)
     for gait in chosen.gaits:
         known(gait, base.gaits())
-    return (chart_of(chosen.network, base, chosen.over, chosen.points),
+    return (chart_of(reference(base.name), base, chosen.over, chosen.points),
             tuple(chosen.gaits or base.gaits()))
 
 
@@ -119,12 +120,19 @@ def drawn(chart: Chart, gaits: tuple[str, ...], fleet: Fleet, folder: Path
 
     curves = stored.curves()
     if curves is None:
-        fleet.what = 'gaits'
-        hopf = [*chain(*fleet.map(hopf_curves, [(chart, (gait,)) for gait in gaits]))]
+        fleet.what = 'lines'
+        hopf = hopf_curves(chart, gaits, fleet.map)
     else:
         hopf = [curve for curve in curves if curve.kind == 'Hopf']
     sheets = refine(chart, gaits, hopf, run)
     if curves is None:
+        fleet.what = 'edges'
+        missed = curves_from(chart, chain(*fleet.map(hopf_starts, [
+            edge for gait, sheet in sheets.items()
+            for edge in uncrossed_edges(chart, gait, sheet, hopf)])))
+        if missed:
+            hopf += missed
+            sheets = refine(chart, gaits, hopf, run)
         fleet.what = 'boundaries'
         jobs: list[tuple[Any, ...]] = [
             *((orbit_curves, (chart, gait, edges(chart, sheet)))
@@ -156,7 +164,7 @@ def _map(chosen: argparse.Namespace) -> int:
     counted = ', '.join(f'{gait} {100 * (sheet.label > 0).mean():.0f} %'
                         for gait, sheet in sheets.items())
     say(f'share of the plane in which each gait exists: {counted}\n'
-        f'boundaries: {", ".join(f"{c.kind} of {c.gait}" for c in curves) or "none"}\n'
+        f'boundaries: {", ".join(map(str, curves)) or "none"}\n'
         f'written: {", ".join(map(str, written))}')
     return 0
 

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A bag's messages published on a graph, as ``ros2 bag play`` does it."""
+"""Publishing the messages of a bag, as ``ros2 bag play`` does."""
 
 from collections import Counter
 from collections.abc import Sequence
@@ -37,10 +37,10 @@ def play(node: Node, path: Path, wanted: Sequence[str] = (), rate: float = 1.0) 
     """Publish a bag's messages at the pace at which they were received.
 
     Args:
-        node: ours.
+        node: publishes.
         path: of the bag.
         wanted: topics; all, if empty.
-        rate: recorded seconds a second.
+        rate: recorded seconds per second.
 
     Returns:
         Topic -> messages published.
@@ -73,7 +73,7 @@ def play(node: Node, path: Path, wanted: Sequence[str] = (), rate: float = 1.0) 
 
 
 def _wait_for_listeners(node: Node, publishers: Sequence[Publisher]) -> None:
-    """Give those who listen a moment to find the publishers: the first messages count, too."""
+    """Wait briefly for subscribers, so that they receive the first messages."""
     end = time.monotonic() + PATIENCE
     while time.monotonic() < end and not all(one.get_subscription_count() for one in publishers):
         rclpy.spin_once(node, timeout_sec=0.02)

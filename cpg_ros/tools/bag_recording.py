@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What is published on a graph, recorded into a bag as ``ros2 bag record`` does it."""
+"""Recording the topics of a graph into a bag, as ``ros2 bag record`` does."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -32,9 +32,9 @@ def record(node: Node, path: Path, wanted: Sequence[str]) -> BagRecorder:
     """Record until Ctrl-C.
 
     Args:
-        node: ours.
-        path: of the bag, a folder that is not there yet.
-        wanted: topics; all that there are and that appear, if empty.
+        node: subscribes.
+        path: of the bag, a folder that does not exist yet.
+        wanted: topics; if empty, all that exist or appear.
 
     Raises:
         BagError: something is there already, or the folder cannot be written to.
@@ -58,7 +58,7 @@ def record(node: Node, path: Path, wanted: Sequence[str]) -> BagRecorder:
 
 
 def _subscribed(node: Node, recorder: BagRecorder, wanted: Sequence[str]) -> list[str]:
-    """Record what is new on the graph; return the topics."""
+    """Record topics that are new on the graph; return them."""
     return [topic for topic, kinds in node.get_topic_names_and_types()
             if topic not in recorder.counts and topic not in recorder.passed_over
             and (topic in wanted if wanted else topic not in USUAL)

@@ -12,10 +12,10 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Executable ``calibrate``: what feedback has to know of a robot, measured.
+"""Executable ``calibrate``: measures the robot data that feedback needs.
 
-``calibrate BAG --robot my_robot.yaml`` writes into the robot file what the base does by itself in
-the gait that the bag has; ``calibrate --model go2 --robot ...`` measures it in simulation.
+``calibrate BAG --robot my_robot.yaml`` writes the efference copy of the recorded gait into the
+robot file; ``calibrate --model go2 --robot ...`` measures it in simulation.
 """
 
 import argparse

@@ -12,9 +12,9 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Executable ``check_robot``: holds a robot file against its URDF or MJCF file and its gaits.
+"""Executable ``check_robot``: compares a robot file with its URDF or MJCF file and its gaits.
 
-``check_robot my_robot.yaml --urdf my.urdf`` compares names, kinds and limits, and works out every
+``check_robot my_robot.yaml --urdf my.urdf`` compares names, kinds and limits, and evaluates every
 gait. ``check_robot --urdf my.urdf --make my_robot.yaml`` writes a first robot file. ``--mjcf``
 takes a MuJoCo model instead.
 """
@@ -37,6 +37,7 @@ from cpg_ros.robots.description import RobotDescription
 from cpg_ros.robots.robot import Robot
 from cpg_ros.robots.robot_file import load_robot, write_robot
 from cpg_ros.robots.urdf import load_urdf
+from cpg_ros.simulation.biped_description import read_biped, soled
 from cpg_ros.simulation.body import Body
 from cpg_ros.simulation.leg_geometry import read_geometry
 from cpg_ros.simulation.mjcf_description import load_mjcf
@@ -114,7 +115,10 @@ def _made(chosen: Namespace, known: RobotDescription) -> Robot:
         geometry, feet = usable(robot, _geometry(chosen, robot, known), known.format)
     except SimulationError as error:
         geometry, feet = None, f'feedback: {error}'
-    robot, notes = replace(robot, geometry=geometry), f'{notes}\n{feet}'
+    biped = None
+    if chosen.mjcf is not None and soled(robot):
+        biped, feet = read_biped(chosen.mjcf, robot), 'feedback: of a biped with soles'
+    robot, notes = replace(robot, geometry=geometry, biped=biped), f'{notes}\n{feet}'
     source = find_model(chosen.mjcf) if chosen.urdf is None else chosen.urdf
     write_robot(chosen.make, robot, COMMENT.format(source=source.name, format=known.format,
                                                    notes=notes))

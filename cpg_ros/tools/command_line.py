@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The frame of every tool: its parser, its messages in one line, and its exit codes.
+"""What every tool shares: its parser, messages of one line, and exit codes.
 
 A tool is one file with a parser, a function that takes the parsed arguments and returns the exit
 code, and ``main``, which passes both to ``run``. 0 is success, 1 a negative result, 2 unusable
@@ -82,7 +82,7 @@ def note(tool: str, line: str) -> None:
 
 
 def say(text: str) -> None:
-    """Print to a reader that may leave, as in ``... | head -1``."""
+    """Print to a pipe whose reader may close it, as in ``... | head -1``."""
     try:
         print(printable(text), flush=True)
     except BrokenPipeError:

@@ -12,9 +12,9 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What a shell completes the words of ``cpg`` with: also what a running node and graph offer.
+"""Shell completion of ``cpg``, with the parameters and topics of a running graph.
 
-The library argcomplete does it, where it is installed; it comes with colcon.
+It needs the library argcomplete, which comes with colcon.
 """
 
 from argparse import ArgumentParser, Namespace
@@ -41,14 +41,14 @@ class NoCompletion(CpgError):
 
 
 def complete(parser: ArgumentParser) -> None:
-    """Print completions and end, if a shell asks for them."""
+    """Print completions and exit, if a shell requests them."""
     if find_spec('argcomplete') is not None:
         import argcomplete
         argcomplete.autocomplete(parser)
 
 
 def shell_code() -> str:
-    """Return what bash evaluates.
+    """Return the code that bash evaluates.
 
     Raises:
         NoCompletion: the library is not installed.
@@ -67,7 +67,7 @@ def _looked_up(look: Callable[['Node'], list[Any]]) -> list[Any]:
     try:
         return look(rclpy.create_node('cpg_completion', enable_rosout=False))
     except CpgError:
-        # Nobody answers: there is nothing to complete with.
+        # No node responds, so there is nothing to offer.
         return []
     finally:
         try_shutdown()
@@ -92,12 +92,12 @@ def parameters(parsed_args: Namespace, **_: Any) -> list[str]:
 
 
 def gaits(parsed_args: Namespace, **_: Any) -> list[str]:
-    """Return the gaits that the node can be asked for."""
+    """Return the gaits of the node."""
     return _choices(parsed_args, 'gait')
 
 
 def values(parsed_args: Namespace, **_: Any) -> list[str]:
-    """Return what the parameter can be, where that is one of a few words."""
+    """Return the values of a parameter that has a list of choices."""
     return _choices(parsed_args, parsed_args.parameter)
 
 

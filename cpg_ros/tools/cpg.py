@@ -18,7 +18,7 @@
 ros2 comes with ROS and is not on PyPI.
 """
 
-from argparse import ArgumentTypeError, Namespace, REMAINDER
+from argparse import ArgumentTypeError, Namespace, REMAINDER, SUPPRESS
 import asyncio
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -27,11 +27,11 @@ import signal
 import sys
 from typing import Any, TYPE_CHECKING
 
-from cpg_ros.errors import InputError
+from cpg_ros.errors import CpgError, InputError
 from cpg_ros.files.yaml_reader import parsed
 from cpg_ros.tools import completion
 from cpg_ros.tools.arguments import number
-from cpg_ros.tools.command_line import Parser, run, say
+from cpg_ros.tools.command_line import note, Parser, run, say
 from cpg_ros.tools.executables import EXECUTABLES, start
 import yaml
 
@@ -52,22 +52,38 @@ examples:
   cpg record walk_bag
   cpg run inversion --bag walk_bag --out fitted.yaml
 
+--node and --wait may stand anywhere but after run.
 eval "$(cpg completion)" makes the shell complete all of it, parameters and topics included.
 
 exit codes: 0 done, 1 refused, or nothing answered in time, 2 wrong arguments."""
 
 
+#: The node that actions are for, and how long it may take to be found, and then to answer, s:
+#: a setting of the generator may compile a network first.
+NODE, WAIT, ANSWER = '/cpg_generator', 5.0, 60.0
+
+
+def _common(node: str, wait: float | str) -> Parser:
+    made = Parser(add_help=False)
+    made.add_argument('--node', default=node, metavar='NAME',
+                      help=f'node to talk to (default: {NODE})')
+    made.add_argument('--wait', type=number, default=wait, metavar='S',
+                      help='how long a node, or the publisher of a topic, is waited for, s '
+                      f'(default: {WAIT:g})')
+    return made
+
+
 def parser() -> Parser:
     """Return the arguments of the executable."""
-    made = Parser(prog='cpg', description=DESCRIPTION, epilog=EPILOG)
-    made.add_argument('--node', default='/cpg_generator', metavar='NAME',
-                      help='node to talk to (default: %(default)s)')
-    made.add_argument('--wait', type=number, default=60.0, metavar='S',
-                      help='maximum time to wait for a response, s (default: %(default)g)')
+    made = Parser(prog='cpg', description=DESCRIPTION, epilog=EPILOG,
+                  parents=[_common(NODE, WAIT)])
     actions = made.add_subparsers(dest='action', required=True, metavar='ACTION')
+    # Without defaults, which would replace what stands before the action.
+    anywhere = _common(SUPPRESS, SUPPRESS)
 
     def add(group: Any, name: str, text: str) -> Any:
-        return group.add_parser(name, help=text, description=text.capitalize() + '.')
+        return group.add_parser(name, help=text, description=text.capitalize() + '.',
+                                parents=[] if name in ('run', 'completion') else [anywhere])
 
     one = add(actions, 'run', 'run an executable of the package')
     one.add_argument('executable', choices=[name for name in EXECUTABLES if name != 'cpg'],
@@ -81,7 +97,7 @@ def parser() -> Parser:
         add(actions, name, text)
 
     parameters = add(actions, 'param', "a node's parameters").add_subparsers(
-        dest='what', required=True, metavar='WHAT')
+        dest='what', required=True, metavar='{set,get,list}')
     for name, text in (('set', 'set a parameter'), ('get', 'print a parameter')):
         one = add(parameters, name, text)
         one.add_argument('parameter', metavar='PARAMETER').completer = completion.parameters
@@ -91,7 +107,7 @@ def parser() -> Parser:
     add(parameters, 'list', 'print all parameters and their descriptions')
 
     topics = add(actions, 'topic', "a graph's topics").add_subparsers(
-        dest='what', required=True, metavar='WHAT')
+        dest='what', required=True, metavar='{list,echo,hz}')
     add(topics, 'list', 'print all topics and their types')
     echo = add(topics, 'echo', 'print the messages of a topic until Ctrl-C')
     echo.add_argument('--once', action='store_true', help='print the next message only')
@@ -116,7 +132,7 @@ def parameter_value(text: str) -> Any:
     """Read a parameter's value as YAML.
 
     Raises:
-        argparse.ArgumentTypeError: it is of no kind that a parameter can be.
+        argparse.ArgumentTypeError: no parameter has values of this type.
 
     """
     from rclpy.parameter import Parameter
@@ -142,7 +158,10 @@ def rate(text: str) -> float:
 
 def _called(chosen: Namespace, node: 'Node') -> str:
     from cpg_ros.nodes.node_client import CallError, NodeClient, NoService, ServiceClients
-    other = NodeClient(ServiceClients(node, chosen.wait), chosen.node)
+    running = 'is a generator running?' if chosen.node == NODE else 'is it running?'
+    services = ServiceClients(node, search=chosen.wait, late=lambda: note(
+        'cpg', f'waiting for {chosen.node} ({running})'))
+    other = NodeClient(services, chosen.node)
     try:
         return asyncio.run(_call(chosen, other))
     except NoService as error:
@@ -153,13 +172,14 @@ async def _call(chosen: Namespace, other: 'NodeClient') -> str:
     from cpg_ros.nodes.node_client import CallError
     from std_srvs.srv import SetBool, Trigger
     if chosen.action in ('enable', 'disable'):
-        return await other.command(SetBool, 'enable', data=chosen.action == 'enable')
+        return await other.command(SetBool, 'enable', ANSWER,
+                                   data=chosen.action == 'enable')
     if chosen.action == 'reset':
-        return await other.command(Trigger, 'reset')
+        return await other.command(Trigger, 'reset', ANSWER)
     if chosen.action == 'gait':
-        await other.set_parameters({'gait': chosen.gait})
+        await other.set_parameters({'gait': chosen.gait}, ANSWER)
     elif chosen.what == 'set':
-        await other.set_parameters({chosen.parameter: chosen.value})
+        await other.set_parameters({chosen.parameter: chosen.value}, ANSWER)
     elif chosen.what == 'get':
         value, = await other.values([chosen.parameter])
         if value is None:
@@ -176,11 +196,12 @@ def _listened(chosen: Namespace, node: 'Node') -> str:
     from cpg_ros.tools.graph_topics import shown, Topic, topics
     if chosen.what == 'list':
         return '\n'.join(f'{name}  {kind}' for name, kind in topics(node).items())
-    topic = Topic(node, chosen.topic, chosen.wait)
+    topic = Topic(node, chosen.topic, chosen.wait, lambda name: note(
+        'cpg', f'waiting for {name} (does anything publish it?)'))
     if chosen.what == 'hz':
         return f'{topic.rate():.1f} Hz'
     for message in topic.messages():
-        say(shown(message) + ('' if chosen.once else '\n---'))
+        say(f'{shown(message)}---')
         if chosen.once:
             break
     return ''
@@ -217,15 +238,15 @@ def _graph() -> Iterator['Node']:
     from rclpy.exceptions import NameValidationException
     from rclpy.signals import SignalHandlerOptions
     from rclpy.utilities import try_shutdown
-    # A shell that starts it in the background would have it deaf to Ctrl-C.
+    # A shell makes processes in the background ignore Ctrl-C.
     for one in (signal.SIGINT, signal.SIGTERM):
         signal.signal(one, signal.default_int_handler)
     try:
-        # The context stays valid while a signal ends what goes on.
+        # The context stays valid while a signal ends the action.
         rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
         yield rclpy.create_node('cpg', enable_rosout=False)
     except (NameValidationException, RuntimeError) as error:
-        # What follows is about the sources of rclpy.
+        # The rest of the message names source files of rclpy.
         raise InputError(str(error).splitlines()[0].partition(', at /')[0]) from error
     finally:
         try_shutdown()
@@ -246,11 +267,14 @@ def _do(chosen: Namespace) -> int:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Do one thing; return the exit code."""
+    """Perform one action; return the exit code."""
     made = parser()
     completion.complete(made)
     words = list(sys.argv[1:] if arguments is None else arguments)
-    if words and words[0] in EXECUTABLES and words[0] != 'cpg':
+    if not words:
+        made.print_help(sys.stderr)
+        return CpgError.exit_code
+    if words[0] in EXECUTABLES and words[0] != 'cpg':
         words.insert(0, 'run')
     return run(made, _do, words, stopped='')
 

@@ -17,78 +17,68 @@
 from collections.abc import Callable
 
 from cpg_ros.tools.command_line import say
+from cpg_ros.tools.demo_operator import Operator
 from geometry_msgs.msg import Twist, Wrench
-from nav_msgs.msg import Odometry
 import rclpy
-from rclpy.node import Node
+from rclpy.publisher import Publisher
 
-#: What robot_sim and the generator are told, beside what every demonstration tells them.
+#: Arguments of robot_sim and of the generator, beside those of every demonstration.
 GROUND = ('-p', 'terrain:=course', '-p', 'terrain_size:=0.05')
 GENERATOR = ('-p', 'cmd_vel:=true', '-p', 'feedback.enabled:=true')
-#: Where what begins, m.
+#: Where each stage begins, m.
 STAGES = ((0.6, 'rough ground'), (3.0, 'a ramp up'), (4.2, 'and down'), (5.5, 'blocks'))
 #: Where the robot is pushed to the left, or to the right with a minus, N s.
 PUSHES = ((1.5, 15.0), (2.4, -15.0), (6.2, 12.0))
-#: Seconds that a push acts, the end of the course in m, the speed in m/s, most time in s.
+#: Duration of a push in s, end of the course in m, speed in m/s, longest run in s.
 PUSH, END, SPEED, LONGEST = 0.1, 7.5, 0.4, 60.0
-#: A base whose vertical leans further than this has fallen: cosine.
+#: A robot has fallen if its base leans further than the angle of this cosine.
 FALLEN = 0.5
 
 
-class Runner:
-    """Takes the robot over the course."""
+def run(robot: Operator, look: Callable[[], None]) -> bool:
+    """Walk the course, then leave the robot to others; return whether it reached the end.
 
-    def __init__(self, node: Node) -> None:
-        self._node = node
-        self._steer = node.create_publisher(Twist, 'cmd_vel', 10)
-        self._push = node.create_publisher(Wrench, 'robot_sim/push', 10)
-        node.create_subscription(Odometry, 'odom', self._odom, 1)
-        self._wanted = Twist()
-        self._wanted.linear.x = SPEED
-        self._x = self._y = self._time = 0.0
-        self._began: float | None = None
-        self._up = 1.0
+    Args:
+        robot: the node that follows it.
+        look: called again and again; what it raises ends the run.
 
-    def _odom(self, message: Odometry) -> None:
-        pose = message.pose.pose
-        self._x, self._y = pose.position.x, pose.position.y
-        self._up = 1.0 - 2.0 * (pose.orientation.x**2 + pose.orientation.y**2)
-        self._time = message.header.stamp.sec + 1e-9 * message.header.stamp.nanosec
+    """
+    steer = robot.create_publisher(Twist, 'cmd_vel', 10)
+    try:
+        return _walk(robot, look, steer)
+    finally:
+        robot.destroy_publisher(steer)
 
-    def _report(self, text: str) -> None:
-        since = self._time - (self._began or 0.0)
-        say(f'{since:5.1f} s  {text:<24} at x {self._x:5.2f} m, y {self._y:+5.2f} m')
 
-    def run(self, look: Callable[[], None]) -> bool:
-        """Walk the course; return whether the robot came to its end.
+def _walk(robot: Operator, look: Callable[[], None], steer: Publisher) -> bool:
+    push = robot.create_publisher(Wrench, 'robot_sim/push', 10)
+    forward = Twist()
+    forward.linear.x = SPEED
+    stages, pushes, began = list(STAGES), list(PUSHES), robot.time
 
-        Args:
-            look: called again and again; what it raises ends the run.
+    def report(text: str) -> None:
+        x, y = robot.place
+        say(f'{robot.time - began:5.1f} s  {text:<24} at x {x:5.2f} m, y {y:+5.2f} m')
 
-        """
-        stages, pushes = list(STAGES), list(PUSHES)
-        while self._time == 0.0:
-            rclpy.spin_once(self._node, timeout_sec=0.05)
-            look()
-        self._began = self._time
-        self._report('flat ground')
-        while self._time < self._began + LONGEST:
-            rclpy.spin_once(self._node, timeout_sec=0.05)
-            look()
-            self._steer.publish(self._wanted)
-            if self._up < FALLEN:
-                self._report('the robot has fallen')
-                return False
-            if stages and self._x > stages[0][0]:
-                self._report(stages.pop(0)[1])
-            if pushes and self._x > pushes[0][0]:
-                impulse = pushes.pop(0)[1]
-                wrench = Wrench()
-                wrench.force.y = impulse / PUSH
-                self._push.publish(wrench)
-                self._report(f'a push of {impulse:+.0f} N s')
-            if self._x > END:
-                self._report('the end of the course')
-                return True
-        self._report('time is up')
-        return False
+    report('flat ground')
+    while robot.time < began + LONGEST:
+        rclpy.spin_once(robot, timeout_sec=0.05)
+        look()
+        steer.publish(forward)
+        x, _ = robot.place
+        if robot.upright < FALLEN:
+            report('the robot has fallen')
+            return False
+        if stages and x > stages[0][0]:
+            report(stages.pop(0)[1])
+        if pushes and x > pushes[0][0]:
+            impulse = pushes.pop(0)[1]
+            wrench = Wrench()
+            wrench.force.y = impulse / PUSH
+            push.publish(wrench)
+            report(f'a push of {impulse:+.0f} N s')
+        if x > END:
+            report('the end of the course')
+            return True
+    report('time is up')
+    return False

@@ -12,12 +12,13 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The executables: each loads what it runs, and can be interrupted while it does."""
+"""The executables: each loads its module, and can be interrupted while it does."""
 
 from collections.abc import Callable
 from functools import partial
 from importlib import import_module
 import os
+from pathlib import Path
 import signal
 import sys
 from types import FrameType
@@ -27,24 +28,34 @@ from cpg_ros.errors import MissingLibraryError
 
 #: The signals by which users, terminals and launch files end a process.
 ENDINGS = signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT
+#: Where an installation of ROS lists its packages.
+INDEX = 'share/ament_index/resource_index/packages'
 #: Executable -> module whose ``main`` it runs.
 EXECUTABLES = {'generator': 'nodes.generator', 'robot_sim': 'nodes.robot_sim',
                'unitree_bridge': 'nodes.unitree.bridge', 'panel': 'panel.panel_node',
                **{name: f'tools.{name}'
                   for name in ('inversion', 'cpg', 'demo', 'analyze', 'check_robot', 'optimize',
-                               'reproduce', 'tune', 'calibrate', 'atlas')}}
+                               'reproduce', 'tune', 'calibrate', 'atlas', 'export')}}
+
+
+def command(name: str) -> list[str]:
+    """Return the words that run an executable in a process of its own, whatever installed it."""
+    return [sys.executable, '-P', '-m', 'cpg_ros.tools.executables', name]
 
 
 def start(name: str) -> int:
     """Run an executable on the words of the command line; return its exit code."""
     def leave(number: int, _: FrameType | None = None) -> NoReturn:
-        # An exception amid the loading of compiled code would become another error there.
+        # An exception while compiled code loads would become another error there.
         print(f'{name}: stopped', file=sys.stderr, flush=True)
         os._exit(128 + number)
 
-    # Nodes heed SIGINT also where a script has started them in the background, as launches may.
+    # Nodes handle SIGINT also where a script starts them in the background, as launch files may.
     before = {number: signal.signal(number, leave) for number in ENDINGS
               if number != signal.SIGHUP or signal.getsignal(number) != signal.SIG_IGN}
+    # ROS from wheels finds its parts below the environment that they were installed into.
+    if (Path(sys.prefix) / INDEX / 'cpg_ros').exists():
+        os.environ.setdefault('AMENT_PREFIX_PATH', sys.prefix)
     try:
         main = import_module(f'cpg_ros.{EXECUTABLES[name]}').main
     except MissingLibraryError as error:
@@ -55,13 +66,17 @@ def start(name: str) -> int:
             signal.signal(number, signal.default_int_handler if callable(handler) else handler)
         code: int = main()
     except KeyboardInterrupt:
-        # What it runs has not begun to handle it.
+        # The tool does not handle the signal yet.
         return leave(signal.SIGINT)
     return code
 
 
 def __getattr__(name: str) -> Callable[[], int]:
-    """Return what runs an executable, for the entry points of setup.py."""
+    """Return the function that runs an executable, for the entry points of setup.py."""
     if name in EXECUTABLES:
         return partial(start, name)
     raise AttributeError(f'module {__name__!r} has no attribute {name!r}')
+
+
+if __name__ == '__main__':
+    raise SystemExit(start(sys.argv.pop(1)))

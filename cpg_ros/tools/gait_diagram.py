@@ -26,12 +26,12 @@ import sys
 
 from cpg_ros.dynamics.orbit import Orbit, solve_preset
 from cpg_ros.errors import InputError
-from cpg_ros.gaits.steady_stretch import true_runs
 from cpg_ros.motion.phase_readout import evaluate, phase_map
 from cpg_ros.networks.leg_numbers import footfall_order
 from cpg_ros.networks.network import Network
 from cpg_ros.networks.registry import find_network, SHIPPED
 from cpg_ros.robots.robot import HARMONICS
+from cpg_ros.simulation.footfall_diagram import draw_stances, stances
 from cpg_ros.tools.command_line import Parser, run
 import matplotlib
 from matplotlib.axes import Axes
@@ -86,28 +86,24 @@ def active(orbit: Orbit, cell: int, strides: float = STRIDES) -> list[tuple[floa
     else:
         # Not merely below 0: at a peak on the grid the sign of the slope is that of rounding.
         on = signal(orbit, cell, theta, 1) < -1e-9
-    return [(float(theta[first]), float(theta[min(last + 1, theta.size - 1)] - theta[first]))
-            for first, last in true_runs(on)]
+    return stances(theta, on)
 
 
 def draw(axes: Axes, orbit: Orbit, title: str) -> None:
     """Draw one gait, with each row's cell as a line over it."""
     drawn = rows(type(orbit.network))
     theta = np.linspace(0.0, STRIDES, 801)
-    for row, (_, cell, colour) in enumerate(drawn):
-        height = len(drawn) - 1 - row
-        axes.broken_barh(active(orbit, cell), (height - 0.36, 0.72), color=colour, alpha=0.85)
+    names, cells, colours = zip(*drawn, strict=True)
+    draw_stances(axes, names, [active(orbit, cell) for cell in cells], colours, 0.85)
+    for row, cell in enumerate(cells):
         wave = int(orbit.waves[cell - 1])
         middle, half = orbit.levels[wave, 0]
         line = (orbit.waveform(theta + orbit.phases[cell - 1], 0, wave) - middle) / half
-        axes.plot(theta, height + 0.33 * line, color=matplotlib.rcParams['text.color'],
+        axes.plot(theta, row - 0.33 * line, color=matplotlib.rcParams['text.color'],
                   linewidth=0.9)
-    axes.set_yticks(range(len(drawn)), [name for name, _, _ in reversed(drawn)])
     axes.set_xlim(0.0, STRIDES)
-    axes.set_ylim(-0.55, len(drawn) - 0.45)
     axes.set_title(title, fontsize=10, loc='left')
-    for side in ('top', 'right', 'left'):
-        axes.spines[side].set_visible(False)
+    axes.spines[['top', 'right', 'left']].set_visible(False)
     axes.tick_params(left=False)
 
 

@@ -12,17 +12,21 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The topics of a graph: what there is, the next message, how often one comes."""
+"""The topics of a graph: their list, messages and rates."""
 
-from collections.abc import Iterator
+from array import array
+from collections.abc import Callable, Iterator
 import time
 from typing import Any
 
 from cpg_ros.errors import CpgError
 from cpg_ros.nodes.message_types import message_class
+from cpg_ros.nodes.node_client import SILENCE
 from cpg_ros.nodes.polled_group import PolledSubscription
 from cpg_ros.nodes.qos_profiles import best_effort
+import numpy as np
 from rclpy.node import Node
+import yaml
 
 #: How long the graph is looked at before its topics are listed, s: discovery takes a moment.
 LOOK = 1.0
@@ -31,13 +35,13 @@ COUNT, EVERY, DEPTH = 3.0, 0.02, 1000
 
 
 class SilentTopic(CpgError):
-    """Nobody publishes on a topic, or nothing came."""
+    """A topic has no publisher, or no message arrived."""
 
     exit_code = 1
 
 
 def topics(node: Node) -> dict[str, str]:
-    """Return the topics that are published or listened to, and their types, sorted."""
+    """Return the topics that have publishers or subscribers, and their types, sorted."""
     time.sleep(LOOK)
     return {name: ' '.join(kinds) for name, kinds in sorted(node.get_topic_names_and_types())}
 
@@ -45,32 +49,36 @@ def topics(node: Node) -> dict[str, str]:
 class Topic:
     """A topic, subscribed to."""
 
-    def __init__(self, node: Node, name: str, wait: float) -> None:
+    def __init__(self, node: Node, name: str, wait: float,
+                 late: Callable[[str], None] = lambda name: None) -> None:
         """Find a topic's type and subscribe.
 
         Args:
-            node: ours.
+            node: subscribes.
             name: relative names are of the namespace /.
             wait: for a publisher and for the first message, s.
+            late: called once with the topic's name if neither has come within ``SILENCE``.
 
         Raises:
-            SilentTopic: nobody publishes on it.
+            SilentTopic: it has no publisher.
 
         """
-        self._name, self._end = name, time.monotonic() + wait
-        topic = node.resolve_topic_name(name)
+        began = time.monotonic()
+        self._end, self._silence = began + wait, began + SILENCE
+        self._late = late
+        self._name = topic = node.resolve_topic_name(name)
         while not (kinds := dict(node.get_topic_names_and_types()).get(topic)):
             if time.monotonic() > self._end:
                 raise SilentTopic(f'nobody publishes on {topic}')
-            time.sleep(EVERY)
+            self._pause()
         self._subscription = PolledSubscription(node, message_class(kinds[0]), name,
                                                 best_effort(DEPTH), overridable=False)
 
     def messages(self) -> Iterator[Any]:
-        """Yield messages as they come.
+        """Yield messages as they arrive.
 
         Raises:
-            SilentTopic: none comes.
+            SilentTopic: none arrives.
 
         """
         silent = True
@@ -80,10 +88,19 @@ class Topic:
                 yield message
             if silent and time.monotonic() > self._end:
                 raise SilentTopic(f'nothing came on {self._name}')
-            time.sleep(EVERY)
+            if silent:
+                self._pause()
+            else:
+                time.sleep(EVERY)
+
+    def _pause(self) -> None:
+        if time.monotonic() > self._silence:
+            self._late(self._name)
+            self._silence = np.inf
+        time.sleep(EVERY)
 
     def rate(self) -> float:
-        """Count messages for a while; return how many came a second (Hz)."""
+        """Count messages for a while; return their rate, Hz."""
         count, end = 0, time.monotonic() + COUNT
         while time.monotonic() < end:
             time.sleep(EVERY)
@@ -92,6 +109,19 @@ class Topic:
 
 
 def shown(message: Any) -> str:
-    """Return a message with a line for each of its fields."""
-    return '\n'.join(f'{field}: {getattr(message, field)}'
-                     for field in message.get_fields_and_field_types())
+    """Return a message as YAML, as ``ros2 topic echo`` prints it, with a line break at its end."""
+    dumper = getattr(yaml, 'CSafeDumper', yaml.SafeDumper)
+    return str(yaml.dump(_plain(message), Dumper=dumper, sort_keys=False, allow_unicode=True,
+                         default_flow_style=False, width=2**31 - 1))
+
+
+def _plain(value: Any) -> Any:
+    """Return a message or a field of one as YAML has it."""
+    if hasattr(value, 'get_fields_and_field_types'):
+        return {field: _plain(getattr(value, field))
+                for field in value.get_fields_and_field_types()}
+    if isinstance(value, (np.ndarray, array)):
+        return value.tolist()
+    if isinstance(value, bytes):  # one octet; those of a list are integers, too
+        return value[0]
+    return [_plain(one) for one in value] if isinstance(value, (list, tuple)) else value

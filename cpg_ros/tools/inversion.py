@@ -122,7 +122,7 @@ def _recording(chosen: Namespace, robot: Robot | None) -> Recording:
 
 
 def _refuse_options(chosen: Namespace) -> None:
-    """Refuse what can be refused before any work."""
+    """Check the options before any work."""
     if chosen.bags is not None:
         _refuse_for_many(chosen)
     elif given := [option for option in ('watch', 'dask', 'tls', 'jobs')
@@ -156,8 +156,8 @@ def _refuse_files(chosen: Namespace) -> None:
 
 
 def _invert_many(chosen: Namespace, robot: Robot | None, starts: list[dict[str, float]]) -> int:
-    """Invert what folders hold; 0 if any recording could be fitted."""
-    # Their tables need a library that one recording does not.
+    """Invert the recordings in folders; return 0 if any could be fitted."""
+    # The tables need a library that a single recording does not.
     from cpg_ros.fleet.many_recordings import Folders
     from cpg_ros.fleet.recording_job import FitSettings
     report = partial(note, 'inversion')
@@ -188,7 +188,8 @@ def _invert(chosen: Namespace) -> int:
     network, compared = _explained(chosen, recording, robot)
     with progress_bar('fitting', 100) as bar:
         found = fit_recording(recording, robot, network, chosen.gait or '',
-                              chosen.free, chosen.order, chosen.preset or '', starts,
+                              free=chosen.free, order=chosen.order,
+                              preset=chosen.preset or '', starts=starts,
                               done=lambda share: bar(round(100.0 * share)))
     fits = _paper(chosen, found, starts)
     written = _written(chosen, found, robot)
@@ -211,7 +212,7 @@ def _invert(chosen: Namespace) -> int:
 
 def _explained(chosen: Namespace, recording: Recording, robot: Robot | None
                ) -> tuple[str, list[NetworkComparison]]:
-    """Return the network to fit, and how well others explain the recording where that is asked."""
+    """Return the network to fit and, for auto, how well each explains the recording."""
     if chosen.network != 'auto':
         return chosen.network or '', []
     with progress_bar('comparing networks', 100) as bar:
@@ -225,7 +226,7 @@ def _explained(chosen: Namespace, recording: Recording, robot: Robot | None
 
 def _paper(chosen: Namespace, found: RecordingFit, starts: list[dict[str, float]]
            ) -> list[PaperFit]:
-    """Fit as the paper does, if that is wanted."""
+    """Fit as the paper does, if --paper is given."""
     if not chosen.paper:
         return []
     network = preset_of(found.fit.network.name, chosen.preset or found.fit.gait).network

@@ -12,50 +12,99 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The options --network, --preset and --set, which choose a network and its parameters."""
+"""The options --network, --presets, --preset and --set: a network and its parameters."""
 
 from argparse import ArgumentParser, Namespace
 from dataclasses import replace
+from pathlib import Path
+from typing import Any
 
 from cpg_ros.errors import InputError
-from cpg_ros.networks.network import Network
+from cpg_ros.files.yaml_reader import YamlReader
+from cpg_ros.networks.network import Network, Preset
+from cpg_ros.networks.preset_files import PresetError, read_presets
 from cpg_ros.networks.registry import find_network, NetworkError, SHIPPED
 from cpg_ros.tools.arguments import assignment, refuse_repeated
 import numpy as np
 
 #: No parameter is larger: beyond, the arithmetic breaks down before it tells anything.
 LARGEST = 1e6
+DEFAULT = 'delayed'
 
 
 def add_network_options(parser: ArgumentParser) -> None:
     """Add the options to a tool's."""
-    parser.add_argument('--network', default='delayed', metavar='NAME',
+    parser.add_argument('--network', metavar='NAME',
                         help=f'{", ".join(SHIPPED)}, or the path of a Python file that defines '
-                        'one (default: %(default)s)')
+                        f'one (default: {DEFAULT}, or that of --presets)')
+    parser.add_argument('--presets', type=Path, metavar='FILE', help='take --preset from this '
+                        'file: preset.yaml of optimize, or the parameter file of inversion')
     parser.add_argument('--preset', metavar='NAME', help='shipped preset that supplies the '
-                        'parameters not given by --set (default: ' + ', '.join(
+                        'parameters not given by --set, or that of --presets (default: the only '
+                        'one of --presets, or ' + ', '.join(
                             f'{name} {kind.usual_gait}' for name, kind in SHIPPED.items()) + ')')
     parser.add_argument('--set', nargs='+', action='extend', default=[], type=assignment,
                         metavar='PARAMETER=VALUE', help='parameter values, such as c=6.5 tau=0.4; '
                         'w_a sets all four weights of the biped')
 
 
+def _presets(chosen: Namespace) -> tuple[type[Network], dict[str, Preset], str]:
+    """Return the network, the presets to choose from, and the name of the default one or ''."""
+    name, file = chosen.network or DEFAULT, chosen.presets
+    reader = None if file is None else YamlReader(file, 'preset file', PresetError, LARGEST)
+    tree = reader.tree() if reader else {}
+    fitted = tree.get('/**') if isinstance(tree, dict) else None
+    if reader and chosen.network is None:
+        inner = fitted.get('ros__parameters') if isinstance(fitted, dict) else tree
+        if not isinstance(inner, dict) or 'network' not in inner:
+            raise reader.fail('network', 'is not given')
+        name = reader.text(inner['network'], 'network')
+    try:
+        kind = find_network(name)
+    except NetworkError as error:
+        raise InputError(f'{"--network" if chosen.network else file or "--network"}: {error}'
+                         ) from error
+    if not reader:
+        return kind, kind.presets(), kind.usual_gait
+    presets = read_presets(file, kind) if fitted is None else _fitted(reader, fitted, kind)
+    return kind, presets, next(iter(presets)) if len(presets) == 1 else ''
+
+
+def _fitted(reader: YamlReader, tree: Any, kind: type[Network]) -> dict[str, Preset]:
+    """Return what a parameter file of the generator, as inversion writes it, runs: one gait."""
+    inner = reader.keys(tree, '/**', {'ros__parameters'})['ros__parameters']
+    where = '/**.ros__parameters'
+    inner = reader.keys(inner, where, {'gait', kind.name},
+                        {'network', 'robot', 'frequency', 'amplitude'})
+    gait = reader.text(inner['gait'], f'{where}.gait')
+    if gait not in kind.gaits():
+        raise reader.fail(f'{where}.gait', f"'{gait}' is not one of {', '.join(kind.gaits())}")
+    where = f'{where}.{kind.name}'
+    values = reader.keys(inner[kind.name], where, set(kind.parameters()))
+    return {gait: Preset(gait, kind(*(reader.number(values[name], f'{where}.{name}')
+                                      for name in kind.parameters())))}
+
+
 def chosen_network(chosen: Namespace) -> Network:
-    """Return the network that the options choose: a preset's parameters, some of them changed.
+    """Return the network that the options choose; errors as of chosen_preset."""
+    return chosen_preset(chosen)[1]
+
+
+def chosen_preset(chosen: Namespace) -> tuple[Preset, Network]:
+    """Return the preset that the options choose, and its parameters, some of them changed.
 
     Raises:
         InputError: an unknown name, or a value that makes no sense; the message says which.
+        PresetError: the file of --presets cannot be used.
 
     """
-    try:
-        kind = find_network(chosen.network)
-    except NetworkError as error:
-        raise InputError(f'--network: {error}') from error
-    presets = kind.presets()
-    preset = kind.usual_gait if chosen.preset is None else chosen.preset
-    if preset not in presets:
-        raise InputError(f"--preset: '{preset}' is not one of {', '.join(presets)}")
-    network = presets[preset].network
+    kind, presets, default = _presets(chosen)
+    name = chosen.preset or default
+    if name not in presets:
+        wrong = f"'{name}' is not one of" if name else f'{chosen.presets} has several, choose from'
+        raise InputError(f'--preset: {wrong} {", ".join(presets)}')
+    preset = presets[name]
+    network = preset.network
     refuse_repeated('--set', [member for key, _ in chosen.set
                               for member in kind.groups.get(key, (key,))])
     for key, value in chosen.set:
@@ -78,4 +127,4 @@ def chosen_network(chosen: Namespace) -> Network:
     for key, lost in kind.needed.items():
         if network.as_dict()[key] == 0.0:
             raise InputError(f'--set: {key} is 0: {lost}')
-    return network
+    return preset, network

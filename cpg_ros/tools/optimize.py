@@ -118,8 +118,9 @@ def _optimize(chosen: argparse.Namespace) -> int:
     chosen.out.mkdir(parents=True, exist_ok=True)
     with executor_for(max(1, chosen.islands), chosen, 'epochs of islands',
                       partial(note, 'optimize')) as executor:
-        front = optimise(chosen.network, chosen.gait, chosen.population, chosen.generations,
-                         chosen.seed, dict(chosen.bounds), dict(chosen.fix),
+        front = optimise(chosen.network, chosen.gait, population=chosen.population,
+                         generations=chosen.generations, seed=chosen.seed,
+                         bounds=dict(chosen.bounds), fixed=dict(chosen.fix),
                          progress=executor is None and sys.stderr.isatty(),
                          islands=chosen.islands, executor=executor)
     write_front(chosen.out / 'front.csv', front)

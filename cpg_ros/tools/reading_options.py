@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""The options that say what recordings to read and how: those of all formats."""
+"""The options that choose recordings and how to read them, for all formats."""
 
 from argparse import Namespace
 from pathlib import Path
@@ -25,7 +25,7 @@ from cpg_ros.tools.command_line import Parser
 
 
 def add_reading_options(parser: Parser) -> None:
-    """Add an option for each format, one for folders, and what the formats' readers take."""
+    """Add an option for each format, one for folders, and the options of the readers."""
     source = parser.add_mutually_exclusive_group(required=True)
     first, *others = FORMATS.values()
     source.add_argument(f'--{first.name}', type=Path, metavar=first.metavar, help=first.help)
@@ -67,7 +67,7 @@ def check_reading_options(chosen: Namespace) -> None:
 
 
 def reading_arguments(chosen: Namespace) -> dict[str, Any]:
-    """Return what the options say, as of read_recording.
+    """Return the options as arguments of read_recording.
 
     Raises:
         InputError: a gain is out of its range.

@@ -18,15 +18,15 @@ import base64
 from dataclasses import asdict
 from html import escape
 import json
-import math
-from typing import Any
 
+from cpg_ros.files import plain_text
 from cpg_ros.files.page_style import STYLE
 from cpg_ros.papers.reproduction import Reproduction
 from cpg_ros.papers.row import ReproducedRow
 
 #: Widest columns of the table on a terminal: quantity, published, computed.
 WIDEST = (58, 30, 30)
+HEAD = ('place', 'quantity', 'published', 'computed', 'verdict')
 
 
 def _cut(text: str, width: int) -> str:
@@ -35,22 +35,14 @@ def _cut(text: str, width: int) -> str:
 
 def table(found: Reproduction) -> str:
     """Write the rows by paper in aligned columns, the errata that were used, and the summary."""
-    head = ('place', 'quantity', 'published', 'computed', 'verdict')
-    cells = [(row, (row.place, *(_cut(text, width) for text, width in zip(
-        (row.quantity, row.published, row.computed), WIDEST, strict=True)), row.verdict))
-        for row in found.rows]
-    widths = [max(len(line[k]) for line in [head, *(line for _, line in cells)])
-              for k in range(len(head))]
-
-    def aligned(line: tuple[str, ...]) -> str:
-        return '  '.join(f'{text:<{width}}'
-                         for text, width in zip(line, widths, strict=True)).rstrip()
-
+    head, *rest = plain_text.table([HEAD, *(
+        (row.place, *(_cut(text, width) for text, width in zip(
+            (row.quantity, row.published, row.computed), WIDEST, strict=True)), row.verdict)
+        for row in found.rows)])
     lines: list[str] = []
     for paper in found.papers:
-        lines += [paper.reference, aligned(head)]
-        lines += [aligned(line) for row, line in cells if row.paper == paper.authors]
-        lines.append('')
+        lines += [paper.reference, head, *(line for row, line in zip(
+            found.rows, rest, strict=True) if row.paper == paper.authors), '']
     used = {row.erratum for row in found.explained}
     lines += [f'erratum {number} ({paper}): {text}'
               for number, (paper, text) in found.errata.items() if number in used]
@@ -59,20 +51,15 @@ def table(found: Reproduction) -> str:
 
 def as_json(found: Reproduction) -> str:
     """Write everything but the figures for machines."""
-    def plain(row: ReproducedRow) -> dict[str, Any]:
-        # JSON has no word for what is not finite.
-        value = row.value if row.value is not None and math.isfinite(row.value) else None
-        return {**asdict(row), 'value': value, 'verdict': row.verdict}
-
     tree = {
         'papers': [{'name': paper.name, 'authors': paper.authors, 'reference': paper.reference}
                    for paper in found.papers],
         'summary': {'published': len(found.rows), 'agree': sum(row.agrees for row in found.rows),
                     'explained': len(found.explained), 'failed': len(found.failed)},
-        'rows': [plain(row) for row in found.rows],
+        'rows': [{**asdict(row), 'verdict': row.verdict} for row in found.rows],
         'errata': {str(number): {'paper': paper, 'text': text}
                    for number, (paper, text) in found.errata.items()}}
-    return json.dumps(tree, indent=1, allow_nan=False) + '\n'
+    return json.dumps(plain_text.finite(tree), indent=1, allow_nan=False) + '\n'
 
 
 def _line(row: ReproducedRow) -> str:
@@ -89,8 +76,7 @@ def _line(row: ReproducedRow) -> str:
 
 def as_html(found: Reproduction) -> str:
     """Write one page with the rows, the errata and the figures."""
-    head = ''.join(f'<th>{name}</th>' for name in (
-        'place', 'quantity', 'published', 'computed', 'verdict', 'note; how compared'))
+    head = ''.join(f'<th>{name}</th>' for name in (*HEAD, 'note; how compared'))
     parts = ['<!DOCTYPE html>', '<html lang="en"><head><meta charset="utf-8">',
              '<title>The papers reproduced</title>', f'<style>{STYLE}</style></head><body>',
              '<h1>The papers reproduced</h1>', f'<p>{escape(found.summary)}.</p>']

@@ -14,8 +14,8 @@
 
 """Executable ``tune``: a robot's gaits, found by optimisation in simulation.
 
-``tune --robot my_robot.yaml --model go2 --out tuned.yaml`` looks for foot paths that walk far and
-upright, measures how to steer them, and writes the robot file with its part ``gaits``.
+``tune --robot my_robot.yaml --model go2 --out tuned.yaml`` searches for foot paths that walk far
+and upright, measures how to steer them, and writes the robot file with its part ``gaits``.
 """
 
 import argparse
@@ -75,7 +75,7 @@ def _parser() -> Parser:
 
 
 def figures(tuned: Sequence[Tuned]) -> list[str]:
-    """Return a table of what was found, in lines."""
+    """Return a table of the gaits that were found, in lines."""
     rows: list[tuple[str, ...]] = [
         ('gait', 'distance [m]', 'heading [deg]', 'speed [m/s]', 'Hz', 'duty', 'hops',
          'lift [cm]', 'pitch [deg]', 'cost of transport', 'slip', 'verdict')]
@@ -126,8 +126,9 @@ def _tune(chosen: argparse.Namespace) -> int:
         raise InputError(f'argument --out: {chosen.out} is a directory')
     with executor_for(len(chosen.gaits) * chosen.seeds, chosen, 'searches', report) as executor:
         robot, found, missing = tune(
-            robot, chosen.model, chosen.gaits, chosen.evaluations, chosen.seed, executor,
-            chosen.seeds, chosen.kp, chosen.kd, 1 if executor else chosen.jobs, report)
+            robot, chosen.model, chosen.gaits, chosen.evaluations, chosen.seed,
+            executor=executor, seeds=chosen.seeds, kp=chosen.kp, kd=chosen.kd,
+            threads=1 if executor else chosen.jobs, say=report)
     lines = [*figures(found), *missing, *invented(robot)]
     write_robot(chosen.out, robot, '\n'.join([
         f'Gaits made by: ros2 run cpg_ros {chosen.command}',

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What ``unitree_go/msg/LowState`` says, read from its bytes (little-endian CDR)."""
+"""The message ``unitree_go/msg/LowState``, read from its bytes (little-endian CDR)."""
 
 from cpg_ros.safety.robot_state import RobotState
 from cpg_ros.unitree.low_cmd import SERVO_MODE

@@ -104,4 +104,4 @@ def settings_of(robot: Robot, model: Model, kp: list[float], kd: list[float],
     return settings_for(
         robot, places(robot), kp=each(kp, 'kp', model.most_kp), kd=each(kd, 'kd', model.most_kd),
         torque=torque_factor * np.resize(model.torque, n), lying=np.resize(model.lying, n),
-        **others)
+        most_kp=model.most_kp, **others)

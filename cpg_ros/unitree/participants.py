@@ -43,7 +43,7 @@ def harmful(packet: bytes) -> str:
 
 
 class Announcements:
-    """Hears the announcements of a domain; none where the socket cannot be had."""
+    """Receives the announcements of a domain; none where the socket cannot be opened."""
 
     def __init__(self, domain: int) -> None:
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
@@ -66,7 +66,7 @@ class Announcements:
             return
 
     def look(self) -> str:
-        """Return which harmful participant has been heard since the last look, or ''."""
+        """Return which harmful participant has announced itself since the last call, or ''."""
         found = ''
         while self._socket.fileno() >= 0:
             try:
@@ -76,5 +76,5 @@ class Announcements:
         return found
 
     def close(self) -> None:
-        """Hear no more."""
+        """Close the socket."""
         self._socket.close()

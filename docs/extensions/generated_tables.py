@@ -83,8 +83,7 @@ FIXED = {'robot_sim': robot_sim.SPECS, 'unitree_bridge': unitree_parameters.SPEC
 def parameters(what: str) -> str:
     """Return the parameters of a node, or those of a network in the generator."""
     if what in FIXED:
-        return table(HEAD, parameter_rows({name: one.fixed()
-                                           for name, one in FIXED[what].items()}))
+        return table(HEAD, parameter_rows(FIXED[what]))
     if what == 'panel':
         return table(HEAD, parameter_rows(panel_node.SPECS))
     if what == 'feedback':

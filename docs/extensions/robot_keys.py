@@ -23,7 +23,9 @@ from cpg_ros.networks.registry import SHIPPED
 from cpg_ros.robots.robot_file import load_robot
 
 #: Keys that are names of the user's own, or of the network's.
-NAMED = {'legs': 'LEG', 'gaits': 'GAIT', 'joints': 'JOINT'}
+NAMED = {'legs': 'LEG', 'gaits': 'GAIT', 'joints': 'JOINT', 'links': 'JOINT', 'soles': 'LEG'}
+#: Shipped files that have all keys between them.
+COMPLETE = ('unitree_go2', 'humanoid')
 
 
 def asked_for() -> dict[str, bool]:
@@ -41,9 +43,11 @@ def asked_for() -> dict[str, bool]:
                 found[f'{place}.{key}'.removeprefix('file.')] = key in required
         return ask(self, tree, where, required, optional)
 
-    names = {joint.name for joint in load_robot('unitree_go2').joints}
+    robots = [load_robot(name) for name in COMPLETE]
+    names = {name for robot in robots for name in (*robot.order, *robot.held)}
     with patch.object(YamlReader, 'keys', noted):
-        load_robot('unitree_go2')
+        for name in COMPLETE:
+            load_robot(name)
     return found
 
 

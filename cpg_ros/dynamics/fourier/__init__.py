@@ -14,4 +14,4 @@
 
 """Periodic orbits as trigonometric polynomials: for networks with a delay."""
 
-__all__ = ['collocation', 'curve', 'floquet', 'mode', 'newton', 'orbit', 'solve']
+__all__ = ['adjoint', 'collocation', 'curve', 'floquet', 'newton', 'orbit', 'solve']

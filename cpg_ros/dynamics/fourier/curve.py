@@ -30,6 +30,7 @@ from cpg_ros.dynamics.fourier.newton import (
     MOST_NODES,
     NODES,
     RESOLVED,
+    rows_of,
 )
 from cpg_ros.dynamics.fourier.orbit import FourierOrbit
 from cpg_ros.dynamics.periodic import NoOrbit
@@ -141,9 +142,7 @@ def beside(network: Network, symmetry: Symmetry, line: ParameterLine,
         period: of the orbits, model time.
 
     """
-    columns = [variable * network.cells + cell for cell in symmetry.first
-               for variable in range(network.variables)]
     theta = np.arange(NODES) / NODES
     return (FourierCurve(network, symmetry, line, scales),
-            np.append(path(theta)[:, columns].T.ravel(), [period, line.value(network)]),
-            np.append(disturbance(theta)[:, columns].T.ravel(), [0.0, 0.0]))
+            np.append(rows_of(network, symmetry, path(theta)), [period, line.value(network)]),
+            np.append(rows_of(network, symmetry, disturbance(theta)), [0.0, 0.0]))

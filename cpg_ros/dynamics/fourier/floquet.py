@@ -203,3 +203,40 @@ def variation(orbit: FourierOrbit) -> tuple[Variation, np.ndarray]:
         if np.abs(within - 1.0).min() <= TRIVIAL:
             break
     return equation, within
+
+
+def mode(orbit: FourierOrbit, part: int, multiplier: complex
+         ) -> Callable[[np.ndarray], np.ndarray]:
+    """Return the disturbance with a multiplier as a function of time, of size 1 at most.
+
+    The multiplier's eigenvector is a history; the variational equation takes it through a period,
+    after which it is the multiplier times as large.
+
+    Args:
+        orbit: of a network with a delay.
+        part: 0 for the gait's class, then the subspaces transverse to it, as in transverse.
+        multiplier: about that of the disturbance, real and not the trivial one.
+
+    Returns:
+        States, shape (points, components), as a function of times in cycles, shape (points,).
+
+    """
+    equation = variation(orbit)[0]
+    columns = (equation.inside, *equation.outside)[part]
+    size, through = equation.march(columns, 0.0)
+    roots, vectors = np.linalg.eig(equation.period_map(columns, 0.0)[1](np.eye(size)))
+    gaps = np.abs(roots - multiplier)
+    if part == 0:
+        # The disturbance along the orbit.
+        gaps[np.abs(roots - 1.0).argmin()] = np.inf
+    nearest = gaps.argmin()
+    values = through(vectors[:, [nearest]].real)
+    values /= np.abs(values).max()
+    nu = float(roots[nearest].real)
+
+    def path(theta: np.ndarray) -> np.ndarray:
+        turns = np.floor(theta)
+        times = (theta - turns) * orbit.period / equation.length
+        return nu**turns[:, None] * equation.read(values, times)[..., 0] @ columns.T
+
+    return path

@@ -20,8 +20,10 @@ all cells collapse to a periodic problem for one cell of each: with theta = t / 
 solved at even nodes with the period as unknown. Phase zero is where cell 1 peaks.
 """
 
+from collections.abc import Sequence
 from functools import lru_cache
 
+from cpg_ros.dynamics.deflation import deflation_factor
 from cpg_ros.dynamics.fourier import collocation
 from cpg_ros.dynamics.fourier.orbit import FourierOrbit
 from cpg_ros.dynamics.periodic import NoOrbit
@@ -31,9 +33,9 @@ from cpg_ros.networks.symmetry import Symmetry
 import numpy as np
 
 NODES = 63
-MOST_NODES = 255
+MOST_NODES = 1023
 #: Newton stops at this residual; a waveform is resolved when its last harmonics are this small.
-TOLERANCE = 1e-12
+TOLERANCE, STEPS = 1e-12, 12
 RESOLVED = 1e-12
 #: States, parameters, derivative by the delay, and slopes in theta; see ``equations``.
 Point = tuple[list[np.ndarray], list[np.ndarray], np.ndarray, np.ndarray]
@@ -55,6 +57,13 @@ def _heard(network: type[Network], symmetry: Symmetry
                            float(symmetry.phases[other] - symmetry.phases[cell])))
         found.append((one.delayed, places))
     return found
+
+
+def rows_of(network: Network, symmetry: Symmetry, states: np.ndarray) -> np.ndarray:
+    """Pick the waveforms out of states, a row for each variable of each wave."""
+    columns = [variable * network.cells + cell for cell in symmetry.first
+               for variable in range(network.variables)]
+    return states[:, columns].T.copy()
 
 
 def equations(network: Network, symmetry: Symmetry, u: np.ndarray, period: float
@@ -153,16 +162,23 @@ def complete(network: Network, symmetry: Symmetry, u: np.ndarray, period: float,
                         u.reshape(shape), derivatives)
 
 
-def newton(network: Network, symmetry: Symmetry, u: np.ndarray, period: float
-           ) -> FourierOrbit | None:
+def newton(network: Network, symmetry: Symmetry, u: np.ndarray, period: float,
+           known: Sequence[float] = ()) -> FourierOrbit | None:
     """Newton from a guess, doubling the nodes until the waveforms are resolved.
+
+    Args:
+        network: parameters.
+        symmetry: of the gait.
+        u: guess at the waveforms on the nodes, shape (rows, n).
+        period: in model time.
+        known: periods of orbits to be kept off, model time.
 
     Raises:
         NoOrbit: they would need more nodes than there may be.
 
     """
     while True:
-        for _ in range(12):
+        for _ in range(2 * STEPS if known else STEPS):
             residual, jacobian, point = equations(network, symmetry, u, period)
             size = float(np.abs(residual[:-1]).max())
             if size <= TOLERANCE * max(1.0, float(np.abs(point[3]).max()) / period):
@@ -173,6 +189,8 @@ def newton(network: Network, symmetry: Symmetry, u: np.ndarray, period: float
                 step = np.linalg.solve(jacobian, residual)
             except np.linalg.LinAlgError:
                 return None
+            if known:
+                step = step * deflation_factor(period, -float(step[-1]), known)
             u, period = u - step[:-1].reshape(u.shape), period - float(step[-1])
             # A period that leaves the range of the delay has run away, and so has a waveform.
             if not (1e-3 * network.delay < period < 1e3 * network.delay
@@ -186,5 +204,5 @@ def newton(network: Network, symmetry: Symmetry, u: np.ndarray, period: float
             break
         if u.shape[1] >= MOST_NODES:
             raise NoOrbit(f'the waveform is too steep for {MOST_NODES} nodes')
-        u = np.array([collocation.resample(row, 2 * row.size + 1) for row in u])
+        u, known = np.array([collocation.resample(row, 2 * row.size + 1) for row in u]), ()
     return complete(network, symmetry, u, period, residual, jacobian, point)

@@ -64,7 +64,7 @@ class FourierOrbit(Orbit):
 
     @property
     def samples(self) -> int:
-        """Even points of a cycle that tell all there is: the nodes."""
+        """How many evenly spaced points of a cycle resolve a waveform: the nodes."""
         return int(self.values.shape[-1])
 
     def waveform(self, theta: np.ndarray, order: int = 0, wave: int = 0, variable: int = 0

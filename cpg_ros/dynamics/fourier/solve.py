@@ -14,14 +14,14 @@
 
 """Finding the orbit of a gait of a network with a delay: from another, or from its onset."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import lru_cache
 
 from cpg_ros.dynamics.delay_crossings import critical_delay, frequencies
-from cpg_ros.dynamics.fourier.newton import newton, NODES
+from cpg_ros.dynamics.fourier.newton import newton, NODES, rows_of
 from cpg_ros.dynamics.fourier.orbit import FourierOrbit
-from cpg_ros.dynamics.hopf import first_hopf
+from cpg_ros.dynamics.hopf_point import first_hopf
 from cpg_ros.dynamics.periodic import check_values, NoOrbit
 from cpg_ros.dynamics.seek import find_orbit
 from cpg_ros.networks.equations import equations_of, values_of
@@ -100,7 +100,7 @@ def _guess(network: Network, gait: str) -> tuple[np.ndarray, float] | None:
     point = first_hopf(network, gait)
     if point is None or (network.delay - point.value) * point.normal_form.side <= 0.0:
         return None
-    return (_rows(network, symmetry, point.path(network.delay, THETA)),
+    return (rows_of(network, symmetry, point.path(network.delay, THETA)),
             point.period(network.delay))
 
 
@@ -147,19 +147,13 @@ def beside(network: Network, near: FourierOrbit) -> FourierOrbit:
 
 
 def from_path(network: Network, symmetry: Symmetry, path: Callable[[np.ndarray], np.ndarray],
-              period: float) -> FourierOrbit | None:
+              period: float, known: Sequence[float] = ()) -> FourierOrbit | None:
     """Solve for an orbit from a guess, states over times in cycles; None where none is found."""
     try:
-        return _accepted(newton(network, symmetry, _rows(network, symmetry, path(THETA)), period))
+        u = rows_of(network, symmetry, path(THETA))
+        return _accepted(newton(network, symmetry, u, period, known))
     except NoOrbit:
         return None
-
-
-def _rows(network: Network, symmetry: Symmetry, states: np.ndarray) -> np.ndarray:
-    """Pick the waveforms out of states, a row for each variable of each wave."""
-    columns = [variable * network.cells + cell for cell in symmetry.first
-               for variable in range(network.variables)]
-    return states[:, columns].T.copy()
 
 
 def from_preset(preset: Preset) -> FourierOrbit:

@@ -14,5 +14,5 @@
 
 """Periodic orbits as polynomials on a mesh: for networks without delay."""
 
-__all__ = ['collocation', 'curve', 'elimination', 'floquet', 'kinks', 'mode', 'newton', 'orbit',
-           'periodic_schur', 'refinement', 'solve']
+__all__ = ['adaptation', 'adjoint', 'collocation', 'curve', 'elimination', 'floquet', 'kinks',
+           'newton', 'orbit', 'periodic_schur', 'solve']

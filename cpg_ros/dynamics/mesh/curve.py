@@ -22,6 +22,7 @@ the parameter against what is given.
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
+from cpg_ros.dynamics.mesh.adaptation import completed
 from cpg_ros.dynamics.mesh.newton import (
     bordered,
     FEWEST,
@@ -35,7 +36,6 @@ from cpg_ros.dynamics.mesh.newton import (
     Solution,
 )
 from cpg_ros.dynamics.mesh.orbit import MeshOrbit
-from cpg_ros.dynamics.mesh.refinement import completed
 from cpg_ros.networks.network import Network
 from cpg_ros.networks.parameter_line import ParameterLine
 from cpg_ros.networks.symmetry import Symmetry

@@ -24,14 +24,17 @@ those of what is left across it, so that none of them is mixed up with it at a f
 double.
 """
 
+from collections.abc import Callable
 from functools import lru_cache
 
 from cpg_ros.dynamics.isotypic_split import split
+from cpg_ros.dynamics.mesh import collocation
 from cpg_ros.dynamics.mesh.elimination import summed, transfer
 from cpg_ros.dynamics.mesh.newton import Reduced
 from cpg_ros.dynamics.mesh.orbit import MeshOrbit
 from cpg_ros.dynamics.mesh.periodic_schur import eigenvalues
 import numpy as np
+from numpy.polynomial import polynomial
 
 
 def within(orbit: MeshOrbit) -> tuple[np.ndarray, complex]:
@@ -88,7 +91,7 @@ class Flow:
         symmetry, network = orbit.symmetry, orbit.network
         place = Reduced(network, symmetry).place
         self._jacobians = network.jacobian(orbit.stages[..., place])
-        #: Of the intervals, model time.
+        #: Lengths of the intervals, model time.
         self.lengths = np.diff(orbit.mesh) * orbit.period / symmetry.order
         self._turn = (symmetry.turn
                       + np.arange(network.variables)[:, None] * network.cells).ravel()
@@ -119,3 +122,61 @@ def _across(along: np.ndarray) -> np.ndarray:
     mirror[:, 0] += np.where(along[:, 0] < 0.0, -1.0, 1.0)
     mirror /= np.linalg.norm(mirror, axis=1)[:, None]
     return (np.eye(along.shape[1]) - 2.0 * mirror[:, :, None] * mirror[:, None, :])[:, :, 1:]
+
+
+def mode(orbit: MeshOrbit, part: int, multiplier: complex
+         ) -> Callable[[np.ndarray], np.ndarray]:
+    """Return the disturbance with a multiplier as a function of time, of size 1 at most.
+
+    On a gait ``x(t + T/m) = M x(t)``, M the change of places of the cells after T/m. So the
+    disturbances w that return as a multiple nu of themselves are those of the map over T/m in the
+    frame that changes places with the cells, and ``v(t + j T/m) = M^j Re(nu^j w(t))``.
+
+    Args:
+        orbit: of a network without delay.
+        part: 0 for the gait's class, then the subspaces transverse to it, as in transverse.
+        multiplier: about that of the disturbance over a period, not the trivial one.
+
+    Returns:
+        States, shape (points, components), as a function of times in cycles, shape (points,).
+
+    """
+    inside, outside = split(orbit.symmetry)
+    columns, m = (inside, *outside)[part], orbit.symmetry.order
+    flow = Flow(orbit)
+    jacobians, answers = flow.solved(columns)
+    steps, change = flow.on(columns)
+    whole = np.eye(columns.shape[1])
+    for step in steps:
+        whole = step @ whole
+    roots, vectors = np.linalg.eig((change.T @ whole).astype(complex))
+    again = np.linalg.matrix_power(change, m)
+    shares = np.einsum('ik,ij,jk->k', vectors.conj(), again, vectors)
+    gaps = np.abs(shares * roots**m - multiplier)
+    if part == 0:
+        # The disturbance along the orbit.
+        gaps[np.abs(roots - 1.0).argmin()] = np.inf
+    nu, w = roots[gaps.argmin()], [vectors[:, gaps.argmin()]]
+    for step in steps:
+        w.append(step @ w[-1])
+    left = np.array(w)
+    inner = np.einsum('nsij,nj->nsi', answers, left[:-1])
+    slopes = np.einsum('nsij,nsj->nsi', jacobians, inner)
+    coefficients = collocation.power_coefficients(left[:-1], slopes, flow.lengths)
+    size = float(np.abs(left).max())
+
+    def path(theta: np.ndarray) -> np.ndarray:
+        places = np.asarray(theta, dtype=float) * m
+        turns = np.floor(places).astype(int)
+        places = places - turns
+        k = np.clip(np.searchsorted(orbit.mesh, places, side='right') - 1, 0,
+                    orbit.mesh.size - 2)
+        xi = (places - orbit.mesh[k]) / np.diff(orbit.mesh)[k]
+        values = polynomial.polyval(xi[:, None], coefficients[:, k], tensor=False)
+        out = (nu**turns[:, None] * values).real
+        for turn in np.unique(turns):
+            there = turns == turn
+            out[there] = out[there] @ np.linalg.matrix_power(change, int(turn)).T
+        return out @ columns.T / size
+
+    return path

@@ -21,9 +21,10 @@ interval's inner values, which leaves a linear system in y(0) and T. Secondary g
 waveforms, are no different.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
+from cpg_ros.dynamics.deflation import deflation_factor
 from cpg_ros.dynamics.mesh import collocation
 from cpg_ros.dynamics.mesh.elimination import chained, summed, transfer
 from cpg_ros.dynamics.periodic import NoOrbit
@@ -40,6 +41,7 @@ FEWEST, MOST_INTERVALS = 12, 300
 #: Newton stops at steps this small, against the size of the states and the period: what is left
 #: is of the order of their square.
 TOLERANCE = 1e-8
+STEPS = 15
 
 
 class Reduced(Field):
@@ -109,11 +111,18 @@ def bordered(reduced: Reduced, now: Solution, p: np.ndarray, r: np.ndarray) -> n
     return matrix
 
 
-def newton(reduced: Reduced, now: Solution, steps: int = 15) -> bool:
-    """Solve on a fixed mesh, in place; tell whether it converged."""
+def newton(reduced: Reduced, now: Solution, known: Sequence[float] = ()) -> bool:
+    """Solve on a fixed mesh, in place; tell whether it converged.
+
+    Args:
+        reduced: the network in a gait.
+        now: the guess, and then the solution.
+        known: lengths T/m, model time, of orbits to be kept off.
+
+    """
     scale = np.abs(now.points).max()
     d, longest = now.points.shape[1], 20.0 * now.length
-    for _ in range(steps):
+    for _ in range(2 * STEPS if known else STEPS):
         try:
             p, r, by_start, by_source = linearised(reduced, now)
             right = np.empty(d + 1)
@@ -132,6 +141,8 @@ def newton(reduced: Reduced, now: Solution, steps: int = 15) -> bool:
             return False
         # A long first step would leave the range where cosh is tame.
         share = min(1.0, 0.5 / max(size, 1e-300))
+        if known and size > TOLERANCE:
+            share *= deflation_factor(now.length, float(length), known)
         now.points += share * moved
         now.stages += share * inner
         now.length += share * float(length)
@@ -150,7 +161,7 @@ def sampled(path: Callable[[np.ndarray], np.ndarray], mesh: np.ndarray, length: 
 
 
 def coefficients_of(reduced: Reduced, now: Solution) -> np.ndarray:
-    """Of the polynomials on each interval, shape (S + 1, n, d)."""
+    """Return the coefficients of the polynomials on each interval, shape (S + 1, n, d)."""
     return collocation.power_coefficients(now.points[:-1], reduced.rates(now.stages),
                                           now.length * np.diff(now.mesh))
 

@@ -23,6 +23,7 @@ from functools import cached_property
 
 from cpg_ros.dynamics.mesh.newton import derivatives, Reduced, Solution
 from cpg_ros.dynamics.periodic import Orbit
+from cpg_ros.networks.symmetry import Symmetry
 import numpy as np
 
 #: Even points of a cycle that resolve a relaxation oscillation.
@@ -71,47 +72,63 @@ class MeshOrbit(Orbit):
         """
         return self._derivatives[0]
 
-    def _columns(self, wave: int, variable: int) -> list[int]:
-        """Where u_wave is found in the reduced state, in each m-th of the cycle."""
-        symmetry, columns = self.symmetry, []
-        cell = int(symmetry.first[wave])
-        for _ in range(symmetry.order):
-            columns.append(int(symmetry.classes[cell]
-                               + variable * (symmetry.classes.max() + 1)))
-            cell = int(symmetry.turn[cell])
-        return columns
-
-    def _evaluate(self, coefficients: np.ndarray, theta: np.ndarray, order: int, wave: int,
-                  variable: int) -> np.ndarray:
-        theta = np.asarray(theta, dtype=float) - self.phases[self.symmetry.first[wave]]
-        places = (theta - np.floor(theta)) * self.symmetry.order
-        part = np.minimum(places.astype(int), self.symmetry.order - 1)
-        places = places - part
-        interval = np.clip(np.searchsorted(self.mesh, places, side='right') - 1, 0,
-                           self.mesh.size - 2)
-        length = np.diff(self.mesh)[interval]
-        xi = (places - self.mesh[interval]) / length
-        column = np.array(self._columns(wave, variable))[part]
-        terms = coefficients
-        for _ in range(order):
-            terms = terms[1:] * np.arange(1, terms.shape[0]).reshape(-1, *[1] * (terms.ndim - 1))
-        picked = terms[:, interval, column]
-        xi = xi.reshape(xi.shape + (1,) * (picked.ndim - 1 - xi.ndim))
-        out = np.zeros(picked.shape[1:])
-        for term in picked[::-1]:
-            out = out * xi + term
-        return out * ((self.symmetry.order / length)**order).reshape(xi.shape)
-
     def waveform(self, theta: np.ndarray, order: int = 0, wave: int = 0, variable: int = 0
                  ) -> np.ndarray:
         """Return a waveform, or its derivative in theta of order 1 or 2, at theta in cycles."""
-        return self._evaluate(self.coefficients, theta, order, wave, variable)
+        return evaluate(self.symmetry, self.mesh, self.coefficients, theta, order=order, wave=wave,
+                        variable=variable)
 
     def d_waveform(self, theta: np.ndarray, wave: int = 0, variable: int = 0) -> np.ndarray:
         """Return the derivatives by the parameters, shape theta.shape + (parameters,)."""
-        return self._evaluate(self.d_coefficients, theta, 0, wave, variable)
+        return evaluate(self.symmetry, self.mesh, self.d_coefficients, theta, wave=wave,
+                        variable=variable)
 
     @property
     def samples(self) -> int:
-        """Even points of a cycle that tell all there is to a waveform."""
+        """How many evenly spaced points of a cycle resolve a waveform."""
         return SAMPLES
+
+
+def _columns(symmetry: Symmetry, wave: int, variable: int) -> list[int]:
+    """Where u_wave is found in the reduced state, in each m-th of the cycle."""
+    columns, cell = [], int(symmetry.first[wave])
+    for _ in range(symmetry.order):
+        columns.append(int(symmetry.classes[cell] + variable * (symmetry.classes.max() + 1)))
+        cell = int(symmetry.turn[cell])
+    return columns
+
+
+def evaluate(symmetry: Symmetry, mesh: np.ndarray, coefficients: np.ndarray, theta: np.ndarray, *,
+             order: int = 0, wave: int = 0, variable: int = 0) -> np.ndarray:
+    """Evaluate a waveform, or its derivative in theta, that polynomials on a mesh describe.
+
+    Args:
+        symmetry: of the gait.
+        mesh: ends of the intervals over T/m, from 0 to 1, shape (n + 1,).
+        coefficients: of reduced states on each interval, shape (terms, n, d, ...).
+        theta: where, in cycles, any shape.
+        order: of the derivative, 0 for the value.
+        wave: which waveform.
+        variable: of the cell.
+
+    Returns:
+        An array of shape theta.shape + (...).
+
+    """
+    theta = np.asarray(theta, dtype=float) - symmetry.phases[symmetry.first[wave]]
+    places = (theta - np.floor(theta)) * symmetry.order
+    part = np.minimum(places.astype(int), symmetry.order - 1)
+    places = places - part
+    interval = np.clip(np.searchsorted(mesh, places, side='right') - 1, 0, mesh.size - 2)
+    length = np.diff(mesh)[interval]
+    xi = (places - mesh[interval]) / length
+    column = np.array(_columns(symmetry, wave, variable))[part]
+    terms = coefficients
+    for _ in range(order):
+        terms = terms[1:] * np.arange(1, terms.shape[0]).reshape(-1, *[1] * (terms.ndim - 1))
+    picked = terms[:, interval, column]
+    xi = xi.reshape(xi.shape + (1,) * (picked.ndim - 1 - xi.ndim))
+    out = np.zeros(picked.shape[1:])
+    for term in picked[::-1]:
+        out = out * xi + term
+    return out * ((symmetry.order / length)**order).reshape(xi.shape)

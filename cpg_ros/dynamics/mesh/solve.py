@@ -17,6 +17,7 @@
 From the given start Newton's method is tried at once; failing that, the network is left to find
 its gait by itself, held in its symmetry, from there and from many other states; failing that, the
 orbit is followed from the known parameters to the wanted ones, which also tells how far it exists.
+Where no orbit is known, those that are unstable within their class are followed from Hopf points.
 """
 
 from collections.abc import Callable
@@ -24,10 +25,10 @@ from dataclasses import replace
 from functools import lru_cache
 
 from cpg_ros.dynamics.equilibrium import NoEquilibrium
+from cpg_ros.dynamics.mesh.adaptation import collocate as from_path
+from cpg_ros.dynamics.mesh.adaptation import predicted
 from cpg_ros.dynamics.mesh.orbit import MeshOrbit
-from cpg_ros.dynamics.mesh.refinement import collocate as from_path
-from cpg_ros.dynamics.mesh.refinement import predicted
-from cpg_ros.dynamics.periodic import check_values, NoOrbit, richer
+from cpg_ros.dynamics.periodic import check_values, NoOrbit, Orbit, richer
 from cpg_ros.dynamics.seek import find_orbit, settle
 from cpg_ros.integration.simulate import simulate
 from cpg_ros.networks.network import Network, Preset
@@ -87,8 +88,9 @@ def _stated(network: Network, gait: str) -> MeshOrbit | None:
 def _sought(network: Network, gait: str) -> MeshOrbit:
     orbit = _settled(network, gait)
     if orbit is None:
-        raise NoOrbit(f'no {gait} at these parameters was found from any state about the '
-                      'equilibrium')
+        # Hopf points are looked at, too, before anybody reads this: see orbit.solve_orbit.
+        raise NoOrbit(f'no {gait} was found at these parameters, neither by simulations from '
+                      f'states about the equilibrium nor from a Hopf point along {network.line}')
     return orbit
 
 
@@ -109,7 +111,7 @@ def _by_itself(network: Network, symmetry: Symmetry, start: np.ndarray, period: 
     return None if found is None else _accepted(from_path(network, symmetry, *found))
 
 
-def _on_cycles(orbit: MeshOrbit) -> Callable[[np.ndarray], np.ndarray]:
+def _on_cycles(orbit: Orbit) -> Callable[[np.ndarray], np.ndarray]:
     return lambda theta: orbit(theta * orbit.period)
 
 

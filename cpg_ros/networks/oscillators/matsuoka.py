@@ -32,6 +32,7 @@ from functools import cache
 from typing import Any, ClassVar
 
 from cpg_ros.networks.cell import Cell
+from cpg_ros.networks.leg_numbers import for_legs
 from cpg_ros.networks.leg_pairs import LegPairs
 from cpg_ros.networks.network import Preset, Range
 from cpg_ros.networks.network_definition import leg_count
@@ -116,28 +117,8 @@ class MatsuokaOscillators(LegPairs):
                 for gait in cls.gaits()}
 
 
-@dataclass(frozen=True)
+@for_legs(4)
 class Matsuoka(MatsuokaOscillators):
     """Matsuoka oscillators for four legs."""
 
-    k_rh_lh: float
-    k_lh_rh: float
-    k_rf_lf: float
-    k_lf_rf: float
-    k_lf_lh: float
-    k_rf_rh: float
-    k_lh_lf: float
-    k_rh_rf: float
-    k_rf_lh: float
-    k_lf_rh: float
-    k_rh_lf: float
-    k_lh_rf: float
-
     name: ClassVar[str] = 'matsuoka'
-    usual_gait: ClassVar[str] = 'trot'
-    usual_robot: ClassVar[str] = 'quadruped'
-
-
-# By the same rule as for other numbers of legs.
-for _name, _value in Matsuoka.stated(4).items():
-    setattr(Matsuoka, _name, _value)

@@ -35,7 +35,7 @@ import math
 from typing import Any, ClassVar
 
 from cpg_ros.networks.cell import Cell
-from cpg_ros.networks.leg_numbers import leg_names, places
+from cpg_ros.networks.leg_numbers import for_legs, leg_names, places
 from cpg_ros.networks.network import known, Network, Preset, Range
 from cpg_ros.networks.rings import ring_gaits
 from cpg_ros.networks.stated_gait import stated_gait
@@ -54,24 +54,6 @@ def _alone(cells: int) -> Symmetry:
     return Symmetry.of(Group(cells, ()), {}, variables=3)
 
 
-def _stated(legs: int) -> dict[str, Any]:
-    """Return what the network has for a number of legs; InputError for an odd number."""
-    names = leg_names(legs)
-    offsets = tuple(f'offset_{leg}' for leg in names)
-    return {
-        'cells': legs, **places(legs), 'offsets': dict(zip(names, offsets, strict=True)),
-        'legs': {'implicit': {leg: (n + 1,) for n, leg in enumerate(names)}},
-        # Of the cell n places further round: offset_j where i + n is j.
-        'own_of_cells': {f'offset{n}': offsets[n:] + offsets[:n] for n in range(legs)},
-        'ranges': {
-            'nu': Range(0.1, 10.0, 'intrinsic frequency of every oscillator [cycles/model time]'),
-            'r': Range(0.01, 10.0, 'amplitude R to which every oscillator converges'),
-            'a': Range(1.0, 200.0, 'how fast amplitudes converge [1/model time]'),
-            'w': Range(0.0, 50.0, 'weight of every other oscillator [1/model time]'),
-            **{f'offset_{leg}': Range(-1.0, 1.0, f'cycles by which the leg {leg} is ahead')
-               for leg in names}}}
-
-
 @dataclass(frozen=True)
 class PhaseOscillators(Network):
     """Phase oscillators for any even number of legs; nu in cycles, a and w per model time."""
@@ -83,6 +65,11 @@ class PhaseOscillators(Network):
 
     #: Gait -> cycles of a stride at which the legs touch down, in their order.
     footfalls: ClassVar[dict[str, tuple[float, ...]]]
+    own_ranges: ClassVar[dict[str, Range]] = {
+        'nu': Range(0.1, 10.0, 'intrinsic frequency of every oscillator [cycles/model time]'),
+        'r': Range(0.01, 10.0, 'amplitude R to which every oscillator converges'),
+        'a': Range(1.0, 200.0, 'how fast amplitudes converge [1/model time]'),
+        'w': Range(0.0, 50.0, 'weight of every other oscillator [1/model time]')}
     states: ClassVar[tuple[str, ...]] = ('x', 'y', 's')
     readout: ClassVar = 'phase'
     step: ClassVar[float] = 0.0025
@@ -97,7 +84,8 @@ class PhaseOscillators(Network):
     @classmethod
     def fitted(cls, legs: int) -> dict[str, Any]:
         """Return what the network has for this many legs; InputError for an odd number."""
-        stated = _stated(legs)
+        names = leg_names(legs)
+        offsets = tuple(f'offset_{leg}' for leg in names)
         gaits: dict[str, tuple[float, ...]] = {'walk': (0.0, 0.5), 'hop': (0.0, 0.0)}
         if legs > 2:
             # Leg by leg from behind, left before right; phases of the modes (j, k) of two rings.
@@ -107,9 +95,16 @@ class PhaseOscillators(Network):
         # Between the two waves that come to the legs of a side one after the other.
         between = (0.0, 0.25) if legs == 2 else tuple(
             (0.5 * (i % 2) + 1.5 * (i // 2) / legs) % 1.0 for i in range(legs))
-        return {**stated, 'footfalls': {**gaits, 'unnamed': between},
-                'usual_gait': next(iter(gaits)), 'fields': tuple(stated['offsets'].values()),
-                'usual_robot': {2: 'biped', 6: 'hexapod'}.get(legs, '')}
+        return {
+            'cells': legs, **places(legs), 'offsets': dict(zip(names, offsets, strict=True)),
+            'legs': {'implicit': {leg: (n + 1,) for n, leg in enumerate(names)}},
+            # Of the cell n places further round: offset_j where i + n is j.
+            'own_of_cells': {f'offset{n}': offsets[n:] + offsets[:n] for n in range(legs)},
+            'ranges': {**cls.own_ranges, **{
+                f'offset_{leg}': Range(-1.0, 1.0, f'cycles by which the leg {leg} is ahead')
+                for leg in names}},
+            'footfalls': {**gaits, 'unnamed': between}, 'usual_gait': next(iter(gaits)),
+            'fields': offsets}
 
     @classmethod
     def equations(cls, cell: Cell, p: Any) -> tuple[Number, ...]:
@@ -156,18 +151,12 @@ class PhaseOscillators(Network):
                 for gait, falls in cls.footfalls.items()}
 
 
-@dataclass(frozen=True)
+@for_legs(4)
 class Phase(PhaseOscillators):
     """Phase oscillators for four legs."""
 
-    offset_lh: float
-    offset_rh: float
-    offset_lf: float
-    offset_rf: float
-
     name: ClassVar[str] = 'phase'
     usual_gait: ClassVar[str] = 'trot'
-    usual_robot: ClassVar[str] = 'quadruped'
     #: Footfalls of LH RH LF RF. The symmetrical gaits are ordered by how far a fore foot is behind
     #: the hind foot on its side (Hildebrand, Science 150, 1965): 0 pace, 1/8 amble, 1/4 walk in
     #: lateral and 3/4 in diagonal sequence, 1/2 trot. Of the others, the canter has three beats,
@@ -188,8 +177,3 @@ class Phase(PhaseOscillators):
         'half_bound': (0.0, 0.0, 0.4, 0.6),
         'pronk': (0.0, 0.0, 0.0, 0.0),
         'unnamed': (0.0, 0.5, 0.375, 0.875)}
-
-
-# By the same rule as for other numbers of legs.
-for _name, _value in _stated(4).items():
-    setattr(Phase, _name, _value)

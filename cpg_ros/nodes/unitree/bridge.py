@@ -19,7 +19,7 @@ import sys
 
 from cpg_ros.nodes.bridge_base import BridgeNode
 from cpg_ros.nodes.bridge_start import Wait
-from cpg_ros.nodes.node_base import help_or_error, run
+from cpg_ros.nodes.node_base import run
 from cpg_ros.nodes.unitree.interfaces import message, Unitree
 from cpg_ros.nodes.unitree.motion_modes import release
 from cpg_ros.nodes.unitree.parameters import SPECS
@@ -108,9 +108,8 @@ class UnitreeBridge(BridgeNode):
 
 def main(args: list[str] | None = None) -> int:
     """Run the node until a signal ends it; return the exit code."""
-    code = help_or_error(NAME, 'Leads a Unitree robot by what a generator publishes.', SPECS,
-                         args)
-    return run(UnitreeBridge, NAME, args) if code is None else code
+    return run(UnitreeBridge, NAME, 'Leads a Unitree robot by what a generator publishes.', SPECS,
+               args)
 
 
 if __name__ == '__main__':

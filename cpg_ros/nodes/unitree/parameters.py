@@ -15,11 +15,11 @@
 """The parameters of ``unitree_bridge``."""
 
 from cpg_ros.nodes.bridge_parameters import bridge_specs
-from cpg_ros.nodes.parameter_spec import one_of, Spec
+from cpg_ros.nodes.parameter_spec import fixed, one_of, Spec
 from cpg_ros.unitree.low_state import BUTTONS
 from cpg_ros.unitree.models import MODELS
 
-SPECS = bridge_specs(
+SPECS = fixed(bridge_specs(
     'unitree_go2',
     model=Spec('go2', 'robot model, which determines the torque limits',
                constraints=one_of(MODELS)),
@@ -29,4 +29,4 @@ SPECS = bridge_specs(
     stop_button=Spec('B', 'button of the wireless remote that stops the robot, pressed alone or '
                      'with others', constraints=one_of(BUTTONS)),
     motion_switcher=Spec(True, "ask the robot's own service to release its motion modes; set to "
-                         'false for simulators, which have none'))
+                         'false for simulators, which have none')))

@@ -15,14 +15,13 @@
 """The measurements of a Unitree robot, on the topics that robot_sim has."""
 
 from cpg_ros.nodes.joint_publishers import joint_state, labelled
-from cpg_ros.nodes.message_block import each, MessageBlock, Template
+from cpg_ros.nodes.message_block import each, MessageBlock, places, Template
+from cpg_ros.nodes.qos_profiles import OVERRIDABLE
 from cpg_ros.robots.robot import Robot
 from cpg_ros.unitree.low_state import LowState
 from cpg_ros.unitree.models import JOINTS, PARTS
-import numpy as np
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
-from rclpy.qos_overriding_options import QoSOverridingOptions
 from sensor_msgs.msg import BatteryState, Imu
 
 #: Unitree's feet are in the order of its legs.
@@ -33,39 +32,32 @@ class Sensors:
     """Publishes ``joint_states``, ``imu``, ``foot_contacts``; once a second ``battery``."""
 
     def __init__(self, node: Node, robot: Robot, state: LowState) -> None:
-        """Be ready to publish what ``state`` holds, joints in ``robot.order``."""
+        """Publish the contents of ``state``, joints in ``robot.order``."""
         self._state = state
-        names = list(robot.order)
+        names = robot.order
         self._from = [JOINTS.index(name) for name in names]
         self._feet = [FEET.index(leg[0].name.partition('_')[0]) for leg in robot.legs.values()]
         n = len(names)
-        # The block's numbers: positions, velocities, efforts, orientation, rates, forces.
-        parts = np.split(np.arange(3 * n + 10 + len(self._feet)),
-                         np.cumsum([n, n, n, 4, 3, 3]))
-        self._parts = [slice(part[0], part[-1] + 1) for part in parts]
-        *_, orientation, rates, acceleration, forces = parts
+        sizes = n, n, n, 4, 3, 3, len(self._feet)
+        *joints, orientation, rates, acceleration, forces = places(sizes)
         imu = Imu()
         imu.header.frame_id = 'imu'
-        self._block = MessageBlock(node, parts[-1][-1] + 1, [
-            ('joint_states', joint_state(names, np.arange(n), n, 2 * n)),
+        self._block = MessageBlock(node, sizes, [
+            ('joint_states', joint_state(names, *joints)),
             ('imu', Template(imu, [imu.header.stamp], numbers=[
                 *each(imu.orientation, 'wxyz', orientation),
                 *each(imu.angular_velocity, 'xyz', rates),
                 *each(imu.linear_acceleration, 'xyz', acceleration)])),
             ('foot_contacts', labelled(tuple(robot.legs), forces))])
-        self._battery = node.create_publisher(
-            BatteryState, 'battery', QoSProfile(depth=100),
-            qos_overriding_options=QoSOverridingOptions.with_default_policies())
+        self._battery = node.create_publisher(BatteryState, 'battery', QoSProfile(depth=100),
+                                              qos_overriding_options=OVERRIDABLE)
 
     def publish(self, stamp: int) -> None:
         """Publish the state; stamp in ns."""
-        state, values = self._state, self._block.values
-        for part, given in zip(self._parts, (
-                state.q[self._from], state.dq[self._from], state.torque[self._from],
-                state.quaternion, state.gyroscope, state.accelerometer,
-                state.feet[self._feet]), strict=True):
-            values[part] = given
-        self._block.publish(stamp)
+        state, joints = self._state, self._from
+        self._block.publish(stamp, (
+            state.q[joints], state.dq[joints], state.torque[joints], state.quaternion,
+            state.gyroscope, state.accelerometer, state.feet[self._feet]))
 
     def publish_battery(self, stamp: int) -> None:
         """Publish the battery's state; stamp in ns."""

@@ -1,6 +1,7 @@
 // One canvas with axes, ticks and their units.
 
 const style = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
+const LABEL = 11;  // px from one label to the next
 export const COLOURS = ['--a', '--b', '--c', '--d', '--e', '--f'];
 export const colour = (k) => style(COLOURS[k % COLOURS.length]);
 
@@ -17,6 +18,11 @@ export class Chart {
   constructor(id) {
     this.canvas = document.getElementById(id);
     this.context = this.canvas.getContext('2d');
+  }
+
+  // Height for a number of rows that each have a label.
+  rows(count) {
+    this.canvas.style.height = `max(11.75rem, ${(LABEL + 2) * count + 40}px)`;
   }
 
   get visible() {
@@ -57,9 +63,13 @@ export class Chart {
     context.fillText(xLabel, (this.x0 + this.x1) / 2, this.y0 + 18);
     context.textAlign = 'right';
     context.textBaseline = 'middle';
+    let above = Infinity;
     for (const [value, text] of names || ticks(low, high).map((one) => [one, one])) {
       if (!names) line(this.x0, this.y(value), this.x1, this.y(value));
-      context.fillText(text, this.x0 - 5, this.y(value));
+      // One that would overlap with its neighbour is left out.
+      if (Math.abs(this.y(value) - above) < LABEL) continue;
+      above = this.y(value);
+      context.fillText(text, this.x0 - 5, above);
     }
     context.save();
     context.translate(9, (this.y0 + this.y1) / 2);

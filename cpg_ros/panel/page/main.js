@@ -5,6 +5,7 @@ import { Parameters } from './parameters.js';
 import { Plots } from './plots.js';
 import { Scene } from './scene.js';
 import { Steering } from './steering.js';
+import { Tour } from './tour.js';
 
 const at = (id) => document.getElementById(id);
 const token = new URLSearchParams(location.search).get('token');
@@ -38,7 +39,11 @@ let opened = false, state = {}, body = null, frames = 0, counted = 0, fresh = tr
 const last = {};
 const link = new Worker('link.js');
 const send = (request) => link.postMessage({ send: request });
-const parameters = new Parameters((name, value) => send({ do: 'set', name, value }));
+const set = (name, value) => send({ do: 'set', name, value });
+const parameters = new Parameters((name, value) => {
+  if (name === 'gait') tour.end();
+  set(name, value);
+});
 const lease = new Lease(send);
 const steering = new Steering((held) => link.postMessage({ held }));
 const scene = new Scene(at('scene'), camera, () => {
@@ -46,9 +51,10 @@ const scene = new Scene(at('scene'), camera, () => {
   remember();
 });
 const plots = new Plots(view, remember);
+const tour = new Tour(steering, set, at('tour'));
 // What tests look at.
 window.panel = { get frames() { return frames; }, last, get state() { return state; },
-  get body() { return body; }, get lease() { return lease.now; }, scene, steering };
+  get body() { return body; }, get lease() { return lease.now; }, plots, scene, steering, tour };
 
 function say(text, kind) {
   const line = Object.assign(document.createElement('p'), { textContent: text, className: kind });
@@ -69,6 +75,7 @@ function beside() {
   at('fit').disabled = !inversion;
   const steered = parameters.known.cmd_vel?.value === true;
   steering.enable(steered && lease.steers);
+  tour.enable(steering.able, parameters.gaitNames);
   at('steered').textContent = lease.reason || (steered
     ? `up to ${state.fastest[0]} m/s and ${state.fastest[1]} rad/s`
     : 'this generator ignores cmd_vel; start it with cmd_vel:=true to steer');
@@ -84,7 +91,9 @@ const takes = {
     at('download').hidden = message.recording || !message.bag;
     at('download').href = `bags/${message.bag}.zip${token ? `?token=${encodeURIComponent(token)}`
       : ''}`;
-    if (!message.generators.length) chip(at('now'), 'no generator found; start one');
+    if (!message.generators.length) chip(at('now'), 'no generator yet');
+    at('starting').textContent = message.starting || 'waiting for a generator';
+    at('starting').hidden = message.generators.length > 0;
     beside();
   },
   chosen(message) {
@@ -103,6 +112,7 @@ const takes = {
     plots.clear();
     parameters.show([]);
     at('health').replaceChildren();
+    at('fallen').hidden = true;
     chip(at('now'), 'no gait');
     beside();
     remember();
@@ -142,6 +152,13 @@ const takes = {
       made.append(head, table);
       return made;
     }));
+    const parts = Object.values(message.parts);
+    const worst = ['error', 'warn', 'stale'].find((level) =>
+      parts.some((part) => part.level === level)) || 'ok';
+    chip(at('worst'), parts.filter((part) => part.level === worst).map((part) => part.text)
+      .join(', '), worst);
+    at('fallen').hidden = !parts.some((part) => part.values.fallen === 'True');
+    plots.paced(Number(parts.map((part) => part.values['frequency [Hz]']).find(Boolean)));
   },
   lease(message) {
     lease.take(message);
@@ -160,6 +177,7 @@ const takes = {
       frames++;
       Object.assign(last, frame);
       plots.take(frame);
+      if (frame.time !== undefined) tour.take(frame.time);
     }
     fresh = true;
     link.postMessage({ drawn: true });
@@ -206,6 +224,7 @@ function timed(drawing) {
 
 function draw() {
   requestAnimationFrame(draw);
+  scene.beat(performance.now());
   if (!fresh || pauses()) return;
   fresh = false;
   timed(picture);
@@ -225,9 +244,12 @@ setInterval(() => {
   if (document.hidden) return;
   at('paused').hidden = !pauses();
   if (!pauses()) timed(() => plots.draw());
-  const digits = (value, unit) => value == null ? '–' : `${value.toFixed(2)} ${unit}`;
-  at('speed').textContent = digits(last.speed?.[0], 'm/s');
-  at('turning').textContent = digits(last.speed?.[2], 'rad/s');
+  // Without a minus before a zero.
+  const digits = (value, unit) => value == null ? '–'
+    : `${(+value.toFixed(2) || 0).toFixed(2)} ${unit}`;
+  const [speed, , turning] = plots.speed();
+  at('speed').textContent = digits(speed, 'm/s');
+  at('turning').textContent = digits(turning, 'rad/s');
   at('time').textContent = digits(last.time == null ? null : last.time % 1e5, 's');
 }, 150);
 setInterval(() => {
@@ -244,7 +266,7 @@ const stop = () => {
 at('generators').onchange = () => send({ do: 'choose', node: at('generators').value });
 at('stop').onclick = stop;
 at('enable').onclick = () => send({ do: 'enable', on: true });
-at('reset').onclick = () => send({ do: 'reset' });
+at('reset').onclick = at('stand-up').onclick = () => send({ do: 'reset' });
 at('fit').onclick = () => send({ do: 'fit' });
 at('record').onclick = () => send({ do: 'record', on: !state.recording });
 at('push').onclick = () => send({ do: 'push', force: +at('force').value,

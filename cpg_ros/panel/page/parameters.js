@@ -15,35 +15,73 @@ export class Parameters {
     this.set = set;
     this.place = document.getElementById('parameters');
     this.gaits = document.getElementById('gaits');
+    this.presets = document.getElementById('presets');
+    this.field = document.getElementById('find');
+    this.field.oninput = () => this.find(this.field.value);
+    this.members = [];  // group, element and words of each parameter
     this.known = {};
     this.shown = {};
+    this.gaitNames = [];  // without presets of other names
   }
 
   show(controls) {
     this.known = Object.fromEntries(controls.map((one) => [one.name, one]));
     this.shown = {};
     const groups = {}, fixed = [];
+    this.members = [];
     for (const one of controls) {
       if (one.name === 'gait' && one.choices.length) continue;
       if (one.fixed) fixed.push(one);
       else (groups[one.name.includes('.') ? one.name.split('.')[0] : 'general'] ??= []).push(one);
     }
     this.place.replaceChildren(
-      ...Object.entries(groups).map(([name, members]) => make('details', { open: true },
-        make('summary', { textContent: name }), ...members.map((one) => this.control(one)))),
-      make('details', {}, make('summary', { textContent: 'read-only while the node runs' }),
-        ...fixed.map((one) => make('div', { className: 'parameter' },
-          make('div', { className: 'name' }, make('span', { textContent: one.name }),
-            make('output', { textContent: String(one.value) || '–' })),
-          make('p', { textContent: one.text })))));
+      ...Object.entries(groups).map(([name, members]) => this.group(name, members,
+        (one) => this.control(one))),
+      this.group('read-only while the node runs', fixed, (one) => make('div',
+        { className: 'parameter' }, make('div', { className: 'name' },
+          make('span', { textContent: one.name }),
+          make('output', { textContent: String(one.value) || '–' })),
+        make('p', { textContent: one.text }))));
+    this.find(this.field.value);
     const words = this.known.gait?.choices || [];
-    this.gaits.replaceChildren(...words.map((gait, k) => {
-      const button = make('button', { textContent: gait, onclick: () => this.set('gait', gait) });
-      button.dataset.gait = gait;
-      if (k < 9) button.append(make('kbd', { textContent: k + 1 }));
-      return button;
-    }));
+    const presets = this.known.gait?.presets || [];
+    this.gaitNames = words.filter((word) => !presets.includes(word));
+    const button = (gait, k) => {
+      const made = make('button', { textContent: gait, onclick: () => this.set('gait', gait) });
+      made.dataset.gait = gait;
+      if (k < 9) made.append(make('kbd', { textContent: k + 1 }));
+      return made;
+    };
+    this.gaits.replaceChildren(...this.gaitNames.map(button));
+    this.presets.replaceChildren(...presets.map((preset) => button(preset, Infinity)));
+    document.getElementById('preset-group').hidden = !presets.length;
     this.mark(this.known.gait?.value);
+  }
+
+  group(name, members, control) {
+    const made = make('details', {}, make('summary', { textContent: `${name} ` },
+      make('small', { textContent: members.length })));
+    for (const one of members) {
+      const element = control(one);
+      this.members.push({ group: made, element, words: `${one.name} ${one.text}`.toLowerCase() });
+      made.append(element);
+    }
+    return made;
+  }
+
+  // Show the parameters whose names or descriptions have all words; with none, the closed groups.
+  find(text) {
+    const wanted = text.toLowerCase().split(/\s+/).filter(Boolean), found = new Set();
+    for (const { group, element, words } of this.members) {
+      element.hidden = !wanted.every((word) => words.includes(word));
+      if (!element.hidden) found.add(group);
+    }
+    for (const group of this.place.children) {
+      group.hidden = !found.has(group);
+      if (wanted.length) group.open = true;
+      else if (this.searched) group.open = false;
+    }
+    this.searched = wanted.length > 0;
   }
 
   control(one) {
@@ -100,7 +138,7 @@ export class Parameters {
     this.shown[one.name] = (value) => parts.forEach((part) => part(value));
     this.shown[one.name](one.value);
     const label = one.name.includes('.') ? one.name.slice(one.name.indexOf('.') + 1) : one.name;
-    return make('div', { className: 'parameter' }, make('div', { className: 'name' },
+    return make('div', { className: 'parameter' }, make('label', { className: 'name' },
       make('span', { textContent: label + (one.unit ? ` [${one.unit}]` : '') }), input), about);
   }
 
@@ -119,7 +157,7 @@ export class Parameters {
   }
 
   mark(gait) {
-    for (const button of this.gaits.children) {
+    for (const button of [...this.gaits.children, ...this.presets.children]) {
       button.classList.toggle('on', button.dataset.gait === gait);
       button.setAttribute('aria-pressed', button.dataset.gait === gait);
     }

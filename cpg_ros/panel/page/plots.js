@@ -4,6 +4,9 @@ import { Chart, colour, ink } from './chart.js';
 const SPAN = 5;      // s shown
 const STANDS = 5;    // a foot stands from this force on, N
 const KEPT = 400;    // frames
+const USUAL = 1.7;   // times the usual time between two frames; after more, some were missed
+const CHORD = 0.1;   // share of a stride that a straight line may stand for
+const STRIDE = 1;    // s; what speeds are averaged over where the stride rate is not known
 
 export class Plots {
   constructor(view, changed) {
@@ -22,8 +25,14 @@ export class Plots {
 
   clear() {
     this.frames = [];
+    this.stride = STRIDE;
     this.names = {};
     this.shape = null;
+  }
+
+  // The stride rate, Hz, of the gait.
+  paced(frequency) {
+    this.stride = frequency > 0 ? Math.min(1 / frequency, SPAN) : STRIDE;
   }
 
   named(names) {
@@ -59,9 +68,35 @@ export class Plots {
     const last = this.frames.at(-1);
     const now = { ...last, ...frame };
     if (last && now.time < last.time) this.frames = [];
+    now.fresh = frame.cells !== undefined;
     if (now.time === undefined) now.time = performance.now() / 1000;
     this.frames.push(now);
     if (this.frames.length > KEPT) this.frames.splice(0, this.frames.length - KEPT);
+  }
+
+  // A component of the speed at each of some frames, averaged over the stride before it.
+  averages(shown, k) {
+    let from = 0, sum = 0, count = 0;
+    return shown.map((frame) => {
+      const value = frame.speed?.[k];
+      if (value != null) {
+        sum += value;
+        count++;
+      }
+      for (; shown[from].time < frame.time - this.stride; from++)
+        if (shown[from].speed?.[k] != null) {
+          sum -= shown[from].speed[k];
+          count--;
+        }
+      return count ? sum / count : null;
+    });
+  }
+
+  // The averages at the newest frame: forward and to the left, m/s, and turning, rad/s.
+  speed() {
+    const end = this.frames.at(-1)?.time;
+    const stride = this.frames.filter((frame) => frame.time >= end - this.stride);
+    return [0, 1, 2].map((k) => this.averages(stride, k).at(-1));
   }
 
   draw() {
@@ -97,8 +132,13 @@ export class Plots {
     const cell = this.cellNames?.indexOf(this.portrait.value) ?? -1;
     if (cell < 0 || !shown.at(-1).cells) return chart.say('the generator does not publish ~/cells');
     const [x, y] = this.states;
-    const [xs, ys] = [cell, this.cellCount + cell].map((k) =>
-      shown.map((frame) => frame.cells?.[k]));
+    const own = shown.filter((frame) => frame.fresh);
+    // Where frames were missed the line is broken: it would be a chord.
+    const gaps = own.map((frame, j) => j ? frame.time - own[j - 1].time : 0);
+    const most = Math.min(USUAL * [...gaps].sort((a, b) => a - b)[own.length >> 1],
+      CHORD * this.stride);
+    const points = own.flatMap(({ cells }, j) => gaps[j] > most ? [null, cells] : [cells]);
+    const [xs, ys] = [cell, this.cellCount + cell].map((k) => points.map((row) => row?.[k]));
     const span = (values) => {
       const known = values.filter((value) => value != null);
       const low = Math.min(...known), high = Math.max(...known), rim = 0.08 * (high - low) + 1e-3;
@@ -107,6 +147,7 @@ export class Plots {
     const unit = y.startsWith('d') ? '1/model time' : '1';
     chart.begin([...span(xs), `${x} [1]`], [...span(ys), `${y} [${unit}]`]);
     chart.line(xs, ys, colour(0), 1);
+    xs.forEach((x0, j) => x0 != null && chart.dot(x0, ys[j], colour(0), 1));
     chart.dot(xs.at(-1), ys.at(-1), colour(1));
   }
 
@@ -149,6 +190,7 @@ export class Plots {
   limits(chart, shown) {
     const { joints } = this.names, angles = shown.at(-1).angles;
     if (!joints || !angles) return chart.say('no joint states received');
+    chart.rows(joints.length);
     const rows = joints.length, of = this.legs(), legs = Object.keys(this.shape?.feet || {});
     const spans = joints.map((joint) => this.shape?.limits[joint] || [null, null]);
     const ends = [...spans.flat(), ...angles].filter((value) => value != null);
@@ -173,7 +215,7 @@ export class Plots {
 
   speeds(chart, shown, times, axis) {
     if (!shown.at(-1).speed) return chart.say('no node publishes odom');
-    const rows = [0, 1].map((k) => shown.map((frame) => frame.speed?.[k]));
+    const rows = [0, 1].map((k) => this.averages(shown, k));
     const known = rows.flat().filter((value) => value != null);
     chart.begin(axis, [Math.min(-0.2, ...known), 0.1 + Math.max(1, ...known), 'speed [m/s]']);
     rows.forEach((row, k) => chart.line(times, row, colour(k)));

@@ -2,6 +2,7 @@
 import { identity, lookAt, multiply, perspective } from './matrices.js';
 
 const LIGHT = [0.35, 0.25, -1];
+const LEAST = 0.7;      // share of the screen's pixels that are drawn at least, each way
 const NEWTON = 0.0022;  // length of an arrow for each newton, m
 
 const SOLID = [`#version 300 es
@@ -49,6 +50,7 @@ export class Scene {
     this.moved = moved;
     this.target = [0, 0, 0.25];
     this.meshes = [];
+    this.share = 1;
     this.gl = canvas.getContext('webgl2', { stencil: true, antialias: true });
     this.drag();
     if (!this.gl) return;
@@ -111,7 +113,8 @@ export class Scene {
   draw(forces) {
     const { gl, canvas, camera } = this;
     if (!gl) return;
-    const scale = this.sharpness() * Math.min(window.devicePixelRatio || 1, 2);
+    // One pixel for each of the screen's; the edges are smoothed by the context's antialiasing.
+    const scale = this.share * Math.min(window.devicePixelRatio || 1, 3);
     const [wide, high] = [canvas.clientWidth, canvas.clientHeight].map((one) => one * scale | 0);
     if (canvas.width !== wide || canvas.height !== high)
       [canvas.width, canvas.height] = [wide, high];
@@ -163,14 +166,14 @@ export class Scene {
     }
   }
 
-  // Fewer pixels where they take too long, as without a graphics card; 1 is one for each.
-  sharpness() {
-    const now = performance.now(), passed = now - (this.before ?? now);
+  // Fewer pixels where drawing them holds up the browser, as without a graphics card. Called at each
+  // of its beats, also when there is nothing to draw: a robot that moves slowly is drawn as sharply.
+  beat(now) {
+    const passed = now - (this.before ?? now);
     this.before = now;
     if (passed > 0 && passed < 1000) this.pace = 0.8 * (this.pace ?? 33) + 0.2 * passed;
-    if (this.pace > 70) this.share = Math.max(0.5, 0.9 * (this.share ?? 1));
-    else if (this.pace < 40) this.share = Math.min(1, 1.01 * (this.share ?? 1));
-    return this.share ?? 1;
+    if (this.pace > 70) this.share = Math.max(LEAST, 0.9 * this.share);
+    else if (this.pace < 40) this.share = Math.min(1, 1.01 * this.share);
   }
 
   // Every pixel of the floor is darkened once, however many links are above it.

@@ -1,5 +1,7 @@
 // The pad and the arrow keys: the robot is steered only while one of them is held.
 
+const REACH = 3.9;  // rem from the middle of the pad to the outermost place of the knob
+
 export class Steering {
   // What is held goes to the link, which repeats it: [speed, turn], or null.
   constructor(hold) {
@@ -9,6 +11,7 @@ export class Steering {
     this.keys = new Set();
     this.able = false;
     this.held = null;
+    this.released = () => {};
     this.listen();
   }
 
@@ -21,7 +24,9 @@ export class Steering {
   hold(speed, turn) {
     if (!this.able) return;
     this.held = [speed, turn];
-    this.knob.style.transform = `translate(${-4 * turn}rem, ${-4 * speed}rem)`;
+    // Both at full reach are in a corner: the knob stays in its circle.
+    const reach = REACH / Math.max(1, Math.hypot(speed, turn));
+    this.knob.style.transform = `translate(${-reach * turn}rem, ${-reach * speed}rem)`;
     this.send(this.held);
   }
 
@@ -31,6 +36,7 @@ export class Steering {
     this.knob.style.transform = '';
     if (this.held) this.send(null);
     this.held = null;
+    this.released();
   }
 
   listen() {

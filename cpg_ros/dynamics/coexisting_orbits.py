@@ -1,0 +1,237 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""All coexisting orbits of a gait: which there are, and which of them attract.
+
+At one parameter set a gait may have several periodic orbits, of which the one that Newton's method
+reaches first need not be the one on which the network settles. Orbits that attract within the
+gait's symmetry class are what simulations within it settle on; unstable ones lie on the branches
+of the class's Hopf points, or are reached by Newton's method when those known are deflated.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from cpg_ros.dynamics.branch_orbits import branch_orbits
+from cpg_ros.dynamics.equilibrium import NoEquilibrium
+from cpg_ros.dynamics.floquet import leading_within
+from cpg_ros.dynamics.hopf_point import first_hopf
+from cpg_ros.dynamics.orbit import NoOrbit, Orbit, solve_from_path, solve_orbit
+from cpg_ros.dynamics.periodic import check_values, richer
+from cpg_ros.dynamics.seek import find_orbit, Path, RANDOM, SIZES
+from cpg_ros.networks.network import Network
+from cpg_ros.short_repr import ShortRepr
+import numpy as np
+
+#: States at random from which a thorough search simulates.
+MORE_RANDOM = 37
+#: Orbits of periods this close, relative, whose waveforms have ranges this close, over the size,
+#: are one up to phase and the network's symmetry.
+SAME_PERIOD, SAME_LEVEL = 1e-6, 1e-4
+#: What a simulation settles on is a known orbit if period and waveforms agree so far.
+NEAR_PERIOD, NEAR_WAVEFORM = 5e-3, 0.02
+#: Starts of the deflated method: a known orbit about its mean, so much larger, so much slower.
+SCALED = ((0.5, 1.0), (1.5, 1.0), (0.8, 0.8), (1.2, 1.3))
+#: No more orbits of a gait are looked for than these.
+MOST = 24
+#: Points of a cycle at which waveforms are compared.
+POINTS = 120
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class CoexistingOrbits(ShortRepr):
+    """The orbits of a gait at one parameter set.
+
+    Attributes:
+        gait: one of the network's.
+        orbits: those that attract within the gait's class first, and of them that whose period is
+            nearest to the known one's first.
+        starts: number of states in the gait's class from which simulations were run.
+        hopf_points: number of Hopf points of its class whose branches were followed.
+        deflated: whether Newton's method was deflated about the orbits.
+
+    """
+
+    gait: str
+    orbits: tuple[Orbit, ...]
+    starts: int = 0
+    hopf_points: int = 0
+    deflated: bool = False
+
+    @property
+    def searched(self) -> str:
+        """What was searched, as 'searched from 15 starts and 2 Hopf points'; '' for nothing."""
+        counts = [f'{count} {what}{"" if count == 1 else "s"}' for count, what in (
+            (self.starts, 'start'), (self.hopf_points, 'Hopf point')) if count]
+        deflated = ', and by deflation' if self.deflated and self.orbits else ''
+        return f'searched from {" and ".join(counts)}{deflated}' if counts else ''
+
+    def _summary(self) -> str:
+        periods = ', '.join(f'{one.period:.7g}' for one in self.orbits)
+        return ', '.join(filter(None, (f'{self.gait}: {periods}', self.searched)))
+
+
+def coexisting_orbits(network: Network, gait: str, near: Orbit | None = None, *,
+                      starts: bool = True, everything: bool = True) -> CoexistingOrbits:
+    """Find the orbits that a gait has at one parameter set.
+
+    If the orbit that is reached first attracts within its class, only what is requested is
+    searched besides; otherwise everything is, except for branches without a delay.
+
+    Args:
+        network: parameters.
+        gait: one of the network's gaits.
+        near: a known orbit of the gait, from which to start and to whose period the one that
+            comes first is nearest.
+        starts: simulate from states in the gait's class.
+        everything: simulate from more states, follow the branches of the class's Hopf points and
+            deflate Newton's method about each orbit.
+
+    Raises:
+        InputError: an unknown gait, or parameters that are not finite or a delay not positive.
+        NoEquilibrium: a gait that no start is known for, of a network without equilibrium.
+        NoOrbit: none was found; the message says from how many starts and Hopf points.
+
+    """
+    check_values(network, gait)
+    search = _Search(network, gait)
+    why = search.reach(near)
+    if everything or (not search.starts and (starts or not search.attracting)):
+        search.simulate(MORE_RANDOM if everything else RANDOM)
+    if everything or not search.attracting:
+        # Without a delay branches take longer than anything else.
+        if everything or network.delay_parameter:
+            search.follow()
+        search.deflate()
+    found = search.result(near)
+    if not found.orbits:
+        below = _below_threshold(network, gait)
+        raise NoOrbit('; '.join(filter(None, (below or why, found.searched))))
+    return found
+
+
+class _Search:
+    """The orbits of a gait that are known so far, and what has been looked at."""
+
+    def __init__(self, network: Network, gait: str) -> None:
+        self.network, self.gait, self.symmetry = network, gait, network.symmetry(gait)
+        self.orbits: list[Orbit] = []
+        self._growth: list[float] = []
+        self.starts = self.hopf_points = 0
+        self.deflated = False
+
+    def reach(self, near: Orbit | None) -> str:
+        """Solve for one orbit; return why there is none, or ''."""
+        try:
+            self.add(solve_orbit(self.network, self.gait, near))
+        except NoOrbit as error:
+            if not self.network.delay_parameter:
+                # It has been left to settle from the usual starts.
+                self.starts = len(SIZES) + RANDOM
+            return str(error)
+        return ''
+
+    @property
+    def attracting(self) -> bool:
+        """Whether an orbit is known that attracts within its class."""
+        return any(growth < 1.0 for growth in self._growth)
+
+    def result(self, near: Orbit | None) -> CoexistingOrbits:
+        known = near or (self.orbits[0] if self.orbits else None)
+        order = sorted(range(len(self.orbits)), key=lambda k: (
+            self._growth[k] >= 1.0,
+            0.0 if known is None else abs(np.log(self.orbits[k].period / known.period))))
+        return CoexistingOrbits(self.gait, tuple(self.orbits[k] for k in order), self.starts,
+                                self.hopf_points, self.deflated)
+
+    def add(self, orbit: Orbit | None) -> bool:
+        """Add an orbit unless it is known or has more symmetry; tell whether it is new."""
+        if orbit is None or richer(orbit) or any(_same(orbit, one) for one in self.orbits):
+            return False
+        self.orbits.append(orbit)
+        self._growth.append(leading_within(orbit))
+        return True
+
+    def simulate(self, random: int) -> None:
+        """Let the network settle in the gait's class from many states."""
+        try:
+            for path, period in find_orbit(self.network, self.gait, random):
+                if len(self.orbits) < MOST and not any(
+                        _near(path, period, one) for one in self.orbits):
+                    self.add(solve_from_path(self.network, self.symmetry, path, period))
+        except NoEquilibrium:
+            # About which the starts would be.
+            return
+        self.starts = len(SIZES) + random
+
+    def follow(self) -> None:
+        """Follow the branches of the class's Hopf points to the parameters."""
+        for orbits in branch_orbits(self.network, self.gait):
+            self.hopf_points += 1
+            for orbit in orbits:
+                if len(self.orbits) < MOST:
+                    self.add(orbit)
+
+    def deflate(self) -> None:
+        """Deflate Newton's method about all known orbits until it finds no more."""
+        self.deflated = True
+        todo = list(self.orbits)
+        while todo:
+            orbit = todo.pop(0)
+            for path, period in _scaled(orbit):
+                found = solve_from_path(self.network, self.symmetry, path, period,
+                                        [one.period for one in self.orbits])
+                if len(self.orbits) < MOST and self.add(found):
+                    todo.append(self.orbits[-1])
+
+
+def _scaled(orbit: Orbit) -> Iterator[tuple[Path, float]]:
+    """Yield guesses about an orbit, states over times in cycles, and their periods."""
+    mean = orbit(np.arange(POINTS) / POINTS * orbit.period).mean(axis=0)
+    for size, slower in SCALED:
+        def path(theta: np.ndarray, size: float = size) -> np.ndarray:
+            return mean + size * (orbit(theta * orbit.period) - mean)
+
+        yield path, slower * orbit.period
+
+
+def _levels(orbit: Orbit) -> np.ndarray:
+    """Ranges of the waveforms in an order that no symmetry changes, shape (waves, 2 variables)."""
+    rows = orbit.levels.reshape(len(orbit.levels), -1)
+    return rows[np.lexsort(rows.round(6).T)]
+
+
+def _same(one: Orbit, other: Orbit) -> bool:
+    if abs(one.period / other.period - 1.0) > SAME_PERIOD:
+        return False
+    a, b = _levels(one), _levels(other)
+    return bool(np.abs(a - b).max() < SAME_LEVEL * np.abs(a).max())
+
+
+def _near(path: Path, period: float, orbit: Orbit) -> bool:
+    """Whether a simulation's cycle is a known orbit, so that it need not be solved for again."""
+    if abs(period / orbit.period - 1.0) > NEAR_PERIOD:
+        return False
+    theta = np.arange(POINTS) / POINTS
+    exact = orbit(theta * orbit.period)
+    return bool(np.abs(path(theta) - exact).max() < NEAR_WAVEFORM * np.ptp(exact))
+
+
+def _below_threshold(network: Network, gait: str) -> str:
+    """Say that a gait's critical delay is larger than the delay, or ''."""
+    point = first_hopf(network, gait) if network.delay_parameter else None
+    if point is None or point.value <= network.delay:
+        return ''
+    return (f"{network.delay_parameter} {network.delay:g} is below the {gait}'s critical delay "
+            f'{point.value:.4f}')

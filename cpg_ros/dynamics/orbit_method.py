@@ -1,0 +1,50 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The one place that chooses between the two ways to solve for orbits.
+
+Fourier collocation takes any delay, Gauss collocation on a mesh any steepness. Each is a folder
+with the same functions; what they solve for are orbits and curves that know what to do.
+"""
+
+from types import ModuleType
+from typing import NamedTuple
+
+from cpg_ros.dynamics.fourier import adjoint as fourier_adjoint
+from cpg_ros.dynamics.fourier import curve as fourier_curve
+from cpg_ros.dynamics.fourier import floquet as fourier_floquet
+from cpg_ros.dynamics.fourier import solve as fourier_solve
+from cpg_ros.dynamics.mesh import adjoint as mesh_adjoint
+from cpg_ros.dynamics.mesh import curve as mesh_curve
+from cpg_ros.dynamics.mesh import floquet as mesh_floquet
+from cpg_ros.dynamics.mesh import solve as mesh_solve
+from cpg_ros.networks.network import Network
+
+
+class OrbitMethod(NamedTuple):
+    """Modules with the same functions, which find, follow and judge orbits, and adjoints."""
+
+    solve: ModuleType
+    curve: ModuleType
+    floquet: ModuleType
+    adjoint: ModuleType
+
+
+FOURIER = OrbitMethod(fourier_solve, fourier_curve, fourier_floquet, fourier_adjoint)
+MESH = OrbitMethod(mesh_solve, mesh_curve, mesh_floquet, mesh_adjoint)
+
+
+def orbit_method(network: Network) -> OrbitMethod:
+    """Return how a network's orbits are found, followed and judged."""
+    return FOURIER if network.delay_parameter else MESH

@@ -1,0 +1,136 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Phase response curves: how far a small input to a variable of a cell shifts a gait's phase.
+
+After a small disturbance has decayed, a gait is ahead of or behind where it would have been. To
+first order the phase in cycles changes by ``Z(t) . dx``, where Z solves the adjoint of the
+variational equation along the orbit (Malkin; Ermentrout & Terman, *Mathematical Foundations of
+Neuroscience*, ch. 8), with a delay
+
+    Z'(t) = -A(t)' Z(t) - B(t + tau)' Z(t + tau),
+
+A and B the Jacobians by the states now and a delay ago, and is T-periodic (Kotani et al., Phys.
+Rev. Lett. 109, 2012; Novicenko & Pyragas, Physica D 241, 2012). It is normalised by
+
+    Z(t) . x'(t) + integral of Z(t + s + tau)' B(t + s + tau) x'(t + s) ds, -tau < s < 0, = 1/T.
+
+Z has the symmetry of the gait: each cell has the waveform of its wave at its phase. So a symmetry
+lock, which acts on what lacks that symmetry only, does not change it.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from cpg_ros.dynamics.orbit_method import orbit_method
+from cpg_ros.dynamics.periodic import Orbit, Waveforms
+from cpg_ros.networks.field import Field
+from cpg_ros.short_repr import ShortRepr
+import numpy as np
+from numpy.polynomial import legendre
+
+#: Gauss points of a panel of the integral over the history, and panels of a cycle.
+_PLACES, _WEIGHTS = legendre.leggauss(12)
+PANELS = 24
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class PhaseResponse(ShortRepr):
+    """The infinitesimal phase response curves of an orbit.
+
+    Called with times it gives the cycles by which a unit of each variable, added to it at once,
+    advances the phase.
+
+    Attributes:
+        orbit: whose phase is shifted.
+        waveform: the curve of a wave and a variable over theta in cycles, as an orbit's waveforms:
+            cell i's is that of its wave at ``t/T + phi_i``.
+
+    """
+
+    orbit: Orbit
+    waveform: Waveforms
+
+    def _summary(self) -> str:
+        return f'phase response of {self.orbit!r}'
+
+    def __call__(self, times: np.ndarray) -> np.ndarray:
+        """Return the responses at model times, cell 1 peaking at 0.
+
+        Returns:
+            Cycles per unit, shape times.shape + (cells, variables).
+
+        """
+        orbit = self.orbit
+        theta = np.asarray(times, dtype=float)[..., None] / orbit.period + orbit.phases
+        out = np.empty((*theta.shape, orbit.network.variables))
+        for wave in range(int(orbit.waves.max()) + 1):
+            cells = np.flatnonzero(orbit.waves == wave)
+            for variable in range(orbit.network.variables):
+                out[..., cells, variable] = self.waveform(theta[..., cells], wave, variable)
+        return out
+
+    def remembered(self, times: np.ndarray) -> np.ndarray:
+        """Return the responses to what a delay later is made of the states at model times.
+
+        A change of the history alone, ``dx(t + s)`` for -tau < s < 0, shifts the phase by the
+        integral over it of these times dx; all 0 without a delay.
+
+        Returns:
+            Cycles per unit and model time, shape times.shape + (cells, variables).
+
+        """
+        orbit, network = self.orbit, self.orbit.network
+        times = np.asarray(times, dtype=float)
+        later = times + network.delay
+        by_past = Field(network).linearised(orbit(later), orbit(times))[2]
+        shape = (*times.shape, network.cells, network.variables)
+        if not by_past.size:
+            return np.zeros(shape)
+        flat = self(later).swapaxes(-1, -2).reshape(*times.shape, network.components)
+        heard = np.einsum('...i,...ij->...j', flat, by_past)
+        return heard.reshape(*times.shape, network.variables, network.cells).swapaxes(-1, -2)
+
+    def shift(self, time: float, motion: Callable[[np.ndarray], np.ndarray]) -> float:
+        """Return by how many cycles a motion added to state and history advances the phase.
+
+        Args:
+            time: of the newest state, model time from a peak of cell 1 on.
+            motion: of model times up to 0, that of the newest state, shape (n,), to what is added,
+                shape (n, components); small, and smooth.
+
+        """
+        network, tau = self.orbit.network, self.orbit.network.delay
+        panels = int(np.ceil(PANELS * tau / self.orbit.period))
+        ends = -tau * np.arange(panels + 1) / max(panels, 1)
+        times = (0.5 * (ends[:-1] + ends[1:])[:, None] + 0.5 * tau / max(panels, 1) * _PLACES)
+        times = np.append(times.ravel(), 0.0)
+        weights = np.append(np.tile(0.5 * tau / max(panels, 1) * _WEIGHTS, panels), 1.0)
+        kernel = np.concatenate([self.remembered(time + times[:-1]),
+                                 self(np.array([time]))])
+        added = motion(times).reshape(-1, network.variables, network.cells).swapaxes(1, 2)
+        return float(weights @ (kernel * added).sum(axis=(1, 2)))
+
+
+def phase_response(orbit: Orbit) -> PhaseResponse:
+    """Solve for the phase response curves of an orbit.
+
+    Args:
+        orbit: of any network, stable or not.
+
+    Raises:
+        NoOrbit: the orbit is not isolated, as at a fold, or its response is too steep.
+
+    """
+    return PhaseResponse(orbit, orbit_method(orbit.network).adjoint.adjoint(orbit))

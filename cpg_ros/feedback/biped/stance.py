@@ -1,0 +1,114 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Force of the legs that stand: height, attitude, centre of pressure within the soles.
+
+One force and one moment are wanted of the ground. Its horizontal part points from the centre of
+pressure to the centre of mass, which turns nothing; what is to turn the body is added. The legs
+share it, and each leg's joints get J' F.
+"""
+
+import math
+
+from cpg_ros.feedback.kinematics import GRAVITY
+from cpg_ros.feedback.law import Gain
+from cpg_ros.integration.jit import jit
+
+GAINS = {
+    'height': Gain(0.647, 3.0, 'm', 'of the centre of mass over the soles'),
+    'height_kp': Gain(4186.0, 5e4, 'N/m', 'upward force by the height'),
+    'height_kd': Gain(246.0, 5e3, 'N s/m', 'the same by its rate'),
+    'roll_kp': Gain(59.8, 5e3, 'N m/rad', 'moment by roll'),
+    'roll_kd': Gain(35.7, 500.0, 'N m s/rad', 'the same by its rate'),
+    'pitch_kp': Gain(207.6, 5e3, 'N m/rad', 'moment by pitch'),
+    'pitch_kd': Gain(15.5, 500.0, 'N m s/rad', 'the same by its rate'),
+    'yaw_kp': Gain(121.4, 5e3, 'N m/rad', 'moment by the heading'),
+    'yaw_kd': Gain(18.7, 500.0, 'N m s/rad', 'the same by its rate'),
+    'lean': Gain(0.0662, 0.5, 'rad', 'pitch that the base is to have, positive forward'),
+    'pressure_x': Gain(2.60, 10.0, '', "centre of pressure's shift by the capture point's error"),
+    'pressure_y': Gain(0.769, 10.0, '', 'the same sideways'),
+    'pressure_reach_x': Gain(0.0566, 0.3, 'm', 'its largest shift from the middle of a sole'),
+    'pressure_reach_y': Gain(0.0247, 0.3, 'm', 'the same sideways'),
+    'stand': Gain(2.5, 10.0, '', 'centre of pressure by the capture point while standing'),
+    'stance_damping': Gain(1.63, 20.0, 'N m s/rad', 'of the joints of a leg that stands'),
+    'reaction': Gain(0.0032, 1.5, '', "share of the swing leg's moment that the stance leg gives"),
+    'reaction_yaw': Gain(0.684, 1.5, '', 'the same about the vertical'),
+    'friction': Gain(0.55, 2.0, '', 'largest horizontal force by the upward one'),
+    'twist': Gain(14.0, 200.0, 'N m', 'largest moment about the vertical')}
+#: Least and most upward force by the weight.
+LEAST, MOST = 0.3, 1.8
+
+
+@jit
+def pressure_shift(error, half, gains):
+    """Return the centre of pressure's shift in the sole's axes, m.
+
+    Args:
+        error: of the capture point, forward and left, m.
+        half: half the length and width of a sole, m.
+        gains: BipedGains.
+
+    """
+    reach_x = min(gains.pressure_reach_x, half[0])
+    reach_y = min(gains.pressure_reach_y, half[1])
+    return (min(max(gains.pressure_x * error[0], -reach_x), reach_x),
+            min(max(gains.pressure_y * error[1], -reach_y), reach_y))
+
+
+@jit
+def ground_force(center, velocity, pressure, level, mass, moment, gains):
+    """Return the force that the ground is to exert, N.
+
+    Args:
+        center: of mass, m.
+        velocity: of it, m/s.
+        pressure: centre of it, m.
+        level: height of the soles that bear, m.
+        mass: of the robot, kg.
+        moment: that is to turn the body, about x and y, N m.
+        gains: BipedGains.
+
+    """
+    weight = mass * GRAVITY
+    up = (weight + gains.height_kp * (gains.height - (center[2] - level))
+          - gains.height_kd * velocity[2])
+    up = min(max(up, LEAST * weight), MOST * weight)
+    arm = max(center[2] - pressure[2], 0.3)
+    x = ((center[0] - pressure[0]) * up - moment[1]) / arm
+    y = ((center[1] - pressure[1]) * up + moment[0]) / arm
+    size, most = math.sqrt(x * x + y * y), gains.friction * up
+    if size > most:
+        x, y = x * most / size, y * most / size
+    return x, y, up
+
+
+@jit
+def attitude_moment(rpy, turning, heading_error, reaction, gains):
+    """Return the moment about the world's axes that is to right the body, N m.
+
+    Args:
+        rpy: of the base, rad.
+        turning: angular velocity, world's axes, rad/s.
+        heading_error: rad.
+        reaction: moment that the leg that swings takes, N m, (3,).
+        gains: BipedGains.
+
+    """
+    about_x, about_y = -gains.roll_kp * rpy[0], -gains.pitch_kp * (rpy[1] - gains.lean)
+    c, s = math.cos(rpy[2]), math.sin(rpy[2])
+    about_z = (gains.yaw_kp * heading_error - gains.yaw_kd * turning[2]
+               + gains.reaction_yaw * reaction[2])
+    return (c * about_x - s * about_y - gains.roll_kd * turning[0] + gains.reaction * reaction[0],
+            s * about_x + c * about_y - gains.pitch_kd * turning[1] + gains.reaction * reaction[1],
+            min(max(about_z, -gains.twist), gains.twist))

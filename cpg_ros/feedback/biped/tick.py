@@ -1,0 +1,222 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""One tick of a biped's feedback, compiled: from sensors and the clock to joint torques."""
+
+import math
+
+from cpg_ros.feedback.biped import clock, placement, stance, swing, velocity
+from cpg_ros.feedback.biped.links import (
+    add_torques,
+    carry,
+    center_velocity,
+    gravity_torque,
+    place,
+    sole_velocity,
+)
+from cpg_ros.feedback.biped.memory import SHIFT, WALK
+from cpg_ros.feedback.kinematics import cross, GRAVITY, wrapped
+from cpg_ros.integration.jit import entry, jit
+
+#: Share of the load that each foot keeps while standing.
+KEPT = 0.02
+
+
+@jit
+def _side(leg):
+    return 1.0 - 2.0 * leg
+
+
+@jit
+def _sense(links, gains, memory, sensors, dt):
+    """Fill pose, velocities and loads from what is measured."""
+    pose, rates, weight = memory.pose, sensors.joint_velocities[0], GRAVITY
+    place(links, sensors.rpy[0], sensors.joint_positions[0], pose)
+    weight *= pose.carried[0]
+    for k in range(3):
+        memory.turning[k] = carry(pose.turns[0], sensors.angular_velocity[0], k)
+        memory.center[0, k] = pose.moments[0, k] / pose.carried[0]
+    for leg in range(2):
+        memory.loads[leg] = max(sensors.foot_forces[0, leg], 0.0) / weight
+        sole_velocity(links, pose, leg, memory.turning, rates, memory.soles[leg])
+    velocity.update(pose.turns[0], sensors.acceleration[0], memory.soles, memory.loads, dt,
+                    gains, memory.base)
+    center_velocity(pose, memory.turning, rates, memory.center[1])
+    for k in range(3):
+        memory.center[1, k] += memory.base[k]
+
+
+@jit
+def _approach(gains, memory, command, dt):
+    """Approach the wanted velocity and heading; command as of tick."""
+    wanted, most = memory.wanted, gains.acceleration * dt
+    for k in range(2):
+        wanted[k] += min(max(command[k] - wanted[k], -most), most)
+    memory.heading[0] += command[2] * dt
+
+
+@jit
+def _follow_clock(gains, memory):
+    """Let legs lift off and land by their phases, and early by the load on them."""
+    soles, swing_share = memory.pose.soles, clock.swing_share(gains)
+    memory.clock[1] = 0.0
+    for leg in range(2):
+        phase = memory.phases[leg]
+        if phase < swing_share and not memory.swinging[leg]:
+            memory.swinging[leg], memory.landed[leg] = True, False
+            for k in range(3):
+                memory.lift_off[leg, k] = soles[leg, k] - soles[1 - leg, k]
+        if phase >= swing_share and memory.swinging[leg]:
+            memory.swinging[leg] = memory.landed[leg] = False
+        if (memory.swinging[leg] and not memory.landed[leg] and phase > clock.LATE * swing_share
+                and memory.loads[leg] > gains.touchdown):
+            memory.landed[leg] = True
+            memory.clock[1] = max(memory.clock[1], swing_share - phase)
+    clock.load_shares(memory.phases, memory.landed, gains, memory.shares)
+
+
+@jit
+def _step(gains, memory, xi, axes, rate):
+    """Fill the capture point's error, the clock's factor and the target of a swinging foot."""
+    soles, phases, (c, s) = memory.pose.soles, memory.phases, axes
+    stands = 0 if memory.shares[0] > memory.shares[1] else 1
+    swings = 1 - stands
+    x, y = xi[0] - soles[stands, 0], xi[1] - soles[stands, 1]
+    wanted = (memory.wanted[0] + gains.speed_integral * memory.integral[0], memory.wanted[1])
+    error = placement.capture_error(
+        (c * x + s * y, c * y - s * x), _side(swings), clock.time_in_step(phases[swings], gains),
+        rate, wanted, gains)
+    memory.error[0], memory.error[1] = error
+    for leg in range(2):
+        if memory.swinging[leg]:
+            if leg == stands:
+                continue
+            memory.clock[0] = placement.speed_up(error, gains)
+            forward, left = placement.step(
+                error, _side(leg), placement.time_to_touchdown(phases[leg], gains), rate, wanted,
+                gains)
+            memory.target[leg, 0] = c * forward - s * left
+            memory.target[leg, 1] = s * forward + c * left
+            memory.target[leg, 2] = 0.0
+
+
+@jit
+def _stand(gains, memory, xi, axes, rate, shifted):
+    """Fill the legs' shares of the weight, and the error of the capture point forward."""
+    soles, (c, s) = memory.pose.soles, axes
+    left = c * soles[0, 1] - s * soles[0, 0]
+    right = c * soles[1, 1] - s * soles[1, 0]
+    _, inward, _ = placement.offsets(0.0, 0.0, rate, gains)
+    middle = 0.5 * (left + right)
+    goal, now = middle + shifted * (right + inward - middle), -s * xi[0] + c * xi[1]
+    pressure = now + (gains.stand - 1.0) * (now - goal)
+    memory.shares[0] = min(max((pressure - right) / (left - right), KEPT), 1.0 - KEPT)
+    memory.shares[1] = 1.0 - memory.shares[0]
+    ahead = 0.5 * (c * (soles[0, 0] + soles[1, 0]) + s * (soles[0, 1] + soles[1, 1]))
+    memory.error[0], memory.error[1] = c * xi[0] + s * xi[1] - ahead, 0.0
+
+
+@jit
+def _bear(links, gains, memory, sensors, shift):
+    """Fill the torques of the legs that stand; shift of the centre of pressure in soles, m."""
+    pose, shares = memory.pose, memory.shares
+    turns = (pose.turns[links.chains[0, -1]], pose.turns[links.chains[1, -1]])
+    first, second = pose.soles[0], pose.soles[1]
+    points = ((first[0] + carry(turns[0], shift, 0), first[1] + carry(turns[0], shift, 1),
+               first[2] + carry(turns[0], shift, 2)),
+              (second[0] + carry(turns[1], shift, 0), second[1] + carry(turns[1], shift, 1),
+               second[2] + carry(turns[1], shift, 2)))
+    a, b = shares[0], shares[1]
+    pressure = (a * points[0][0] + b * points[1][0], a * points[0][1] + b * points[1][1],
+                a * points[0][2] + b * points[1][2])
+    moment = stance.attitude_moment(sensors.rpy[0], memory.turning,
+                                    wrapped(memory.heading[0] - sensors.rpy[0, 2]),
+                                    memory.reaction, gains)
+    force = stance.ground_force(memory.center[0], memory.center[1], pressure,
+                                a * first[2] + b * second[2], pose.carried[0], moment, gains)
+    for leg in range(2):
+        torque, bears = memory.torque[leg], shares[leg] > 0.0
+        damping = gains.stance_damping * (1.0 if bears else swing.SWUNG)
+        for k in range(torque.size):
+            row = links.chains[leg, k]
+            torque[k] = (gravity_torque(pose, row)
+                         - damping * sensors.joint_velocities[0, row - 1])
+        if bears:
+            share = -shares[leg]
+            add_torques(links, pose, leg, points[leg],
+                        (share * force[0], share * force[1], share * force[2]),
+                        (0.0, 0.0, share * moment[2]), torque)
+
+
+@jit
+def _swing(links, gains, memory, leg):
+    """Add the torques of a leg that swings, and fill the moment that it takes."""
+    pose, other, way = memory.pose, 1 - leg, memory.path
+    duration = clock.swing_share(gains) / gains.frequency
+    share = min(max(memory.phases[leg] / clock.swing_share(gains), 0.0), 1.0)
+    swing.path(share, duration, memory.lift_off[leg], memory.target[leg], gains, way)
+    foot, still, moving = pose.soles[leg], pose.soles[other], memory.soles[leg]
+    for k in range(3):
+        way[0, k] += still[k]
+    now = (moving[0] + memory.base[0], moving[1] + memory.base[1], moving[2] + memory.base[2])
+    strength = swing.LANDED if memory.landed[leg] else 1.0
+    x, y, z = swing.foot_force(way, foot, now, gains)
+    force = (strength * x, strength * y, strength * z)
+    x, y, z = swing.level_moment(pose.turns[links.chains[leg, -1]], memory.heading[0],
+                                 moving[3:], gains)
+    moment = (strength * x, strength * y, strength * z)
+    add_torques(links, pose, leg, foot, force, moment, memory.torque[leg])
+    center = memory.center[0]
+    taken = cross((foot[0] - center[0], foot[1] - center[1], foot[2] - center[2]), force)
+    for k in range(3):
+        memory.reaction[k] += taken[k] + moment[k]
+
+
+@entry
+def tick(links, gains, memory, sensors, command, mode, step):
+    """Fill the memory's torques, and what the clock is to do.
+
+    Args:
+        links: Links of the robot.
+        gains: BipedGains.
+        memory: BipedMemory, changed in place; its phases are those of the legs now.
+        sensors: SensorData of one run, joints in the order of the links.
+        command: velocity forward and left, m/s, and rate of turning, rad/s, shape (3,).
+        mode: STAND, SHIFT or WALK.
+        step: time since the last tick, s, and the share of the weight's shift that is done.
+
+    """
+    dt, shifted = step
+    _sense(links, gains, memory, sensors, dt)
+    soles, center = memory.pose.soles, memory.center
+    rate = placement.growth_rate(center[0, 2] - min(soles[0, 2], soles[1, 2]))
+    xi = (center[0, 0] + center[1, 0] / rate, center[0, 1] + center[1, 1] / rate)
+    axes = (math.cos(memory.heading[0]), math.sin(memory.heading[0]))
+    if mode == WALK:
+        _approach(gains, memory, command, dt)
+        _follow_clock(gains, memory)
+        _step(gains, memory, xi, axes, rate)
+        ahead = axes[0] * center[1, 0] + axes[1] * center[1, 1]
+        memory.integral[0] = placement.integrate(memory.integral[0], memory.wanted[0] - ahead, dt)
+        shift = stance.pressure_shift(memory.error, links.half, gains)
+    else:
+        _stand(gains, memory, xi, axes, rate, shifted if mode == SHIFT else 0.0)
+        reach = links.half[0]
+        shift = (min(max(gains.stand * memory.error[0], -reach), reach), 0.0)
+        memory.swinging[:] = False
+    _bear(links, gains, memory, sensors, (shift[0], shift[1], 0.0))
+    memory.reaction[:] = 0.0
+    for leg in range(2):
+        if memory.swinging[leg]:
+            _swing(links, gains, memory, leg)

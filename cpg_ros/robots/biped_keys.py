@@ -1,0 +1,151 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""A biped in a robot file, part ``biped``: links and their masses, soles, servos, gains.
+
+A link is what one joint moves. Places are those with all joints at 0, in the frame of the base (x
+forward, y left, z up), so that no link needs a frame of its own.
+"""
+
+from collections.abc import Collection, Mapping
+from dataclasses import asdict, dataclass, field
+from typing import Any
+
+from cpg_ros.files.yaml_reader import YamlReader
+from cpg_ros.short_repr import ShortRepr
+import numpy as np
+
+BASE = 'base'
+NUMBERS = ('mass', 'kp', 'kd', 'effort', 'armature')
+
+
+@dataclass(frozen=True)
+class BipedLink:
+    """A joint, the link that it moves, and the servo that drives it.
+
+    Attributes:
+        parent: joint that moves the link before, or BASE.
+        axis: of the joint, a unit vector.
+        anchor: a point on the axis, m.
+        mass: of the link, kg.
+        center: of that mass, m.
+        kp: proportional gain of the servo, N m / rad.
+        kd: its damping, N m s / rad.
+        effort: the most it can, N m.
+        armature: inertia of its rotor at the joint, kg m^2.
+        angle: where a joint that is no leg's is held, rad; None of the legs' joints.
+
+    """
+
+    parent: str
+    axis: tuple[float, ...]
+    anchor: tuple[float, ...]
+    mass: float
+    center: tuple[float, ...]
+    kp: float
+    kd: float
+    effort: float
+    armature: float = 0.0
+    angle: float | None = None
+
+
+@dataclass(frozen=True, repr=False)
+class BipedBody(ShortRepr):
+    """Links of a biped with soles, parents before children.
+
+    Attributes:
+        mass: of the base, kg.
+        center: of that mass, m.
+        links: by the names of their joints.
+        soles: middle of each leg's sole, m, by leg.
+        sole_size: length and width of a sole, m.
+        gains: of the feedback where they are not the usual ones, by name.
+
+    """
+
+    mass: float
+    center: tuple[float, ...]
+    links: dict[str, BipedLink]
+    soles: dict[str, tuple[float, ...]]
+    sole_size: tuple[float, ...]
+    gains: dict[str, float] = field(default_factory=dict)
+
+    @property
+    def held(self) -> dict[str, float]:
+        """Joints that are held, and where, rad."""
+        return {name: link.angle for name, link in self.links.items() if link.angle is not None}
+
+
+def read_biped(reader: YamlReader, tree: Any, legs: Mapping[str, Collection[str]]) -> BipedBody:
+    """Take the part ``biped``; legs are those of the file with the names of their joints."""
+    tree = reader.keys(tree, 'biped', {'base', 'links', 'soles', 'sole_size'}, {'gains'})
+    base = reader.keys(tree['base'], 'biped.base', {'mass', 'center'})
+    driven = {name for names in legs.values() for name in names}
+    links: dict[str, BipedLink] = {}
+    listed = reader.keys(tree['links'], 'biped.links', driven, set(tree['links'])
+                         if isinstance(tree['links'], Mapping) else set())
+    for name in listed:
+        links[name] = _link(reader, listed[name], f'biped.links.{name}', links, name in driven)
+    soles = reader.keys(tree['soles'], 'biped.soles', set(legs))
+    size = reader.numbers(tree['sole_size'], 'biped.sole_size', 2)
+    for k, value in enumerate(size):
+        _positive(reader, value, f'biped.sole_size[{k}]')
+    gains = tree.get('gains', {})
+    gains = reader.keys(gains, 'biped.gains', set(), set(gains))
+    return BipedBody(
+        _positive(reader, base['mass'], 'biped.base.mass'),
+        reader.numbers(base['center'], 'biped.base.center', 3), links,
+        {leg: reader.numbers(soles[leg], f'biped.soles.{leg}', 3) for leg in legs}, size,
+        {name: reader.number(value, f'biped.gains.{name}') for name, value in gains.items()})
+
+
+def _positive(reader: YamlReader, value: Any, where: str) -> float:
+    number = reader.number(value, where)
+    if number <= 0.0:
+        raise reader.fail(where, f'{number:g} must be positive')
+    return number
+
+
+def _link(reader: YamlReader, tree: Any, where: str, before: Collection[str], driven: bool
+          ) -> BipedLink:
+    places = ('axis', 'anchor', 'center')
+    tree = reader.keys(tree, where, {'parent', *places, *NUMBERS[:4]}
+                       | (set() if driven else {'angle'}), {'armature'})
+    parent = reader.text(tree['parent'], f'{where}.parent')
+    if parent != BASE and parent not in before:
+        raise reader.fail(f'{where}.parent', f"'{parent}' is neither {BASE} nor a link before")
+    axis, anchor, center = (reader.numbers(tree[key], f'{where}.{key}', 3) for key in places)
+    length = float(np.linalg.norm(axis))
+    if abs(length - 1.0) > 1e-3:
+        raise reader.fail(f'{where}.axis', f'has the length {length:g}, not 1')
+    mass, kp, kd, effort, armature = (reader.number(tree.get(key, 0.0), f'{where}.{key}')
+                                      for key in NUMBERS)
+    for key, value in zip(NUMBERS, (mass, kp, kd, effort, armature), strict=True):
+        if value < 0.0 or (value == 0.0 and key in ('kp', 'effort')):
+            raise reader.fail(f'{where}.{key}', f'{value:g} must be '
+                              + ('positive' if key in ('kp', 'effort') else 'at least 0'))
+    angle = None if driven else reader.number(tree['angle'], f'{where}.angle')
+    return BipedLink(parent, tuple(value / length for value in axis), anchor, mass, center, kp, kd,
+                effort, armature, angle)
+
+
+def biped_tree(biped: BipedBody) -> dict[str, Any]:
+    """Return a biped as the tree that read_biped takes."""
+    links = {name: {key: list(value) if isinstance(value, tuple) else value
+                    for key, value in asdict(link).items() if value is not None}
+             for name, link in biped.links.items()}
+    tree = {'base': {'mass': biped.mass, 'center': list(biped.center)}, 'links': links,
+            'soles': {leg: list(place) for leg, place in biped.soles.items()},
+            'sole_size': list(biped.sole_size)}
+    return tree | ({'gains': dict(biped.gains)} if biped.gains else {})

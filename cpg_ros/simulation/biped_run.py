@@ -1,0 +1,156 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""A biped with its feedback in the simulation: commands and pushes in, how it went out."""
+
+from dataclasses import dataclass, field
+import math
+
+from cpg_ros.feedback.biped.feedback import BipedFeedback
+from cpg_ros.feedback.estimate import SensorData
+from cpg_ros.feedback.kinematics import GRAVITY
+from cpg_ros.robots.robot import Robot
+from cpg_ros.short_repr import ShortRepr
+from cpg_ros.simulation.body import Body
+from cpg_ros.simulation.proprioception import fill_sensor_data, NoisySenses
+from cpg_ros.simulation.scenario import PUSH, SensorNoise
+from cpg_ros.simulation.terrain import set_friction
+import numpy as np
+
+#: A robot has fallen whose centre of mass is lower than this share of its height.
+LOW = 0.6
+#: Start of what is measured after the first step, s.
+SETTLING = 3.0
+
+
+@dataclass(eq=False, repr=False)
+class BipedOutcome(ShortRepr):
+    """How a biped's run went.
+
+    Attributes:
+        fell: when it fell, s, infinite if it did not.
+        speed: mean velocity forward and left, heading's axes, m/s, after SETTLING.
+        tilt: largest angle of the base to the vertical, rad.
+        steps: touchdowns by the clock.
+        cost: of transport: mechanical work, taken positive, by weight and way.
+        path: time, place of the base (x y z) and its yaw, every 10 ms, shape (n, 5).
+        poses: all of ``qpos`` at these times, shape (n, ...), as ``camera.shoot`` takes it.
+
+    """
+
+    fell: float = math.inf
+    speed: tuple[float, float] = (0.0, 0.0)
+    tilt: float = 0.0
+    steps: int = 0
+    cost: float = math.inf
+    path: np.ndarray = field(default_factory=lambda: np.zeros((0, 5)))
+    poses: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
+
+
+class BipedRun:
+    """One simulated biped whose servos follow its feedback at every step of the physics."""
+
+    def __init__(self, model: str, robot: Robot, noise: SensorNoise | None = None,
+                 friction: float = 0.6, timestep: float = 0.002) -> None:
+        """Load the model.
+
+        Args:
+            model: as of ``robot_model.load``.
+            robot: whose file has the part ``biped``.
+            noise: of the sensors; none if not given.
+            friction: between feet and ground.
+            timestep: of physics and feedback, s.
+
+        """
+        self.body = Body(model, robot, timestep=timestep)
+        self.robot, self.noise, self.dt = robot, noise or SensorNoise(), timestep
+        set_friction(self.body.model, friction)
+        biped = robot.biped
+        order = list(biped.links) if biped is not None else []
+        joints = [self.body.model.joint(name).id for name in order]
+        self._angles = self.body.model.jnt_qposadr[joints]
+        self._speeds = self.body.model.jnt_dofadr[joints]
+        self.senses = SensorData.zeros(1, 2, len(order))
+        self._velocity = np.zeros((1, 3))
+
+    def measure(self, before: np.ndarray) -> SensorData:
+        """Return what is true now; before is the base's motion a step ago, shape (1, 6)."""
+        body, senses = self.body, self.senses
+        senses.joint_positions[0] = body.data.qpos[self._angles]
+        senses.joint_velocities[0] = body.data.qvel[self._speeds]
+        senses.foot_forces[0] = body.feet
+        fill_sensor_data(senses, body.quaternion[None], body.rates[None], before, self.dt,
+                         self._velocity)
+        return senses
+
+    def run(self, duration: float, commands: tuple[tuple[float, float, float, float], ...] = (),
+            pushes: tuple[tuple[float, float, float], ...] = (),
+            feedback: BipedFeedback | None = None, seed: int = 0) -> BipedOutcome:
+        """Stand up and follow commands.
+
+        Args:
+            duration: s.
+            commands: each (s, m/s forward, m/s left, rad/s); with NaN as a speed it stands.
+            pushes: each (s, N forward, N left) on the base for PUSH seconds.
+            feedback: of the robot, not used before; one with its own gains if not given.
+            seed: of the noise.
+
+        """
+        body, dt = self.body, self.dt
+        body.reset()
+        feedback = feedback or BipedFeedback(self.robot)
+        senses = NoisySenses(SensorNoise(**{**vars(self.noise), 'seed': seed}), 1, 2, dt)
+        before, outcome = body.rates[None].copy(), BipedOutcome()
+        path, poses, work, moved, count, began = [], [], 0.0, np.zeros(2), 0, math.inf
+        wishes, forces = sorted(commands), sorted(pushes)
+        was = feedback.memory.swinging.copy()
+        for k in range(round(duration / dt)):
+            time = k * dt
+            while wishes and wishes[0][0] <= time:
+                _, forward, left, turn = wishes.pop(0)
+                if math.isnan(forward):
+                    feedback.stand()
+                else:
+                    feedback.walk(forward, left, turn)
+                    began = min(began, time)
+            while forces and forces[0][0] <= time:
+                body.push(np.array([*forces.pop(0)[1:], 0.0]), PUSH)
+            true = self.measure(before)
+            before[0] = body.rates
+            body.command(feedback.advance(senses(true), dt))
+            body.step()
+            outcome.steps += int((was & ~feedback.memory.swinging).sum())
+            was[:] = feedback.memory.swinging
+            up = body.axes[2, 2]
+            outcome.tilt = max(outcome.tilt, math.acos(min(max(up, -1.0), 1.0)))
+            work += float(np.abs(body.torque * body.velocity).sum()) * dt
+            if time > began + SETTLING:
+                c, s = math.cos(feedback.memory.heading[0]), math.sin(feedback.memory.heading[0])
+                x, y = body.rates[:2]
+                moved += c * x + s * y, c * y - s * x
+                count += 1
+            if k % round(0.01 / dt) == 0:
+                path.append((time, *body.base, body.yaw))
+                poses.append(body.data.qpos.copy())
+            height = feedback.memory.center[0, 2] - feedback.memory.pose.soles[:, 2].min()
+            if body.fallen or height < LOW * feedback.gains.height:
+                outcome.fell = time
+                break
+        outcome.path, outcome.poses = np.array(path), np.array(poses)
+        if count:
+            outcome.speed = float(moved[0] / count), float(moved[1] / count)
+        way = float(np.linalg.norm(outcome.path[-1, 1:3] - outcome.path[0, 1:3]))
+        if way > 0.5:
+            outcome.cost = work / (body.mass * GRAVITY * way)
+        return outcome

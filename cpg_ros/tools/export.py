@@ -1,0 +1,205 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Executable ``export``: gaits of a robot as C, for microcontrollers and anything without Python.
+
+``export --robot my_robot.yaml --network delayed --gaits trot walk --out gait/`` writes the
+network, its readout and the switching between gaits as C99, and a test against the generator.
+"""
+
+import argparse
+from collections.abc import Sequence
+from dataclasses import replace
+import math
+from pathlib import Path
+import sys
+
+from cpg_ros.errors import CpgError, InputError
+from cpg_ros.export.c_project import CProject, SUBSTEP
+from cpg_ros.export.fixed_point import FixedData, FixedProject
+from cpg_ros.export.gait_data import CFormat, GaitData
+from cpg_ros.export.golden import golden_of
+from cpg_ros.export.petoi import skills
+from cpg_ros.export.readme import readme
+from cpg_ros.files.atomic_write import write_atomically
+from cpg_ros.files.plain_text import table
+from cpg_ros.motion.plan import GaitPlan, plan, PlanError
+from cpg_ros.networks.registry import find_network
+from cpg_ros.robots.robot_file import load_robot
+from cpg_ros.tools.arguments import number, refuse_repeated
+from cpg_ros.tools.command_line import note, Parser, run, say
+
+DESCRIPTION = """\
+Write gaits of a robot as C99 without dependencies: the network's equations, or the orbits of its
+gaits as tables; the joints' readout, cross-fades between gaits, the ramp and all limits as in the
+generator. With it come a test with golden vectors of the Python generator, and a README."""
+EPILOG = """\
+example: cpg export --robot quadruped --network delayed --gaits trot walk --out gait/
+         cc -std=c99 gait/*.c -lm -o test_cpg && ./test_cpg
+
+exit codes: 0 written, 1 a gait cannot run on the robot, 2 invalid arguments."""
+#: By which tables may differ from what they are of, over its half range.
+TOLERANCES = {'float32': 1e-4, 'float64': 1e-9}
+MOST_STEPS = 2000
+
+
+def _parser() -> Parser:
+    parser = Parser(prog='export', description=DESCRIPTION, epilog=EPILOG)
+    parser.add_argument('--robot', required=True, metavar='FILE',
+                        help='robot file, or the name of a shipped one')
+    parser.add_argument('--network', metavar='NAME', help="network, or the path of a Python file "
+                        "that defines one (default: the robot's first)")
+    parser.add_argument('--gaits', nargs='+', metavar='GAIT', help='gaits or presets of the '
+                        "network, the first one at the start (default: the network's usual gait)")
+    parser.add_argument('--target', choices=('c99', 'arduino', 'petoi'), default='c99',
+                        help='plain files, an Arduino library with an example sketch, or skill '
+                        "arrays of Petoi's OpenCat (default: %(default)s)")
+    parser.add_argument('--form', choices=('network', 'table'), default='network',
+                        help="the network's equations, or the gaits' orbits alone, as tables, for "
+                        'the smallest boards (default: %(default)s)')
+    parser.add_argument('--real', choices=('float32', 'float64', 'fixed'), default='float32',
+                        help='type of all numbers; fixed, with --form table, has whole numbers '
+                        'for processors of 8 bits (default: %(default)s)')
+    parser.add_argument('--step', type=number, metavar='T', help="model time per step (default: "
+                        "the network's own); a longer one saves time and, with a delay, memory")
+    parser.add_argument('--substep', type=number, metavar='S',
+                        help='longest part of a tick while gaits fade or the ramp moves, s '
+                        f'(default: {SUBSTEP:g}, as in the generator); at most one tick on slow '
+                        'boards')
+    parser.add_argument('--rate', type=number, metavar='HZ',
+                        help='ticks per second of the golden vectors, the sketch and all that is '
+                        'fixed, Hz (default: 1000, or 50 with --real fixed)')
+    parser.add_argument('--frequency', type=number, metavar='HZ', help='strides per second of all '
+                        'gaits, Hz (default: as the robot file has it, or else 1)')
+    parser.add_argument('--tolerance', type=number, metavar='SHARE', help='by which tables may '
+                        'differ from what they are of, over its half range (default: 1e-4 with '
+                        'float32, 1e-9 with float64)')
+    parser.add_argument('--out', type=Path, required=True, metavar='DIR',
+                        help='folder to write to; made if it is not there')
+    return parser
+
+
+def _refuse_options(chosen: argparse.Namespace) -> None:
+    for option, value, low, high in (
+            ('step', chosen.step, 0.0, math.inf), ('substep', chosen.substep, 0.0, 1.0),
+            ('rate', chosen.rate, 0.0, 1e4), ('frequency', chosen.frequency, 0.0, 10.0),
+            ('tolerance', chosen.tolerance, 0.0, 0.1)):
+        if value is not None and not low < value <= high:
+            raise InputError(f'argument --{option}: {value:g} is not above {low:g} and up to '
+                             f'{high:g}')
+    if chosen.target == 'petoi':
+        for option, usual in (('form', 'network'), ('real', 'float32'), ('step', None),
+                              ('substep', None), ('rate', None), ('tolerance', None)):
+            if getattr(chosen, option) != usual:
+                raise InputError(f'argument --{option}: not for --target petoi, which has frames '
+                                 'of whole degrees')
+    elif chosen.real == 'fixed':
+        if chosen.form != 'table':
+            raise InputError('argument --real: fixed needs --form table')
+        for option in ('step', 'substep', 'tolerance'):
+            if getattr(chosen, option) is not None:
+                raise InputError(f'argument --{option}: not for --real fixed, which has tables of '
+                                 '256 points and ticks of one part')
+    refuse_repeated('argument --gaits', chosen.gaits or [])
+    if chosen.out.exists() and not chosen.out.is_dir():
+        raise InputError(f'argument --out: {chosen.out} is not a directory')
+
+
+def _plans(chosen: argparse.Namespace) -> list[GaitPlan]:
+    robot = load_robot(chosen.robot)
+    network = find_network(chosen.network or robot.networks[0])
+    if network.name not in robot.networks:
+        raise InputError(f"argument --network: '{network.name}' does not drive {robot.name}, "
+                         f'which names {", ".join(robot.networks)}')
+    presets, plans = network.presets(), []
+    for name in chosen.gaits or [network.usual_gait]:
+        if name not in presets:
+            raise InputError(f"argument --gaits: '{name}' is not one of {', '.join(presets)}")
+        preset = presets[name]
+        own = robot.motion(name, preset.gait).frequency
+        frequency = chosen.frequency or (1.0 if own is None else own)
+        try:
+            made = plan(robot, name, preset, preset.network, frequency)
+        except PlanError as error:
+            raise PlanError(f'{name}: {error}') from error
+        plans.append(replace(made, step=chosen.step))
+    _refuse_step(chosen.step, plans)
+    return plans
+
+
+def _refuse_step(step: float | None, plans: Sequence[GaitPlan]) -> None:
+    """Refuse a step that a network could not be run with."""
+    if step is None:
+        return
+    shortest = min(one.orbit.network.delay or one.orbit.period / 8.0 for one in plans)
+    longest = max(one.orbit.network.delay for one in plans)
+    if not longest / MOST_STEPS <= step <= shortest:
+        raise InputError(f'argument --step: {step:g} is not from {longest / MOST_STEPS:g} to '
+                         f'{shortest:g}')
+
+
+def _title(plans: Sequence[GaitPlan]) -> str:
+    first = plans[0]
+    return (f'Gaits of {first.robot.name} by the network {first.orbit.network.name}: '
+            f'{", ".join(one.name for one in plans)}')
+
+
+def _project(chosen: argparse.Namespace, plans: Sequence[GaitPlan]) -> tuple[CProject, float]:
+    """Return what to export, and the ticks per second of its test."""
+    title = _title(plans)
+    if chosen.real == 'fixed':
+        rate = chosen.rate or 50.0
+        return FixedProject(FixedData(plans, rate), title), rate
+    tolerance = chosen.tolerance or TOLERANCES[chosen.real]
+    data = GaitData(plans, CFormat(chosen.form, chosen.real, tolerance))
+    return CProject(data, title, chosen.substep or SUBSTEP), chosen.rate or 1000.0
+
+
+def _export(chosen: argparse.Namespace) -> int:
+    _refuse_options(chosen)
+    plans = _plans(chosen)
+    if chosen.target == 'petoi':
+        _write(chosen.out, {'petoi_skills.h': skills(plans, _title(plans))})
+        return 0
+    project, rate = _project(chosen, plans)
+    data = project.data
+    try:
+        golden = golden_of(data, 1.0 / rate, project.substep)
+    except CpgError as error:
+        raise InputError(f'the golden vectors cannot be made: {error}') from error
+    arduino = chosen.target == 'arduino'
+    files = project.files(golden, arduino)
+    files['README.md'] = readme(project, golden, chosen.command, arduino)
+    _write(chosen.out, files)
+    note('export', f'state {project.ram} bytes, constants {data.bytes} bytes; {golden.switches} '
+         'switches in the test')
+    return 0
+
+
+def _write(folder: Path, files: dict[str, str]) -> None:
+    for name, text in files.items():
+        path = folder / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        write_atomically(path, text)
+    say('\n'.join(table([('file', 'bytes'), *((str(folder / name), str(len(text)))
+                                              for name, text in files.items())], '<>')))
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the export; return the exit code."""
+    return run(_parser(), _export, arguments, 'stopped')
+
+
+if __name__ == '__main__':
+    sys.exit(main())

@@ -1,0 +1,138 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""All orbits of a gait: what simulations settle on is found, and judged with the others."""
+
+from cpg_ros.dynamics.coexisting_orbits import coexisting_orbits
+from cpg_ros.dynamics.floquet import leading_within, multipliers
+from cpg_ros.dynamics.orbit import NoOrbit
+from cpg_ros.integration.simulate import simulate, Trajectory
+from cpg_ros.networks.biped import Biped
+from cpg_ros.networks.delayed import Delayed
+from cpg_ros.networks.registry import PRESETS
+from cpg_ros.search.settled_cycle import last_cycle
+import numpy as np
+import pytest
+
+#: A set that optimize certified: the hop of period 13.9143 attracts, that of 13.38 does not.
+CERTIFIED = Biped(current=0.2787, phi=0.2601, w_21=0.2612, w_12=-0.8434, w_43=0.2612,
+                  w_34=-0.8434, w_31=0.7012, w_42=0.4165, w_13=0.7012, w_24=0.4165,
+                  w_41=-0.5327, w_32=0.442, w_23=-0.5327, w_14=0.442)
+
+
+def settled(network, gait, rng, span=900.0):
+    """Periods of the cycles, with the gait's shifts, on which states of its class settle."""
+    symmetry = network.symmetry(gait)
+    starts = rng.uniform(-0.4, 0.5, (6, network.components)) @ symmetry.basis.T
+    starts = starts @ symmetry.basis
+    # The lock acts outside the class only, on rounding.
+    run = simulate(network, starts, span, 2.0 * network.step, lock=(1.0, symmetry), every=5,
+                   progress=False)
+    found = []
+    for x, slopes in zip(run.x, run.slopes, strict=True):
+        cycle = last_cycle(Trajectory(run.t, x, slopes), network.cells)
+        if cycle is None:
+            continue
+        signals = cycle.signals[:, :network.cells]
+        gaps = [np.abs(signals[:, list(symmetry.group.elements[name])] - np.roll(
+            signals, -round(float(shift) * len(signals)), axis=0)).max()
+            for name, shift in symmetry.shifts]
+        if max(gaps) < 0.01 * np.ptp(signals):
+            found.append(cycle.period)
+    return found
+
+
+def test_the_orbit_that_attracts_comes_first():
+    found = coexisting_orbits(CERTIFIED, 'one_legged_hop')
+    first = found.orbits[0]
+    assert first.period == pytest.approx(13.9143, abs=1e-4)
+    assert multipliers(first).attracts
+    assert multipliers(first).leading == pytest.approx(0.0055, abs=1e-4)
+    # That of period 13.38 is one of the others, none of which attracts.
+    assert min(abs(one.period - 13.3812) for one in found.orbits[1:]) < 1e-4
+    assert all(leading_within(one) > 1.0 for one in found.orbits[1:])
+    assert all(one.residual < 1e-9 for one in found.orbits)
+    # What the plan takes comes at less cost.
+    quick = coexisting_orbits(CERTIFIED, 'one_legged_hop', starts=False, everything=False)
+    assert quick.orbits[0].period == pytest.approx(first.period, rel=1e-7)
+
+
+@pytest.mark.parametrize('delay', [4.0, 5.0])
+def test_long_delays(delay):
+    network = Delayed(-4.5, 1.0, 6.5, -2.0, delay)
+    found = coexisting_orbits(network, 'trot')
+    first = found.orbits[0]
+    # Long delays: twice the delay and the time of a switch, which no longer changes.
+    assert first.period == pytest.approx(2.0 * delay + 0.5674, abs=1e-3)
+    assert leading_within(first) < 0.1 and first.residual < 1e-9
+    # It comes back after a disturbance of 5 per cent in its class.
+    symmetry = network.symmetry('trot')
+
+    def kicked(times):
+        return 1.05 * first(times)
+
+    run = simulate(network, kicked, 6.0 * first.period, lock=(1.0, symmetry), progress=False)
+    late = run.t[run.t > 5.0 * first.period]
+    states = run(late)
+    shift = late[states[:, 0].argmax()]
+    assert np.abs(states - first(late - shift)).max() < 0.02 * np.ptp(states)
+    # An orbit at a delay is one at the delay and whole periods more (Yanchuk & Perlikowski).
+    for orbit in found.orbits[1:]:
+        assert orbit.residual < 1e-9
+        earlier = network.replace(tau=delay - orbit.period) if orbit.period < delay else None
+        if earlier is not None:
+            periods = [one.period for one in coexisting_orbits(earlier, 'trot').orbits]
+            assert np.abs(np.array(periods) / orbit.period - 1.0).min() < 1e-6
+            break
+
+
+def test_a_gait_below_its_critical_delay():
+    """Jumps of a large amplitude coexist with a stable rest: simulation settles on them."""
+    network = PRESETS['delayed']['trot'].network.replace(tau=0.2)
+    orbit = coexisting_orbits(network, 'jump', everything=False).orbits[0]
+    assert leading_within(orbit) < 1.0 and orbit.residual < 1e-9
+    symmetry = network.symmetry('jump')
+    starts = np.random.default_rng(3).uniform(-2.0, 2.0, (8, network.components))
+    run = simulate(network, starts @ symmetry.basis.T @ symmetry.basis, 20.0 * orbit.period,
+                   lock=(1.0, symmetry), progress=False)
+    sizes = 0.5 * np.ptp(run.x[:, run.t > 10.0 * orbit.period, 0], axis=1)
+    assert np.abs(sizes / orbit.levels[0, 0, 1] - 1.0).min() < 1e-4
+
+
+def test_what_was_searched_is_said():
+    network = PRESETS['delayed']['trot'].network
+    with pytest.raises(NoOrbit, match=r'0\.7446; searched from 15 starts and 1 Hopf'):
+        coexisting_orbits(network, 'pace', everything=False)
+    with pytest.raises(NoOrbit, match=r'no pace .*; searched from 15 starts$'):
+        coexisting_orbits(PRESETS['quadruped']['trot'].network, 'pace', everything=False)
+    # An orbit that attracts in its class is enough for a plan.
+    quick = coexisting_orbits(network, 'trot', starts=False, everything=False)
+    assert (len(quick.orbits), quick.searched) == (1, '')
+
+
+@pytest.mark.parametrize('seed', range(4))
+def test_what_simulations_settle_on_is_found_and_attracts(seed):
+    rng = np.random.default_rng(4100 + seed)
+    seen = 0
+    for _ in range(4):
+        network = Biped.symmetric(rng.uniform(0.2, 0.32), rng.uniform(0.15, 0.4),
+                                  *rng.uniform(-1, 1, 3))
+        for gait in ('walk', 'run', 'two_legged_jump', 'two_legged_hop'):
+            for period in settled(network, gait, rng):
+                orbits = coexisting_orbits(network, gait, everything=False).orbits
+                ours = [one for one in orbits if abs(one.period / period - 1.0) < 3e-3]
+                assert ours and leading_within(ours[0]) < 1.0, (network, gait, period)
+                assert leading_within(orbits[0]) < 1.0
+                seen += 1
+    assert seen

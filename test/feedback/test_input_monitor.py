@@ -1,0 +1,68 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Measurements that are believed, and those that are not."""
+
+from cpg_ros.feedback.input_monitor import DELAYED, InputMonitor, STALE
+from cpg_ros.feedback.plausibility import judge_joints, VERDICTS
+import numpy as np
+import pytest
+
+FASTEST = np.array([20.0, 10.0])
+
+
+@pytest.fixture
+def monitor():
+    monitor = InputMonitor('imu')
+    monitor.note(1.0, 1.0, b'first')
+    assert not monitor.fault(1.0)
+    return monitor
+
+
+@pytest.mark.parametrize(('off', 'why'), [
+    (-1.5 * DELAYED, 'stamps 0.15 s old'), (1.5 * DELAYED, 'stamps 0.15 s ahead')])
+def test_stamps_far_from_now_are_named(monitor, off, why):
+    now = 1.0 + 1.1 * STALE
+    monitor.note(now, now + off, b'second')
+    assert why in monitor.fault(now)
+    monitor.note(now, now + off / 2.0, b'third')
+    assert not monitor.fault(now)
+
+
+def test_the_same_numbers_are_believed_for_as_long_as_allowed(monitor):
+    monitor.note(1.2, 1.2, b'first', patience=0.3)
+    assert not monitor.fault(1.2)
+    monitor.note(1.4, 1.4, b'first', patience=0.3)
+    assert monitor.fault(1.4) == 'the same numbers again and again'
+
+
+def test_silence_is_named(monitor):
+    assert monitor.fault(1.0 + 1.1 * STALE) == 'no messages'
+    assert InputMonitor('feet').fault(1.0) == 'no message yet'
+
+
+@pytest.mark.parametrize(('angles', 'speeds', 'why'), [
+    ((0.1, 0.2), (59.0, -29.0), ''),
+    ((0.1, 0.2), (0.0, 31.0), 'an impossible speed of a joint'),
+    ((0.1, 0.2), (0.0, -31.0), 'an impossible speed of a joint'),
+    ((0.1, -1.4), (0.0, 0.0), 'a joint far beyond its limits'),
+    ((1.4, 0.2), (0.0, 0.0), 'a joint far beyond its limits'),
+    ((np.nan, 0.2), (0.0, 0.0), 'numbers that are not finite')])
+def test_joints_are_where_and_as_fast_as_they_can_be(angles, speeds, why):
+    found = np.full((2, 2), 7.0)
+    # In the message the joints are the other way round.
+    verdict = judge_joints(np.array(angles[::-1]), np.array(speeds[::-1]), np.array([1, 0]),
+                           np.full(2, -1.0), np.full(2, 1.0), FASTEST, *found)
+    assert VERDICTS[verdict] == why
+    assert (found == ([angles, speeds] if not why else 7.0)).all()

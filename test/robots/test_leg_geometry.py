@@ -1,0 +1,99 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The part geometry of robot files: from a URDF, in a file, and legs that feedback cannot move."""
+
+from dataclasses import replace
+from pathlib import Path
+
+from cpg_ros.feedback.kinematics import forward, geometry_of
+from cpg_ros.robots.robot_file import read_robot, RobotError, write_robot
+from cpg_ros.tools.check_robot import main
+from go2 import displace, FILE, GO2
+import numpy as np
+import pytest
+
+URDF = Path(__file__).parents[2] / 'urdf' / 'quadruped.urdf'
+
+
+def made(tmp_path, urdf=URDF):
+    path = tmp_path / 'robot.yaml'
+    assert main(['--urdf', str(urdf), '--make', str(path)]) in (0, 1)
+    return read_robot(path)
+
+
+def test_check_robot_reads_the_geometry_off_the_urdf(tmp_path, capsys):
+    robot = made(tmp_path)
+    assert 'feedback can move all feet' in capsys.readouterr().err
+    leg = robot.geometry.legs['rf']
+    assert leg.joints == ('rf_hip_joint', 'rf_thigh_joint', 'rf_calf_joint')
+    assert leg.hip[0] > 0.0 > leg.hip[1] and leg.thigh[1] < 0.0
+    assert leg.calf == (0.0, 0.0, -0.2) and leg.foot == (0.0, 0.0, -0.22)
+    assert robot.geometry.foot_radius == 0.02
+
+
+def test_a_displaced_foot_of_the_made_robot_arrives(tmp_path):
+    robot = made(tmp_path)
+    geometry, stand = geometry_of(robot), robot.column('offset')
+    feet = forward(geometry, stand)
+    way = np.tile([0.03, -0.02, 0.04], (4, 1))
+    assert forward(geometry, displace(geometry, stand, feet, way)) == pytest.approx(feet + way)
+
+
+def test_a_leg_that_feedback_cannot_move_is_named_and_stays(tmp_path, capsys):
+    """Its hip turns about z."""
+    text = URDF.read_text()
+    at = text.index('<joint name="lh_hip_joint"')
+    begin = text.index('<axis', at)
+    end = text.index('/>', begin)
+    (tmp_path / 'other.urdf').write_text(text[:begin] + '<axis xyz="0 0 1"' + text[end:])
+    robot = made(tmp_path, tmp_path / 'other.urdf')
+    assert 'feedback moves no foot of lh' in capsys.readouterr().err
+    assert set(robot.geometry.legs) == {'rh', 'lf', 'rf'}
+    geometry, stand = geometry_of(robot), robot.column('offset')
+    way = np.tile([0.03, -0.02, 0.04], (4, 1))
+    moved = displace(geometry, stand, forward(geometry, stand), way) != stand
+    assert moved.tolist() == [leg != 'lh' for leg in robot.legs for _ in range(3)]
+
+
+def test_geometry_and_efference_are_read_as_they_were_written(tmp_path):
+    write_robot(tmp_path / 'go2.yaml', GO2)
+    again = read_robot(tmp_path / 'go2.yaml')
+    assert again.geometry == GO2.geometry
+    assert ({name: motion.efference for name, motion in again.motions.items()}
+            == {name: motion.efference for name, motion in GO2.motions.items()})
+
+
+@pytest.mark.parametrize(('wrong', 'right', 'says'), [
+    ('mass: 15.2', 'mass: -15.2', 'geometry.mass: '),
+    ('[RL_hip_joint, RL_thigh_joint, RL_calf_joint]', '[RL_hip_joint, RL_thigh_joint, spine]',
+     "geometry.legs.lh.joints[2]: 'spine' is not a joint of this leg"),
+    ('turns: [1.0, 1.0, 1.0]', 'turns: [1.0, 0.5, 1.0]', 'turns[1]: 0.5 must be 1 or -1')])
+def test_a_mistake_in_the_geometry_is_named(tmp_path, wrong, right, says):
+    text = FILE.read_text()
+    assert wrong in text
+    (tmp_path / 'go2.yaml').write_text(text.replace(wrong, right, 1))
+    with pytest.raises(RobotError) as caught:
+        read_robot(tmp_path / 'go2.yaml')
+    assert says in str(caught.value) and '\n' not in str(caught.value)
+
+
+def test_a_short_row_of_an_efference_table_is_named(tmp_path):
+    efference = GO2.motions['trot'].efference
+    short = replace(efference, rows=efference.rows | {
+        'roll': tuple(row[:63] for row in efference.rows['roll'])})
+    robot = replace(GO2, motions={'trot': replace(GO2.motions['trot'], efference=short)})
+    write_robot(tmp_path / 'go2.yaml', robot)
+    with pytest.raises(RobotError, match=r'gaits.trot.efference.roll\[0\]: has 63 numbers'):
+        read_robot(tmp_path / 'go2.yaml')

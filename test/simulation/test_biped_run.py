@@ -1,0 +1,140 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""A humanoid in physics walks, turns, stops and survives pushes, clocked by the biped network."""
+
+from dataclasses import replace
+from functools import cache
+import importlib.util
+import math
+import re
+
+from cpg_ros.feedback.biped.feedback import BipedFeedback
+from cpg_ros.feedback.biped.gains import BipedGains
+from cpg_ros.robots.robot_file import load_robot
+from cpg_ros.tools import check_robot
+import numpy as np
+import pytest
+
+mujoco = pytest.importorskip('mujoco')
+
+from cpg_ros.simulation.biped_description import read_biped  # noqa: E402
+from cpg_ros.simulation.biped_run import BipedRun  # noqa: E402
+from cpg_ros.simulation.robot_model import find_model, SimulationError  # noqa: E402
+from cpg_ros.simulation.scenario import impulse, SensorNoise  # noqa: E402
+
+#: Sensors as of benchmarks/bench_humanoid.py.
+NOISE = SensorNoise(delay=0.004, gyroscope_noise=0.02, accelerometer_noise=0.1, force_noise=0.05)
+STOP = (math.nan, 0.0, 0.0)
+DIRECTIONS = [(1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0)]
+
+
+@cache
+def runner(name='humanoid'):
+    if name == 'unitree_g1' and importlib.util.find_spec('mjlab') is None:
+        pytest.skip('mjlab, which has the G1, is not installed')
+    return BipedRun(name, load_robot(name), NOISE)
+
+
+@pytest.mark.parametrize('name', ['humanoid', 'unitree_g1'])
+@pytest.mark.parametrize('speed', [0.0, 0.3, 0.5, -0.2])
+def test_it_walks_as_fast_as_it_is_told(name, speed):
+    found = runner(name).run(12.0, ((1.0, speed, 0.0, 0.0),), seed=7)
+    assert math.isinf(found.fell)
+    assert abs(found.speed[0] - speed) < max(0.1 * abs(speed), 0.02)
+    # 10 s at 1.65 strides a second.
+    assert found.steps > 28 and found.tilt < 0.3
+
+
+def test_it_turns_and_goes_sideways():
+    turned = runner().run(12.0, ((1.0, 0.2, 0.0, 0.3),), seed=8)
+    assert math.isinf(turned.fell)
+    yaw = np.unwrap(turned.path[:, 4])
+    late = turned.path[:, 0] > 5.0
+    rate = np.polyfit(turned.path[late, 0], yaw[late], 1)[0]
+    assert rate == pytest.approx(0.3, abs=0.03)
+    aside = runner().run(12.0, ((1.0, 0.0, 0.1, 0.0),), seed=9)
+    assert math.isinf(aside.fell)
+    assert aside.speed[1] == pytest.approx(0.1, abs=0.03)
+
+
+def test_it_stands_walks_and_stands_ten_times():
+    robot = runner().robot
+    feedback = BipedFeedback(robot)
+    commands = [(8.0 * k + 1.0, 0.3, 0.0, 0.0) for k in range(10)]
+    commands += [(8.0 * k + 5.0, *STOP) for k in range(10)]
+    found = runner().run(80.0, tuple(commands), feedback=feedback, seed=10)
+    assert math.isinf(found.fell)
+    time, x = found.path[:, 0], found.path[:, 1]
+    for k in range(10):
+        # It walks in between, and stands at the end of each round.
+        rest = x[(time > 8.0 * k + 7.5) & (time < 8.0 * k + 8.0)]
+        assert np.ptp(rest) < 0.02, k
+    assert x[-1] > 10 * 0.6
+
+
+@pytest.mark.parametrize('number', range(4))
+def test_it_survives_pushes_by_placing_its_feet(number):
+    push = impulse(6.0, *(20.0 * np.array(DIRECTIONS[number])))
+    commands = ((1.0, 0.3, 0.0, 0.0),)
+    assert math.isinf(runner().run(11.0, commands, (push,), seed=number).fell)
+    robot = runner().robot
+    fixed = BipedFeedback(robot, BipedGains.of({'place_x': 0.0, 'place_y': 0.0}))
+    assert math.isfinite(runner().run(11.0, commands, (push,), fixed, number).fell)
+
+
+def test_the_velocity_is_estimated_without_bias():
+    run, found = runner(), []
+    feedback = BipedFeedback(run.robot)
+    advance = feedback.advance
+
+    def noted(sensors, dt):
+        command = advance(sensors, dt)
+        found.append((feedback.memory.base - run.body.rates[:3]).copy())
+        return command
+
+    feedback.advance = noted
+    run.run(10.0, ((1.0, 0.3, 0.0, 0.0),), feedback=feedback, seed=11)
+    off = np.array(found[1500:])
+    assert np.abs(off[:, :2].mean(axis=0)).max() < 0.01
+    assert off[:, :2].std(axis=0).max() < 0.05
+
+
+def test_the_robot_file_is_what_the_model_says():
+    robot = load_robot('humanoid')
+    read = read_biped('humanoid', robot)
+    # The shipped one walks with the usual gains.
+    assert replace(read, gains={}) == robot.biped
+
+
+@pytest.mark.parametrize('joints', [6, 5])
+def test_a_robot_file_made_from_a_model_alone_walks(tmp_path, joints):
+    text = find_model('humanoid').read_text()
+    if joints == 5:
+        text = re.sub(r'<joint name="(left|right)_hip_yaw_joint"[^>]*>', '', text)
+    model = tmp_path / 'mine.xml'
+    model.write_text(text)
+    made = tmp_path / 'mine.yaml'
+    assert check_robot.main(['--mjcf', str(model), '--make', str(made)]) == 0
+    robot = load_robot(made)
+    assert {len(leg) for leg in robot.legs.values()} == {joints}
+    found = BipedRun(str(model), robot, NOISE).run(12.0, ((1.0, 0.3, 0.0, 0.0),), seed=12)
+    assert math.isinf(found.fell)
+    assert found.speed[0] == pytest.approx(0.3, abs=0.03)
+
+
+def test_where_the_g1_comes_from_is_said(monkeypatch):
+    monkeypatch.setattr('importlib.util.find_spec', lambda name: None)
+    with pytest.raises(SimulationError, match='pip install --no-deps mjlab'):
+        find_model('unitree_g1')

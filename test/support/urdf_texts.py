@@ -1,0 +1,57 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""URDFs as text, as tests need them."""
+
+from pathlib import Path
+
+SOURCE = Path(__file__).resolve().parents[2]
+URDF = (SOURCE / 'urdf' / 'quadruped.urdf').read_text()
+LEGS = ('lh', 'rh', 'lf', 'rf')
+
+
+def joint_of(name, kind='revolute', limit='lower="-1" upper="1" velocity="20"', axis='0 1 0',
+             parent='base', more=''):
+    return (f'<joint name="{name}" type="{kind}"><parent link="{parent}"/><child link="{name}_l"/>'
+            f'<axis xyz="{axis}"/><limit effort="1" {limit}/>{more}</joint>'
+            f'<link name="{name}_l"/>')
+
+
+def robot_of(*joints):
+    return f'<robot name="r"><link name="base"/>{"".join(joints)}</robot>'
+
+
+def quadruped_urdf(calf='lower="-2.7" upper="-0.8" velocity="20"', axis='0 1 0', rpy='0 0 0',
+                   thigh='lower="-1" upper="3" velocity="20"', hip='lower="-0.8" upper="0.8"',
+                   roll='1 0 0'):
+    """Return a quadruped named as Unitree does, calves given before thighs."""
+    joints = []
+    for leg in ('FL', 'FR', 'RL', 'RR'):
+        joints += [joint_of(f'{leg}_calf_joint', limit=calf, axis=axis,
+                            parent=f'{leg}_thigh_joint_l'),
+                   joint_of(f'{leg}_thigh_joint', limit=thigh, axis=axis,
+                            parent=f'{leg}_hip_joint_l'),
+                   joint_of(f'{leg}_hip_joint', limit=hip, axis=roll,
+                            more=f'<origin rpy="{rpy}"/>')]
+    return robot_of(*joints, joint_of('neck_joint'))
+
+
+def biped_of(left, right, *more):
+    """Return a URDF of two legs, with hip, knee and ankle each; more joints hang on the base."""
+    joints = []
+    for side in (left, right):
+        for name, parent in (('HIP_P', ''), ('KNEE', 'HIP_P'), ('ANKLE_P', 'KNEE')):
+            joints.append(joint_of(f'{side}_{name}', limit='lower="-2" upper="2" velocity="20"',
+                                   parent=f'{side}_{parent}_l' if parent else 'base'))
+    return robot_of(*joints, *(joint_of(name, axis='1 0 0') for name in more))

