@@ -34,7 +34,7 @@ ONLINE := -n $(LIVE) --dist loadgroup
 # is listed. In depth, and without a graph, nothing does.
 AGAIN := --reruns 1 -r aR
 # What tests compile is kept here from run to run, whatever becomes of install/.
-test test-deep test-export browser coverage mutants: export NUMBA_CACHE_DIR ?= $(CURDIR)/.numba
+test test-deep test-export browser coverage mutants docs: export NUMBA_CACHE_DIR ?= $(CURDIR)/.numba
 
 .PHONY: build run demo shell test test-deep test-export browser mutants docs figures coverage \
 	bench wheel unitree clean

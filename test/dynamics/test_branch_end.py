@@ -22,6 +22,7 @@ from cpg_ros.networks.biped import Biped
 from cpg_ros.networks.parameter_line import ParameterLine
 from cpg_ros.networks.quadruped import Quadruped
 from cpg_ros.networks.registry import NETWORKS, PRESETS
+from depth import in_depth
 import numpy as np
 import pytest
 
@@ -84,10 +85,11 @@ def test_a_fold_at_a_point_of_the_branch_is_no_obstacle():
         assert abs(fold.place.rate) < 1e-6
 
 
-def test_random_lines_end_in_branches_or_are_refused():
+@pytest.mark.parametrize('lines', [25, *in_depth(100)])
+def test_random_lines_end_in_branches_or_are_refused(lines):
     draw = np.random.default_rng(20261122)
     ended = 0
-    for _ in range(100):
+    for _ in range(lines):
         name = draw.choice(list(PRESETS))
         preset = PRESETS[name][draw.choice(list(PRESETS[name]))]
         kind = NETWORKS[name]
@@ -101,7 +103,7 @@ def test_random_lines_end_in_branches_or_are_refused():
         assert {end.why for end in branch.ends} <= {
             'rest', 'symmetry', 'period', 'bound', 'steps', 'steep', 'lost'}
         ended += 1
-    assert ended > 40
+    assert ended > 0.4 * lines
 
 
 @pytest.mark.parametrize(('name', 'text', 'low', 'high', 'words'), [

@@ -22,6 +22,7 @@ from cpg_ros.networks.biped import Biped
 from cpg_ros.networks.delayed import Delayed
 from cpg_ros.networks.registry import PRESETS
 from cpg_ros.search.settled_cycle import last_cycle
+from depth import in_depth
 import numpy as np
 import pytest
 
@@ -121,7 +122,7 @@ def test_what_was_searched_is_said():
     assert (len(quick.orbits), quick.searched) == (1, '')
 
 
-@pytest.mark.parametrize('seed', range(4))
+@pytest.mark.parametrize('seed', [0, 1, *in_depth(2, 3)])
 def test_what_simulations_settle_on_is_found_and_attracts(seed):
     rng = np.random.default_rng(4100 + seed)
     seen = 0

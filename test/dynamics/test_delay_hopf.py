@@ -151,8 +151,8 @@ def test_blocks_have_the_roots_of_the_whole_network():
 
 
 @pytest.mark.parametrize(('text', 'low', 'high'), [
-    ('lag', 0.1, 30.0), *in_depth(('weight', -1.6, -0.3), ('threshold', 0.3, 1.3)),
-    ('lag=-weight', 0.3, 2.0)])
+    ('lag', 0.1, 30.0), *in_depth(('weight', -1.6, -0.3), ('threshold', 0.3, 1.3),
+                                ('lag=-weight', 0.3, 2.0))])
 def test_points_lie_where_the_whole_linearisation_crosses(text, low, high):
     line = ParameterLine.parse(text, Ring)
     points = hopf_points(RING, line, low, high)

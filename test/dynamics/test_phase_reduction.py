@@ -25,6 +25,7 @@ from cpg_ros.dynamics.phase_reduction import (
 from cpg_ros.dynamics.phase_response import phase_response
 from cpg_ros.errors import InputError
 from cpg_ros.networks.registry import PRESETS
+from depth import in_depth
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
@@ -61,6 +62,7 @@ def beat(orbit, frequency, amplitude):
     return whole / (at - crossings[5])
 
 
+@pytest.mark.deep
 def test_a_gait_is_locked_up_to_the_edge_of_the_tongue():
     """Beyond it the beat is sqrt(detuning^2 - half-width^2), which gives the half-width."""
     orbit = solve_preset(PRESETS['biped']['run'])
@@ -91,7 +93,8 @@ def test_noise_makes_the_phase_of_oscillators_diffuse_as_in_closed_form():
     assert phase_diffusion(response, 0.02) == pytest.approx(0.5 * 0.02**2 * 2.0 * SIZE**2)
 
 
-@pytest.mark.parametrize(('network', 'name'), [('biped', 'run'), ('delayed', 'walk')])
+@pytest.mark.parametrize(('network', 'name'), [
+    ('delayed', 'walk'), *in_depth(('biped', 'run'))])
 def test_noise_makes_the_phase_diffuse_as_in_simulations(network, name):
     orbit = solve_preset(PRESETS[network][name])
     noise = 2e-3

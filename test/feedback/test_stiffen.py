@@ -72,6 +72,7 @@ def test_late_senses_do_not_keep_servos_stiff(loop, expected):
     assert ran.upright.sum() >= 15 and (ran.kp_scale[ran.upright, -1] == 1.0).all()
 
 
+@pytest.mark.deep
 def test_rough_ground_does_not_stiffen(loop, expected):
     trials = [Scenario(terrain=Terrain('height_field', 0.08, seed)) for seed in range(8)]
     ran = loop.run(trials, 8.0, gains=GAINS, expected=expected)

@@ -168,6 +168,7 @@ def test_names_that_are_not_utf8_cost_no_row(folder, tmp_path):
     assert 'w\\xffalk.csv' in (tmp_path / 'out' / 'index.html').read_text(encoding='utf-8')
 
 
+@pytest.mark.deep
 def test_one_recording_whose_name_is_not_utf8(tmp_path):
     path = tmp_path / os.fsdecode(b'w\xffalk.csv')
     path.write_text(table())

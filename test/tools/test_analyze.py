@@ -197,6 +197,7 @@ def test_hopf_points_of_linear_rates_have_no_normal_form(capsys, monkeypatch):
     assert as_json(capsys, '--network', 'hopf', '--range=-1:1')['hopf'][0]['degenerate'] is False
 
 
+@pytest.mark.deep
 def test_coexisting_orbits_are_listed(capsys):
     """At a long delay the trot, which attracts in its class, and shorter ones, which do not."""
     trot = as_json(capsys, *EXAMPLE_1[:-1], 'tau=4', '--all-orbits')['gaits']['trot']
