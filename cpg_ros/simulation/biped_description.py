@@ -107,7 +107,7 @@ def _fitting(robot: Robot, order: list[str]) -> dict[str, float]:
     stand |= robot.held
     pose, count = blank_pose(links), len(links.masses) - 1
     angles, center = np.array([stand[name] for name in order]), np.zeros(6)
-    kinematics(links, np.zeros(3), angles, np.zeros(3), np.zeros(count), pose, center,
+    kinematics(links, np.zeros(3), angles, (np.zeros(3), np.zeros(count)), pose, center,
                np.zeros((2, 6)), np.zeros(count))
     wide = abs(float(pose.soles[0, 1] - pose.soles[1, 1]))
     return {'height': round(float(center[2] - pose.soles[:, 2].mean()) - CROUCH, 4),

@@ -65,7 +65,7 @@ def test_kinematics_and_weights_are_those_of_mujoco(name):
         data.qvel[:3], data.qvel[3:6], data.qvel[speeds] = 0.0, turn.T @ turning, rates
         mujoco.mj_forward(model, data)
         mujoco.mj_subtreeVel(model, data)
-        kinematics(links, rpy, joints, turning, rates, pose, center, soles, weights)
+        kinematics(links, rpy, joints, (turning, rates), pose, center, soles, weights)
         np.testing.assert_allclose(center[:3], data.subtree_com[1], atol=1e-9)
         np.testing.assert_allclose(center[3:], data.subtree_linvel[1], atol=1e-9)
         for leg, (own, chain) in enumerate(zip(robot.legs.values(), links.chains, strict=True)):

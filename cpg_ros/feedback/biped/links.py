@@ -252,21 +252,22 @@ def add_torques(links, pose, leg, point, force, moment, torques):
 
 
 @entry
-def kinematics(links, rpy, joints, turning, rates, pose, center, soles, weights):
+def kinematics(links, rpy, joints, motion, pose, center, soles, weights):
     """Fill everything about a pose; for checks and pictures, the laws take what they need.
 
     Args:
         links: Links.
         rpy: of the base, rad, shape (3,).
         joints: rad, shape (joints,).
-        turning: angular velocity of the base, world's axes, rad/s, shape (3,).
-        rates: of the joints, rad/s, shape (joints,).
+        motion: angular velocity of the base, world's axes, rad/s, shape (3,), and the joints'
+            rates, rad/s, shape (joints,).
         pose: filled.
         center: place and velocity of the centre of mass from the base's, shape (6,).
         soles: velocities, m/s and rad/s, from the base's, shape (legs, 6).
         weights: gravity torques of all joints, N m, shape (joints,).
 
     """
+    turning, rates = motion
     place(links, rpy, joints, pose)
     center_velocity(pose, turning, rates, center[3:])
     for k in range(3):
