@@ -18,6 +18,7 @@ from cpg_ros.feedback.estimate import SensorData
 from cpg_ros.feedback.feedback import Feedback
 from cpg_ros.feedback.foot_force import loads_of
 from cpg_ros.feedback.kinematics import Geometry
+from cpg_ros.feedback.odometry import Odometry
 from cpg_ros.feedback.plausibility import (
     agreement,
     IMU,
@@ -46,3 +47,4 @@ def warm_up(geometry: Geometry, joints: int) -> None:
     planned = PlannedMotion(some[None], one, np.zeros((1, 2), dtype=np.int64), one.copy(),
                             np.zeros((1, 2)), one.copy())
     feedback.advance(sensors, planned, 0.002, 0.0)
+    Odometry(geometry).advance(sensors, np.zeros(3), np.zeros(legs, dtype=bool), 0.002)

@@ -22,6 +22,7 @@ from cpg_ros.feedback.feedback import Feedback
 from cpg_ros.feedback.gait_tables import SLOTS
 from cpg_ros.feedback.input_monitor import Fade
 from cpg_ros.feedback.kinematics import Geometry
+from cpg_ros.feedback.odometry import Odometry
 from cpg_ros.feedback.plausibility import agreement
 from cpg_ros.feedback.tick import PlannedMotion
 from cpg_ros.feedback.timetable import POINTS, Timetable
@@ -52,6 +53,7 @@ class FeedbackLoop:
         waiting: whether an input has never arrived.
         share: of all corrections, 0 to 1.
         kp_scale: factor of the servos' proportional gain.
+        odometry: of the base, where it is wanted; it goes on as long as gaits are corrected.
 
     """
 
@@ -76,6 +78,7 @@ class FeedbackLoop:
                                       np.zeros((1, 2)), np.zeros(1))
         self.wanted, self.waiting, self.faults = False, True, ''
         self._trim = np.zeros(len(pattern.robot.legs))
+        self.odometry: Odometry | None = None
         self.restart()
         self.learn(pattern.program)
 
@@ -85,6 +88,8 @@ class FeedbackLoop:
         self._dt, self._agrees = 0.0, 1.0
         self.feedback.reset()
         self._inputs.restart()
+        if self.odometry is not None:
+            self.odometry.restart()
         self._release()
 
     def learn(self, program: GaitPlan) -> None:
@@ -114,6 +119,8 @@ class FeedbackLoop:
             if pattern.correct is not None:
                 self.feedback.reset()
                 self._release()
+            if self.odometry is not None:
+                self.odometry.lose(dt)
         else:
             pattern.correct = self._correct
 
@@ -160,6 +167,9 @@ class FeedbackLoop:
         found = feedback.advance(inputs.sensor_data, planned, self._dt, self.share, pattern.level)
         pattern.frequency_scale = float(memory.frequency_scale[0])
         self.kp_scale = float(memory.kp_scale[0])
+        if self.odometry is not None:
+            self.odometry.advance(inputs.sensor_data, memory.velocity[0], memory.contact[0],
+                                  self._dt)
         if pattern.drive is not None:
             self._trim[:] = memory.stride[0]
             pattern.drive.trim = self._trim

@@ -42,7 +42,13 @@ TOPICS = fixed({
                               'the efforts of the measured joints', constraints=one_of(CONTACTS)),
     f'{PREFIX}contacts_topic': Spec('foot_contacts', 'topic of the std_msgs/Float64MultiArray '
                                     'with the loads on the feet in N; with wrenches, the name of '
-                                    "each leg's own topic, as in lh/foot_contacts")})
+                                    "each leg's own topic, as in lh/foot_contacts"),
+    f'{PREFIX}odometry_topic': Spec('', 'topic of the nav_msgs/Odometry, where the base is by the '
+                                    "robot's legs and IMU, such as odom; none by default"),
+    f'{PREFIX}odom_frame': Spec('odom', 'frame of that odometry, which begins where the base is'),
+    f'{PREFIX}base_frame': Spec('base_link', "frame of the robot's base"),
+    f'{PREFIX}odometry_tf': Spec(True, 'publish the transform between these frames on /tf, too, '
+                                 'where tf2_msgs is installed')})
 #: Switches of the laws and gains, all of which can be set at any time.
 GAINS = {**{f'{PREFIX}{law.name}': Spec(law.on, law.text) for law in LAWS},
          **{f'{PREFIX}{name}': Spec(gain.default, f'{gain.text} [{gain.unit}]' if gain.unit

@@ -19,6 +19,7 @@ from dataclasses import replace
 from typing import Any
 
 from cpg_ros.feedback.kinematics import geometry_of
+from cpg_ros.feedback.odometry import Odometry
 from cpg_ros.feedback.warm_up import warm_up
 from cpg_ros.motion.pattern import Pattern
 from cpg_ros.motion.plan import GaitPlan
@@ -29,6 +30,7 @@ from cpg_ros.nodes.feedback_parameters import ENABLED, PREFIX
 from cpg_ros.nodes.kernels import announced, FEEDBACK
 from cpg_ros.nodes.kp_scale import KpScalePublisher
 from cpg_ros.nodes.node_base import StartError
+from cpg_ros.nodes.odometry_publisher import OdometryPublisher
 from cpg_ros.nodes.parameter_spec import Spec
 from cpg_ros.nodes.sensor_input import SensorInput
 from cpg_ros.robots.robot import Robot
@@ -90,6 +92,7 @@ class FeedbackSwitch:
         """
         self._node, self._pattern, self._motion, self._own = node, pattern, motion, own
         self.loop: FeedbackLoop | None = None
+        self._odometry: OdometryPublisher | None = None
         if refusal := self.judge([node.get_parameter(ENABLED)]):
             raise StartError(refusal)
         self.apply()
@@ -130,6 +133,12 @@ class FeedbackSwitch:
             for line in shortfalls(robot):
                 self._node.get_logger().warning(line)
             self._kp_scale = KpScalePublisher(self._node)
+            if topic := self._value('odometry_topic'):
+                loop.odometry = Odometry(geometry)
+                self._odometry = OdometryPublisher(
+                    self._node, loop.odometry, topic,
+                    (self._value('odom_frame'), self._value('base_frame')),
+                    self._value('odometry_tf'))
             self.loop = loop
         if self.loop is not None:
             self.loop.feedback.gains = feedback_parameters.gains(self._value)
@@ -145,10 +154,12 @@ class FeedbackSwitch:
         if self.loop is not None:
             self.loop.sense(dt, 1e-9 * stamp)
 
-    def publish(self, dt: float) -> None:
-        """Publish the factor of the servos' gains if it is time; dt since the last call, s."""
+    def publish(self, dt: float, stamp: int) -> None:
+        """Publish what is due; dt since the last call, s, and stamp, ns."""
         if self.loop is not None:
             self._kp_scale.publish(dt, self.loop.kp_scale)
+            if self._odometry is not None and self.loop.share > 0.0:
+                self._odometry.publish(dt, stamp)
 
     def restart(self) -> None:
         """Start again, as where simulated time jumps back."""

@@ -239,7 +239,7 @@ class Generator(StartedNode):
         self.pattern.advance(dt)
         self._outputs.publish(stamp, dt, self.pattern.position, self.pattern.velocity,
                               self.pattern.phases)
-        self._feedback.publish(dt)
+        self._feedback.publish(dt, stamp)
         self._cells.publish(dt, self.pattern.state)
         if self.ticker.stopping and self.pattern.standing:
             self.ticker.stopping = False

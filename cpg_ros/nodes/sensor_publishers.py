@@ -14,15 +14,12 @@
 
 """The measurements that a simulated robot publishes every period."""
 
-from importlib import import_module, util
-
 from cpg_ros.nodes.joint_publishers import joint_state, labelled
 from cpg_ros.nodes.message_block import each, MessageBlock, places, Template
+from cpg_ros.nodes.odometry_messages import has_transforms, odometry, transform
 from cpg_ros.simulation.body import Body
 from cpg_ros.simulation.inertial_unit import InertialUnit
 from cpg_ros.simulation.robot_model import legs
-from geometry_msgs.msg import TransformStamped
-from nav_msgs.msg import Odometry
 import numpy as np
 from rclpy.node import Node
 from sensor_msgs.msg import Imu
@@ -38,24 +35,12 @@ class Measurements:
         n = len(names)
         sizes = n, n, n, len(feet), 3, 4, 6
         *joints, forces, base, quaternion, twist = places(sizes)
-        odometry = Odometry(child_frame_id='base')
-        odometry.header.frame_id = 'odom'
-        pose, moving = odometry.pose.pose, odometry.twist.twist
-        messages = [
-            ('joint_states', joint_state(names, *joints)),
-            ('odom', Template(odometry, [odometry.header.stamp], numbers=[
-                *each(pose.position, 'xyz', base), *each(pose.orientation, 'wxyz', quaternion),
-                *each(moving.linear, 'xyz', twist[:3]),
-                *each(moving.angular, 'xyz', twist[3:])])),
-            ('foot_contacts', labelled(tuple(feet), forces))]
-        if util.find_spec('tf2_msgs'):
-            transform = TransformStamped(child_frame_id='base')
-            transform.header.frame_id = 'odom'
-            kind = import_module('tf2_msgs.msg').TFMessage
-            messages.append(('/tf', Template(
-                kind(transforms=[transform]), [transform.header.stamp], numbers=[
-                    *each(transform.transform.translation, 'xyz', base),
-                    *each(transform.transform.rotation, 'wxyz', quaternion)])))
+        frames = 'odom', 'base'
+        messages = [('joint_states', joint_state(names, *joints)),
+                    odometry('odom', frames, base, quaternion, twist),
+                    ('foot_contacts', labelled(tuple(feet), forces))]
+        if has_transforms():
+            messages.append(transform(frames, base, quaternion))
         self._block = MessageBlock(node, sizes, messages)
         imu = Imu()
         imu.header.frame_id = 'base'

@@ -124,3 +124,29 @@ def test_it_goes_and_turns_as_cmd_vel_asks_and_stops(robot):
     until(lambda: track.now > ended + 3.0, 'simulated time to pass')
     assert np.ptp(track.after(ended + 2.0)[:, 1]) < 0.02
     assert 'fallen' not in body.log
+
+
+def test_leg_odometry_is_published_with_its_frames_and_follows_the_body(robot):
+    _, _, track = robot('-p', 'gait:=trot', '-p', 'feedback.odometry_topic:=legs/odom', '-p',
+                        'feedback.base_frame:=trunk')
+    found = []
+    track.node.create_subscription(Odometry, 'legs/odom', found.append, 1000)
+    until(lambda: track.now >= 12.0, 'simulated time to pass')
+    first, last = found[0], found[-1]
+    assert (last.header.frame_id, last.child_frame_id) == ('odom', 'trunk')
+    stamps = np.array([one.header.stamp.sec + 1e-9 * one.header.stamp.nanosec for one in found])
+    assert np.median(np.diff(stamps)) == pytest.approx(0.02, abs=1e-6)
+    rows = track.after(0.0)
+    true = [np.interp([stamps[0], stamps[-1]], rows[:, 0], rows[:, k]) for k in (1, 2)]
+    way = math.hypot(*(ends[1] - ends[0] for ends in true))
+    position, before = last.pose.pose.position, first.pose.pose.position
+    assert way > 2.0
+    assert math.hypot(position.x - before.x - true[0][1] + true[0][0],
+                      position.y - before.y - true[1][1] + true[1][0]) < 0.05 * way
+    assert position.z == pytest.approx(rows[-1, 3], abs=0.03)
+    covariance = np.reshape(last.pose.covariance, (6, 6))
+    assert np.allclose(covariance, covariance.T) and (np.linalg.eigvalsh(covariance) > 0.0).all()
+    assert 0.0 < math.sqrt(covariance[0, 0]) < 0.1 * way
+    late = track.after(stamps[-1] - 2.0)
+    speed = math.hypot(*(late[-1, 1:3] - late[0, 1:3])) / (late[-1, 0] - late[0, 0])
+    assert last.twist.twist.linear.x == pytest.approx(speed, abs=0.15)

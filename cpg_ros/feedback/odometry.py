@@ -1,0 +1,163 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Leg odometry: where the base is, from the estimated velocity, and how uncertain that is.
+
+The position integrates the velocity of the base, turned by the measured heading. Its error is that
+of a velocity which is off by a little that changes slowly - feet that give way, slip or sink, as a
+first-order Gauss-Markov process in the base's frame - and by white noise, and of a heading that
+drifts. The covariance is that of an extended Kalman filter without corrections.
+"""
+
+from collections.abc import Callable
+import math
+
+from cpg_ros.feedback.estimate import SensorData
+from cpg_ros.feedback.kinematics import foot_of, Geometry
+from cpg_ros.integration.jit import bound, entry
+import numpy as np
+
+#: Standard deviation of the slow velocity error: at rest, m/s, and as a share of the speed; its
+#: correlation time, s. The likeliest ones for a simulated Go2 that trots and walks, turns and is
+#: pushed, on flat and rough ground.
+STILL, SHARE, SLOWLY = 0.001, 0.02, 15.0
+#: White noise of the position, m/sqrt(s), and of the heading, rad/sqrt(s): an IMU drifts by half a
+#: degree in a minute.
+PLACE, HEADING = 0.001, 0.001
+#: Feet stand on ground that is level within this share of the way, one standard deviation.
+LEVEL = 0.05
+#: Standard deviation of the height above level ground, m.
+HEIGHT = 0.01
+#: Standard deviation of the velocity forward, to the left and up at an instant, m/s.
+INSTANT = 0.02, 0.02, 0.03
+#: Standard deviation of roll and pitch as IMUs measure them, rad, and of their rates, rad/s.
+TILT, RATE = 0.01, 0.02
+#: Without measurements the position is lost by this much in a second, m/sqrt(s).
+UNSEEN = 0.5
+#: Components of the state: x, y and heading, and the slow error forward and to the left.
+STATES = 5
+
+
+@entry
+def _advance(legs, joints, contact, velocity, rpy, dt, pose, covariance, scratch):
+    """Advance a pose, x, y, z and heading, and the covariance of its states, in place."""
+    yaw = rpy[2] - pose[4]
+    cr, sr, cp, sp = math.cos(rpy[0]), math.sin(rpy[0]), math.cos(rpy[1]), math.sin(rpy[1])
+    cy, sy = math.cos(yaw), math.sin(yaw)
+    forward = cp * velocity[0] + sp * (sr * velocity[1] + cr * velocity[2])
+    left = cr * velocity[1] - sr * velocity[2]
+    east, north = cy * forward - sy * left, sy * forward + cy * left
+    pose[0] += dt * east
+    pose[1] += dt * north
+    pose[3] = (yaw + math.pi) % (2.0 * math.pi) - math.pi
+    high, standing = 0.0, 0
+    for leg in range(contact.shape[0]):
+        if contact[leg] and legs.rows[leg, 1] != 0.0:
+            columns = legs.columns[leg]
+            x, y, z = foot_of(legs.rows[leg], joints[columns[0]], joints[columns[1]],
+                              joints[columns[2]])
+            high += sp * x - cp * (sr * y + cr * z) + legs.radius
+            standing += 1
+    pose[2] = (high / standing if standing else
+               pose[2] + dt * (cp * (sr * velocity[1] + cr * velocity[2]) - sp * velocity[0]))
+
+    # P <- F P F' + Q, where F differs from one in the rows of x and y, and in the slow errors.
+    stays = math.exp(-dt / SLOWLY)
+    scratch[:] = 0.0
+    for k in range(STATES):
+        scratch[k, k] = 1.0 if k < 3 else stays
+    scratch[0, 2], scratch[1, 2] = -dt * north, dt * east
+    scratch[0, 3], scratch[0, 4] = dt * cy, -dt * sy
+    scratch[1, 3], scratch[1, 4] = dt * sy, dt * cy
+    covariance[:] = scratch @ covariance @ scratch.T
+    slow = STILL**2 + SHARE**2 * (forward**2 + left**2)
+    for k, added in enumerate((dt * PLACE**2, dt * PLACE**2, dt * HEADING**2,
+                               (1.0 - stays**2) * slow, (1.0 - stays**2) * slow)):
+        covariance[k, k] += added
+    pose[5] += dt * math.hypot(forward, left)
+
+
+class Odometry:
+    """Where the base of one robot is, from where it was first; a tick allocates nothing lasting.
+
+    The x axis of its frame is the base's heading at the start. Height is that above the feet which
+    stand: going up a slope is not seen.
+
+    Attributes:
+        pose: x, y and z in m, heading in rad, those of the start, and the way so far in m.
+        covariance: of x, y, heading, and the slow velocity error forward and to the left, in m,
+            rad and m/s, shape (5, 5).
+        twist: velocity and angular velocity in the base's frame, m/s and rad/s, shape (6,).
+
+    """
+
+    def __init__(self, geometry: Geometry) -> None:
+        self._legs = geometry.arrays
+        self.pose = np.zeros(6)
+        self.covariance = np.zeros((STATES, STATES))
+        self._scratch = np.zeros((STATES, STATES))
+        self._tilt, self.twist = np.zeros(3), np.zeros(6)
+        self._kernel: Callable | None = None
+        self._started = False
+
+    def restart(self) -> None:
+        """Start again where the base is now."""
+        self.pose[:] = self.covariance[:] = 0.0
+        self._started = False
+
+    def advance(self, sensors: SensorData, velocity: np.ndarray, contact: np.ndarray, dt: float
+                ) -> None:
+        """Take a step.
+
+        Args:
+            sensors: what is measured now, of one run.
+            velocity: of the base in its own frame, as estimated, m/s, shape (3,).
+            contact: whether each foot is on the ground, shape (legs,).
+            dt: s.
+
+        """
+        rpy = sensors.rpy[0]
+        if not self._started:
+            self.pose[4], self._started = rpy[2], True
+            self.covariance[3, 3] = self.covariance[4, 4] = STILL**2
+        arguments = (self._legs, sensors.joint_positions[0], contact, velocity, rpy, dt, self.pose,
+                     self.covariance, self._scratch)
+        if self._kernel is None:
+            self._kernel = bound(_advance, *arguments)
+        self._kernel(*arguments)
+        self._tilt = rpy
+        self.twist[:3], self.twist[3:] = velocity, sensors.angular_velocity[0]
+
+    def lose(self, dt: float) -> None:
+        """Take a step of dt in s without measurements: the base may go on at UNSEEN."""
+        for k in range(2):
+            self.covariance[k, k] += dt * UNSEEN**2
+
+    def orientation(self, out: np.ndarray) -> None:
+        """Fill the orientation in the odometry's frame, w x y z."""
+        roll, pitch, yaw = 0.5 * self._tilt[0], 0.5 * self._tilt[1], 0.5 * self.pose[3]
+        cr, sr, cp, sp = math.cos(roll), math.sin(roll), math.cos(pitch), math.sin(pitch)
+        cy, sy = math.cos(yaw), math.sin(yaw)
+        out[0], out[1] = cr * cp * cy + sr * sp * sy, sr * cp * cy - cr * sp * sy
+        out[2], out[3] = cr * sp * cy + sr * cp * sy, cr * cp * sy - sr * sp * cy
+
+    def pose_covariance(self, out: np.ndarray) -> np.ndarray:
+        """Fill that of x, y, z, roll, pitch and yaw in m and rad, shape (6, 6), as ROS has it."""
+        out[:] = 0.0
+        for row, k in enumerate((0, 1, 5)):
+            for column, other in enumerate((0, 1, 5)):
+                out[k, other] = self.covariance[row, column]
+        out[2, 2] = HEIGHT**2 + (LEVEL * self.pose[5])**2
+        out[3, 3] = out[4, 4] = TILT**2
+        return out

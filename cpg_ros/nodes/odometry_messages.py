@@ -1,0 +1,61 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Messages of odometry: nav_msgs/Odometry and, where tf2_msgs is installed, the transform."""
+
+from importlib import import_module, util
+
+from cpg_ros.nodes.message_block import each, Template
+from geometry_msgs.msg import TransformStamped
+from nav_msgs.msg import Odometry
+import numpy as np
+
+#: Numbers of a position, an orientation w x y z, a twist, and the covariances of pose and twist.
+POSE, ORIENTATION, TWIST, COVARIANCE = 3, 4, 6, 36
+
+
+def has_transforms() -> bool:
+    """Return whether transforms can be published: tf2_msgs is not on PyPI."""
+    return util.find_spec('tf2_msgs') is not None
+
+
+def odometry(topic: str, frames: tuple[str, str], *places: np.ndarray) -> tuple[str, Template]:
+    """Return topic and message; places are those of its numbers in the block.
+
+    Args:
+        topic: to be published on.
+        frames: of the pose, and of the twist and of what moves.
+        places: of position, orientation, twist and, if they change, both covariances.
+
+    """
+    message = Odometry(child_frame_id=frames[1])
+    message.header.frame_id = frames[0]
+    pose, moving = message.pose.pose, message.twist.twist
+    numbers = [*each(pose.position, 'xyz', places[0]), *each(pose.orientation, 'wxyz', places[1]),
+               *each(moving.linear, 'xyz', places[2][:3]),
+               *each(moving.angular, 'xyz', places[2][3:])]
+    numbers += [(part, 'covariance', where) for part, where in zip(
+        (message.pose, message.twist), places[3:], strict=False)]
+    return topic, Template(message, [message.header.stamp], numbers=numbers)
+
+
+def transform(frames: tuple[str, str], position: np.ndarray, orientation: np.ndarray
+              ) -> tuple[str, Template]:
+    """Return the topic /tf and the message with the same pose."""
+    message = TransformStamped(child_frame_id=frames[1])
+    message.header.frame_id = frames[0]
+    return '/tf', Template(
+        import_module('tf2_msgs.msg').TFMessage(transforms=[message]), [message.header.stamp],
+        numbers=[*each(message.transform.translation, 'xyz', position),
+                 *each(message.transform.rotation, 'wxyz', orientation)])
