@@ -29,9 +29,8 @@ from cpg_ros.integration.jit import bound, entry
 import numpy as np
 
 #: Standard deviation of the slow velocity error: at rest, m/s, and as a share of the speed; its
-#: correlation time, s. The likeliest ones for a simulated Go2 that trots and walks, turns and is
-#: pushed, on flat and rough ground.
-STILL, SHARE, SLOWLY = 0.001, 0.02, 15.0
+#: correlation time, s. Of a simulated Go2 that trots, walks, turns and is pushed.
+STILL, SHARE, SLOWLY = 0.001, 0.015, 15.0
 #: White noise of the position, m/sqrt(s), and of the heading, rad/sqrt(s): an IMU drifts by half a
 #: degree in a minute.
 PLACE, HEADING = 0.001, 0.001
