@@ -25,7 +25,7 @@ from cpg_ros.files.plain_text import table
 from cpg_ros.gaits.leg_names import legs_of, LegsError, role_of
 from cpg_ros.motion.plan import plan, PlanError
 from cpg_ros.networks.registry import NETWORKS
-from cpg_ros.robots.description import JointDescription, RobotDescription
+from cpg_ros.robots.description import JointDescription, RobotDescription, SERVOS, SLOW
 from cpg_ros.robots.robot import Joint, Motion, Robot
 
 #: Files have limits rounded: differences up to this many rad (rad/s) are none.
@@ -275,6 +275,11 @@ def _notes(robot: Robot, known: RobotDescription) -> Iterator[str]:
         yield f'limits that the {what} does not have are invented: ' + ', '.join(
             f'{joint.name} ({", ".join(joint.invented)})' for joint in robot.joints
             if joint.invented)
+    slow = sorted({joint.velocity for joint in robot.joints if joint.velocity < SLOW})
+    if slow:
+        yield (f'velocity limits of {" and ".join(f"{one:g}" for one in slow)} rad/s are slow for '
+               f'a walking robot ({SERVOS}), and gaits keep to them: if your motors are faster, '
+               f'correct the {what}, or make the file with --velocity and what they reach')
     unbounded = [name for name in driven
                  if name in known.joints and known.joints[name].velocity == inf]
     if unbounded:

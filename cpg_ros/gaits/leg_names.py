@@ -95,6 +95,11 @@ def words_of(name: str) -> list[str]:
     return [word if k <= side or word != 'r' else 'roll' for k, word in enumerate(words)]
 
 
+def _moved(words: Sequence[str]) -> Sequence[str]:
+    """Return the words of what a joint moves: torso_to_abduct is no joint of the torso."""
+    return words[words.index('to') + 1:] if 'to' in words else words
+
+
 def _read(words: Sequence[str]) -> tuple[str, str, frozenset[str]]:
     """Return leg of four or six, leg of two ('' for none), and the words that name it."""
     codes = {CODES[word] for word in words if word in CODES}
@@ -146,7 +151,7 @@ def legs_of(joints: Sequence[str], whole: bool = False) -> Legs:
     more = HEXAPOD if any(read[name][0] in ('lm', 'rm') for name in joints) else QUADRUPED
     for known, column, others in ((more, 0, OTHER), (BIPED, 1, OTHER | UPPER)):
         found = {leg: tuple(name for name in joints if read[name][column] == leg
-                            and not others & set(words[name])) for leg in known}
+                            and not others & set(_moved(words[name]))) for leg in known}
         there = [leg for leg in known if found[leg]]
         if len(there) == len(known):
             break

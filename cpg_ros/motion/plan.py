@@ -51,12 +51,13 @@ class OutOfLimits(PlanError):
     Attributes:
         message: the joint and the figure, as 'knee at 11.46 rad/s, above its limit 10'.
         excess: how far beyond, in rad, or as a share of the limit of speed.
+        key: which limit it is, as robot files call it: lower, upper or velocity.
 
     """
 
-    def __init__(self, cause: str, message: str, excess: float) -> None:
+    def __init__(self, cause: str, message: str, excess: float, key: str) -> None:
         super().__init__(f'{cause} {message}')
-        self.message, self.excess = message, excess
+        self.message, self.excess, self.key = message, excess, key
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -261,7 +262,7 @@ def plan(robot: Robot, name: str, preset: Preset, network: Network, frequency: f
         cause = f'amplitude {amplitude:g} takes'
         if key == 'velocity':
             cause = f'frequency {strides:.3g} Hz at amplitude {amplitude:g} moves'
-        raise OutOfLimits(cause, message, excess)
+        raise OutOfLimits(cause, message, excess, key)
     gain = judged.chosen if gain < 0.0 else gain
     return GaitPlan(name, robot, gait, orbit, judged, gain, strides, motion, shift, readout,
                     in_place, span, speed, stands.shares)

@@ -25,5 +25,5 @@ __all__ = ['bag_recorder', 'bounded_request', 'bridge_base', 'bridge_interface',
            'local_socket', 'lockstep', 'log_queue', 'measured_pose', 'message_block',
            'message_types', 'node_base', 'node_client', 'other_publishers', 'parameter_services',
            'parameter_spec', 'polled_group', 'qos_profiles', 'raw_messages', 'real_time',
-           'robot_sim', 'sensor_input', 'sensor_publishers', 'shutdown', 'unitree', 'watchdog',
-           'watchdog_link']
+           'robot_sim', 'sensor_input', 'sensor_publishers', 'shutdown', 'start_progress',
+           'unitree', 'watchdog', 'watchdog_link']

@@ -16,17 +16,12 @@
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-import threading
-import time
 
 from cpg_ros.integration.compilation import noticing
 from cpg_ros.motion.network_kernels import precompile
-from cpg_ros.nodes.health_publisher import START
-from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from cpg_ros.nodes.start_progress import StartProgress
 from rclpy.node import Node
 
-#: How often it says so, s.
-EVERY = 1.0
 #: How long a network's kernels and those of the feedback take, on one core of 2023, s.
 NETWORK, FEEDBACK = 20.0, 25.0
 
@@ -47,13 +42,13 @@ def announced(node: Node, what: str, seconds: float) -> Iterator[None]:
         seconds: that it takes, s.
 
     """
-    begun: list[_Progress] = []
+    begun: list[StartProgress] = []
 
     def compiling() -> None:
         if not begun:
             node.get_logger().info(f'compiling {what}: about {seconds:g} s, only at its first '
                                    'start on this installation')
-            begun.append(_Progress(node, what, seconds))
+            begun.append(StartProgress(node, f'compiling {what}', seconds))
     try:
         with noticing(compiling):
             yield
@@ -62,34 +57,3 @@ def announced(node: Node, what: str, seconds: float) -> Iterator[None]:
     finally:
         for progress in begun:
             progress.end()
-
-
-class _Progress:
-    """A thread that publishes how long a compilation has taken."""
-
-    def __init__(self, node: Node, what: str, seconds: float) -> None:
-        self._node, self._what, self._seconds, self._began = node, what, seconds, time.monotonic()
-        self._publisher = node.create_publisher(DiagnosticArray, '/diagnostics', 10)
-        self._ended = threading.Event()
-        self._thread = threading.Thread(target=self._publish, name='progress', daemon=True)
-        self._thread.start()
-
-    def _publish(self) -> None:
-        name = self._node.get_fully_qualified_name()
-        while not self._ended.wait(EVERY):
-            message = DiagnosticArray(status=[DiagnosticStatus(
-                level=DiagnosticStatus.OK, name=f'{name}: {START}', message=f'compiling '
-                f'{self._what}, {self.passed:.0f} of about {self._seconds:g} s')])
-            message.header.stamp = self._node.get_clock().now().to_msg()
-            self._publisher.publish(message)
-
-    @property
-    def passed(self) -> float:
-        """How long it has taken, s."""
-        return time.monotonic() - self._began
-
-    def end(self) -> None:
-        """Publish no more."""
-        self._ended.set()
-        self._thread.join()
-        self._node.destroy_publisher(self._publisher)

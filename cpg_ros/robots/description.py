@@ -25,6 +25,8 @@ import numpy as np
 
 #: Kinds of joints that turn, which a cell can drive.
 TURNING = ('revolute', 'continuous')
+#: Limits of speed below this, rad/s, are those of a file rather than of a motor.
+SLOW, SERVOS = 5.0, 'hobby servos reach about 5 to 10 rad/s'
 
 
 class DescriptionError(CpgError):

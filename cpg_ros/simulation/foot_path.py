@@ -202,9 +202,10 @@ class Feet:
             path = paths[name]
             curves = np.array([leg.angles(*one(phase))
                                for one in (path, replace(path, stride=0.0))])
+            psi = {cell: basis(orbit, cell - 1, self.robot.harmonics, path)
+                   for cell in {joint.cell for joint in leg.joints}}
             for joint, curve in zip(leg.joints, curves.swapaxes(0, 1), strict=True):
-                psi = basis(orbit, joint.cell - 1, self.robot.harmonics, path)
-                offset, weights, _ = fit(curve, psi)
+                offset, weights, _ = fit(curve, psi[joint.cell])
                 full, still = (tuple(float(w) for w in row) for row in weights.round(DIGITS))
                 found[joint.name] = JointMotion(round(offset, DIGITS), full, still)
         return found

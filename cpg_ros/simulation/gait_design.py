@@ -99,6 +99,12 @@ class Aim:
             lift=start.lift + share * (low.lift - start.lift),
             height=start.height + share * (low.height - start.height)))
 
+    def slower(self, share: float) -> 'Aim':
+        """Return the same at this share of all frequencies, and of the speed that follows."""
+        low, start, high = (replace(one, frequency=share * one.frequency)
+                            for one in (self.low, self.start, self.high))
+        return Aim(share * self.speed, self.hops, low, start, high)
+
     @property
     def place(self) -> np.ndarray:
         """Where the start is in the unit cube."""

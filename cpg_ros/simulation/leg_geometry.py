@@ -24,6 +24,9 @@ from cpg_ros.simulation.model_indices import Anatomy
 from cpg_ros.simulation.robot_model import engine, legs
 import numpy as np
 
+#: Share up to which the centre of mass counts as above the middle of the feet.
+CENTRED = 0.1
+
 
 def at_zero(body: Body) -> Any:
     """Return a ``mujoco.MjData`` with all joints at 0, kinematics done."""
@@ -61,6 +64,17 @@ def two_link_angles(upper: complex, lower: complex, bend: float, place: np.ndarr
 def wrapped(angle: np.ndarray) -> np.ndarray:
     """Return angles from -pi to pi, rad."""
     return (angle + math.pi) % (2.0 * math.pi) - math.pi
+
+
+def centre_ahead(body: Body, parts: Anatomy) -> float:
+    """Return how far the centre of mass is ahead of the middle of the feet in the stand, m.
+
+    It is 0 where that is less than CENTRED of half the distance from hind to fore feet.
+    """
+    body.reset()
+    feet = parts.places(body.data)[:, 0]
+    ahead = float(body.data.subtree_com[parts.base, 0] - feet.mean())
+    return ahead if abs(ahead) > 0.5 * CENTRED * np.ptp(feet) else 0.0
 
 
 def read_geometry(body: Body, parts: Anatomy) -> BodyGeometry:

@@ -32,8 +32,9 @@ DURATION = 8.0
 #: Floors that speeds and turns are means of.
 FLOORS = (Scenario(), Scenario(0.7))
 #: A gait counts as steered if its speeds rise by at least this much a row, m/s, and if it turns at
-#: least so fast for a difference of 1, rad/s.
-RISE, TURN = 0.01, 0.2
+#: least so fast for a difference of 1, rad/s; of a slow one, these for each m/s of its speed.
+RISE, TURN = 0.01, 0.1
+RISE_SHARE, TURN_SHARE = 0.05, 0.5
 
 
 def measure(batch: Batch, program: GaitPlan,
@@ -64,7 +65,7 @@ def measure(batch: Batch, program: GaitPlan,
         n = len(FLOORS)
         turn = (np.mean(turns[n:2 * n]) - np.mean(turns[2 * n:])) / (2.0 * DIFFERENCE)
         rows.append((float(np.mean(speeds[:n])), stride, pace * program.frequency, float(turn),
-                     bool(turn >= TURN) and all(trial.upright for trial in trials)))
+                     all(trial.upright for trial in trials)))
         update(done + 1)
     return _rising(rows)
 
@@ -73,12 +74,15 @@ def _rising(rows: list[tuple[float, float, float, float, bool]]) -> SteeringTabl
     """Keep the rows about the stride of 0 as far as speeds rise."""
     zero = STRIDES.index(0.0)
     first = last = zero
-    while last + 1 < len(rows) and rows[last + 1][4] and (
-            rows[last + 1][0] >= rows[last][0] + RISE):
+    top = max(rows[-1][0], 0.0)
+    rise, turning = min(RISE, RISE_SHARE * top), min(TURN, TURN_SHARE * top)
+    good = [upright and turn >= turning for *_, turn, upright in rows]
+    while last + 1 < len(rows) and good[last + 1] and (
+            rows[last + 1][0] >= rows[last][0] + rise):
         last += 1
-    while first > 0 and rows[first - 1][4] and rows[first - 1][0] <= rows[first][0] - RISE:
+    while first > 0 and good[first - 1] and rows[first - 1][0] <= rows[first][0] - rise:
         first -= 1
-    if not rows[zero][4] or last == zero:
+    if not good[zero] or last == zero:
         return None
     speed, stride, frequency, turn = zip(*(row[:4] for row in rows[first:last + 1]), strict=True)
     return SteeringTable(*(tuple(round(value, 4) for value in column)

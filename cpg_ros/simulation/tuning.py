@@ -33,11 +33,13 @@ from cpg_ros.robots.robot import Motion, Robot, SteeringTable
 from cpg_ros.simulation.batch import Batch, targets
 from cpg_ros.simulation.efference_measurement import calibrated
 from cpg_ros.simulation.foot_path import Feet, OWN
-from cpg_ros.simulation.gait_design import AIMS, Design, LENGTH, price
+from cpg_ros.simulation.gait_design import Aim, AIMS, Design, LENGTH, price
+from cpg_ros.simulation.leg_geometry import centre_ahead
+from cpg_ros.simulation.nearest_design import NearestDesign, NoDesign
 from cpg_ros.simulation.robot_model import SimulationError
-from cpg_ros.simulation.run_metrics import RunMetrics
 from cpg_ros.simulation.scenario import Scenario
 from cpg_ros.simulation.steering_table import measure, STRIDES
+from cpg_ros.simulation.tuned_gait import Tuned
 import numpy as np
 
 #: Length of the runs that designs are compared by, and of the one that figures are of, s.
@@ -48,58 +50,16 @@ SCENARIOS = (Scenario(), Scenario(0.9),
              Scenario(0.8, 0.95, ((3.0, -50.0, 0.0), (4.5, 0.0, -50.0))))
 #: Mass that these pushes are for, kg; others have pushes that make them as fast.
 MASS = 15.2
-#: Price of a design that the joints cannot follow, and what each unit beyond a limit adds.
-REFUSED, BEYOND = 1000.0, 100.0
-#: Generations after which a search that has met no other design ends.
-GIVE_UP = 8
-#: Share of the speed aimed at from which a gait is good.
-GOOD = 0.3
+#: Price of a design that the joints cannot follow, what each unit beyond a limit adds, which leads
+#: the search back to what they can, and the price of one that has no gait.
+REFUSED, BEYOND, NO_GAIT = 1000.0, 100.0, 1e5
+#: Least share of a gait's usual frequencies that is tried where the joints are slow, and how far
+#: below their limit of speed its gentlest start then begins.
+SLOWEST, ROOM = 0.3, 0.9
 #: Designs in a generation, and how far about the start the first ones are (1: all there is).
 GENERATION, SPREAD = 12, 0.15
 #: Starts that are tried first: how much gentler than the usual one.
 GENTLE = (0.0, 0.25, 0.5, 0.75, 1.0)
-
-
-class NoDesign(SimulationError):
-    """None of a gait's designs can be run; the message gives the reason."""
-
-    exit_code = 1
-
-
-@dataclass(frozen=True)
-class Tuned:
-    """What was found for a gait.
-
-    Attributes:
-        gait: its name.
-        design: of the lowest price.
-        price: its price.
-        first: price of the usual start.
-        motion: what it makes of the robot.
-        trial: LONG seconds of it on a good floor, nothing disturbing it.
-        aim: speed that it was to reach on this robot, m/s.
-
-    """
-
-    gait: str
-    design: Design
-    price: float
-    first: float
-    motion: Motion
-    trial: RunMetrics
-    aim: float
-
-    @property
-    def good(self) -> bool:
-        """Whether it stays upright and gets on."""
-        return self.trial.upright and self.trial.speed >= GOOD * self.aim
-
-    @property
-    def verdict(self) -> str:
-        """Good or poor, and why."""
-        if not self.trial.upright:
-            return f'poor: falls after {self.trial.fell:.1f} s'
-        return f'{"good" if self.good else "poor"}: {self.trial.speed:.2f} m/s'
 
 
 class Tuner:
@@ -120,13 +80,19 @@ class Tuner:
                                   'are not tuned, as they need balance, and foot paths alone do '
                                   'not give it')
         self.robot = robot
-        self._nearest: OutOfLimits | None = None
+        self._nearest: NearestDesign | None = None
         self.batch = Batch(model, robot, kp, kd, threads=threads, say=say)
         body = self.batch.body
         say('the joints have kp {:g} N m/rad and kd {:g} N m s/rad'.format(*body.gains)
             + (f', a guess from {body.mass:.1f} kg' if None in (kp, kd) else ''))
         self.feet = Feet(self.batch.body, self.batch.parts)
         self.scale = self.feet.length / LENGTH
+        # Designs are of robots whose feet bear alike.
+        self.ahead = centre_ahead(body, self.batch.parts)
+        if self.ahead:
+            say(f'the centre of mass is {100.0 * abs(self.ahead):.1f} cm '
+                f'{"ahead of" if self.ahead > 0.0 else "behind"} the middle of the feet in the '
+                'stand: gaits move the feet below it')
         # Of a push the same speed.
         heavy = body.mass / MASS * math.sqrt(self.scale)
         self.scenarios = tuple(replace(one, pushes=tuple(
@@ -137,8 +103,9 @@ class Tuner:
         """Return the robot's motion by a design."""
         preset = NETWORKS[self.robot.networks[0]].presets()[gait]
         design = replace(design, duty=round(design.duty, 3), lead=round(design.lead, 3))
-        paths = {leg: design.path(self.robot.girdles.get(leg, ''), self.scale)
-                 for leg in self.robot.legs}
+        paths = {leg: replace(path, ahead=path.ahead + self.ahead) for leg, path in (
+            (leg, design.path(self.robot.girdles.get(leg, ''), self.scale))
+            for leg in self.robot.legs)}
         return Motion(round(design.frequency / math.sqrt(self.scale), 3),
                       self.feet.joints(gait_of(preset, preset.network)[0], paths),
                       duty=design.duty, stance=(-design.lead, OWN))
@@ -153,24 +120,32 @@ class Tuner:
         robot = replace(self.robot, motions={gait: motion})
         return plan(robot, gait, preset, preset.network, motion.frequency or 0.0)
 
-    def prices(self, gait: str, designs: Sequence[Design]) -> np.ndarray:
+    def prices(self, gait: str, designs: Sequence[Design], aim: Aim | None = None) -> np.ndarray:
         """Return the price of each design: of its mean and its worst run.
 
-        The runs take by turns those of the robot's networks that have the gait.
+        The runs take by turns those of the robot's networks that have the gait. What the joints
+        cannot follow costs the more the further it is beyond their limits.
+
+        Args:
+            gait: one of AIMS.
+            designs: of it.
+            aim: what it is to reach, instead of the usual.
+
         """
-        aim = AIMS[gait]
+        aim = aim or AIMS[gait]
         aim = replace(aim, speed=aim.speed * math.sqrt(self.scale),
                       hops=aim.hops / math.sqrt(self.scale))
-        found, runs, runnable = np.full(len(designs), REFUSED), [], []
+        found, runs, runnable = np.full(len(designs), NO_GAIT), [], []
         for k, design in enumerate(designs):
             motion = self.motion(gait, design)
             try:
                 angles = [targets(self.program(gait, motion, network), SHORT, self.batch.timestep)
                           for network in self.robot.networks_with(gait)]
             except OutOfLimits as error:
-                found[k] += BEYOND * error.excess
-                if self._nearest is None or error.excess < self._nearest.excess:
-                    self._nearest = error
+                found[k] = REFUSED + BEYOND * error.excess
+                if self._nearest is None or error.excess < self._nearest.error.excess:
+                    self._nearest = NearestDesign(design, motion.frequency or 0.0, self.scale,
+                                                  error)
                 continue
             except PlanError:
                 continue
@@ -196,9 +171,7 @@ class Tuner:
             NoDesign: no design can be run.
 
         """
-        self._nearest = None
-        aims = [AIMS[gait].gentler(share) for share in GENTLE]
-        prices = self.prices(gait, [one.start for one in aims])
+        aims, prices = self._starts(gait)
         aim, first, cheapest = aims[int(prices.argmin())], float(prices[0]), float(prices.min())
         best = aim.start
         search = self._cma.CMAEvolutionStrategy(
@@ -208,22 +181,31 @@ class Tuner:
         while tried < evaluations:
             places = search.ask()
             designs = [aim.design(place) for place in places]
-            prices = self.prices(gait, designs)
+            prices = self.prices(gait, designs, aim)
             search.tell(places, prices.tolist())
             tried += len(places)
             update(min(tried, evaluations))
             if prices.min() < cheapest:
                 best, cheapest = designs[int(prices.argmin())], float(prices.min())
-            if cheapest >= REFUSED and tried > GIVE_UP * GENERATION:
-                break
         if cheapest >= REFUSED:
             raise NoDesign(f"{gait}: none of {tried} designs keeps to the joints' limits"
-                           + (f'; the nearest moves {self._nearest.message}'
-                              if self._nearest else ''))
+                           + (f'; {self._nearest}' if self._nearest else ''))
         motion = self.motion(gait, best)
         angles = targets(self.program(gait, motion), LONG, self.batch.timestep)
         return Tuned(gait, best, cheapest, first, motion,
-                     self.batch.run([(angles, Scenario())])[0], aim.speed * math.sqrt(self.scale))
+                     self.batch.run([(angles, Scenario())])[0], aim.speed * math.sqrt(self.scale),
+                     aim.speed / AIMS[gait].speed)
+
+    def _starts(self, gait: str) -> tuple[list[Aim], np.ndarray]:
+        """Return where to begin, gentler and gentler, and slower if the joints cannot follow."""
+        self._nearest = None
+        aims = [AIMS[gait].gentler(share) for share in GENTLE]
+        prices = self.prices(gait, [one.start for one in aims])
+        nearest = self._nearest
+        if prices.min() < REFUSED or nearest is None or nearest.share == 1.0:
+            return aims, prices
+        aims = [one.slower(max(ROOM * nearest.share, SLOWEST)) for one in aims]
+        return aims, self.prices(gait, [one.start for one in aims], aims[0])
 
 
 @dataclass(frozen=True)

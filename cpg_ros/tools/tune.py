@@ -31,7 +31,8 @@ from cpg_ros.networks.registry import NETWORKS
 from cpg_ros.robots.robot import Robot
 from cpg_ros.robots.robot_file import LIMITS, load_robot, write_robot
 from cpg_ros.simulation.gait_design import AIMS
-from cpg_ros.simulation.tuning import GOOD, LONG, tune, Tuned
+from cpg_ros.simulation.tuned_gait import GOOD, Tuned
+from cpg_ros.simulation.tuning import LONG, tune
 from cpg_ros.tools.arguments import number, refuse_repeated
 from cpg_ros.tools.command_line import note, Parser, run, say
 

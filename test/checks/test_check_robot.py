@@ -203,6 +203,7 @@ def test_files_that_are_no_urdf_end_in_one_line(tmp_path, capsys, urdf, words):
     (('quadruped', '--urdf', 'URDF', '--gaits', 'canter'), "'canter' is not one of walk, trot"),
     (('quadruped', '--urdf', 'URDF', '--frequency', 'nan'), '--frequency: nan is not from 0'),
     (('quadruped', '--urdf', 'URDF', '--amplitude', '-1'), '--amplitude: -1 is not from 0 to 3'),
+    (('quadruped', '--urdf', 'URDF', '--velocity', '0'), '--velocity: 0 is not above 0'),
     (('--urdf', 'URDF', '--make', 'a.txt'), 'a.txt does not end in .yaml'),
     (('--urdf', 'URDF', '--make', 'URDF.yaml'), 'already exists'),
     (('--urdf', 'URDF', '--make', 'nowhere/a.yaml'), 'No such file or directory'),

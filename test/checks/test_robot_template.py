@@ -123,6 +123,24 @@ def test_bipeds_with_unusual_names_are_made(tmp_path, capsys, left, right, more)
     assert robot.networks == ('biped',)
 
 
+def test_slow_joints_are_told_at_once_and_can_be_corrected(tmp_path, capsys):
+    urdf, out = tmp_path / 'my.urdf', tmp_path / 'robot.yaml'
+    urdf.write_text(quadruped_urdf(calf='lower="-2.7" upper="-0.8" velocity="0.7"',
+                                   thigh='lower="-1" upper="3" velocity="1.5"'))
+    assert main(['--urdf', str(urdf), '--make', str(out)]) == 0
+    assert ('note: velocity limits of 0.7 and 1.5 rad/s are slow for a walking robot (hobby '
+            'servos reach about 5 to 10 rad/s), and gaits keep to them: if your motors are '
+            'faster, correct the URDF, or make the file with --velocity'
+            ) in capsys.readouterr().out
+    out.unlink()
+    assert main(['--urdf', str(urdf), '--make', str(out), '--velocity', '8']) == 0
+    said = capsys.readouterr()
+    assert 'are slow' not in said.out and '8 rad/s, as given with --velocity' in said.err
+    robot = read_robot(out)
+    assert {joint.velocity for joint in robot.joints} == {8.0}
+    assert not any('velocity' in joint.invented for joint in robot.joints)
+
+
 def test_lopsided_legs_are_a_finding(tmp_path, capsys):
     path, out = tmp_path / 'my.urdf', tmp_path / 'made.yaml'
     path.write_text(biped_of('L', 'R', 'L_TOE_X'))

