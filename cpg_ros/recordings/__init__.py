@@ -12,12 +12,13 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Recorded and live joint states: bags, CSV files, messages as bytes.
+"""Recorded and live joint states: bags, files of laboratories, messages as bytes.
 
 Imports ``files``; knows nothing of ROS, but for ``rosbag2_library``, which reads bags by it.
 """
 
-__all__ = ['bag_library', 'bag_reader', 'bag_storage', 'bag_writer', 'cdr', 'csv_reader',
-           'formats', 'joint_streams', 'live_buffer', 'recording', 'recording_format',
-           'rosbag2_library', 'rosbags_library', 'servo', 'stray_samples', 'table_text', 'thinned',
-           'unfinished_mcap']
+__all__ = ['bag_library', 'bag_reader', 'bag_storage', 'bag_writer', 'bvh_reader', 'c3d_reader',
+           'cdr', 'csv_reader', 'formats', 'frame_stamps', 'joint_patterns', 'joint_streams',
+           'live_buffer', 'markers', 'mot_reader', 'npz_reader', 'number_rows', 'pose_reader',
+           'recording', 'recording_format', 'rosbag2_library', 'rosbags_library', 'segments',
+           'servo', 'stray_samples', 'table_text', 'thinned', 'trc_reader', 'unfinished_mcap']

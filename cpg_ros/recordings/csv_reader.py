@@ -34,7 +34,7 @@ from cpg_ros.recordings.recording import (
     RecordingError,
     require,
 )
-from cpg_ros.recordings.recording_format import JOINTS, Option, RecordingFormat
+from cpg_ros.recordings.recording_format import JOINTS, Option, RecordingFormat, UNIT
 from cpg_ros.recordings.table_text import decimal_commas, opened, preamble, units_of
 import numpy as np
 
@@ -334,12 +334,11 @@ def _number(cell: str) -> float | None:
 
 CSV = RecordingFormat(
     name='csv', contents='a CSV file with a column for time and one for each joint',
-    help="a table with a header, optionally compressed with gzip, or OpenSim's .mot or .sto",
+    help='a table with a header, optionally compressed with gzip',
     metavar='FILE',
-    read=read_csv, endings=('.csv', '.csv.gz', '.mot', '.sto'),
+    read=read_csv, endings=('.csv', '.csv.gz'),
     options=(JOINTS,
-             Option('unit', 'unit of the angles in the CSV file (default: as in its header, or '
-                    'rad)', choices=('rad', 'deg')),
+             UNIT,
              Option('time', 'unit of the time in the CSV file (default: as in its header, or s)',
                     choices=('s', 'ms', 'us', 'ns'))),
     lacks={'topics': 'a CSV file has none', 'servo': 'a CSV file has no efforts'})

@@ -20,12 +20,19 @@ from typing import Any
 
 from cpg_ros.errors import InputError
 from cpg_ros.recordings.bag_reader import BAG
+from cpg_ros.recordings.bvh_reader import BVH
+from cpg_ros.recordings.c3d_reader import C3D
 from cpg_ros.recordings.csv_reader import CSV
+from cpg_ros.recordings.mot_reader import MOT
+from cpg_ros.recordings.npz_reader import NPZ
+from cpg_ros.recordings.pose_reader import POSE
 from cpg_ros.recordings.recording import few, Recording, RecordingError
 from cpg_ros.recordings.recording_format import Option, RecordingFormat
+from cpg_ros.recordings.trc_reader import TRC
 
 #: Name -> format. One more is a file like those of these, and its name here.
-FORMATS: dict[str, RecordingFormat] = {one.name: one for one in (BAG, CSV)}
+FORMATS: dict[str, RecordingFormat] = {
+    one.name: one for one in (BAG, CSV, MOT, TRC, C3D, POSE, BVH, NPZ)}
 
 
 def reading_options() -> list[Option]:
@@ -36,6 +43,8 @@ def reading_options() -> list[Option]:
 def format_of(path: Path) -> RecordingFormat:
     """Return a recording's format, by the ending of its name or by what the folder holds.
 
+    Where several formats have the ending, the first that recognises the file is its format.
+
     Raises:
         RecordingError: it is a file of another ending.
         OSError: the folder cannot be listed.
@@ -44,9 +53,10 @@ def format_of(path: Path) -> RecordingFormat:
     if path.is_dir():
         folders = [one for one in FORMATS.values() if one.files_in is not None]
         return next((one for one in folders if one.files_in and one.files_in(path)), folders[0])
-    for one in FORMATS.values():
-        if path.name.endswith(one.endings):
-            return one
+    fitting = [one for one in FORMATS.values() if path.name.endswith(one.endings)]
+    if fitting:
+        return next((one for one in fitting if one.recognises and one.recognises(path)),
+                    next((one for one in fitting if not one.recognises), fitting[0]))
     endings = [ending for one in FORMATS.values() for ending in one.endings]
     raise RecordingError(f'{path}: no recording; the names of recordings end in '
                          f'{", ".join(endings)}')
@@ -62,8 +72,8 @@ def read_recording(path: str | Path, format_name: str = '', *, robot_joints: Seq
         robot_joints: joints of a robot, of which those that are there are taken where ``joints``
             names none and the format may hold others.
         progress: show a progress bar.
-        options: as of the format's reader, `read_bag` or `read_csv`; those that are None or
-            empty count as not given.
+        options: as of the format's reader, such as `read_bag` or `read_csv`; those that are None
+            or empty count as not given.
 
     Raises:
         RecordingError: see `merged`; the recording cannot be read, or its format is not known.

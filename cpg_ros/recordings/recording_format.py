@@ -46,8 +46,10 @@ class Option:
 
 
 #: Every format has joints, so that every reader takes this.
-JOINTS = Option('joints', "joints to use (default: the robot's, or all); for a CSV file also "
-                "patterns such as 'JointPos*'", 'NAME', several=True)
+JOINTS = Option('joints', "joints to use (default: the robot's, or all); for files other than "
+                "bags also patterns such as 'JointPos*'", 'NAME', several=True)
+UNIT = Option('unit', 'unit of the angles (default: as the file says, or rad)',
+              choices=('rad', 'deg'))
 
 
 @dataclass(frozen=True)
@@ -65,6 +67,8 @@ class RecordingFormat:
         features: what else its reader takes: ``servo``, if it has velocities and efforts, and
             ``some``, to pass over joints that are not there.
         lacks: option or feature -> why it is refused, in a phrase.
+        recognises: tells whether a file with one of its endings is of this format, where others
+            have that ending, too.
         files_in: returns the files of a folder that is one recording, sorted, or none for any
             other folder; None if recordings of this format are files.
 
@@ -79,6 +83,7 @@ class RecordingFormat:
     options: tuple[Option, ...] = (JOINTS,)
     features: tuple[str, ...] = ()
     lacks: Mapping[str, str] = field(default_factory=dict)
+    recognises: Callable[[Path], bool] | None = None
     files_in: Callable[[Path], list[Path]] | None = None
 
     def refusal(self, argument: str) -> str:

@@ -90,7 +90,8 @@ def opened(path: Path) -> Iterator[io.TextIOBase]:
         raise RecordingError(f'{path}: not a text file ({error.reason})') from error
 
 
-def preamble(first: str, text: io.TextIOBase) -> tuple[str, int, str | None] | None:
+def preamble(first: str, text: io.TextIOBase
+             ) -> tuple[str, int, str | None, int | None] | None:
     """Pass over the preamble of OpenSim's files.
 
     Args:
@@ -98,8 +99,8 @@ def preamble(first: str, text: io.TextIOBase) -> tuple[str, int, str | None] | N
         text: the rest.
 
     Returns:
-        The line of the header, how many lines come before that, and the unit of angles if it
-        is declared; None if it is no such file.
+        The line of the header, how many lines come before that, and, if they are declared, the
+        unit of angles and the number of rows; None if it is no such file.
 
     """
     lines = [first]
@@ -110,7 +111,9 @@ def preamble(first: str, text: io.TextIOBase) -> tuple[str, int, str | None] | N
     values = {name.strip().lower(): value.strip().lower()
               for name, mark, value in (line.partition('=') for line in lines) if mark}
     units = {'yes': 'deg', 'no': 'rad'}
-    return text.readline(), len(lines), units.get(values.get('indegrees', ''))
+    rows = values.get('nrows', values.get('datarows', ''))
+    return (text.readline(), len(lines), units.get(values.get('indegrees', '')),
+            int(rows) if rows.isdecimal() and len(rows) < 12 else None)
 
 
 def units_of(cells: Sequence[str]) -> list[str] | None:

@@ -67,17 +67,17 @@ examples:
   ros2 run cpg_ros generator --ros-args --params-file fitted.yaml
   inversion --bags recordings/ --out results/ --jobs 2
 
-Without {}, inversion runs as the node cpg_inversion, which listens to joint states
-and fits them when ~/fit is called.
+Without a recording, inversion runs as the node cpg_inversion, which listens to joint states and
+fits them when ~/fit is called.
 
 exit codes: 0 fitted, 1 no steady gait or none that fits, 2 invalid arguments or damaged input."""
 
 
 def _parser() -> Parser:
+    *contents, last = (one.contents for one in FORMATS.values())
     parser = Parser(
         prog='inversion', description=fill(DESCRIPTION.format(
-            ', or '.join(one.contents for one in FORMATS.values())), 98),
-        epilog=EPILOG.format(' and '.join(f'--{name}' for name in FORMATS)))
+            f'{", ".join(contents)}, or {last}'), 98), epilog=EPILOG)
     add_reading_options(parser)
     parser.add_argument('--robot', metavar='FILE', help='robot file, or the name of a shipped '
                         'one, which assigns joints to legs and cells and gives their limits '

@@ -68,8 +68,8 @@ def test_options_go_to_the_reader_or_are_refused(table, bag):
             cpg_ros.read_recording(path, **option)
     # What counts as not given is refused by none.
     assert cpg_ros.read_recording(table, topics=(), servo=None, progress=False)
-    with pytest.raises(InputError, match="no format 'c3d' of recordings; there are 'bag', 'csv'"):
-        cpg_ros.read_recording(table, 'c3d')
+    with pytest.raises(InputError, match="no format 'xyz' of recordings; there are 'bag', 'csv'"):
+        cpg_ros.read_recording(table, 'xyz')
 
 
 def read_steps(path, joints=(), rate=None, progress=True):
@@ -117,12 +117,12 @@ def test_a_format_of_ones_own_is_read_by_the_tool_and_found_in_folders(steps, ba
     with pytest.raises(SystemExit):
         main(['--help'])
     text = ' '.join(capsys.readouterr().out.split())
-    assert 'one for each joint, or a file of steps.' in text
-    assert 'Without --bag and --csv and --steps,' in text
+    assert ', or a file of steps.' in text
+    assert 'Without a recording,' in text
 
 
 def test_the_help_lists_the_formats_that_come_with_the_package():
     text = subprocess.run([sys.executable, '-m', 'cpg_ros.tools.inversion', '--help'],
                           capture_output=True, text=True, check=True).stdout
-    assert '(--bag DIR | --bags FOLDER [FOLDER ...] | --csv FILE)' in text
+    assert '(--bag DIR | --bags FOLDER [FOLDER ...] | --csv FILE | --mot FILE' in text
     assert text.index('--topics') < text.index('--joints') < text.index('--unit')

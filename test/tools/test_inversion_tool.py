@@ -202,7 +202,7 @@ def test_what_is_no_gait_is_refused_and_not_fitted(tmp_path, capsys, signals):
 
 
 @pytest.mark.parametrize(('arguments', 'words'), [
-    ((), 'one of the arguments --bag --bags --csv is required'),
+    ((), 'one of the arguments --bag --bags --csv --mot --trc'),
     (('--bag', 'x', '--csv', 'y'), 'not allowed with'),
     (('--bag', 'nowhere'), 'nowhere'),
     (('--csv', '{csv}', '--topics', '/a'), '--topics: a CSV file has none'),

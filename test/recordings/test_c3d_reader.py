@@ -1,0 +1,79 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""C3D files that ezc3d wrote: markers come back, and damaged files end in one line."""
+
+import sys
+
+from cpg_ros.errors import MissingLibraryError
+from cpg_ros.recordings.c3d_reader import c3d_markers, read_c3d
+from cpg_ros.recordings.recording import RecordingError
+import ezc3d
+import numpy as np
+import pytest
+from skeletons import angles, LABELS, places
+
+TIME = np.arange(40) / 200.0
+
+
+@pytest.fixture
+def path(tmp_path):
+    file = ezc3d.c3d()
+    file['parameters']['POINT']['RATE']['value'] = [200]
+    file['parameters']['POINT']['LABELS']['value'] = [f'Anna:{name}' for name in LABELS]
+    points = 1000.0 * places(angles(TIME)).transpose(2, 1, 0)
+    points[:, 4, 7] = np.nan
+    file['data']['points'] = np.concatenate([points, np.ones_like(points[:1])])
+    file.write(str(tmp_path / 'walk.c3d'))
+    return tmp_path / 'walk.c3d'
+
+
+def test_markers_and_rate_come_back(path):
+    found = c3d_markers(path)
+    assert found.names == LABELS
+    assert found.stamps == pytest.approx(1e9 * TIME)
+    expected = 1000.0 * places(angles(TIME))
+    expected[7, 4] = np.nan
+    # Single precision, of lengths in mm.
+    np.testing.assert_allclose(found.points, expected, atol=1e-3)
+    recording = read_c3d(path, 'human_plug_in_gait', ['right_*'])
+    assert recording.joints == ('right_hip', 'right_knee', 'right_ankle')
+    assert recording.positions == pytest.approx(angles(TIME)[:, 3:], abs=1e-4)
+
+
+def test_a_cut_file_is_read_as_far_as_it_goes(path):
+    data = path.read_bytes()
+    path.write_bytes(data[:-20 * len(LABELS) * 16])
+    found = c3d_markers(path)
+    assert len(found.stamps) < 40
+    assert found.notes == (f'{len(found.stamps)} frames, where the header states 40: it may be '
+                           'cut',)
+
+
+@pytest.mark.parametrize('data', [b'', b'C3D', b'\x02\x50' * 100, b'\x02P' + bytes(2000),
+                                  b'\x00P' + bytes(2000), b'\xff' * 4000])
+def test_what_is_none_ends_in_one_line(tmp_path, data):
+    path = tmp_path / 'walk.c3d'
+    path.write_bytes(data)
+    with pytest.raises(RecordingError, match=r'walk\.c3d: no C3D file') as raised:
+        c3d_markers(path)
+    assert '\n' not in str(raised.value)
+
+
+def test_without_the_library_the_line_says_how_to_get_it(path, monkeypatch):
+    hook = sys.excepthook
+    monkeypatch.setattr('cpg_ros.errors.find_spec', lambda name: None)
+    monkeypatch.setattr(sys, 'excepthook', hook)
+    with pytest.raises(MissingLibraryError, match=r'cpg_ros needs ezc3d, .*/pip install ezc3d'):
+        c3d_markers(path)
