@@ -17,5 +17,7 @@
 Imports ``fleet``, ``dynamics`` and what is below; knows nothing of ROS.
 """
 
-__all__ = ['chart', 'fold_curves', 'grid_refinement', 'hopf_curves', 'hopf_starts', 'map_page',
-           'map_picture', 'orbit_curves', 'row_job', 'stored']
+__all__ = ['bautin_folds', 'chart', 'codimension_two', 'fold_curves', 'fold_cusps',
+           'grid_refinement', 'hopf_condition', 'hopf_curve_ends', 'hopf_curves',
+           'hopf_degeneracies', 'hopf_starts', 'map_page', 'map_picture', 'orbit_curves',
+           'orbit_plane', 'resonances', 'row_job', 'stored']

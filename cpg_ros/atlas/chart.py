@@ -76,8 +76,12 @@ class Chart:
 
     def at_share(self, share: np.ndarray) -> Network:
         """Return the network at a point given in shares of the ranges, shape (2,)."""
+        return self.at(*self.values_at(share))
+
+    def values_at(self, share: np.ndarray) -> tuple[float, float]:
+        """Return the values on both axes at a point given in shares of the ranges, shape (2,)."""
         one, other = (self.low + share * self.size).tolist()
-        return self.at(one, other)
+        return one, other
 
     def share(self, point: tuple[int, int]) -> np.ndarray:
         """Return a point of the grid, given by row and column, in shares of the ranges."""

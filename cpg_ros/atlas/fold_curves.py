@@ -24,6 +24,7 @@ from itertools import pairwise
 from typing import Any
 
 from cpg_ros.atlas.chart import Chart, COARSE
+from cpg_ros.atlas.fold_cusps import cusp_beyond
 from cpg_ros.atlas.grid_refinement import grid_indices, Sheet
 from cpg_ros.atlas.hopf_curves import Boundary
 from cpg_ros.atlas.orbit_curves import Edge
@@ -38,6 +39,8 @@ from scipy.optimize import brentq
 #: Steps of the first parameter in shares of its range, and how far along a branch its turn is
 #: looked for.
 STEP, SHORTEST, REACHES = 1.0 / 24.0, 1.0 / 800.0, (0.01, 0.03, 0.1, 0.3)
+#: Smaller orbits are rest.
+REST = 5e-3
 #: Edges that are tried for a gait, points of a branch, and curves this close, in shares, are one.
 TRIED, MOST, SAME = 8, 80, 0.02
 
@@ -68,10 +71,30 @@ def fold_curves(job: tuple[Chart, str, list[Edge]]) -> list[Boundary]:
             if any((np.abs(curve.points - (one, fold.value)) / chart.size).max(axis=1).min() < SAME
                    for curve in found):
                 continue
-            back, ahead = (followed(chart, fold, one, way) for way in (-1.0, 1.0))
-            found.append(Boundary('fold', (gait,), np.array(
-                [*back[::-1], (one, fold.value), *ahead])))
+            found.append(fold_curve(chart, gait, fold, one))
     return found
+
+
+def fold_curve(chart: Chart, gait: str, fold: CurvePoint, one: float) -> Boundary:
+    """Follow the folds on both sides of one, with the cusps in which they end.
+
+    Args:
+        chart: the plane.
+        gait: whose.
+        fold: a fold along the second axis.
+        one: value on the first axis there.
+
+    """
+    back, ahead = (followed(chart, fold, one, way) for way in (-1.0, 1.0))
+    points = [(value, place.value) for value, place in
+              [*back[::-1], (one, fold), *ahead]]
+    ends = [(back or [(one, fold)])[-1], (ahead or [(one, fold)])[-1]]
+    cusps = [cusp_beyond(chart, gait, place, value, way)
+             for (value, place), way in zip(ends, (-1.0, 1.0), strict=True)]
+    # A cusp is the last point of its curve.
+    return Boundary('fold', (gait,), np.array([
+        *(cusp.values for cusp in cusps[:1] if cusp), *points,
+        *(cusp.values for cusp in cusps[1:] if cusp)]), tuple(filter(None, cusps)))
 
 
 def _folds(chart: Chart, gait: str, edge: Edge) -> list[CurvePoint]:
@@ -82,8 +105,9 @@ def _folds(chart: Chart, gait: str, edge: Edge) -> list[CurvePoint]:
     return [point.place for point in branch.folds]
 
 
-def followed(chart: Chart, fold: CurvePoint, one: float, way: float) -> list[tuple[float, float]]:
-    """Follow folds from one on in a direction of the first parameter; return their values.
+def followed(chart: Chart, fold: CurvePoint, one: float, way: float
+             ) -> list[tuple[float, CurvePoint]]:
+    """Follow folds from one on in a direction of the first parameter.
 
     Args:
         chart: the plane.
@@ -91,8 +115,11 @@ def followed(chart: Chart, fold: CurvePoint, one: float, way: float) -> list[tup
         one: value on the first axis there.
         way: 1 or -1, the direction.
 
+    Returns:
+        The value on the first axis and the fold, of each.
+
     """
-    found: list[tuple[float, float]] = []
+    found: list[tuple[float, CurvePoint]] = []
     size, step = chart.size[0], STEP
     before: tuple[Any, float] | None = None
     while step >= SHORTEST:
@@ -103,7 +130,8 @@ def followed(chart: Chart, fold: CurvePoint, one: float, way: float) -> list[tup
         ahead = None
         if chart.first.low <= new <= chart.first.high:
             ahead = _next(chart, fold, new, guess)
-        if ahead is None:
+        if ahead is None or ahead.amplitude < REST:
+            # Beyond a Bautin point what is left is the Hopf point, where branches turn, too.
             # Beyond the edge, too: up to it.
             step *= 0.5
             continue
@@ -111,7 +139,7 @@ def followed(chart: Chart, fold: CurvePoint, one: float, way: float) -> list[tup
             break
         before = fold.z, one
         fold, one = ahead, new
-        found.append((one, ahead.value))
+        found.append((one, ahead))
         step = min(STEP, 1.5 * step)
     return found
 

@@ -22,21 +22,16 @@ AUTO-07p and DDE-BIFTOOL do). For the delayed network Delta = i omega - A - B ex
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from itertools import chain
-from typing import Any
 
 from cpg_ros.atlas.chart import Chart
+from cpg_ros.atlas.codimension_two import CodimensionTwo
+from cpg_ros.atlas.hopf_condition import HopfCondition
 from cpg_ros.atlas.hopf_starts import hopf_starts, HopfStart, lines_across
-from cpg_ros.dynamics.characteristic import characteristic_matrix
-from cpg_ros.dynamics.equilibrium import equilibrium
-from cpg_ros.dynamics.isotypic import blocks
-from cpg_ros.errors import CpgError
 from cpg_ros.short_repr import ShortRepr
 import numpy as np
 
 #: Steps in shares of the ranges, and points of a curve at most.
 FIRST, LONGEST, SHORTEST, MOST = 0.01, 0.04, 1e-5, 400
-#: Newton's method: steps, and where it ends; differences for its matrix, in shares.
-NEWTON, EXACT, DIFFERENCE = 12, 1e-12, 1e-6
 #: A beginning this close to a curve, in shares of the ranges, lies on it. Two classes share a
 #: curve if a few points on it, so many, are solutions of both.
 SAME, SHARED, CHECKED = 5e-3, 1e-8, 8
@@ -50,72 +45,17 @@ class Boundary(ShortRepr):
         kind: 'Hopf', 'torus', 'period doubling', 'branch point' or 'fold'.
         gaits: whose: several, where classes with the same eigenvalues share it.
         points: values on both axes, and of a Hopf point omega, shape (n, 2 or 3).
+        codimension_two: points on it where a second condition holds.
 
     """
 
     kind: str
     gaits: tuple[str, ...]
     points: np.ndarray
+    codimension_two: tuple[CodimensionTwo, ...] = ()
 
     def __str__(self) -> str:
         return f'{self.kind} of {" and ".join(self.gaits)}'
-
-
-class _Condition:
-    """Two real equations in (p1, p2, omega), counted in shares of the ranges."""
-
-    def __init__(self, chart: Chart, mode: tuple[int, ...], omega: float) -> None:
-        self.chart, self.mode = chart, mode
-        self.low, self.size = np.append(chart.low, 0.0), np.append(chart.size, omega)
-
-    def values(self, share: np.ndarray) -> np.ndarray:
-        one, other, omega = self.low + share * self.size
-        network = self.chart.at(one, other)
-        block = next(block for block in blocks(network, equilibrium(network))
-                     if block.mode == self.mode)
-        matrix = characteristic_matrix(1j * omega, block.now, block.past, network.delay)[0]
-        found = np.linalg.det(matrix)
-        return np.array([found.real, found.imag])
-
-    def slopes(self, share: np.ndarray) -> np.ndarray:
-        return slopes(self.values, share, DIFFERENCE)
-
-
-def slopes(values: Callable[[np.ndarray], Any], share: np.ndarray, difference: float
-           ) -> np.ndarray:
-    """Return the derivatives of a function by its arguments, from central differences.
-
-    Args:
-        values: of m numbers, or of one.
-        share: its argument, shape (n,).
-        difference: of the argument.
-
-    Returns:
-        Shape (m, n), or (n,) if the function has one number.
-
-    """
-    return np.array([(values(share + step) - values(share - step)) / (2.0 * difference)
-                     for step in difference * np.eye(share.size)]).T
-
-
-def _corrected(condition: _Condition, share: np.ndarray, tangent: np.ndarray
-               ) -> tuple[np.ndarray, int] | None:
-    for count in range(NEWTON):
-        try:
-            matrix = np.vstack([condition.slopes(share), tangent])
-            move = np.linalg.solve(matrix, np.append(-condition.values(share), 0.0))
-        except (np.linalg.LinAlgError, CpgError, ArithmeticError):
-            return None
-        share = share + move
-        if not np.abs(move).max() < 0.5:
-            return None
-        if np.abs(move).max() < EXACT:
-            return share, count
-    return None
-
-
-def _tangent(condition: _Condition, share: np.ndarray) -> np.ndarray:
-    return np.linalg.svd(condition.slopes(share))[2][-1]
 
 
 def _inside(share: np.ndarray) -> bool:
@@ -123,13 +63,13 @@ def _inside(share: np.ndarray) -> bool:
                 and share[2] > 1e-4)
 
 
-def _followed(condition: _Condition, start: np.ndarray, way: float) -> list[np.ndarray]:
+def _followed(condition: HopfCondition, start: np.ndarray, way: float) -> list[np.ndarray]:
     here, step = start, FIRST
-    tangent = way * _tangent(condition, start)
+    tangent = way * condition.tangent(start)
     found: list[np.ndarray] = []
     while len(found) < MOST and step >= SHORTEST:
-        ahead = _corrected(condition, here + step * tangent, tangent)
-        new = tangent if ahead is None else _tangent(condition, ahead[0])
+        ahead = condition.corrected(here + step * tangent, tangent)
+        new = tangent if ahead is None else condition.tangent(ahead[0])
         if ahead is None or abs(new @ tangent) < 0.95 or not _inside(ahead[0]):
             # Beyond the edge, too: up to it by ever shorter steps.
             step *= 0.5
@@ -154,9 +94,9 @@ class _Followed:
         if not _on(self.shares, start.share):
             return False
         if start.mode not in self.modes:
-            condition = _Condition(chart, start.mode, 1.0)
+            condition = HopfCondition(chart, start.mode)
             for share in self.shares[::max(1, len(self.shares) // CHECKED)]:
-                exact = _corrected(condition, share, _tangent(condition, share))
+                exact = condition.corrected(share, condition.tangent(share))
                 if exact is None or np.abs(exact[0] - share).max() > SHARED:
                     return False
             self.modes.add(start.mode)
@@ -171,8 +111,8 @@ def curves_from(chart: Chart, starts: Iterable[HopfStart]) -> list[Boundary]:
     for start in starts:
         if any(curve.holds(chart, start) for curve in curves):
             continue
-        condition = _Condition(chart, start.mode, 1.0)
-        exact = _corrected(condition, start.share, _tangent(condition, start.share))
+        condition = HopfCondition(chart, start.mode)
+        exact = condition.corrected(start.share, condition.tangent(start.share))
         if exact is None:
             continue
         back, ahead = (_followed(condition, exact[0], way) for way in (-1.0, 1.0))

@@ -20,9 +20,10 @@ from pathlib import Path
 from typing import Any
 
 from cpg_ros.atlas.chart import Chart
+from cpg_ros.atlas.codimension_two import LABELS
 from cpg_ros.atlas.grid_refinement import Sheet
 from cpg_ros.atlas.hopf_curves import Boundary
-from cpg_ros.atlas.map_picture import LINES, STATES
+from cpg_ros.atlas.map_picture import LINES, markers, STATES
 from cpg_ros.files.atomic_write import write_atomically
 from cpg_ros.files.page_style import STYLE
 from cpg_ros.networks.registry import find_network
@@ -69,6 +70,15 @@ function draw() {
     pen.strokeStyle = A.lines[c.kind]; pen.lineWidth = 1.5; pen.beginPath();
     c.points.forEach((p, k) => pen[k ? 'lineTo' : 'moveTo'](X(p[0]), Y(p[1])));
     pen.stroke();
+  }
+  pen.font = '11px system-ui'; pen.lineWidth = 1.2; pen.strokeStyle = '#1a202c';
+  for (const [x, y, text] of A.gaits[pick.value].special) {
+    const wide = pen.measureText(text).width, left = X(x) + 8 + wide > L + W;
+    pen.fillStyle = '#ffffffc0';
+    pen.fillRect(X(x) + (left ? -8 - wide : 5), Y(y) - 14, wide + 3, 12);
+    pen.fillStyle = '#fff'; pen.beginPath(); pen.arc(X(x), Y(y), 4, 0, 7); pen.fill();
+    pen.stroke(); pen.fillStyle = '#1a202c';
+    pen.fillText(text, X(x) + (left ? -7 - wide : 6), Y(y) - 4);
   }
   pen.fillStyle = '#1a202c'; pen.font = '12px system-ui';
   for (let k = 0; k <= 4; k++) {
@@ -181,6 +191,8 @@ def write_page(path: Path, chart: Chart, sheets: dict[str, Sheet], curves: list[
         'gaits': {gait: {
             'label': _packed(sheet.label.astype(np.uint8)),
             **{name: _packed(sheet.numbers[name].astype(np.float32)) for name in SHOWN},
+            'special': [[*place, ' '.join(labels)]
+                        for place, labels in markers(chart, curves, gait)],
             'waves': _waves(sheet, max(max(cells) for cells in legs.values()))}
             for gait, sheet in sheets.items()}}
     data = json.dumps(atlas).replace('<', '\\u003c')
@@ -188,6 +200,11 @@ def write_page(path: Path, chart: Chart, sheets: dict[str, Sheet], curves: list[
     met = {kind: colour for kind, (colour, _) in LINES.items() if kind in kinds}
     key = ''.join(f'<span style="background:{colour}"></span>{text}'
                   for text, colour in (STATES | met).items())
+    listed = ''.join(
+        f'<tr><td>{LABELS[point.kind]}</td><td>{point}</td></tr>'
+        for point in {str(point): point for curve in curves
+                      for point in curve.codimension_two if point.gait in sheets}.values())
+    special = (f'<h2>Points of codimension two</h2><table>{listed}</table>' if listed else '')
     title = f'Gaits of the {kind.name} network over {axes[0].line} and {axes[1].line}'
     write_atomically(path, f"""<!DOCTYPE html>
 <html lang="en"><head><meta charset="utf-8"><title>{title}</title>
@@ -198,6 +215,7 @@ mean, and the parameters.</p><p class="key">{key}</p>
 <main><canvas id="map" width="760" height="600"></canvas>
 <aside><table id="values"></table><canvas id="waves" width="480" height="280"></canvas>
 <p><button id="copy">Copy the preset</button></p><pre id="preset"></pre></aside></main>
+{special}
 <script type="application/json" id="atlas">{data}</script><script>{SCRIPT}</script></body></html>
 """)
     return path

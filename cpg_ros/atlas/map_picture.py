@@ -18,6 +18,7 @@ import io
 from pathlib import Path
 
 from cpg_ros.atlas.chart import Chart
+from cpg_ros.atlas.codimension_two import LABELS
 from cpg_ros.atlas.grid_refinement import Sheet
 from cpg_ros.atlas.hopf_curves import Boundary
 from cpg_ros.files.atomic_write import write_atomically
@@ -28,6 +29,26 @@ STATES = {'no orbit': '#f1f3f5', 'unstable in its class': '#f4c7a1',
           'attracts with a lock': '#b9d6f2', 'attracts by itself': '#2b6cb0'}
 LINES = {'Hopf': ('#1a202c', '-'), 'torus': ('#c53030', '-'), 'branch point': ('#b7791f', '-'),
          'period doubling': ('#276749', '-'), 'fold': ('#6b46c1', '--')}
+#: Points this close, in shares of the ranges, have one marker.
+TOGETHER = 2e-3
+
+
+def markers(chart: Chart, curves: list[Boundary], gait: str
+            ) -> list[tuple[tuple[float, float], list[str]]]:
+    """Return where a gait's points of codimension two are, each once, with their labels."""
+    found: list[tuple[tuple[float, float], list[str]]] = []
+    for point in (point for curve in curves for point in curve.codimension_two):
+        if point.gait != gait:
+            continue
+        label = LABELS[point.kind]
+        near = next((labels for place, labels in found
+                     if (np.abs(np.subtract(place, point.values)) / chart.size).max() < TOGETHER),
+                    None)
+        if near is None:
+            found.append((point.values, [label]))
+        elif label not in near:
+            near.append(label)
+    return found
 
 
 def draw_map(path: Path, chart: Chart, sheets: dict[str, Sheet], curves: list[Boundary]) -> None:
@@ -57,6 +78,15 @@ def draw_map(path: Path, chart: Chart, sheets: dict[str, Sheet], curves: list[Bo
             if gait in curve.gaits:
                 colour, style = LINES[curve.kind]
                 panel.plot(curve.points[:, 0], curve.points[:, 1], style, color=colour, lw=1.1)
+        for place, labels in markers(chart, curves, gait):
+            panel.plot(*place, 'o', ms=4.5, mfc='#ffffff', mec='#1a202c', mew=1.0, zorder=4)
+            # At the right and the upper edge the text is on the inside.
+            share = (np.array(place) - chart.low) / chart.size
+            panel.annotate(' '.join(labels), place, (-5 if share[0] > 0.85 else 5,
+                                                     -10 if share[1] > 0.9 else 4),
+                           textcoords='offset points', fontsize=7, zorder=5,
+                           ha='right' if share[0] > 0.85 else 'left',
+                           bbox={'fc': '#ffffff', 'ec': 'none', 'alpha': 0.75, 'pad': 0.6})
         panel.set_title(gait)
         panel.set_xlim(chart.first.low, chart.first.high)
         panel.set_ylim(chart.second.low, chart.second.high)
@@ -68,11 +98,16 @@ def draw_map(path: Path, chart: Chart, sheets: dict[str, Sheet], curves: list[Bo
         panel.set_xlabel(str(chart.first.line))
     figure.supylabel(str(chart.second.line))
     kinds = [kind for kind in LINES if any(curve.kind == kind for curve in curves)]
+    met = {point.kind for curve in curves for point in curve.codimension_two
+           if point.gait in sheets}
+    special = [kind for kind in LABELS if kind in met]
     figure.legend(handles=[
         *(Patch(color=colour, label=text) for text, colour in STATES.items()),
         *(Line2D([], [], color=LINES[kind][0], ls=LINES[kind][1], label=kind)
-          for kind in kinds)], loc='outside lower center', ncols=4 + len(kinds), frameon=False,
-        fontsize=9)
+          for kind in kinds),
+        *(Line2D([], [], ls='', marker='o', ms=4.5, mfc='#ffffff', mec='#1a202c',
+                 label=f'{LABELS[kind]} {kind}') for kind in special)],
+        loc='outside lower center', ncols=min(4 + len(kinds), 3 * wide), frameon=False, fontsize=9)
     out = io.BytesIO()
     figure.savefig(out, format='png', dpi=110)
     write_atomically(path, out.getvalue())

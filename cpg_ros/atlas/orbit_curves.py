@@ -21,14 +21,18 @@ Newton's method normal to it.
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from itertools import chain
 
 from cpg_ros.atlas.chart import Chart, COARSE
 from cpg_ros.atlas.grid_refinement import grid_indices, Sheet
-from cpg_ros.atlas.hopf_curves import Boundary, slopes
-from cpg_ros.atlas.row_job import NONE, solve_from_wave, subspace_multipliers
+from cpg_ros.atlas.hopf_condition import slopes
+from cpg_ros.atlas.hopf_curves import Boundary
+from cpg_ros.atlas.orbit_plane import OrbitPlane, spectrum
+from cpg_ros.atlas.resonances import resonances
+from cpg_ros.atlas.row_job import NONE, solve_from_wave
 from cpg_ros.dynamics.bifurcation import REAL
 from cpg_ros.dynamics.floquet import ATTRACTS
-from cpg_ros.dynamics.orbit import NoOrbit, Orbit, solve_beside
+from cpg_ros.dynamics.orbit import NoOrbit
 from cpg_ros.short_repr import ShortRepr
 import numpy as np
 from scipy.optimize import brentq
@@ -37,8 +41,6 @@ from scipy.optimize import brentq
 CURVES, MOST, STEP, SHORTEST = 6, 120, 0.03, 2e-3
 #: How well g is zero, differences for its slope, and Newton's steps.
 EXACT, DIFFERENCE, NEWTON = 1e-8, 1e-5, 8
-#: Tolerances of multipliers, and halvings of the elements.
-ARNOLDI, TRIVIAL, HALVINGS = 1e-12, 1e-8, 5
 
 Distance = Callable[[np.ndarray], float]
 
@@ -70,27 +72,6 @@ def edges(chart: Chart, sheet: Sheet) -> list[Edge]:
     return found
 
 
-def spectrum(orbit: Orbit) -> list[np.ndarray]:
-    """Multipliers of each subspace, largest first; that of the class first, without 1."""
-    return [part[np.argsort(-np.abs(part), kind='stable')]
-            for part in subspace_multipliers(orbit, ARNOLDI, TRIVIAL, HALVINGS)]
-
-
-class _Plane:
-    """Orbits over the plane, each solved beside the last one."""
-
-    def __init__(self, chart: Chart, gait: str) -> None:
-        self.chart, self.gait = chart, gait
-        self.last: Orbit | None = None
-
-    def orbit(self, share: np.ndarray) -> Orbit:
-        assert self.last is not None
-        found = solve_beside(self.chart.at_share(share), self.last)
-        if found.levels[0, 0, 1] < 0.3 * self.last.levels[0, 0, 1]:
-            raise NoOrbit('the orbit has shrunk')
-        return found
-
-
 def orbit_curves(job: tuple[Chart, str, list[Edge]]) -> list[Boundary]:
     """Follow the curves that some edges cross; those that cannot be followed are left out."""
     chart, gait, crossed = job
@@ -111,7 +92,7 @@ def orbit_curves(job: tuple[Chart, str, list[Edge]]) -> list[Boundary]:
 
 
 def _through(chart: Chart, gait: str, edge: Edge) -> Iterator[Boundary]:
-    plane = _Plane(chart, gait)
+    plane = OrbitPlane(chart, gait)
     one, other = edge.here, edge.there
     plane.last = solve_from_wave(chart.at_share(one), gait, edge.wave, edge.period)
     before, after = spectrum(plane.last), spectrum(plane.orbit(other))
@@ -134,12 +115,16 @@ def _through(chart: Chart, gait: str, edge: Edge) -> Iterator[Boundary]:
         kind = ('torus' if abs(crossing.imag) > REAL else
                 'branch point' if crossing.real > 0.0 else 'period doubling')
         at_share = plane.last
-        ways = []
+        ways, special = [], []
         for way in (-1.0, 1.0):
             plane.last = at_share
             ways.append(_followed(g, share, way))
+            if kind == 'torus':
+                plane.last = at_share
+                special.append([*resonances(plane, part, rank, [share, *ways[-1]])][::int(way)])
         shares = np.array([*ways[0][::-1], share, *ways[1]])
-        yield Boundary(kind, (gait,), chart.low + shares * chart.size)
+        yield Boundary(kind, (gait,), chart.low + shares * chart.size,
+                       tuple(chain(*special)))
         plane.last = start
 
 

@@ -15,7 +15,6 @@
 """An atlas on disk: parts as they are finished, then atlas.parquet and boundaries.json."""
 
 from collections.abc import Iterator
-from dataclasses import asdict
 import hashlib
 from itertools import chain
 import json
@@ -23,6 +22,7 @@ from pathlib import Path
 from typing import Any
 
 from cpg_ros.atlas.chart import Chart
+from cpg_ros.atlas.codimension_two import CodimensionTwo
 from cpg_ros.atlas.grid_refinement import NUMBERS, Sheet
 from cpg_ros.atlas.hopf_curves import Boundary
 from cpg_ros.atlas.row_job import AtlasRow
@@ -77,15 +77,18 @@ class AtlasFolder:
     def curves(self) -> list[Boundary] | None:
         """Return the boundaries, if they are done."""
         found = stored_json(self.folder / 'boundaries.json')
-        if found is None or any('gaits' not in one for one in found):
+        if found is None or any('codimension_two' not in one for one in found):
             return None  # Those of an earlier version are followed anew.
-        return [Boundary(one['kind'], tuple(one['gaits']), np.array(one['points']))
+        return [Boundary(one['kind'], tuple(one['gaits']), np.array(one['points']),
+                         tuple(map(CodimensionTwo.of, one['codimension_two'])))
                 for one in found]
 
     def put_curves(self, curves: list[Boundary]) -> None:
         """Store the boundaries."""
         write_atomically(self.folder / 'boundaries.json', json.dumps([
-            {**asdict(curve), 'points': curve.points.tolist()} for curve in curves]))
+            {'kind': curve.kind, 'gaits': curve.gaits, 'points': curve.points.tolist(),
+             'codimension_two': [point.as_dict() for point in curve.codimension_two]}
+            for curve in curves]))
 
     def write(self, sheets: dict[str, Sheet]) -> Path:
         """Write atlas.parquet: a row for each point and gait.

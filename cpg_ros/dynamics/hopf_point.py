@@ -189,8 +189,8 @@ class HopfPoint(ShortRepr):
         """First Lyapunov coefficient l1 = Re k2 / omega (Kuznetsov, section 3.5; <q, q> = 1)."""
         return self.normal_form.k2.real / self.omega
 
-    def _but_critical(self, block: Block, roots: np.ndarray) -> np.ndarray:
-        """Leave out the critical root or pair, where it is the block's."""
+    def but_critical(self, block: Block, roots: np.ndarray) -> np.ndarray:
+        """Return a block's roots without the critical one or pair, where it is the block's."""
         mine = dict(block.symmetry.shifts)
         for critical, symmetry in ((1j * self.omega, self.block.symmetry),
                                    (-1j * self.omega, power(self.block.symmetry, -1))):
@@ -202,14 +202,14 @@ class HopfPoint(ShortRepr):
     def _others(self) -> tuple[tuple[Block, np.ndarray], ...]:
         """All blocks with their other roots on the axis and right of it."""
         close = ON_AXIS * max(1.0, self.omega)
-        return tuple((one, self._but_critical(one, one.right_of(-close)))
+        return tuple((one, self.but_critical(one, one.right_of(-close)))
                      for one in blocks(self.network, self.rest))
 
     @property
     def leading_other(self) -> complex:
         """The rightmost root but for the critical pair, 1/model time."""
         return complex(rightmost_first(np.concatenate([
-            self._but_critical(one, one.roots(3))
+            self.but_critical(one, one.roots(3))
             for one in blocks(self.network, self.rest)]))[0])
 
     def _right(self, within: bool) -> int:

@@ -26,10 +26,12 @@ from pathlib import Path
 import sys
 from typing import Any
 
+from cpg_ros.atlas.bautin_folds import bautin_folds, distinct
 from cpg_ros.atlas.chart import Chart, chart_of
 from cpg_ros.atlas.fold_curves import fold_curves, lost_edges
 from cpg_ros.atlas.grid_refinement import refine, Sheet, uncrossed_edges
 from cpg_ros.atlas.hopf_curves import Boundary, curves_from, hopf_curves
+from cpg_ros.atlas.hopf_degeneracies import with_degeneracies
 from cpg_ros.atlas.hopf_starts import hopf_starts
 from cpg_ros.atlas.map_picture import draw_map
 from cpg_ros.atlas.orbit_curves import edges, orbit_curves
@@ -49,7 +51,8 @@ DESCRIPTION = """\
 Map where a network's gaits live over two parameters: whether each exists and is stable, with what
 symmetry lock, its period, amplitude, leading multiplier and basin. A coarse grid is refined where
 neighbours differ; Hopf points, folds, torus points, period doublings and branch points are
-followed as exact curves and drawn on top."""
+followed as exact curves and drawn on top, with the points at which a second condition holds:
+Bautin, Hopf-Hopf, zero-Hopf and Bogdanov-Takens points, resonances of torus points, cusps."""
 EPILOG = """\
 files: atlas.parquet (a row for each point and gait), boundaries.json, map.png, and index.html
 with --interactive. Run the same command again to continue where it stopped.
@@ -134,12 +137,14 @@ def drawn(chart: Chart, gaits: tuple[str, ...], fleet: Fleet, folder: Path
             hopf += missed
             sheets = refine(chart, gaits, hopf, run)
         fleet.what = 'boundaries'
+        hopf = [*fleet.map(with_degeneracies, [(chart, curve) for curve in hopf])]
         jobs: list[tuple[Any, ...]] = [
+            *((bautin_folds, (chart, curve)) for curve in hopf),
             *((orbit_curves, (chart, gait, edges(chart, sheet)))
               for gait, sheet in sheets.items()),
             *((fold_curves, (chart, gait, lost_edges(chart, sheet)))
               for gait, sheet in sheets.items())]
-        curves = [*hopf, *chain(*fleet.map(_called, jobs))]
+        curves = [*hopf, *distinct(chart, chain(*fleet.map(_called, jobs)))]
         stored.put_curves(curves)
     table, picture = stored.write(sheets), folder / 'map.png'
     draw_map(picture, chart, sheets, curves)
@@ -163,8 +168,10 @@ def _map(chosen: argparse.Namespace) -> int:
         written.append(write_page(chosen.out / 'index.html', chart, sheets, curves))
     counted = ', '.join(f'{gait} {100 * (sheet.label > 0).mean():.0f} %'
                         for gait, sheet in sheets.items())
+    special = dict.fromkeys(str(point) for curve in curves for point in curve.codimension_two)
     say(f'share of the plane in which each gait exists: {counted}\n'
         f'boundaries: {", ".join(map(str, curves)) or "none"}\n'
+        f'of codimension two: {"; ".join(special) or "none found"}\n'
         f'written: {", ".join(map(str, written))}')
     return 0
 

@@ -147,10 +147,10 @@ def test_a_curve_of_folds_is_where_branches_turn(monkeypatch):
     monkeypatch.setattr(fold_curves, 'SHORTEST', 0.02)
     found = fold_curves.followed(chart, first.place, 0.0, 1.0)
     assert len(found) >= 10
-    xi, value = found[3]
+    xi, fold = found[3]
     network = replace(preset.network, xi=xi)
     assert fold_of(solve_orbit(network, 'pace', solve_preset(preset))).value == pytest.approx(
-        value, abs=1e-9)
+        fold.value, abs=1e-9)
 
 
 def _wave(chart, share):
