@@ -15,9 +15,10 @@
 """Leg odometry: where the base is, from the estimated velocity, and how uncertain that is.
 
 The position integrates the velocity of the base, turned by the measured heading. Its error is that
-of a velocity which is off by a little that changes slowly - feet that give way, slip or sink, as a
-first-order Gauss-Markov process in the base's frame - and by white noise, and of a heading that
-drifts. The covariance is that of an extended Kalman filter without corrections.
+of a velocity which is off by a constant share (soft feet, geometry) and by a little that changes
+slowly (feet that slip or sink; a first-order Gauss-Markov process in the base's frame), of white
+noise, and of a heading that drifts. The covariance is that of an extended Kalman filter without
+corrections.
 """
 
 from collections.abc import Callable
@@ -31,6 +32,8 @@ import numpy as np
 #: Standard deviation of the slow velocity error: at rest, m/s, and as a share of the speed; its
 #: correlation time, s. Of a simulated Go2 that trots, walks, turns and is pushed.
 STILL, SHARE, SLOWLY = 0.001, 0.015, 15.0
+#: Standard deviation of the constant share by which a robot's velocity is wrong.
+SCALE = 0.05
 #: White noise of the position, m/sqrt(s), and of the heading, rad/sqrt(s): an IMU drifts by half a
 #: degree in a minute.
 PLACE, HEADING = 0.001, 0.001
@@ -44,13 +47,14 @@ INSTANT = 0.02, 0.02, 0.03
 TILT, RATE = 0.01, 0.02
 #: Without measurements the position is lost by this much in a second, m/sqrt(s).
 UNSEEN = 0.5
-#: Components of the state: x, y and heading, and the slow error forward and to the left.
-STATES = 5
+#: Components of the state: x, y, heading, slow error forward and to the left, constant share.
+STATES = 6
 
 
 @entry
-def _advance(legs, joints, contact, velocity, rpy, dt, pose, covariance, scratch):
+def _advance(legs, joints, contact, motion, pose, covariance, scratch):
     """Advance a pose, x, y, z and heading, and the covariance of its states, in place."""
+    velocity, rpy, dt = motion
     yaw = rpy[2] - pose[4]
     cr, sr, cp, sp = math.cos(rpy[0]), math.sin(rpy[0]), math.cos(rpy[1]), math.sin(rpy[1])
     cy, sy = math.cos(yaw), math.sin(yaw)
@@ -75,10 +79,11 @@ def _advance(legs, joints, contact, velocity, rpy, dt, pose, covariance, scratch
     stays = math.exp(-dt / SLOWLY)
     scratch[:] = 0.0
     for k in range(STATES):
-        scratch[k, k] = 1.0 if k < 3 else stays
+        scratch[k, k] = stays if k in (3, 4) else 1.0
     scratch[0, 2], scratch[1, 2] = -dt * north, dt * east
     scratch[0, 3], scratch[0, 4] = dt * cy, -dt * sy
     scratch[1, 3], scratch[1, 4] = dt * sy, dt * cy
+    scratch[0, 5], scratch[1, 5] = dt * east, dt * north
     covariance[:] = scratch @ covariance @ scratch.T
     slow = STILL**2 + SHARE**2 * (forward**2 + left**2)
     for k, added in enumerate((dt * PLACE**2, dt * PLACE**2, dt * HEADING**2,
@@ -95,14 +100,21 @@ class Odometry:
 
     Attributes:
         pose: x, y and z in m, heading in rad, those of the start, and the way so far in m.
-        covariance: of x, y, heading, and the slow velocity error forward and to the left, in m,
-            rad and m/s, shape (5, 5).
+        covariance: of x, y, heading, the slow velocity error forward and to the left, and the
+            share by which velocities are wrong, in m, rad and m/s, shape (6, 6).
         twist: velocity and angular velocity in the base's frame, m/s and rad/s, shape (6,).
 
     """
 
-    def __init__(self, geometry: Geometry) -> None:
-        self._legs = geometry.arrays
+    def __init__(self, geometry: Geometry, scale: float = 1.0) -> None:
+        """Begin where the base is.
+
+        Args:
+            geometry: of the legs.
+            scale: by which estimated velocities are multiplied: true way over estimated way.
+
+        """
+        self._legs, self._scale, self._velocity = geometry.arrays, scale, np.zeros(3)
         self.pose = np.zeros(6)
         self.covariance = np.zeros((STATES, STATES))
         self._scratch = np.zeros((STATES, STATES))
@@ -130,13 +142,15 @@ class Odometry:
         if not self._started:
             self.pose[4], self._started = rpy[2], True
             self.covariance[3, 3] = self.covariance[4, 4] = STILL**2
-        arguments = (self._legs, sensors.joint_positions[0], contact, velocity, rpy, dt, self.pose,
-                     self.covariance, self._scratch)
+            self.covariance[5, 5] = SCALE**2
+        np.multiply(velocity, self._scale, out=self._velocity)
+        arguments = (self._legs, sensors.joint_positions[0], contact, (self._velocity, rpy, dt),
+                     self.pose, self.covariance, self._scratch)
         if self._kernel is None:
             self._kernel = bound(_advance, *arguments)
         self._kernel(*arguments)
         self._tilt = rpy
-        self.twist[:3], self.twist[3:] = velocity, sensors.angular_velocity[0]
+        self.twist[:3], self.twist[3:] = self._velocity, sensors.angular_velocity[0]
 
     def lose(self, dt: float) -> None:
         """Take a step of dt in s without measurements: the base may go on at UNSEEN."""

@@ -45,6 +45,8 @@ TOPICS = fixed({
                                     "each leg's own topic, as in lh/foot_contacts"),
     f'{PREFIX}odometry_topic': Spec('', 'topic of the nav_msgs/Odometry, where the base is by the '
                                     "robot's legs and IMU, such as odom; none by default"),
+    f'{PREFIX}odometry_scale': Spec(1.0, 'true way over the way by odometry, of the robot and its '
+                                    'ground', 0.5, 2.0),
     f'{PREFIX}odom_frame': Spec('odom', 'frame of that odometry, which begins where the base is'),
     f'{PREFIX}base_frame': Spec('base_link', "frame of the robot's base"),
     f'{PREFIX}odometry_tf': Spec(True, 'publish the transform between these frames on /tf, too, '

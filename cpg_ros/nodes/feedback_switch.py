@@ -134,7 +134,7 @@ class FeedbackSwitch:
                 self._node.get_logger().warning(line)
             self._kp_scale = KpScalePublisher(self._node)
             if topic := self._value('odometry_topic'):
-                loop.odometry = Odometry(geometry)
+                loop.odometry = Odometry(geometry, self._value('odometry_scale'))
                 self._odometry = OdometryPublisher(
                     self._node, loop.odometry, topic,
                     (self._value('odom_frame'), self._value('base_frame')),

@@ -72,7 +72,7 @@ def test_the_base_is_as_high_as_its_standing_legs():
 
 
 def test_its_covariance_is_that_of_draws():
-    """20,000 draws of the slow error, the white noise and the drift of the heading."""
+    """20,000 draws of the share, the slow error, the white noise and the drift of the heading."""
     dt, steps, count = 0.05, 400, 20000
     speed, turn = 0.4, 0.15
     headings = turn * dt * np.arange(steps)
@@ -83,9 +83,10 @@ def test_its_covariance_is_that_of_draws():
                                          * (speed**2 + 0.1**2)))
     error = rng.normal(0.0, module.STILL, (2, count))
     drift, place = np.zeros(count), np.zeros((2, count))
+    share = 1.0 + rng.normal(0.0, module.SCALE, count)
     for heading in headings:
         angle = heading + drift
-        forward, left = speed + error[0], 0.1 + error[1]
+        forward, left = speed * share + error[0], 0.1 * share + error[1]
         place += dt * np.array([np.cos(angle) * forward - np.sin(angle) * left,
                                 np.sin(angle) * forward + np.cos(angle) * left])
         place += rng.normal(0.0, module.PLACE * math.sqrt(dt), (2, count))
@@ -110,6 +111,14 @@ def test_the_orientation_is_that_of_roll_pitch_and_heading():
     assert math.atan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y)) == pytest.approx(0.2)
     assert math.asin(2 * (w * y - z * x)) == pytest.approx(-0.3)
     assert math.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z)) == pytest.approx(0.7)
+
+
+def test_a_robot_whose_way_was_measured_has_its_scale():
+    made = Odometry(GEOMETRY, scale=0.93)
+    for _ in range(100):
+        made.advance(sensors(), np.array([0.5, 0.0, 0.0]), IN_THE_AIR, 0.01)
+    assert made.pose[0] == pytest.approx(0.93 * 0.5)
+    assert made.twist[0] == pytest.approx(0.93 * 0.5)
 
 
 def test_without_measurements_it_knows_less():
