@@ -25,9 +25,9 @@ from dataclasses import replace
 
 from cpg_ros.atlas.chart import Chart
 from cpg_ros.atlas.codimension_two import CodimensionTwo
-from cpg_ros.atlas.fold_curves import fold_curve, SAME
+from cpg_ros.atlas.fold_curves import fold_curve
 from cpg_ros.atlas.hopf_condition import condition_of, HopfCondition
-from cpg_ros.atlas.hopf_curves import Boundary
+from cpg_ros.atlas.hopf_curves import Boundary, crossed
 from cpg_ros.dynamics.arclength import CurvePoint
 from cpg_ros.dynamics.continuation import continue_from_hopf
 from cpg_ros.dynamics.hopf_search import hopf_at
@@ -40,6 +40,8 @@ BESIDE, AMPLITUDE, LONGEST, MOST = (0.03, 0.06, 0.12), 0.01, 0.05, 80
 #: A fold this far, in shares, from its Hopf point is another one; the curve's end that is this
 #: close to the Bautin point ends there.
 NEAR, END = 0.2, 0.02
+#: A curve that stays this close to another one, in shares, is that.
+SAME = 3e-3
 
 
 def bautin_folds(job: tuple[Chart, Boundary]) -> list[Boundary]:
@@ -62,11 +64,12 @@ def distinct(chart: Chart, curves: Iterable[Boundary]) -> list[Boundary]:
     """Leave out fold curves that run along one before them, which may have been met elsewhere."""
     kept: list[Boundary] = []
     for curve in curves:
-        known = [one.points for one in kept
-                 if curve.kind == one.kind == 'fold' and one.gaits == curve.gaits]
-        some = curve.points[len(curve.points) // 2, :2]
-        if not any((np.abs(points - some) / chart.size).max(axis=1).min() < SAME
-                   for points in known):
+        shares = (curve.points[:, :2] - chart.low) / chart.size
+        some = shares[[len(shares) * k // 4 for k in (1, 2, 3)]]
+        if curve.kind != 'fold' or not any(
+                one.kind == 'fold' and one.gaits == curve.gaits
+                and all(crossed(one, chart, share - 0.5 * SAME, share + 0.5 * SAME)
+                        for share in some) for one in kept):
             kept.append(curve)
     return kept
 

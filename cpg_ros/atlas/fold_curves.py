@@ -130,7 +130,9 @@ def followed(chart: Chart, fold: CurvePoint, one: float, way: float
         ahead = None
         if chart.first.low <= new <= chart.first.high:
             ahead = _next(chart, fold, new, guess)
-        if ahead is None or ahead.amplitude < REST:
+        if ahead is None or ahead.amplitude < REST or not _on_course(chart, [
+                *found[-2:], (new, ahead)], step):
+            # Another fold of the branch is none of this curve.
             # Beyond a Bautin point what is left is the Hopf point, where branches turn, too.
             # Beyond the edge, too: up to it.
             step *= 0.5
@@ -142,6 +144,15 @@ def followed(chart: Chart, fold: CurvePoint, one: float, way: float
         found.append((one, ahead))
         step = min(STEP, 1.5 * step)
     return found
+
+
+def _on_course(chart: Chart, last: list[tuple[float, CurvePoint]], step: float) -> bool:
+    """Whether a fold lies about where the two before it lead, a step in shares later."""
+    if len(last) < 3:
+        return True
+    (a, one), (b, two), (c, three) = last
+    ahead = two.value + (two.value - one.value) * (c - b) / (b - a)
+    return bool(abs(three.value - ahead) < 0.5 * step * chart.size[1])
 
 
 def _next(chart: Chart, fold: CurvePoint, new: float, guess: np.ndarray) -> CurvePoint | None:

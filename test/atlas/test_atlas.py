@@ -202,6 +202,19 @@ def test_the_page_is_one_file_with_everything_in_it(drawn):
     assert told['gaits']['trot']['waves']
 
 
+def test_points_of_codimension_two_are_listed_and_marked(drawn):
+    """The trot and the walk are born together where their formulas meet."""
+    c = brentq(lambda c: critical(c, 2, 1, True, 0)[1] - critical(c, 1, 1, True, 0)[1], 6.0, 7.5)
+    stored = json.loads((drawn[0] / 'boundaries.json').read_text())
+    (point,) = (point for curve in stored for point in curve['codimension_two']
+                if (point['type'], point['gait'], point['other']) == (
+                    'Hopf-Hopf', 'trot', ['walk']))
+    assert point['values'] == pytest.approx([c, critical(c, 2, 1, True, 0)[1]], abs=1e-9)
+    told = json.loads((drawn[0] / 'index.html').read_text().split('id="atlas">')[1].split(
+        '</script>')[0])
+    assert [*point['values'], 'HH'] in told['gaits']['trot']['special']
+
+
 @pytest.mark.parametrize('count', [2, 3, 9, 12, 20, 200])
 def test_a_grid_of_any_size_is_halved_until_it_is_whole(count):
     assert grid_indices(count, 1) == list(range(count))
