@@ -23,6 +23,7 @@ from cpg_ros.atlas.hopf_curves import curves_from, hopf_curves
 from cpg_ros.atlas.hopf_degeneracies import hopf_degeneracies, with_degeneracies
 from cpg_ros.atlas.hopf_starts import hopf_starts, HopfStart, Segment
 from cpg_ros.networks.registry import find_network, PRESETS
+from depth import in_depth
 import numpy as np
 import pytest
 from scipy.optimize import brentq
@@ -51,7 +52,7 @@ def start(chart, gait, mode, values, omega):
     return HopfStart(gait, mode, np.append((np.array(values) - chart.low) / chart.size, omega))
 
 
-@pytest.mark.parametrize('order', [1, -1])
+@pytest.mark.parametrize('order', [1, *in_depth(-1)])
 def test_a_bautin_point_is_where_the_cubic_coefficient_is_0(order):
     """Each class has its own: the walk's is at mu = k, the hop's at mu = -k."""
     chart = own('septic_legs', [('a', (-1.0, 1.3)), ('mu', (-1.0, 1.5))][::order], **SEPTIC)
@@ -67,7 +68,7 @@ def test_a_bautin_point_is_where_the_cubic_coefficient_is_0(order):
         assert point.omega == pytest.approx(5.7 if gait == 'walk' else 6.3, abs=1e-10)
 
 
-@pytest.mark.parametrize('order', [1, -1])
+@pytest.mark.parametrize('order', [1, *in_depth(-1)])
 def test_the_fold_curve_that_a_bautin_point_bears_ends_in_a_cusp(order):
     """On the walk mu = k - a rho - b rho^2 + rho^3, with folds at a = 3 rho^2 - 2 b rho."""
     chart = own('septic_legs', [('a', (-1.0, 1.3)), ('mu', (-1.0, 1.5))][::order], **SEPTIC)
