@@ -20,5 +20,6 @@ robots at a time: arrays have a leading axis of runs, which is 1 for a robot alo
 
 __all__ = ['biped', 'clearance', 'efference_copy', 'estimate', 'feedback', 'foot_force', 'gains',
            'gait_tables', 'heading', 'input_monitor', 'interpolation', 'kinematics', 'law',
-           'memory', 'pace', 'placement', 'plausibility', 'posture', 'reflexes', 'sidestep',
-           'slope', 'speed', 'stiffen', 'tegotae', 'tick', 'timetable', 'touchdown', 'warm_up']
+           'memory', 'odometry', 'pace', 'placement', 'plausibility', 'posture', 'reflexes',
+           'sidestep', 'slope', 'speed', 'stiffen', 'tegotae', 'tick', 'timetable', 'touchdown',
+           'warm_up']
