@@ -22,6 +22,7 @@ __all__ = [
            'leg_motion',
            'leg_names',
            'leg_phases',
+           'leg_strides',
            'mean_cycle',
            'period',
            'phase_average',

@@ -34,6 +34,7 @@ __all__ = [
            'paper_fit',
            'parameter_files',
            'recording_fit',
+           'stride_report',
            'trust_region',
            'variable_projection',
            'waveform_harmonics',

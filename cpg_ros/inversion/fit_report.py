@@ -20,7 +20,7 @@ import io
 
 from cpg_ros.files.page_style import STYLE
 from cpg_ros.files.plain_text import table
-from cpg_ros.inversion import fit_figures
+from cpg_ros.inversion import fit_figures, stride_report
 from cpg_ros.inversion.paper_fit import PaperFit
 from cpg_ros.inversion.recording_fit import RecordingFit
 from matplotlib.figure import Figure
@@ -158,6 +158,17 @@ def _warned(found: RecordingFit) -> str:
     return f'<table><thead><tr><th>Warnings</th></tr></thead><tbody>{rows}</tbody></table>'
 
 
+def _strides(found: RecordingFit) -> list[str]:
+    """Return the sections on single strides, that of each stride folded."""
+    legs = stride_report.strides_of(found)
+    parts = ['<h2>Strides</h2>', *(f'<p>{escape(line)}</p>' for line in stride_report.notes(legs)),
+             _html_table(stride_report.by_leg(legs))]
+    if len(pairs := stride_report.symmetry(legs)) > 1:
+        parts += ['<p>Symmetry index, 0 where both sides are alike:</p>', _html_table(pairs)]
+    return [*parts, '<details><summary>Every stride</summary>',
+            _html_table(stride_report.every_stride(legs)), '</details>']
+
+
 def as_html(found: RecordingFit) -> str:
     """Return the report as one page with its figures in it."""
     def paragraphs(lines: list[str]) -> str:
@@ -170,6 +181,7 @@ def as_html(found: RecordingFit) -> str:
              '<h2>Parameters</h2>',
              _html_table(parameters(found)), paragraphs(_judged(found)), '<h2>Joints</h2>',
              paragraphs([_shares(found)]), _html_table(joints(found))]
+    parts += _strides(found)
     for name, draw in FIGURES:
         parts += [f'<h2>{escape(name)}</h2>', _image(draw(found), name)]
     parts += ['<h2>Starts</h2>', _html_table(starts(found))]

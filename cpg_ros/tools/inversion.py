@@ -42,6 +42,7 @@ from cpg_ros.inversion.model_choice import (
 from cpg_ros.inversion.paper_fit import paper_fits, PaperFit, refuse_others
 from cpg_ros.inversion.parameter_files import write_fitted
 from cpg_ros.inversion.recording_fit import fit_recording, network_of, preset_of, RecordingFit
+from cpg_ros.inversion.stride_report import as_csv
 from cpg_ros.networks.registry import SHIPPED
 from cpg_ros.recordings.formats import FORMATS, read_recording
 from cpg_ros.recordings.recording import Recording
@@ -105,7 +106,8 @@ def _parser() -> Parser:
     parser.add_argument('--out', type=Path, metavar='FILE', help='parameter file to write, such '
                         'as fitted.yaml; the robot file is written beside it; with --bags, a '
                         'folder')
-    parser.add_argument('--report', type=Path, metavar='FILE', help='report to write, .html')
+    parser.add_argument('--report', type=Path, metavar='FILE', help='report to write: .html, or '
+                        '.csv for a table of all strides')
     parser.add_argument('--json', action='store_true', help='print JSON instead of text')
     parser.add_argument('--watch', action='store_true', help='with --bags: keep processing new '
                         'recordings until Ctrl-C')
@@ -153,6 +155,9 @@ def _refuse_files(chosen: Namespace) -> None:
             raise InputError(f'argument --{option}: there is no folder {path.parent}')
     if chosen.out is not None and chosen.out.suffix not in ('.yaml', '.yml'):
         raise InputError(f'argument --out: {shown(str(chosen.out))} does not end in .yaml')
+    if chosen.report is not None and chosen.report.suffix not in ('.html', '.csv'):
+        raise InputError(f'argument --report: {shown(str(chosen.report))} does not end in .html '
+                         'or .csv')
 
 
 def _invert_many(chosen: Namespace, robot: Robot | None, starts: list[dict[str, float]]) -> int:
@@ -237,9 +242,13 @@ def _paper(chosen: Namespace, found: RecordingFit, starts: list[dict[str, float]
 def _written(chosen: Namespace, found: RecordingFit, robot: Robot | None) -> list[Path]:
     written = [] if chosen.out is None else write_fitted(chosen.out, found, robot)
     if chosen.report is not None:
-        # matplotlib takes half a second, and only pages need it.
-        from cpg_ros.inversion.fit_report import as_html
-        write_atomically(chosen.report, as_html(found))
+        if chosen.report.suffix == '.csv':
+            text = as_csv(found)
+        else:
+            # matplotlib takes half a second, and only pages need it.
+            from cpg_ros.inversion.fit_report import as_html
+            text = as_html(found)
+        write_atomically(chosen.report, text)
         written.append(chosen.report)
     return written
 
