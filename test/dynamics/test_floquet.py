@@ -183,6 +183,15 @@ def test_an_orbit_that_does_not_attract_is_told():
     assert stability(orbit).flaw.endswith('own symmetry class grows 1.571 times a stride')
 
 
+def test_a_gait_attracts_only_if_disturbances_outside_its_class_decay_too():
+    orbit = solve_preset(PRESETS['delayed']['trot'])
+    alone = multipliers(orbit)
+    assert np.abs(alone.within).max() < 1.0 < np.abs(alone.transverse).max()
+    assert not alone.attracts
+    locked = multipliers(orbit, stability(orbit).chosen)
+    assert np.abs(locked.transverse).max() < 1.0 and locked.attracts
+
+
 @pytest.mark.parametrize('change', [{}, *in_depth({'alpha': -0.6}, {'alpha': -0.3})])
 def test_the_smallest_multipliers_are_right_beside_the_largest(change):
     # Together they multiply volumes as the divergence along the orbit does (Liouville). Beyond
