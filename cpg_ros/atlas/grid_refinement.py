@@ -25,7 +25,7 @@ from typing import Any
 
 from cpg_ros.atlas.chart import Chart, COARSE
 from cpg_ros.atlas.hopf_curves import Boundary, crossed
-from cpg_ros.atlas.hopf_starts import Segment
+from cpg_ros.atlas.hopf_starts import ChartLine
 from cpg_ros.atlas.row_job import AtlasRow, NONE
 from cpg_ros.short_repr import ShortRepr
 import numpy as np
@@ -166,7 +166,7 @@ def refine_once(chart: Chart, gait: str, sheet: Sheet, stride: int) -> list[Atla
 
 
 def uncrossed_edges(chart: Chart, gait: str, sheet: Sheet, curves: Iterable[Boundary]
-                    ) -> Iterator[Segment]:
+                    ) -> Iterator[ChartLine]:
     """Yield edges of the coarse grid at whose ends verdicts differ though no known curve is there.
 
     Args:
@@ -188,7 +188,7 @@ def uncrossed_edges(chart: Chart, gait: str, sheet: Sheet, curves: Iterable[Boun
         if sheet.label[one] != sheet.label[other] and not any(
                 crossed(curve, chart, here, there) for curve in own):
             low, high = ((chart.low + share * chart.size).tolist() for share in (here, there))
-            yield Segment(chart, (gait,), axis, low[1 - axis], low[axis], high[axis])
+            yield ChartLine(chart, (gait,), axis, low[1 - axis], low[axis], high[axis])
 
 
 def _middles(top: int, bottom: int, left: int, right: int, corners: list[tuple[int, int]]

@@ -28,7 +28,7 @@ LINES = 41
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Segment(ShortRepr):
+class ChartLine(ShortRepr):
     """A line across the plane of an atlas, parallel to one of its axes.
 
     Attributes:
@@ -69,15 +69,15 @@ class HopfStart(ShortRepr):
     share: np.ndarray
 
 
-def lines_across(chart: Chart, gaits: tuple[str, ...]) -> Iterator[Segment]:
+def lines_across(chart: Chart, gaits: tuple[str, ...]) -> Iterator[ChartLine]:
     """Yield evenly spaced lines along both axes: lines along one may all miss a curve."""
     axes = chart.first, chart.second
     for along, across in ((1, 0), (0, 1)):
         for fixed in np.linspace(axes[across].low, axes[across].high, LINES):
-            yield Segment(chart, gaits, along, float(fixed), axes[along].low, axes[along].high)
+            yield ChartLine(chart, gaits, along, float(fixed), axes[along].low, axes[along].high)
 
 
-def hopf_starts(segment: Segment) -> list[HopfStart]:
+def hopf_starts(segment: ChartLine) -> list[HopfStart]:
     """Return the Hopf points of some gaits on a line across the plane."""
     chart = segment.chart
     network = chart.at(*segment.place(segment.low))

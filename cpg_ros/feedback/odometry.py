@@ -93,7 +93,7 @@ def _advance(legs, joints, contact, motion, pose, covariance, scratch):
 
 
 class Odometry:
-    """Where the base of one robot is, from where it was first; a tick allocates nothing lasting.
+    """Where the base of one robot is, from where it was first.
 
     The x axis of its frame is the base's heading at the start. Height is that above the feet which
     stand: going up a slope is not seen.

@@ -21,7 +21,7 @@ from cpg_ros.atlas.bautin_folds import bautin_folds, distinct
 from cpg_ros.atlas.chart import chart_of
 from cpg_ros.atlas.hopf_curves import curves_from, hopf_curves
 from cpg_ros.atlas.hopf_degeneracies import hopf_degeneracies, with_degeneracies
-from cpg_ros.atlas.hopf_starts import hopf_starts, HopfStart, Segment
+from cpg_ros.atlas.hopf_starts import ChartLine, hopf_starts, HopfStart
 from cpg_ros.networks.registry import find_network, PRESETS
 from depth import in_depth
 import numpy as np
@@ -43,7 +43,7 @@ def through_line(chart, gaits, axis=1, share=0.4):
     """Return the Hopf curves through one line along an axis."""
     axes = chart.first, chart.second
     fixed, along = axes[1 - axis], axes[axis]
-    return curves_from(chart, hopf_starts(Segment(
+    return curves_from(chart, hopf_starts(ChartLine(
         chart, gaits, axis, fixed.low + share * (fixed.high - fixed.low), along.low, along.high)))
 
 
