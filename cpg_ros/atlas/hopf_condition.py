@@ -24,7 +24,7 @@ from typing import Any
 from cpg_ros.atlas.chart import Chart
 from cpg_ros.dynamics.characteristic import characteristic_matrix
 from cpg_ros.dynamics.equilibrium import equilibrium
-from cpg_ros.dynamics.isotypic import blocks
+from cpg_ros.dynamics.isotypic import block_at, blocks
 from cpg_ros.errors import CpgError
 import numpy as np
 
@@ -42,8 +42,7 @@ class HopfCondition:
     def values(self, share: np.ndarray) -> np.ndarray:
         """Return the real and the imaginary part of the determinant, shape (2,)."""
         network = self.chart.at_share(share[:2])
-        block = next(block for block in blocks(network, equilibrium(network))
-                     if block.mode == self.mode)
+        block = block_at(network, equilibrium(network), self.mode)
         matrix = characteristic_matrix(1j * share[2], block.now, block.past, network.delay)[0]
         found = np.linalg.det(matrix)
         return np.array([found.real, found.imag])

@@ -29,7 +29,7 @@ from cpg_ros.atlas.hopf_condition import slopes
 from cpg_ros.dynamics.characteristic import characteristic_matrix
 from cpg_ros.dynamics.equilibrium import equilibrium, odd, Quotient
 from cpg_ros.dynamics.expansion import Expansion
-from cpg_ros.dynamics.isotypic import Block, block_of, blocks, classes
+from cpg_ros.dynamics.isotypic import Block, block_at, block_of, classes
 from cpg_ros.errors import CpgError
 from cpg_ros.networks.symmetry import Symmetry
 import numpy as np
@@ -117,8 +117,7 @@ def curve_ends(chart: Chart, gait: str, mode: tuple[int, ...], shares: np.ndarra
         return
     for last, before in ((shares[0], shares[1]), (shares[-1], shares[-2])):
         network = chart.at_share(last[:2])
-        block = next(block for block in blocks(network, equilibrium(network))
-                     if block.mode == mode)
+        block = block_at(network, equilibrium(network), mode)
         end = _End(chart, block.symmetry, last)
         start = np.concatenate([end.rest[:end.free], last])
         ahead = last[2] - before[2]

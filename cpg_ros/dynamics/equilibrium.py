@@ -57,7 +57,7 @@ class Quotient(Field[Network]):
     def __init__(self, network: Network) -> None:
         """Look at a network, all of whose couplings are there."""
         super().__init__(network, np.zeros(network.cells, dtype=int))
-        self._whole = self._p
+        self._whole = self._p = [value.flat[0] for value in self._p]
         equations = self._equations
         self._coupled = [equations.by_cell.get(row, (row,))[0] in network.couplings
                          for row in equations.rows]
@@ -69,8 +69,17 @@ class Quotient(Field[Network]):
 
     def together(self, states: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return rates, (..., variables), and their Jacobian, if all cells move together."""
-        rates, now, past = self.linearised(states)
-        return rates, now + past if past.size else now
+        equations = self._equations
+        # Of one state these are numbers, with which equations take a third of the time.
+        variables = np.moveaxis(states, -1, 0)
+        rates, slopes = equations.slopes(
+            [variables[one.variable] for one in equations.arguments], self._p)
+        out, jacobian = np.empty(states.shape), np.zeros((*states.shape, states.shape[-1]))
+        for v, rate in enumerate(rates):
+            out[..., v] = rate
+        for (v, k), slope in slopes.items():
+            jacobian[..., v, equations.arguments[k].variable] += slope
+        return out, jacobian
 
     def push(self, state: np.ndarray) -> np.ndarray:
         """Return the derivative of the rates by the share of the couplings, shape (variables,)."""

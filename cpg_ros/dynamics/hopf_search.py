@@ -25,7 +25,7 @@ from itertools import pairwise
 from cpg_ros.dynamics.delay_crossings import delay_crossings
 from cpg_ros.dynamics.equilibrium import equilibrium, NoEquilibrium
 from cpg_ros.dynamics.hopf_point import crossing_at, HopfPoint, ON_AXIS
-from cpg_ros.dynamics.isotypic import Block, blocks, classes
+from cpg_ros.dynamics.isotypic import Block, block_at, blocks, classes
 from cpg_ros.dynamics.sign_changes import crossings
 from cpg_ros.errors import InputError
 from cpg_ros.networks.equations import equations_of
@@ -85,7 +85,7 @@ def hopf_at(network: Network, line: ParameterLine, mode: tuple[int, ...], omega:
 
     """
     rest = equilibrium(network)
-    block = next(block for block in blocks(network, rest) if block.mode == mode)
+    block = block_at(network, rest, mode)
     # Its real part is zero but for rounding, unless the caller was wrong by more.
     roots = block.right_of(-1e-3)
     root = roots[np.abs(roots - 1j * omega).argmin()]

@@ -65,8 +65,7 @@ class Block(ShortRepr):
     @property
     def mode(self) -> tuple[int, ...]:
         """(j, k): shifts j/m and k/n of the group's generators, of the orders m and n."""
-        shifts, group = dict(self.symmetry.shifts), self.symmetry.group
-        return tuple(int(shifts[name] * group.order(name)) for name, _ in group.generators)
+        return self.symmetry.mode
 
     @property
     def name(self) -> str:
@@ -76,7 +75,7 @@ class Block(ShortRepr):
     @property
     def real(self) -> bool:
         """Whether the class is its own conjugate: its roots are real or in pairs."""
-        return all(2 * shift % 1 == 0 for _, shift in self.symmetry.shifts)
+        return self.symmetry.self_conjugate
 
     @property
     def wave(self) -> str:
@@ -171,8 +170,14 @@ def blocks(network: Network, state: np.ndarray) -> tuple[Block, ...]:
             group does not take the first cell to each cell in exactly one way.
 
     """
-    return tuple(block_of(Expansion(network, np.asarray(state, dtype=float)), symmetry)
-                 for symmetry in classes(network))
+    expansion = Expansion(network, np.asarray(state, dtype=float))
+    return tuple(block_of(expansion, symmetry) for symmetry in classes(network))
+
+
+def block_at(network: Network, state: np.ndarray, mode: tuple[int, ...]) -> Block:
+    """Return the block of one class by its mode, as blocks has it."""
+    symmetry = next(symmetry for symmetry in classes(network) if symmetry.mode == mode)
+    return block_of(Expansion(network, np.asarray(state, dtype=float)), symmetry)
 
 
 def classes(network: Network) -> tuple[Symmetry, ...]:

@@ -233,6 +233,21 @@ class Symmetry(ShortRepr):
         return self._orbit_of_cells[0]
 
     @cached_property
+    def mode(self) -> tuple[int, ...]:
+        """(j, k): shifts j/m and k/n of the group's generators, of the orders m and n.
+
+        Only where H is the whole group.
+        """
+        shifts = dict(self.shifts)
+        return tuple(int(shifts[name] * self.group.order(name))
+                     for name, _ in self.group.generators)
+
+    @cached_property
+    def self_conjugate(self) -> bool:
+        """Whether all shifts are 0 or 1/2: of the two senses of a wave there is but one."""
+        return all(2 * shift % 1 == 0 for _, shift in self.shifts)
+
+    @cached_property
     def phases(self) -> np.ndarray:
         """Phase of each cell in cycles, shape (cells,): x_i(t) = u_wave(i)(t + phase_i T)."""
         shifts = self._orbit_of_cells[1]
