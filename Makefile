@@ -33,6 +33,8 @@ ONLINE := -n $(LIVE) --dist loadgroup
 # A shared machine may stall for seconds: before a commit, a live test that fails runs once more, and
 # is listed. In depth, and without a graph, nothing does.
 AGAIN := --reruns 1 -r aR
+# Compiled while linters run, before tests in several processes would at once.
+KERNELS := feedback delayed quadruped biped phase hopf matsuoka
 # What tests compile is kept here from run to run, whatever becomes of install/.
 test test-deep test-export browser coverage mutants docs: export NUMBA_CACHE_DIR ?= $(CURDIR)/.numba
 
@@ -74,7 +76,7 @@ coverage: install/.built
 # What is run before every commit; with COVERAGE=yes it measures that, too, and takes a minute
 # longer. The kernels of all networks are compiled while linters run.
 test: install/.built unitree
-	@$(ENTER); $(VENV)/bin/python test/support/compiled.py & \
+	@$(ENTER); $(VENV)/bin/python -P -m cpg_ros.tools.precompile $(KERNELS) & \
 		$(VENV)/bin/ruff check . && $(VENV)/bin/mypy && $(VENV)/bin/lint-imports --no-logo && wait $$!
 	@$(ENTER); for part in '$(OFFLINE) -m "not (live or deep or browser)" $(if $(COVERAGE),$(COVER))' \
 		'$(ONLINE) $(AGAIN) -m "live and not (deep or alone or browser)"'; do \

@@ -153,7 +153,8 @@ def test_names_that_are_not_utf8_cost_no_row(folder, tmp_path):
         (folder / os.fsdecode(name)).write_text(text)
     for begun in ('first', 'again'):
         run = subprocess.run([*INVERSION, '--bags', str(folder), '--out', str(tmp_path / 'out'),
-                              '--network', 'delayed', '--free', 'tau', '--order', '1'],
+                              '--network', 'delayed', '--free', 'tau', '--order', '1', '--jobs',
+                              '1'],
                              capture_output=True, text=True)
         assert run.returncode == 0 and 'Traceback' not in run.stderr, (begun, run.stderr)
         assert '7 recordings, 3 fitted' in run.stdout

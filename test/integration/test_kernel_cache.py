@@ -76,14 +76,12 @@ def test_networks_compiled_apart_keep_their_own_code(tmp_path):
 
 @pytest.fixture(scope='module')
 def copied(tmp_path_factory):
-    """Return a copy of the package in which one network has been compiled, and what that left."""
+    """Return a copy of the package in which nothing has been compiled."""
     package = tmp_path_factory.mktemp('package')
     shutil.copytree(Path(cpg_ros.__file__).parent, package / 'cpg_ros',
                     ignore=shutil.ignore_patterns('__pycache__'))
     shutil.copytree(share() / 'config', package / 'config')
-    known = kernels_after_a_start(package, 'biped')
-    assert known
-    return package, known
+    return package
 
 
 def kernels_after_a_start(package, network):
@@ -98,13 +96,14 @@ def kernels_after(package, code):
     return set(package.rglob('*.nbc'))
 
 
+@pytest.mark.deep
 def test_the_first_start_of_another_network_leaves_what_is_compiled(copied):
     # Its generated code is kept beside the sources, where anybody may write there.
-    package, known = copied
-    both = kernels_after_a_start(package, 'phase')
-    assert both > known and list(package.rglob('phase_*/kernel.py'))
+    known = kernels_after_a_start(copied, 'biped')
+    both = kernels_after_a_start(copied, 'phase')
+    assert both > known and list(copied.rglob('phase_*/kernel.py'))
     # Compiled apart, each keeps its own code where both are loaded.
-    assert kernels_after(package, CHECK.format(names=('biped', 'phase', 'biped'))) == both
+    assert kernels_after(copied, CHECK.format(names=('biped', 'phase', 'biped'))) == both
 
 
 ONE = """
@@ -117,41 +116,38 @@ assert doubled(1.0) == 2.0
 
 
 def test_a_changed_source_is_another_cache(copied):
-    package, _ = copied
-    (package / 'one.py').write_text(ONE)
-    before = kernels_after(package, 'import one')
-    assert kernels_after(package, 'import one') == before
-    changed = package / 'cpg_ros' / 'motion' / 'readout.py'
+    (copied / 'one.py').write_text(ONE)
+    before = kernels_after(copied, 'import one')
+    assert kernels_after(copied, 'import one') == before
+    changed = copied / 'cpg_ros' / 'motion' / 'readout.py'
     text = changed.read_text()
     changed.write_text(text + '\n# Changed.\n')
-    after = kernels_after(package, 'import one')
+    after = kernels_after(copied, 'import one')
     assert len(after - before) == 1 and after > before
     changed.write_text(text)
-    assert kernels_after(package, 'import one') == after
+    assert kernels_after(copied, 'import one') == after
 
 
 @pytest.mark.deep
 def test_a_changed_source_is_generated_and_compiled_again(copied):
     # numba watches only the file that a kernel stands in, and the rooms have several.
-    package, _ = copied
-    generated = set(package.rglob('biped_*/kernel.py'))
-    known = set(package.rglob('*.nbc'))
-    assert generated and kernels_after_a_start(package, 'biped') == known
+    known = kernels_after_a_start(copied, 'biped')
+    generated = set(copied.rglob('biped_*/kernel.py'))
+    assert generated and kernels_after_a_start(copied, 'biped') == known
     for source in ('integration/field_code.py', 'motion/readout.py'):
-        changed = package / 'cpg_ros' / source
+        changed = copied / 'cpg_ros' / source
         changed.write_text(changed.read_text() + '\n# Changed.\n')
-        before, known = known, kernels_after_a_start(package, 'biped')
+        before, known = known, kernels_after_a_start(copied, 'biped')
         assert known > before, source
-        older, generated = generated, set(package.rglob('biped_*/kernel.py'))
+        older, generated = generated, set(copied.rglob('biped_*/kernel.py'))
         assert generated > older, source
 
 
 OWN = """
 import numpy as np
 from cpg_ros.integration.stepper import Stepper
-from cpg_ros.motion.network_kernels import precompile
+import one
 from own import TwoLegs
-precompile('delayed')
 state, slope, _ = Stepper(TwoLegs(1.0, 2.0, 0.1), np.array([1.0, 0.5, 0.0, 0.0])).advance(0.01)
 # Of x of the first leg, whose square rate is 1 - x^2 - y^2.
 x, y = state[0], state[2]
@@ -160,6 +156,7 @@ print(np.round((slope[0] + 2.0 * y - 0.1 * state[1]) / x / (1.0 - x ** 2 - y ** 
 
 
 def test_an_edited_network_of_ones_own_is_compiled_again_and_nothing_else(tmp_path):
+    (tmp_path / 'one.py').write_text(ONE)
     own, given = tmp_path / 'own.py', environment(NUMBA_CACHE_DIR=str(tmp_path / 'cache'),
                                                   PYTHONPATH=str(tmp_path))
     text = (Path(__file__).parents[1] / 'networks' / 'test_own_network.py').read_text()
@@ -222,14 +219,12 @@ import sys, tempfile
 if {nowhere}:
     tempfile.tempdir = '/dev/null'
 import cpg_ros
-from cpg_ros.motion.network_kernels import precompile
 assert cpg_ros.__file__.startswith(sys.argv[1])
-precompile('delayed')
+import one
 """
 
 
-@pytest.mark.parametrize('nowhere', [pytest.param(False, id='temporary'), pytest.param(
-    True, id='nowhere', marks=pytest.mark.deep)])
+@pytest.mark.parametrize('nowhere', [False, True], ids=['temporary', 'nowhere'])
 def test_it_starts_where_neither_the_package_nor_the_home_can_be_written(tmp_path, nowhere):
     package, scratch = tmp_path / 'read_only', tmp_path / 'scratch'
     scratch.mkdir()
@@ -239,6 +234,7 @@ def test_it_starts_where_neither_the_package_nor_the_home_can_be_written(tmp_pat
     for room in [folder for folder in package.rglob('*') if folder.is_dir()]:
         # Whoever runs this, root too, can make no folder where a file is.
         (room / '__pycache__').touch()
+    (package / 'one.py').write_text(ONE)
     given = environment('NUMBA_CACHE_DIR', 'XDG_CACHE_HOME', HOME='/dev/null', TMPDIR=str(scratch),
                         PYTHONPATH=str(package))
     seen = []
@@ -292,6 +288,7 @@ exec {generator} --ros-args -p gait:=walk
 """
 
 
+@pytest.mark.deep
 def test_a_node_walks_with_a_full_disk_under_the_cache(tmp_path, monkeypatch):
     # It compiles, which takes minutes beside other tests.
     monkeypatch.setattr('graph.PATIENCE', 300.0)

@@ -29,6 +29,7 @@ from cpg_ros.networks.registry import find_network, NetworkError, NETWORKS, PRES
 from cpg_ros.recordings.csv_reader import read_csv
 from cpg_ros.robots.robot_file import read_robot, RobotError, write_robot
 from cpg_ros.search.search_space import search_space
+from depth import in_depth
 import numpy as np
 import pytest
 import yaml
@@ -240,8 +241,8 @@ def test_other_packages_offer_networks(tmp_path, offered):
 
 @pytest.mark.parametrize(('name', 'value', 'words'), [
     ('lent', 'gone:Twin', "entry point 'lent = gone:Twin': ModuleNotFoundError"),
-    ('lent', 'lent:PRESETS', 'it is not a network class'),
-    ('borrowed', 'lent:Twin', "its network has the name 'lent'")])
+    *in_depth(('lent', 'lent:PRESETS', 'it is not a network class'),
+              ('borrowed', 'lent:Twin', "its network has the name 'lent'"))])
 def test_an_offer_of_no_use_harms_itself_alone(offered, name, value, words):
     places = offered(name, value)
     code, said, _ = analysed(name, **places)

@@ -16,6 +16,7 @@
 
 import importlib.util
 import math
+import time
 
 from geometry_msgs.msg import Twist
 from graph import EXECUTABLE, Process, until, Watcher
@@ -106,13 +107,14 @@ def test_it_goes_and_turns_as_cmd_vel_asks_and_stops(robot):
 
         def over():
             publisher.publish(message)
+            time.sleep(0.02)
             return track.now > began + seconds
 
         until(over, 'simulated time to pass')
         rows = track.after(began + seconds / 3.0)
-        time = rows[-1, 0] - rows[0, 0]
+        passed = rows[-1, 0] - rows[0, 0]
         way = np.hypot(*(rows[-1, 1:3] - rows[0, 1:3]))
-        return way / time, (np.unwrap(rows[:, 4])[-1] - rows[0, 4]) / time
+        return way / passed, (np.unwrap(rows[:, 4])[-1] - rows[0, 4]) / passed
 
     found, turned = ask(0.3, 0.0)
     assert found == pytest.approx(0.3, rel=0.2) and abs(turned) < 0.06

@@ -22,6 +22,7 @@ from cpg_ros.motion.plan import plan
 from cpg_ros.networks.preset_files import write_presets
 from cpg_ros.networks.registry import NETWORKS, PRESETS
 from cpg_ros.robots.robot_file import read_robot
+from depth import in_depth
 from graph import until
 import pytest
 from stepped import refused
@@ -205,7 +206,7 @@ def test_the_zig_zag_assignment_drives_a_leg_by_two_cells(tmp_path, stepped):
             in refused('-p', 'network:=quadruped', '-p', f'robot:={path}'))
 
 
-@pytest.mark.parametrize('live', ['phase', 'hopf', 'matsuoka'], indirect=True)
+@pytest.mark.parametrize('live', ['hopf', 'matsuoka', *in_depth('phase')], indirect=True)
 def test_oscillators_switch_between_all_ordered_pairs(live):
     network, watcher = live
     robot = read_robot(CONFIG / 'quadruped.yaml')

@@ -23,7 +23,7 @@ import tempfile
 from bags import JOINT_STATE, joint_state, JOINTS, START, storage_file, STORAGES, walk, write_bag
 from cpg_ros.recordings.bag_reader import read_bag
 from cpg_ros.recordings.recording import RecordingError
-from depth import examples
+from depth import examples, in_depth
 from hypothesis import given
 from hypothesis import strategies as st
 import numpy as np
@@ -89,7 +89,7 @@ def test_cut_at_fifty_places_it_is_refused_or_reads_what_is_whole(tmp_path, stor
     assert recovered >= (15 if (storage, compression) == ('mcap', 'none') else 0)
 
 
-@pytest.mark.parametrize('compression', ['none', 'file', 'message'])
+@pytest.mark.parametrize('compression', ['none', *in_depth('file', 'message')])
 @pytest.mark.parametrize('storage', STORAGES)
 def test_cut_metadata_is_refused_by_name(tmp_path, storage, compression):
     path = write_bag(tmp_path / 'walk', walk(30)[0], storage, compression)

@@ -44,6 +44,8 @@ from std_msgs.msg import Float64MultiArray, String
 EXECUTABLE = Path(get_package_prefix('cpg_ros')) / 'lib' / 'cpg_ros' / 'generator'
 #: Long enough for a loaded machine; nothing waits that long when all is well.
 PATIENCE = 60.0
+#: For the last lines of a process that has ended, s.
+HELD = 3.0
 #: A request that changes nothing, and has no answer for so long, is sent again, s.
 READING, LOST = (GetParameters, ListParameters), 10.0
 #: Which of the processes that share the tests this one is, and how many there are.
@@ -111,7 +113,8 @@ class Process:
     def wait(self) -> int:
         """Wait for its end and return the exit code."""
         code = self._process.wait(PATIENCE)
-        self._reader.join(PATIENCE)
+        # A watchdog that outlives it holds its output open.
+        self._reader.join(HELD)
         return code
 
     def end(self) -> None:
