@@ -27,10 +27,11 @@ from cpg_ros.atlas.chart import Chart, COARSE
 from cpg_ros.atlas.fold_cusps import cusp_beyond
 from cpg_ros.atlas.grid_refinement import grid_indices, Sheet
 from cpg_ros.atlas.hopf_curves import Boundary
+from cpg_ros.atlas.infinite_periods import infinite_periods
 from cpg_ros.atlas.orbit_curves import Edge
 from cpg_ros.atlas.row_job import NONE, solve_from_wave
 from cpg_ros.dynamics.arclength import CurvePoint, predict_and_correct, resolve_point
-from cpg_ros.dynamics.continuation import continue_orbit
+from cpg_ros.dynamics.continuation import Branch, continue_orbit
 from cpg_ros.dynamics.orbit import NoOrbit
 from cpg_ros.errors import CpgError
 import numpy as np
@@ -58,21 +59,30 @@ def lost_edges(chart: Chart, sheet: Sheet) -> list[Edge]:
 
 
 def fold_curves(job: tuple[Chart, str, list[Edge]]) -> list[Boundary]:
-    """Follow the folds at which a gait is lost over some edges; most are lost at Hopf points."""
+    """Follow the folds at which a gait is lost over some edges; most are lost at Hopf points.
+
+    Where the branch ends in orbits without a period these are followed, too.
+    """
     chart, gait, edges = job
     found: list[Boundary] = []
     for edge in edges[::max(1, len(edges) // TRIED)]:
         try:
-            folds = _folds(chart, gait, edge)
+            branch = _branch(chart, gait, edge)
         except (CpgError, np.linalg.LinAlgError):
             continue
         one = chart.first.low + edge.here[0] * chart.size[0]
-        for fold in folds:
-            if any((np.abs(curve.points - (one, fold.value)) / chart.size).max(axis=1).min() < SAME
-                   for curve in found):
-                continue
-            found.append(fold_curve(chart, gait, fold, one))
+        for fold in branch.folds:
+            if not _known(chart, found, one, fold.value):
+                found.append(fold_curve(chart, gait, fold.place, one))
+        if not all(end.why != 'period' or _known(chart, found, one, end.value)
+                   for end in branch.ends):
+            found += infinite_periods(chart, gait, branch, one)
     return found
+
+
+def _known(chart: Chart, found: list[Boundary], one: float, other: float) -> bool:
+    return any((np.abs(curve.points - (one, other)) / chart.size).max(axis=1).min() < SAME
+               for curve in found)
 
 
 def fold_curve(chart: Chart, gait: str, fold: CurvePoint, one: float) -> Boundary:
@@ -97,12 +107,11 @@ def fold_curve(chart: Chart, gait: str, fold: CurvePoint, one: float) -> Boundar
         *(cusp.values for cusp in cusps[1:] if cusp)]), tuple(filter(None, cusps)))
 
 
-def _folds(chart: Chart, gait: str, edge: Edge) -> list[CurvePoint]:
-    """Return the folds of the branch in the row of an edge."""
+def _branch(chart: Chart, gait: str, edge: Edge) -> Branch:
+    """Return the branch in the row of an edge."""
     orbit = solve_from_wave(chart.at_share(edge.here), gait, edge.wave, edge.period)
-    branch = continue_orbit(orbit, chart.second.line, chart.second.low, chart.second.high,
-                            most=MOST)
-    return [point.place for point in branch.folds]
+    return continue_orbit(orbit, chart.second.line, chart.second.low, chart.second.high,
+                          most=MOST)
 
 
 def followed(chart: Chart, fold: CurvePoint, one: float, way: float

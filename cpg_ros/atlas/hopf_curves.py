@@ -42,7 +42,8 @@ class Boundary(ShortRepr):
     """A boundary in the plane of an atlas.
 
     Attributes:
-        kind: 'Hopf', 'torus', 'period doubling', 'branch point' or 'fold'.
+        kind: 'Hopf', 'torus', 'period doubling', 'branch point', 'fold', or where the period grows
+            without bound, 'homoclinic' or 'SNIC'.
         gaits: whose: several, where classes with the same eigenvalues share it.
         points: values on both axes, and of a Hopf point omega, shape (n, 2 or 3).
         codimension_two: points on it where a second condition holds.

@@ -28,7 +28,8 @@ import numpy as np
 STATES = {'no orbit': '#f1f3f5', 'unstable in its class': '#f4c7a1',
           'attracts with a lock': '#b9d6f2', 'attracts by itself': '#2b6cb0'}
 LINES = {'Hopf': ('#1a202c', '-'), 'torus': ('#c53030', '-'), 'branch point': ('#b7791f', '-'),
-         'period doubling': ('#276749', '-'), 'fold': ('#6b46c1', '--')}
+         'period doubling': ('#276749', '-'), 'fold': ('#6b46c1', '--'),
+         'homoclinic': ('#2c7a7b', ':'), 'SNIC': ('#2c7a7b', '-.')}
 #: Points this close, in shares of the ranges, have one marker.
 TOGETHER = 2e-3
 

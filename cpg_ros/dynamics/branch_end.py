@@ -80,13 +80,12 @@ def without_period(values: np.ndarray, periods: np.ndarray, scale: float) -> flo
     """
     if periods.size < 4 or not periods[-1] > GROWN * periods.min():
         return None
-    slopes = np.diff(values[-4:]) / np.diff(periods[-4:])
+    slopes, middle = _slopes(values, periods)
     if not abs(slopes[-1]) * periods[-1] < STILL * scale:
         return None
-    if not (np.sign(slopes) == np.sign(slopes[-1])).all() or not slopes.all():
-        # It winds in, in ever smaller turns: the last one is the best estimate.
+    if _winds(slopes):
+        # In ever smaller turns: the last one is the best estimate.
         return float(values[-1])
-    middle = 0.5 * (periods[-4:-1] + periods[-3:])
     fall = np.log(slopes[0] / slopes[2])
     power = fall / np.log(middle[2] / middle[0])
     if power <= 1.5:
@@ -97,3 +96,34 @@ def without_period(values: np.ndarray, periods: np.ndarray, scale: float) -> flo
     rate = fall / (middle[2] - middle[0])
     last = slopes[2] * np.exp(-rate * (periods[-1] - middle[2]))
     return float(values[-1] + last / rate)
+
+
+def law_of_growth(values: np.ndarray, periods: np.ndarray) -> str | None:
+    """Return by which law a branch's period grows without bound, from its last points.
+
+    Args:
+        values: of the parameter, shape (points,).
+        periods: of the orbits there, shape (points,).
+
+    Returns:
+        'homoclinic', 'SNIC' (a saddle node on the invariant circle), or None.
+
+    """
+    if periods.size < 4:
+        return None
+    slopes, middle = _slopes(values, periods)
+    if _winds(slopes):
+        return 'homoclinic'
+    power = np.log(slopes[0] / slopes[2]) / np.log(middle[2] / middle[0])
+    return None if power <= 1.5 else 'SNIC' if power < STEEPER else 'homoclinic'
+
+
+def _slopes(values: np.ndarray, periods: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Derivatives of the value by the period between the last four points, and periods there."""
+    return (np.diff(values[-4:]) / np.diff(periods[-4:]),
+            0.5 * (periods[-4:-1] + periods[-3:]))
+
+
+def _winds(slopes: np.ndarray) -> bool:
+    """Whether the value winds in, or no longer moves."""
+    return bool(not slopes.all() or (np.sign(slopes) != np.sign(slopes[-1])).any())

@@ -50,9 +50,10 @@ from cpg_ros.tools.network_options import add_network_options, chosen_network
 DESCRIPTION = """\
 Map where a network's gaits live over two parameters: whether each exists and is stable, with what
 symmetry lock, its period, amplitude, leading multiplier and basin. A coarse grid is refined where
-neighbours differ; Hopf points, folds, torus points, period doublings and branch points are
-followed as exact curves and drawn on top, with the points at which a second condition holds:
-Bautin, Hopf-Hopf, zero-Hopf and Bogdanov-Takens points, resonances of torus points, cusps."""
+neighbours differ; Hopf points, folds, torus points, period doublings, branch points and the
+places at which a period grows without bound are followed as exact curves and drawn on top, with
+the points at which a second condition holds: Bautin, Hopf-Hopf, zero-Hopf and Bogdanov-Takens
+points, resonances of torus points, cusps."""
 EPILOG = """\
 files: atlas.parquet (a row for each point and gait), boundaries.json, map.png, and index.html
 with --interactive. Run the same command again to continue where it stopped.

@@ -18,19 +18,13 @@ The pair of the hop is on the axis where n = x, and 0 is a double root at c = 1,
 """
 
 from dataclasses import dataclass
-from fractions import Fraction
 
-from cpg_ros.networks.network import known, Network, Preset, Range
-from cpg_ros.networks.symmetry import Group, Symmetry
-
-OTHER = (1, 0)
-Z2 = Group(2, (('side', OTHER),))
-SHIFTS = {'hop': Fraction(0), 'walk': Fraction(1, 2)}
-WIDE = Range(-50.0, 50.0, '')
+from cpg_ros.networks.network import Preset
+from two_sided import OTHER, SHIFTS, TwoSided, WIDE
 
 
 @dataclass(frozen=True)
-class FoldingLegs(Network):
+class FoldingLegs(TwoSided):
     """x' = y, y' = m - x + c x_other^2 + (n - x) y."""
 
     m: float
@@ -38,30 +32,17 @@ class FoldingLegs(Network):
     c: float
 
     name = 'folding_legs'
-    cells = 2
-    states = ('x', 'y')
-    readout = 'phase'
-    step = 0.01
     ranges = dict.fromkeys(('m', 'n', 'c'), WIDE)
     couplings = ('c',)
-    legs = {'ankle': {'left': (1,), 'right': (2,)}}
     usual_gait = 'walk'
     free = ('m', 'n')
     line = 'm'
-    span = (-1.0, 3.0)
 
     @staticmethod
     def equations(cell, p):
         x, y = cell.now()
         x_other, _ = cell.now(OTHER)
         return y, p.m - x + p.c * x_other ** 2 + (p.n - x) * y
-
-    @classmethod
-    def gaits(cls):
-        return tuple(SHIFTS)
-
-    def symmetry(self, gait):
-        return Symmetry.of(Z2, {'side': SHIFTS[known(gait, self.gaits())]})
 
     @classmethod
     def presets(cls):

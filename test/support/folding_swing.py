@@ -18,19 +18,13 @@ The pair is on the axis where n = -x, so the curve ends at m = 1/4, n = -1/2.
 """
 
 from dataclasses import dataclass
-from fractions import Fraction
 
-from cpg_ros.networks.network import known, Network, Preset, Range
-from cpg_ros.networks.symmetry import Group, Symmetry
-
-OTHER = (1, 0)
-Z2 = Group(2, (('side', OTHER),))
-SHIFTS = {'hop': Fraction(0), 'walk': Fraction(1, 2)}
-WIDE = Range(-50.0, 50.0, '')
+from cpg_ros.networks.network import Preset
+from two_sided import OTHER, SHIFTS, TwoSided, WIDE
 
 
 @dataclass(frozen=True)
-class FoldingSwing(Network):
+class FoldingSwing(TwoSided):
     """x' = m - x + c x_other^2, z' = (n + x + i omega) z, z = u + i v."""
 
     m: float
@@ -39,17 +33,12 @@ class FoldingSwing(Network):
     omega: float
 
     name = 'folding_swing'
-    cells = 2
     states = ('u', 'v', 'x')
-    readout = 'phase'
-    step = 0.01
     ranges = dict.fromkeys(('m', 'n', 'c', 'omega'), WIDE)
     couplings = ('c',)
-    legs = {'ankle': {'left': (1,), 'right': (2,)}}
     usual_gait = 'walk'
     free = ('m', 'n')
     line = 'm'
-    span = (-1.0, 3.0)
 
     @staticmethod
     def equations(cell, p):
@@ -57,13 +46,6 @@ class FoldingSwing(Network):
         *_, x_other = cell.now(OTHER)
         return ((p.n + x) * u - p.omega * v, (p.n + x) * v + p.omega * u,
                 p.m - x + p.c * x_other ** 2)
-
-    @classmethod
-    def gaits(cls):
-        return tuple(SHIFTS)
-
-    def symmetry(self, gait):
-        return Symmetry.of(Z2, {'side': SHIFTS[known(gait, self.gaits())]})
 
     @classmethod
     def presets(cls):

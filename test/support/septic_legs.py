@@ -19,20 +19,14 @@ On the walk ``mu - k + rho (a + rho (b - rho)) = 0`` with rho the square of the 
 """
 
 from dataclasses import dataclass
-from fractions import Fraction
 
-from cpg_ros.networks.network import known, Network, Preset, Range
-from cpg_ros.networks.symmetry import Group, Symmetry
+from cpg_ros.networks.network import Preset
 import numpy as np
-
-OTHER = (1, 0)
-Z2 = Group(2, (('side', OTHER),))
-SHIFTS = {'hop': Fraction(0), 'walk': Fraction(1, 2)}
-WIDE = Range(-50.0, 50.0, '')
+from two_sided import OTHER, SHIFTS, TwoSided, WIDE
 
 
 @dataclass(frozen=True)
-class SepticLegs(Network):
+class SepticLegs(TwoSided):
     """z' = (mu + i omega + a rho + b rho^2 - rho^3) z + (k + i kappa) z_other, rho = |z|^2."""
 
     mu: float
@@ -43,17 +37,11 @@ class SepticLegs(Network):
     b: float
 
     name = 'septic_legs'
-    cells = 2
-    states = ('x', 'y')
-    readout = 'phase'
-    step = 0.01
     ranges = dict.fromkeys(('mu', 'omega', 'k', 'kappa', 'a', 'b'), WIDE)
     couplings = ('k', 'kappa')
-    legs = {'ankle': {'left': (1,), 'right': (2,)}}
     usual_gait = 'walk'
     free = ('mu', 'k')
     line = 'mu'
-    span = (-1.0, 3.0)
 
     @staticmethod
     def equations(cell, p):
@@ -66,13 +54,6 @@ class SepticLegs(Network):
 
     def at_rest(self):
         return np.zeros(2)
-
-    @classmethod
-    def gaits(cls):
-        return tuple(SHIFTS)
-
-    def symmetry(self, gait):
-        return Symmetry.of(Z2, {'side': SHIFTS[known(gait, self.gaits())]})
 
     @classmethod
     def presets(cls):

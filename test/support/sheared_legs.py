@@ -21,20 +21,16 @@ the other leg heard a delay ago or at once. On the walk ``z = r exp(i pace t)`` 
 """
 
 from dataclasses import dataclass
-from fractions import Fraction
 
 from cpg_ros.dynamics.orbit import solve_from_path
-from cpg_ros.networks.network import known, Network, Preset, Range
-from cpg_ros.networks.symmetry import Group, Symmetry
+from cpg_ros.networks.network import Preset, Range
 import numpy as np
 from scipy.optimize import brentq
-
-OTHER = (1, 0)
-SHIFTS = {'hop': Fraction(0), 'walk': Fraction(1, 2)}
+from two_sided import OTHER, TwoSided
 
 
 @dataclass(frozen=True)
-class ShearedLegs(Network):
+class ShearedLegs(TwoSided):
     """The other leg is heard at once."""
 
     mu: float = 1.0
@@ -43,18 +39,13 @@ class ShearedLegs(Network):
     k: float = -0.5
 
     name = 'sheared_legs'
-    cells = 2
-    states = ('x', 'y')
-    readout = 'phase'
     step = 0.005
     ranges = {name: Range(-10.0, 10.0, '') for name in ('mu', 'omega', 'shear', 'k')}
     couplings = ('k',)
-    legs = {'ankle': {'left': (1,), 'right': (2,)}}
     sides = {'left': 'left', 'right': 'right'}
     usual_gait = 'walk'
     free = ('mu', 'k')
     line = 'mu'
-    span = (-1.0, 3.0)
 
     @staticmethod
     def heard(cell):
@@ -68,13 +59,6 @@ class ShearedLegs(Network):
         turn = p.omega - p.shear * square
         return ((p.mu - square) * x - turn * y + p.k * x_other,
                 (p.mu - square) * y + turn * x + p.k * y_other)
-
-    @classmethod
-    def gaits(cls):
-        return tuple(SHIFTS)
-
-    def symmetry(self, gait):
-        return Symmetry.of(Group(2, (('side', OTHER),)), {'side': SHIFTS[known(gait, SHIFTS)]})
 
     @classmethod
     def presets(cls):
