@@ -26,5 +26,5 @@ __all__ = ['bag_recorder', 'bounded_request', 'bridge_base', 'bridge_interface',
            'message_types', 'node_base', 'node_client', 'odometry_messages', 'odometry_publisher',
            'other_publishers', 'parameter_services', 'parameter_spec', 'polled_group',
            'qos_profiles', 'raw_messages', 'real_time', 'robot_sim', 'sensor_input',
-           'sensor_publishers', 'shutdown', 'start_progress', 'unitree', 'watchdog',
+           'sensor_publishers', 'servos', 'shutdown', 'start_progress', 'unitree', 'watchdog',
            'watchdog_link']
