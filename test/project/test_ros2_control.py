@@ -19,7 +19,6 @@ ROS2_CONTROLLERS names a folder with the sources of ros2_controllers, which have
 
 import os
 from pathlib import Path
-import re
 import sys
 from types import ModuleType
 
@@ -27,11 +26,11 @@ from cpg_ros.nodes.joint_publishers import COMMAND_TOPICS
 from cpg_ros.robots.robot_file import load_robot
 from launch_files import of_generator, Stub
 import pytest
+from snippets import blocks, ROOT
 import yaml
 
-DOCS = Path(__file__).resolve().parents[2] / 'docs'
-PAGE = DOCS / 'how_to' / 'ros2_control.md'
-PAGES = PAGE, DOCS / 'your_robot.md'
+PAGE = ROOT / 'docs' / 'how_to' / 'ros2_control.md'
+PAGES = PAGE, ROOT / 'docs' / 'your_robot.md'
 GO2 = load_robot('unitree_go2')
 #: Controller -> the package that has its schema.
 CONTROLLERS = {'joint_trajectory_controller': 'joint_trajectory_controller',
@@ -45,12 +44,9 @@ BROKEN = {'size_gt': lambda value, limit: len(value) <= limit[0],
           'one_of': lambda value, limit: value not in limit[0]}
 
 
-def blocks(page, language):
-    return re.findall(rf'```{language}\n(.*?)```', page.read_text(), re.DOTALL)
-
-
 def controllers(page):
-    (text,) = [one for one in blocks(page, 'yaml') if one.startswith('controller_manager:')]
+    (text,) = [one.text for one in blocks(str(page.relative_to(ROOT)))
+               if one.text.startswith('controller_manager:')]
     return {name: part['ros__parameters'] for name, part in yaml.safe_load(text).items()}
 
 
@@ -132,9 +128,10 @@ def test_the_controllers_listen_where_the_generator_publishes():
         assert f'| `{name}` | `{command}` | `{COMMAND_TOPICS[command]}` |' in PAGE.read_text()
 
 
-@pytest.mark.parametrize(('number', 'simulator'), [(0, 'ros_gz_sim'), (1, 'mujoco_ros2_control')])
+@pytest.mark.parametrize(('file', 'simulator'), [
+    ('gazebo.launch.py', 'ros_gz_sim'), ('mujoco.launch.py', 'mujoco_ros2_control')])
 def test_a_launch_file_spawns_the_controller_that_the_generator_commands(
-        number, simulator, monkeypatch, tmp_path):
+        file, simulator, monkeypatch, tmp_path):
     (tmp_path / 'go2.urdf').write_text('<robot name="go2"/>')
     for name in ('launch', 'launch.actions', 'launch.launch_description_sources',
                  'launch.substitutions', 'launch_ros', 'launch_ros.actions',
@@ -145,7 +142,8 @@ def test_a_launch_file_spawns_the_controller_that_the_generator_commands(
             'PathJoinSubstitution', 'Node', 'ParameterValue', 'FindPackageShare'), Stub))
         monkeypatch.setitem(sys.modules, name, module)
     space = {'__file__': str(tmp_path / 'x.launch.py')}
-    exec(blocks(PAGE, 'python')[number], space)
+    (text,) = [one.text for one in blocks(str(PAGE.relative_to(ROOT))) if one.file == file]
+    exec(text, space)
     nodes = {one.options['executable']: one.options for one in
              space['generate_launch_description']().arguments[0] if 'package' in one.options}
     assert simulator in {one['package'] for one in nodes.values()}
