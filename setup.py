@@ -99,6 +99,8 @@ setup(
         'generator = cpg_ros.tools.executables:generator',
         'robot_sim = cpg_ros.tools.executables:robot_sim',
         'unitree_bridge = cpg_ros.tools.executables:unitree_bridge',
+        'servo_bridge = cpg_ros.tools.executables:servo_bridge',
+        'servo_bus = cpg_ros.tools.executables:servo_bus',
         'panel = cpg_ros.tools.executables:panel',
         'inversion = cpg_ros.tools.executables:inversion',
         'cpg = cpg_ros.tools.executables:cpg',

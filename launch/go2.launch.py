@@ -15,8 +15,8 @@
 """A simulated Unitree Go2 walks: ros2 launch cpg_ros go2.launch.py gait:=walk film:=walk.gif.
 
 The generator and the physics take turns, as fast as the clock on the wall or, on a slow machine
-and with real_time_factor:=0, as fast as they can; time begins when both are there. Needs MuJoCo:
-pip install cpg-ros[sim]. Another robot: robot:=$PWD/my_robot.yaml model:=$PWD/my.urdf.
+and with real_time_factor:=0, as fast as they can; time begins when both are there. Needs MuJoCo
+(docs/installation.md). Another robot: robot:=$PWD/my_robot.yaml model:=$PWD/my.urdf.
 """
 
 from pathlib import Path

@@ -97,6 +97,12 @@ class BridgeNode(BridgeLoop):
         """Return values for /diagnostics, such as temperatures, by name."""
         return {}
 
+    def dry_report(self) -> str:
+        """Return what the last command would ask of the motors, for the log of a dry run."""
+        command, robot = self.supervisor.command, self.supervisor.robot
+        torque = command.kp * (command.q - robot.q) - command.kd * robot.dq
+        return f'the largest torque would be {abs(torque).max():.1f} N m'
+
     # -- start ----------------------------------------------------------------------------
 
     def _begin_start(self) -> None:
@@ -200,13 +206,11 @@ class BridgeNode(BridgeLoop):
         supervisor, ticker, before = self.supervisor, self.ticker, self._before
         self._before = counts = ticker.ticks, self.received, self.sent
         ticks, received, sent = (new - old for new, old in zip(counts, before, strict=True))
-        state, command, robot = supervisor.state, supervisor.command, supervisor.robot
+        state = supervisor.state
         if received:
             self.publish_slow_measurements(self.get_clock().now().nanoseconds)
         if self.dry and state is not BridgeState.IDLE:
-            torque = command.kp * (command.q - robot.q) - command.kd * robot.dq
-            self.get_logger().info(f'dry run: {state.value}, the largest torque would be '
-                                   f'{abs(torque).max():.1f} N m')
+            self.get_logger().info(f'dry run: {state.value}, {self.dry_report()}')
         if state in (BridgeState.DAMPING, BridgeState.SITTING):
             level, text = DiagnosticStatus.ERROR, f'{state.value}: {supervisor.reason}'
         elif self._refusal and state is BridgeState.IDLE:

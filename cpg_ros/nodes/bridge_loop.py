@@ -33,7 +33,7 @@ from cpg_ros.nodes.watchdog_link import WatchdogLink
 from cpg_ros.robots.robot import Robot
 from cpg_ros.robots.robot_file import load_robot
 from cpg_ros.safety.bridge_settings import BridgeSettings
-from cpg_ros.safety.robot_state import RobotState
+from cpg_ros.safety.robot_state import JointCommand, RobotState
 from cpg_ros.safety.supervisor import BridgeState, Supervisor
 import numpy as np
 from rclpy.impl.logging_severity import LoggingSeverity
@@ -84,13 +84,17 @@ class BridgeLoop(StartedNode):
         self.dry: bool = value('dry_run')
         command_type, state_type = interface.command_type(), interface.state_type()
         self.robot = load_robot(value('robot'))
-        settings = self.make_settings(self.robot, {
-            'period': period, 'tilt': math.radians(value('tilt')),
-            'target_timeout': value('target_timeout'), 'state_timeout': value('state_timeout'),
-            'hottest': value('hottest'), 'astray': math.inf if self.dry else 0.4})
+        common = {'period': period, 'target_timeout': value('target_timeout'),
+                  'state_timeout': value('state_timeout'), 'astray': math.inf if self.dry else 0.4}
+        # Of what some robots do not measure, their bridges have no parameter.
+        if 'tilt' in self.specs:
+            common['tilt'] = math.radians(value('tilt'))
+        if 'hottest' in self.specs:
+            common['hottest'] = value('hottest')
+        settings = self.make_settings(self.robot, common)
         self._order = np.array([self.robot.order.index(name) for name in settings.names])
         self._changes: deque[tuple[BridgeState, str]] = deque()
-        self.supervisor = Supervisor(settings, state, interface.make_command(),
+        self.supervisor = Supervisor(settings, state, self.make_command(),
                                      lambda *change: self._changes.append(change))
         self.topic = topic = self.resolve_topic_name(interface.command_topic)
         domain = self.context.get_domain_id()
@@ -109,7 +113,8 @@ class BridgeLoop(StartedNode):
         self._commands = Commands(self, self.robot, value('command'), period,
                                   settings.stand.take(self._order.argsort()))
         self._kp_scale = KpScaleSubscription(self)
-        self._every = max(1, round(value('rate') / value('sensor_rate')))
+        self._every = (max(1, round(value('rate') / value('sensor_rate')))
+                       if 'sensor_rate' in self.specs else 1)
         self._requests: deque[Callable[[float], None]] = deque()
         self._ending = self._new = False
         self.received = self.sent = 0
@@ -128,6 +133,10 @@ class BridgeLoop(StartedNode):
 
         """
         raise NotImplementedError
+
+    def make_command(self) -> JointCommand:
+        """Return a command to be filled; that of the interface, unless joints are configured."""
+        return self.interface.make_command()
 
     def stop_pressed(self) -> str:
         """Return which stop button the last state reports as pressed, or ''."""

@@ -109,6 +109,7 @@ class Ticker(TickThread):
         dropped: periods left out in stalls.
         jumps: of simulated time back.
         stopping: whether the ticks do not wait for ``/clock``; set it False at rest.
+        paused: set by whoever ticks: the ticks go on, but nothing is done at them.
 
     """
 
@@ -130,7 +131,7 @@ class Ticker(TickThread):
         """
         super().__init__('ticker', rate, failed)
         self.jumps = 0
-        self.stopping = self._resuming = False
+        self.stopping = self._resuming = self.paused = False
         self._clock: Any = node.get_clock()
         self._tick, self._restart, self._resume, self._begin = tick, restart, resume, begin
         self._moved = threading.Event()
@@ -138,6 +139,11 @@ class Ticker(TickThread):
                                   min_backward=Duration(nanoseconds=-1))
         self._jumps = self._clock.create_jump_callback(
             threshold, post_callback=lambda _: self._moved.set())
+
+    @property
+    def waiting(self) -> bool:
+        """Whether it has not been started, or is paused."""
+        return self.paused or not self.is_alive()
 
     def end(self) -> None:
         """Stop after the tick under way."""

@@ -37,8 +37,8 @@ class Diagnostics:
     """
 
     def __init__(self, node: Node, pattern: Pattern, ticker: Ticker, others: OtherPublishers,
-                 cmd_vel: CmdVel | None, feedback: FeedbackSwitch) -> None:
-        self._feedback = feedback
+                 cmd_vel: CmdVel | None, feedback: FeedbackSwitch, awaited: str) -> None:
+        self._feedback, self._awaited = feedback, awaited
         self._node, self._pattern, self._ticker = node, pattern, ticker
         self._others, self._cmd_vel = others, cmd_vel
         self._before = self._counts()
@@ -57,7 +57,7 @@ class Diagnostics:
         self._before = counts
         new = {key: counts[key] - before[key] for key in counts}
         program = pattern.program
-        self._silent = 0 if new['ticks'] else self._silent + 1
+        self._silent = 0 if new['ticks'] and not self._ticker.paused else self._silent + 1
         misfit = self._cmd_vel.look_for_misfits() if self._cmd_vel else ''
         if new['watchdog re-seeds'] or pattern.recovering:
             level, text = DiagnosticStatus.ERROR, 'the network left its orbit and was re-seeded'
@@ -109,16 +109,16 @@ class Diagnostics:
     def _why_silent(self) -> str:
         clock: Any = self._node.get_clock()
         now = clock.now().nanoseconds
-        if not self._ticker.is_alive():
-            return 'waiting for ~/enable'
+        if self._ticker.waiting:
+            return f'waiting for {self._awaited}'
         if not clock.ros_time_is_active:
             return f'no tick for {self._silent} s'
         return f'simulated time is still {1e-9 * now:.3f} s' if now else 'no /clock yet'
 
     def _state(self) -> str:
         pattern = self._pattern
-        if not self._ticker.is_alive():
-            return 'waiting for ~/enable'
+        if self._ticker.waiting:
+            return f'waiting for {self._awaited}'
         if pattern.standing:
             return 'standing'
         if pattern.level < 1.0:

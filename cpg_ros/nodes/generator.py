@@ -40,6 +40,7 @@ from cpg_ros.nodes.generator_parameters import (
 )
 from cpg_ros.nodes.joint_publishers import CellsPublisher, Outputs
 from cpg_ros.nodes.kernels import compile_kernels
+from cpg_ros.nodes.lifecycle import Lifecycle
 from cpg_ros.nodes.measured_pose import MeasuredPose
 from cpg_ros.nodes.node_base import run, StartedNode, StartError
 from cpg_ros.nodes.other_publishers import OtherPublishers
@@ -107,7 +108,8 @@ class Generator(StartedNode):
         program = self._planner.plan(self._values())
         self._planner.prepare()
 
-        steered, autostart = self._value('cmd_vel'), self._value('autostart')
+        steered, managed = self._value('cmd_vel'), self._value('managed')
+        autostart = self._value('autostart') and not managed
         self.pattern = Pattern(program, self._value('ramp'), autostart and not steered,
                                Drive(len(robot.legs)) if steered else None)
         self._cmd_vel = CmdVel(self, self.pattern, program, autostart,
@@ -127,13 +129,18 @@ class Generator(StartedNode):
                              self.pattern.resume, partial(real_time.request, self.get_logger()))
         self._others = OtherPublishers(self, self._outputs.topics)
         self._diagnostics = Diagnostics(self, self.pattern, self.ticker, self._others,
-                                        self._cmd_vel, self._feedback)
+                                        self._cmd_vel, self._feedback,
+                                        'configure' if managed else '~/enable')
         self.add_on_set_parameters_callback(self._judge)
         self.add_post_set_parameters_callback(self._apply)
         self._warn_of_unknown()
         if self._value('exclusive') and self._others.seek(joined + DISCOVERY - time.monotonic()):
             raise StartError(f'{self._others.text}: stop that publisher, rename the topic, '
                              'or set exclusive to false')
+        self._lifecycle = Lifecycle(self, {
+            'configure': lambda: self._begin_at_the_stand()[0],
+            'activate': lambda: self._walk(True), 'deactivate': lambda: self._walk(False),
+            'cleanup': self._fall_silent, 'shutdown': self._shut_down}) if managed else None
 
     # -- parameters -----------------------------------------------------------------------
 
@@ -208,33 +215,70 @@ class Generator(StartedNode):
         self.pattern.start_from(pose, self._value('ramp'))
         return 'the measured pose'
 
+    def _begin_at_the_stand(self) -> tuple[str, str]:
+        """Start publishing; return why not, or '', and the name of the pose to start from."""
+        if self._value('exclusive') and self._others.look():
+            return self._others.text, ''
+        if self.ticker.paused:
+            self.pattern.restart(self._value('ramp'), False)
+            self._feedback.restart()
+        pose = self._lead_to_the_stand()
+        if self.ticker.is_alive():
+            self.ticker.paused = False
+        else:
+            self.ticker.start()
+        return '', pose
+
+    def _walk(self, wanted: bool) -> str:
+        """Ramp into the gait, or down to the stand; return ''."""
+        if wanted:
+            self.ticker.stopping = False
+        if self._cmd_vel:
+            self._cmd_vel.enable(wanted)
+        else:
+            self.pattern.enable(wanted, self._value('ramp'))
+        if not wanted:
+            self.ticker.stop_moving()
+        return ''
+
+    def _fall_silent(self) -> str:
+        """Stop publishing; return why not, or ''."""
+        if not self.pattern.standing:
+            return 'it is still ramping down to the stand'
+        self.ticker.paused = True
+        return ''
+
+    def _shut_down(self) -> str:
+        """End the node as a signal does, with a ramp down; return ''."""
+        self.stop.set()
+        return ''
+
     def _enable(self, request: SetBool.Request, response: SetBool.Response) -> SetBool.Response:
-        ramp = self._value('ramp')
         response.success = True
-        response.message = f'ramping {"up" if request.data else "down"} over {ramp:g} s'
+        response.message = (f'ramping {"up" if request.data else "down"} over '
+                            f'{self._value("ramp"):g} s')
+        if self._lifecycle is not None:
+            response.success = False
+            response.message = 'this node is managed: activate and deactivate it instead'
+            return response
         if not self.ticker.is_alive():
             if not request.data:
                 response.message = 'nothing is published yet'
                 return response
-            if self._value('exclusive') and self._others.look():
-                response.success, response.message = False, self._others.text
+            refusal, pose = self._begin_at_the_stand()
+            if refusal:
+                response.success, response.message = False, refusal
                 return response
-            response.message += f' from {self._lead_to_the_stand()}'
-            self.ticker.start()
-        if request.data:
-            self.ticker.stopping = False
-        if self._cmd_vel:
-            self._cmd_vel.enable(request.data)
-            if request.data and not self._cmd_vel.walking:
-                response.message = 'enabled: standing until cmd_vel asks for motion'
-        else:
-            self.pattern.enable(request.data, ramp)
-        if not request.data:
-            self.ticker.stop_moving()
+            response.message += f' from {pose}'
+        self._walk(request.data)
+        if self._cmd_vel and request.data and not self._cmd_vel.walking:
+            response.message = 'enabled: standing until cmd_vel asks for motion'
         self.get_logger().info(response.message)
         return response
 
     def _tick(self, dt: float, stamp: int) -> None:
+        if self.ticker.paused:
+            return
         self._feedback.sense(dt, stamp)
         self.pattern.advance(dt)
         self._outputs.publish(stamp, dt, self.pattern.position, self.pattern.velocity,
@@ -257,7 +301,9 @@ class Generator(StartedNode):
         self._announce()
         names = len(self.pattern.robot.joints)
         at = f"{names} joints of '{self.pattern.robot.name}' at {self.ticker.rate:g} Hz"
-        if self._value('autostart'):
+        if self._lifecycle is not None:
+            self.get_logger().info(f'publishing nothing until it is configured, then {at}')
+        elif self._value('autostart'):
             self.get_logger().info(f'publishing {at}')
             self.ticker.start()
         else:

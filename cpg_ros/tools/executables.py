@@ -32,7 +32,8 @@ ENDINGS = signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT
 INDEX = 'share/ament_index/resource_index/packages'
 #: Executable -> module whose ``main`` it runs.
 EXECUTABLES = {'generator': 'nodes.generator', 'robot_sim': 'nodes.robot_sim',
-               'unitree_bridge': 'nodes.unitree.bridge', 'panel': 'panel.panel_node',
+               'unitree_bridge': 'nodes.unitree.bridge', 'servo_bridge': 'nodes.servos.bridge',
+               'servo_bus': 'nodes.servos.bus', 'panel': 'panel.panel_node',
                **{name: f'tools.{name}'
                   for name in ('inversion', 'cpg', 'demo', 'analyze', 'check_robot', 'optimize',
                                'reproduce', 'tune', 'calibrate', 'atlas', 'export')}}

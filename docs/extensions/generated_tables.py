@@ -28,6 +28,8 @@ from cpg_ros.dynamics.orbit import solve_preset
 from cpg_ros.networks.registry import find_network, SHIPPED
 from cpg_ros.nodes import feedback_parameters, generator_parameters, inversion_node, robot_sim
 from cpg_ros.nodes.parameter_spec import Spec
+from cpg_ros.nodes.servos import bridge as servo_bridge
+from cpg_ros.nodes.servos import bus as servo_bus
 from cpg_ros.nodes.unitree import parameters as unitree_parameters
 from cpg_ros.panel import panel_node
 from cpg_ros.robots.robot_file import load_robot
@@ -77,7 +79,8 @@ HEAD = ('parameter', 'type', 'default', 'range', 'what')
 
 
 #: Nodes whose parameters are read-only.
-FIXED = {'robot_sim': robot_sim.SPECS, 'unitree_bridge': unitree_parameters.SPECS}
+FIXED = {'robot_sim': robot_sim.SPECS, 'unitree_bridge': unitree_parameters.SPECS,
+         'servo_bridge': servo_bridge.SPECS, 'servo_bus': servo_bus.SPECS}
 
 
 def parameters(what: str) -> str:

@@ -230,7 +230,7 @@ def test_all_of_it_is_installed():
 
 def test_the_page_on_your_own_robot_names_what_there_is():
     page = (SOURCE / 'docs' / 'your_robot.md').read_text()
-    assert re.findall(r'^\*\*(\d+)\.', page, re.MULTILINE) == [str(k) for k in range(1, 11)]
+    assert re.findall(r'^### (\d+)\.', page, re.MULTILINE) == [str(k) for k in range(1, 11)]
     entry_points = (SOURCE / 'setup.py').read_text()
     for name in set(re.findall(r'ros2 run cpg_ros (\w+)', page)):
         assert f"'{name} = cpg_ros." in entry_points

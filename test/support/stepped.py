@@ -108,7 +108,8 @@ class SteppedGenerator:
             message = Clock()
             message.clock.sec, message.clock.nanosec = int(now), int(now % 1 * 1e9)
             end = 0.0
-            while not self._ended.is_set() and (end == 0.0 or samples[-1][0] < now - STEP):
+            while not self._ended.is_set() and (
+                    end == 0.0 or any(one[0] < now - STEP for one in samples[-1:])):
                 if time.monotonic() > end:
                     self._clock.publish(message)
                     end = time.monotonic() + AGAIN

@@ -192,8 +192,8 @@ def solve(network: Network, gait: str, near: MeshOrbit | None = None) -> MeshOrb
             f'{name} {known + reached * (value - known):.4g}' for (name, value), known
             in zip(network.as_dict().items(), near.network.as_dict().values(), strict=True)
             if value != known)
-        raise NoOrbit(f'no {gait} at these parameters: from its preset it was followed '
-                      f'{reached:.0%} of the way, to {changed}, no further')
+        raise NoOrbit(f'no {gait} at these parameters: on the way to them from its preset it ends '
+                      f'at {changed}')
     raise NoOrbit(f'no {gait} at these parameters')
 
 

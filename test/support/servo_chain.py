@@ -1,0 +1,70 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Feetech STS servos on a pseudo terminal: a chain that reaches its goals at once."""
+
+import os
+import pty
+import select
+import threading
+
+
+class ServoChain:
+    """Answers SYNC READ and follows SYNC WRITE, by the maker's manual; independent of the package.
+
+    Attributes:
+        path: of the port.
+        goals, torque: by identity.
+        answering: whether servos answer.
+        error: the byte that reports errors.
+
+    """
+
+    def __init__(self, positions):
+        self.goals, self.torque = dict(positions), dict.fromkeys(positions, False)
+        self.answering, self.error, self.packets = True, 0, 0
+        self._master, self._slave = pty.openpty()
+        self.path = os.ttyname(self._slave)
+        self._going = True
+        self._thread = threading.Thread(target=self._serve, daemon=True)
+        self._thread.start()
+
+    def _serve(self):
+        received = b''
+        while self._going:
+            if not select.select([self._master], [], [], 0.05)[0]:
+                continue
+            received += os.read(self._master, 4096)
+            while len(received) >= 4 and len(received) >= 4 + received[3]:
+                one, received = received[:4 + received[3]], received[4 + received[3]:]
+                assert one[:3] == b'\xff\xff\xfe' and sum(one[2:]) & 0xFF == 0xFF, one.hex()
+                self.packets += 1
+                self._take(one[4], one[5], one[6], one[7:-1])
+
+    def _take(self, instruction, address, length, data):
+        if instruction == 0x82 and self.answering:
+            assert (address, length) == (56, 2)
+            for servo in data:
+                body = bytes((servo, 4, self.error)) + self.goals[servo].to_bytes(2, 'little')
+                os.write(self._master, b'\xff\xff' + body + bytes((~sum(body) & 0xFF,)))
+        elif instruction == 0x83:
+            for k in range(0, len(data), length + 1):
+                servo, value = data[k], int.from_bytes(data[k + 1:k + 1 + length], 'little')
+                {40: self.torque, 42: self.goals}[address][servo] = value
+
+    def end(self):
+        self._going = False
+        self._thread.join()
+        os.close(self._master)
+        os.close(self._slave)
