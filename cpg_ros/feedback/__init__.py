@@ -21,5 +21,5 @@ robots at a time: arrays have a leading axis of runs, which is 1 for a robot alo
 __all__ = ['biped', 'clearance', 'efference_copy', 'estimate', 'feedback', 'foot_force', 'gains',
            'gait_tables', 'heading', 'input_monitor', 'interpolation', 'kinematics', 'law',
            'memory', 'odometry', 'pace', 'placement', 'plausibility', 'posture', 'reflexes',
-           'sidestep', 'slope', 'speed', 'stiffen', 'tegotae', 'tick', 'timetable', 'touchdown',
-           'warm_up']
+           'sidestep', 'slope', 'speed', 'stiffen', 'tegotae', 'tick', 'timetable',
+           'touchdown', 'virtual_stiffness', 'warm_up']

@@ -34,6 +34,7 @@ from cpg_ros.nodes.odometry_publisher import OdometryPublisher
 from cpg_ros.nodes.parameter_spec import Spec
 from cpg_ros.nodes.sensor_input import SensorInput
 from cpg_ros.robots.robot import Robot
+import numpy as np
 from rclpy.parameter import Parameter
 
 
@@ -153,6 +154,10 @@ class FeedbackSwitch:
         """Correct the coming tick by the sensors; dt in s, stamp in ns."""
         if self.loop is not None:
             self.loop.sense(dt, 1e-9 * stamp)
+
+    def targets(self, position: np.ndarray) -> np.ndarray:
+        """Return what to send to joints that are wanted at angles, rad, shape (joints,)."""
+        return position if self.loop is None else self.loop.targets(position)
 
     def publish(self, dt: float, stamp: int) -> None:
         """Publish what is due; dt since the last call, s, and stamp, ns."""

@@ -237,8 +237,8 @@ class Generator(StartedNode):
     def _tick(self, dt: float, stamp: int) -> None:
         self._feedback.sense(dt, stamp)
         self.pattern.advance(dt)
-        self._outputs.publish(stamp, dt, self.pattern.position, self.pattern.velocity,
-                              self.pattern.phases)
+        self._outputs.publish(stamp, dt, self._feedback.targets(self.pattern.position),
+                              self.pattern.velocity, self.pattern.phases)
         self._feedback.publish(dt, stamp)
         self._cells.publish(dt, self.pattern.state)
         if self.ticker.stopping and self.pattern.standing:
