@@ -67,7 +67,9 @@ def usual(node: Any, robot: Robot, combined: str) -> Spec:
     """
     measured = node.get_parameter(f'{PREFIX}joint_states_topic').value
     own = combined and (node.resolve_topic_name(combined) == node.resolve_topic_name(measured))
-    return replace(feedback_parameters.SWITCH, default=not (own or uncalibrated(robot)))
+    helps = robot.feedback is None or robot.feedback.enabled
+    return replace(feedback_parameters.SWITCH,
+                   default=helps and not (own or uncalibrated(robot)))
 
 
 class FeedbackSwitch:

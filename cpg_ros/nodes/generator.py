@@ -18,6 +18,7 @@ from functools import partial
 import sys
 import time
 
+from cpg_ros.feedback.froude_scaling import robot_gains
 from cpg_ros.motion.pattern import Pattern
 from cpg_ros.motion.plan import PlanError
 from cpg_ros.motion.strides import Drive
@@ -96,7 +97,8 @@ class Generator(StartedNode):
         descriptor = gait_spec(network, self._planner.offered).descriptor()
         descriptor.type = ParameterType.PARAMETER_STRING
         self.set_descriptor('gait', descriptor)
-        self._declare(feedback_parameters.SPECS)
+        self._declare({**feedback_parameters.TOPICS,
+                       **feedback_parameters.of_gains(robot_gains(robot))})
         if FORMER in self._parameter_overrides:
             raise StartError(f"there is no parameter '{FORMER}': it is '{ENABLED}'")
         self._declare({ENABLED: usual(self, robot, self._value('combined_topic'))})

@@ -30,6 +30,7 @@ from cpg_ros.fleet.options import add_options, executor_for
 from cpg_ros.networks.registry import NETWORKS
 from cpg_ros.robots.robot import Robot
 from cpg_ros.robots.robot_file import LIMITS, load_robot, write_robot
+from cpg_ros.simulation.feedback_benefit import judge_feedback
 from cpg_ros.simulation.gait_design import AIMS
 from cpg_ros.simulation.tuned_gait import GOOD, Tuned
 from cpg_ros.simulation.tuning import LONG, tune
@@ -40,7 +41,8 @@ DESCRIPTION = """\
 Tune a robot's gaits in simulation. CMA-ES optimises foot paths described by a few lengths and
 times, which inverse kinematics turns into the joints' readout, over runs on good and slippery
 floors, with more and less load and with pushes. Then measure how fast each gait walks and turns
-with shorter strides, for use with cmd_vel."""
+with shorter strides, for use with cmd_vel, and whether feedback saves the robot from pushes: if
+not, the file says that it is off by default."""
 EPILOG = f"""\
 exit codes: 0 written, 1 no gait is good (written if any is possible), 2 invalid arguments, 130
 stopped (nothing written). A gait is good if the robot stays upright and reaches {100 * GOOD:g} %
@@ -130,7 +132,15 @@ def _tune(chosen: argparse.Namespace) -> int:
             robot, chosen.model, chosen.gaits, chosen.evaluations, chosen.seed,
             executor=executor, seeds=chosen.seeds, kp=chosen.kp, kd=chosen.kd,
             threads=1 if executor else chosen.jobs, say=report)
+    # Hops hardly have any use for it, and legs that it cannot move none.
+    judged = [gait for gait, motion in robot.motions.items()
+              if motion.efference is not None and gait in AIMS and not AIMS[gait].hops]
     lines = [*figures(found), *missing, *invented(robot)]
+    if judged:
+        robot, _ = judge_feedback(robot, chosen.model, judged, chosen.kp, chosen.kd, chosen.seed)
+        assert robot.feedback is not None
+        lines.append(f"feedback is {'on' if robot.feedback.enabled else 'off'} by default: "
+                     f'{robot.feedback.made}')
     write_robot(chosen.out, robot, '\n'.join([
         f'Gaits made by: ros2 run cpg_ros {chosen.command}',
         f'{LONG:g} s in simulation from the stand:', *lines]))

