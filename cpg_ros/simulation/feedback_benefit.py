@@ -20,8 +20,9 @@ import math
 
 from cpg_ros.feedback.froude_scaling import leg_length, robot_gains
 from cpg_ros.feedback.gains import Gains
-from cpg_ros.feedback.kinematics import GRAVITY
-from cpg_ros.motion.plan import plan
+from cpg_ros.feedback.kinematics import geometry_of, GRAVITY
+from cpg_ros.feedback.timetable import Timetable
+from cpg_ros.motion.plan import GaitPlan, plan
 from cpg_ros.networks.registry import NETWORKS
 from cpg_ros.robots.feedback_keys import OwnFeedback
 from cpg_ros.robots.robot import Robot
@@ -68,49 +69,74 @@ class Benefit:
                 f'{self.without}), {self.upright} of {UNDISTURBED} undisturbed runs')
 
 
+def program_of(robot: Robot, gait: str) -> GaitPlan:
+    """Plan a gait on the robot's first network; errors as of plan."""
+    preset = NETWORKS[robot.networks[0]].presets()[gait]
+    return plan(robot, gait, preset, preset.network, robot.motion(gait, gait).frequency or 0.0)
+
+
+def judged_gaits(robot: Robot) -> list[str]:
+    """Return the gaits that feedback is judged in: those with an efference copy that do not hop.
+
+    Hops, whose left and right legs land together, have little use for it.
+    """
+    if robot.geometry is None:
+        return []
+    geometry, known = geometry_of(robot), NETWORKS[robot.networks[0]].presets()
+    return [gait for gait, motion in robot.motions.items()
+            if motion.efference is not None and gait in known
+            and not Timetable(program_of(robot, gait), geometry).hops]
+
+
 class FeedbackTrial:
-    """Runs of one gait with any gains, all of which meet the same.
+    """Runs of one gait with any gains.
 
     Attributes:
         loop: the bodies.
+        length: of the legs, m.
         speed: asked for, m/s.
 
     """
 
     def __init__(self, robot: Robot, model: str, gait: str, kp: float | None = None,
-                 kd: float | None = None, seed: int = 0) -> None:
+                 kd: float | None = None) -> None:
         """Load the model; arguments as of tuning.tune, the robot with an efference copy.
 
         Raises:
             SimulationError: the model cannot be used.
 
         """
-        preset, motion = NETWORKS[robot.networks[0]].presets()[gait], robot.motion(gait, gait)
-        program = plan(robot, gait, preset, preset.network, motion.frequency or 0.0)
+        program = program_of(robot, gait)
         self.loop = ClosedLoop(model, program, kp=kp, kd=kd)
-        length = leg_length(self.loop.geometry)
-        self.speed = FROUDE * math.sqrt(GRAVITY * length)
-        if motion.steering is not None:
+        self.length = leg_length(self.loop.geometry)
+        self.speed = FROUDE * math.sqrt(GRAVITY * self.length)
+        if program.motion.steering is not None:
             self.speed = min(self.speed, SHARE * program.speeds[1])
-        unit = self.loop.geometry.weight * math.sqrt(length / GRAVITY)
-        rng = np.random.default_rng(seed)
-        self._pushed = []
-        for share in IMPULSES:
-            first = rng.uniform(0.0, 2.0 * math.pi)
-            for k in range(PUSHES):
-                way = first + 2.0 * math.pi * k / PUSHES
-                self._pushed.append(Scenario(speed=self.speed, phase=rng.uniform(), pushes=(
-                    impulse(PUSHED, share * unit * math.cos(way), share * unit * math.sin(way)),)))
-        self._calm = [Scenario(speed=self.speed, phase=k / UNDISTURBED)
-                      for k in range(UNDISTURBED)]
 
-    def survived(self, gains: Gains | None) -> int:
-        """Return how many pushes are survived; None for no feedback."""
-        return int(self.loop.run(self._pushed, WATCHED, gains).upright.sum())
+    def pushed(self, rng: np.random.Generator, count: int, impulses: Sequence[float]
+               ) -> list[Scenario]:
+        """Return runs with pushes from so many directions of each impulse, as of IMPULSES."""
+        unit = self.loop.geometry.weight * math.sqrt(self.length / GRAVITY)
+        found = []
+        for share in impulses:
+            first = rng.uniform(0.0, 2.0 * math.pi)
+            for k in range(count):
+                way = first + 2.0 * math.pi * k / count
+                found.append(Scenario(speed=self.speed, phase=rng.uniform(), pushes=(
+                    impulse(PUSHED, share * unit * math.cos(way), share * unit * math.sin(way)),)))
+        return found
+
+    def calm(self) -> list[Scenario]:
+        """Return undisturbed runs."""
+        return [Scenario(speed=self.speed, phase=k / UNDISTURBED) for k in range(UNDISTURBED)]
+
+    def survived(self, gains: Gains | None, pushed: Sequence[Scenario]) -> int:
+        """Return how many runs with pushes are survived; None for no feedback."""
+        return int(self.loop.run(pushed, WATCHED, gains).upright.sum())
 
     def upright(self, gains: Gains | None) -> int:
         """Return how many undisturbed runs do not fall."""
-        return int(self.loop.run(self._calm, WALKED, gains).upright.sum())
+        return int(self.loop.run(self.calm(), WALKED, gains).upright.sum())
 
 
 def judge_feedback(robot: Robot, model: str, gaits: Sequence[str], kp: float | None = None,
@@ -133,15 +159,17 @@ def judge_feedback(robot: Robot, model: str, gaits: Sequence[str], kp: float | N
 
     """
     own = robot.feedback or OwnFeedback()
-    trials = {gait: FeedbackTrial(robot, model, gait, kp, kd, seed) for gait in gaits}
-    before = {gait: trial.survived(None) for gait, trial in trials.items()}
+    trials = {gait: FeedbackTrial(robot, model, gait, kp, kd) for gait in gaits}
+    pushed = {gait: trial.pushed(np.random.default_rng(seed), PUSHES, IMPULSES)
+              for gait, trial in trials.items()}
+    before = {gait: trial.survived(None, pushed[gait]) for gait, trial in trials.items()}
     first: list[Benefit] = []
     for without in WITHOUT:
         tried = replace(own, enabled=True, laws={**own.laws, **dict.fromkeys(without, False)})
         gains, found = robot_gains(replace(robot, feedback=tried)), []
         for gait, trial in trials.items():
             upright = trial.upright(gains)
-            survived = trial.survived(gains) if upright == UNDISTURBED else 0
+            survived = trial.survived(gains, pushed[gait]) if upright == UNDISTURBED else 0
             found.append(Benefit(gait, upright, survived, before[gait]))
             if not found[-1].helps:
                 break
