@@ -130,9 +130,9 @@ class FeedbackTrial:
         """Return undisturbed runs."""
         return [Scenario(speed=self.speed, phase=k / UNDISTURBED) for k in range(UNDISTURBED)]
 
-    def survived(self, gains: Gains | None, pushed: Sequence[Scenario]) -> int:
-        """Return how many runs with pushes are survived; None for no feedback."""
-        return int(self.loop.run(pushed, WATCHED, gains).upright.sum())
+    def survived(self, gains: Gains | None, pushed: Sequence[Scenario]) -> np.ndarray:
+        """Return which runs with pushes are survived; None for no feedback."""
+        return np.asarray(self.loop.run(pushed, WATCHED, gains).upright)
 
     def upright(self, gains: Gains | None) -> int:
         """Return how many undisturbed runs do not fall."""
@@ -162,14 +162,16 @@ def judge_feedback(robot: Robot, model: str, gaits: Sequence[str], kp: float | N
     trials = {gait: FeedbackTrial(robot, model, gait, kp, kd) for gait in gaits}
     pushed = {gait: trial.pushed(np.random.default_rng(seed), PUSHES, IMPULSES)
               for gait, trial in trials.items()}
-    before = {gait: trial.survived(None, pushed[gait]) for gait, trial in trials.items()}
+    before = {gait: int(trial.survived(None, pushed[gait]).sum())
+              for gait, trial in trials.items()}
     first: list[Benefit] = []
     for without in WITHOUT:
         tried = replace(own, enabled=True, laws={**own.laws, **dict.fromkeys(without, False)})
         gains, found = robot_gains(replace(robot, feedback=tried)), []
         for gait, trial in trials.items():
             upright = trial.upright(gains)
-            survived = trial.survived(gains, pushed[gait]) if upright == UNDISTURBED else 0
+            survived = (int(trial.survived(gains, pushed[gait]).sum())
+                        if upright == UNDISTURBED else 0)
             found.append(Benefit(gait, upright, survived, before[gait]))
             if not found[-1].helps:
                 break

@@ -60,7 +60,7 @@ ROUGH = 0.12
 #: beyond that without feedback, as shares of them.
 PUSH, CALM, GROUND, SPEED, COST = 1.0, 1.0, 0.5, 0.5, 0.1
 #: Pushes of each impulse that judge what was found, and the seed that draws them.
-JUDGED, FRESH = 32, 10_000_019
+JUDGED, FRESH = 64, 10_000_019
 
 
 @dataclass(frozen=True)
@@ -115,6 +115,7 @@ class TunedFeedback:
         without: survivors without feedback.
         before: with the gains that the search began with.
         after: with those that it found.
+        lost: those of before that are none of after.
         fell: undisturbed runs that fell with these.
 
     """
@@ -123,12 +124,20 @@ class TunedFeedback:
     without: int
     before: int
     after: int
+    lost: int
     fell: int
 
     @property
     def better(self) -> bool:
-        """Whether the search found something, and that fells no undisturbed robot."""
-        return self.after > self.before and not self.fell
+        """Whether what was found survives more, and fells no undisturbed robot.
+
+        The same pushes were met before and after: of those that only one survives, more than
+        chance would have it (p < 0.05, one-sided sign test) must be survived after.
+        """
+        won = self.after - self.before + self.lost
+        changed = won + self.lost
+        return not self.fell and changed > 0 and bool(
+            binomtest(won, changed, alternative='greater').pvalue < 0.05)
 
     def __str__(self) -> str:
         spans = []
@@ -202,13 +211,14 @@ def tune_feedback(robot: Robot, model: str, gaits: Sequence[str], evaluations: i
     fresh = [trial.pushed(np.random.default_rng(FRESH + seed), JUDGED, IMPULSES)
              for trial in trials]
 
-    def survivors(gains: Gains | None) -> int:
-        return sum(trial.survived(gains, pushed)
-                   for trial, pushed in zip(trials, fresh, strict=True))
+    def survivors(gains: Gains | None) -> np.ndarray:
+        return np.concatenate([trial.survived(gains, pushed)
+                               for trial, pushed in zip(trials, fresh, strict=True)])
 
-    found = TunedFeedback(JUDGED * len(IMPULSES) * len(trials), survivors(None),
-                          survivors(before), survivors(after),
-                          sum(UNDISTURBED - trial.upright(after) for trial in trials))
+    old, new = survivors(before), survivors(after)
+    found = TunedFeedback(len(old), int(survivors(None).sum()), int(old.sum()), int(new.sum()),
+                          int((old & ~new).sum()), sum(
+                              UNDISTURBED - trial.upright(after) for trial in trials))
     gains = after if found.better else before
     fell = found.fell if found.better else sum(UNDISTURBED - trial.upright(before)
                                                for trial in trials)

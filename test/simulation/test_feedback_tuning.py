@@ -106,6 +106,14 @@ def test_feedback_that_fells_undisturbed_robots_is_off(body, monkeypatch):
     assert '4 undisturbed runs fell' in robot.feedback.made
 
 
+@pytest.mark.parametrize('after, lost, fell, better', [
+    (55, 0, 0, True), (54, 0, 0, False), (62, 5, 0, True), (56, 5, 0, False), (50, 0, 0, False),
+    (45, 5, 0, False), (70, 0, 1, False)])
+def test_gains_are_better_only_where_chance_does_not_make_them_so(after, lost, fell, better):
+    """Of n pushes that only one survives, all n after: p = 2^-n, below 0.05 from n = 5 on."""
+    assert feedback_tuning.TunedFeedback(96, 20, 50, after, lost, fell).better is better
+
+
 def test_every_gain_that_is_searched_for_exists():
     for law, names in feedback_tuning.SEARCHED.items():
         assert getattr(Gains(), law) and all(getattr(Gains(), name) > 0.0 for name in names)
