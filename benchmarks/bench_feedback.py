@@ -31,6 +31,7 @@ from typing import Any, NamedTuple
 
 from common import emit, log, ROOT
 from cpg_ros.errors import CpgError
+from cpg_ros.feedback.froude_scaling import robot_gains
 from cpg_ros.feedback.gains import Gains
 from cpg_ros.feedback.kinematics import GRAVITY
 from cpg_ros.files.progress_bar import progress_bar
@@ -111,7 +112,7 @@ def measure(job: Job, run: Run) -> Any:
     return found
 
 
-def changed(changes: list[str]) -> Gains:
+def changed(changes: list[str], gains: Gains) -> Gains:
     """Return gains of which some are changed, each a GAIN=VALUE.
 
     Raises:
@@ -119,7 +120,6 @@ def changed(changes: list[str]) -> Gains:
         InputError: it is outside its limits.
 
     """
-    gains = Gains()
     for change in changes:
         name, _, value = change.partition('=')
         if name not in Gains._fields:
@@ -226,9 +226,10 @@ def main() -> int:
     log(f'seed {seed}')
     path = arguments.robot.resolve()
     try:
-        run = Run(path, arguments.model, seed, arguments.quick, changed(arguments.changes),
-                  tuple(arguments.impulses))
-        own = jobs(run.quick) if path == ROBOT else jobs_of(read_robot(path))
+        robot = read_robot(path)
+        run = Run(path, arguments.model, seed, arguments.quick,
+                  changed(arguments.changes, robot_gains(robot)), tuple(arguments.impulses))
+        own = jobs(run.quick) if path == ROBOT else jobs_of(robot)
     except (CpgError, ValueError) as error:
         parser.error(str(error))
     chosen = [job for job in own if job.figure in (arguments.only or [job.figure])

@@ -82,7 +82,7 @@ class Feedback:
             part[...] = blank
 
     def advance(self, sensors: SensorData, planned: PlannedMotion, dt: float, share: float = 1.0,
-                level: float = 1.0) -> np.ndarray:
+                level: float = 1.0, delay: float = 0.0) -> np.ndarray:
         """Return the corrected angles, rad, shape (runs, joints), which no limit holds yet.
 
         Args:
@@ -91,6 +91,7 @@ class Feedback:
             dt: since the last time, s.
             share: of all corrections, 0 to 1.
             level: of the pattern: 0 at the stand, 1 in the full gait.
+            delay: age of the measured angles, s.
 
         Raises:
             InputError: the gains are new, and one is outside its limits.
@@ -98,7 +99,7 @@ class Feedback:
         """
         # A plain tuple, which is made faster than a named one.
         arguments = (self._legs, self._tables, self.gains, self.memory, sensors, planned,
-                     (dt, share * level, level), self.angles)
+                     (dt, share * level, level, delay), self.angles)
         if self._tick is None or self._bound is not self.gains:
             self.gains.check()
             self._tick, self._bound = bound(tick, *arguments), self.gains

@@ -31,13 +31,14 @@ from cpg_ros.feedback import (
     stiffen,
     tegotae,
     touchdown,
+    virtual_stiffness,
 )
 from cpg_ros.feedback.law import Gain, Law, named_tuple
 
 #: In the order in which parameters and the reference list them.
 LAWS: Sequence[Law] = [module.LAW for module in (
-    posture, placement, pace, stiffen, reflexes, clearance, slope, heading, speed, sidestep,
-    touchdown, tegotae)]
+    posture, placement, pace, stiffen, virtual_stiffness, reflexes, clearance, slope, heading,
+    speed, sidestep, touchdown, tegotae)]
 #: Gains of no single law.
 COMMON = {'smooth': Gain(0.008, 0.08, 's',
                          'time constant with which every displacement is smoothed')}

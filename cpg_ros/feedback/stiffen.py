@@ -32,6 +32,7 @@ LAW = Law(
                            low=1.0)},
     memory={
         'stiff_for': StateVariable('time for which servos stay stiff [s]'),
+        'stiff': StateVariable('whether servos are stiff, by gains or targets', (), False),
         'kp_scale': StateVariable("factor of the servos' proportional gain", (), 1.0)})
 
 

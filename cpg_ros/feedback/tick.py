@@ -30,6 +30,7 @@ from cpg_ros.feedback import (
     stiffen,
     tegotae,
     touchdown,
+    virtual_stiffness,
 )
 from cpg_ros.feedback.efference_copy import expect, SIGNALS
 from cpg_ros.feedback.estimate import update
@@ -99,7 +100,7 @@ def _deviation(tables, memory, sensors, planned, run, level):
 @jit
 def _change_strides(tables, gains, memory, run, slot, missing, headings, step):
     """Fill what is added to strides; missing speed in m/s, wanted and measured heading in rad."""
-    stride, (dt, share, _) = memory.stride[run], step
+    stride, (dt, share, _, _) = memory.stride[run], step
     stride[:] = 0.0
     if not tables.steered[slot]:
         return
@@ -127,11 +128,12 @@ def tick(legs, tables, gains, memory, sensors, planned, step, out):
         memory: Memory of all runs, changed in place.
         sensors: SensorData.
         planned: PlannedMotion.
-        step: its length dt in s, the share of all corrections, the pattern's level, 0 to 1 both.
+        step: its length dt in s, the share of all corrections, the pattern's level, 0 to 1 both,
+            and the age of the measured angles, s.
         out: filled.
 
     """
-    rows, columns, (dt, share, level) = legs.rows, legs.columns, step
+    rows, columns, (dt, share, level, delay) = legs.rows, legs.columns, step
     quick = 1.0 - math.exp(-dt / gains.smooth)
     foot, feet = memory.scratch[0], memory.leg_velocities
     for run in range(out.shape[0]):
@@ -226,12 +228,20 @@ def tick(legs, tables, gains, memory, sensors, planned, step, out):
         if gains.pace:
             scale += share * pace.frequency_change(error, memory.fatigue[run], gains)
         memory.fatigue[run] = pace.update_fatigue(memory.fatigue[run], scale - 1.0, gains, dt)
-        memory.kp_scale[run] = 1.0
+        memory.kp_scale[run], memory.stiff[run] = 1.0, False
         if gains.stiffen:
             # Before the full gait is reached the body is not yet where the efference copy has it.
             memory.stiff_for[run] = stiffen.remaining(
                 memory.stiff_for[run], error if share == 1.0 else 0.0, gains, dt)
-            if memory.stiff_for[run] > 0.0:
+            memory.stiff[run] = memory.stiff_for[run] > 0.0
+            if gains.virtual_stiffness:
+                # Measurements of which the feedback lets go may be old.
+                spent = memory.virtual_spent[run]
+                memory.stiff[run] = virtual_stiffness.acts(
+                    spent, memory.stiff[run] and share == 1.0, delay, gains)
+                memory.virtual_spent[run] = virtual_stiffness.spend(spent, memory.stiff[run],
+                                                                    gains, dt)
+            elif memory.stiff[run]:
                 memory.kp_scale[run] = gains.stiffen_kp
         scale += share * phase_rate / (2.0 * math.pi * frequency * rows.shape[0])
         if gains.touchdown:

@@ -26,6 +26,7 @@ from cpg_ros.feedback.odometry import Odometry
 from cpg_ros.feedback.plausibility import agreement
 from cpg_ros.feedback.tick import PlannedMotion
 from cpg_ros.feedback.timetable import POINTS, Timetable
+from cpg_ros.feedback.virtual_stiffness import targets
 from cpg_ros.motion.pattern import Pattern
 from cpg_ros.motion.plan import GaitPlan
 from cpg_ros.nodes.sensor_input import SensorInput
@@ -37,6 +38,8 @@ FURTHEST = 0.5
 DIES_OUT = 0.3
 #: Share of a stride, on average, in which the contacts must agree with the gait.
 AGREES = 0.5
+#: Time constant with which the age of the measured angles is low-passed, s.
+AGE_MEMORY = 0.1
 #: Wanted speeds forward and to the left, m/s, and wanted yaw rate, rad/s.
 Motion = Callable[[], tuple[float, float, float]]
 
@@ -52,6 +55,7 @@ class FeedbackLoop:
         faults: what interrupts it, such as 'imu: no messages for 3.2 s'; empty while it is active.
         waiting: whether an input has never arrived.
         share: of all corrections, 0 to 1.
+        delay: age of the measured angles when they are used, low-passed, s.
         kp_scale: factor of the servos' proportional gain.
         odometry: of the base, where it is wanted; it goes on as long as gaits are corrected.
 
@@ -78,6 +82,7 @@ class FeedbackLoop:
                                       np.zeros((1, 2)), np.zeros(1))
         self.wanted, self.waiting, self.faults = False, True, ''
         self._trim = np.zeros(len(pattern.robot.legs))
+        self._limits = pattern.robot.column('lower'), pattern.robot.column('upper')
         self.odometry: Odometry | None = None
         self.restart()
         self.learn(pattern.program)
@@ -85,7 +90,7 @@ class FeedbackLoop:
     def restart(self) -> None:
         """Start again, as where simulated time jumps back."""
         self._fade, self.share, self._spent = Fade(), 0.0, math.inf
-        self._dt, self._agrees = 0.0, 1.0
+        self._dt, self._agrees, self.delay = 0.0, 1.0, math.inf
         self.feedback.reset()
         self._inputs.restart()
         if self.odometry is not None:
@@ -111,6 +116,9 @@ class FeedbackLoop:
             return
         self._dt = dt
         inputs.take(now, pattern.level > 0.0)
+        age = now - inputs.measured
+        self.delay = (age if math.isinf(self.delay) else
+                      self.delay + min(dt / AGE_MEMORY, 1.0) * (age - self.delay))
         self._judge(now)
         self.share = self._fade.advance(self.wanted and not self.faults, dt)
         self._spent = 0.0 if self.share else self._spent + dt
@@ -164,7 +172,8 @@ class FeedbackLoop:
         else:
             heading[0] = yaw
         memory = feedback.memory
-        found = feedback.advance(inputs.sensor_data, planned, self._dt, self.share, pattern.level)
+        found = feedback.advance(inputs.sensor_data, planned, self._dt, self.share, pattern.level,
+                                 self.delay)
         pattern.frequency_scale = float(memory.frequency_scale[0])
         self.kp_scale = float(memory.kp_scale[0])
         if self.odometry is not None:
@@ -175,8 +184,17 @@ class FeedbackLoop:
             pattern.drive.trim = self._trim
         return found[0]
 
+    def targets(self, position: np.ndarray) -> np.ndarray:
+        """Return what to send to joints that are wanted at angles, rad, shape (joints,)."""
+        feedback, stiff = self.feedback, self.feedback.memory.stiff
+        if not (stiff[0] and feedback.gains.virtual_stiffness):
+            return position
+        return targets(position, self._inputs.sensor_data.joint_positions, stiff, feedback.gains,
+                       self._limits)[0]
+
     def _release(self) -> None:
         """Run the pattern without corrections."""
+        self.feedback.memory.stiff[0] = False
         self._pattern.correct, self._pattern.frequency_scale, self.kp_scale = None, 1.0, 1.0
         if self._pattern.drive is not None:
             self._pattern.drive.trim = None

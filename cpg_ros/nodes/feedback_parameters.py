@@ -52,10 +52,18 @@ TOPICS = fixed({
     f'{PREFIX}odometry_tf': Spec(True, 'publish the transform between these frames on /tf, too, '
                                  'where tf2_msgs is installed')})
 #: Switches of the laws and gains, all of which can be set at any time.
-GAINS = {**{f'{PREFIX}{law.name}': Spec(law.on, law.text) for law in LAWS},
-         **{f'{PREFIX}{name}': Spec(gain.default, f'{gain.text} [{gain.unit}]' if gain.unit
-                                    else gain.text, gain.low, gain.high)
-            for name, gain in GAIN_OF.items()}}
+
+
+def of_gains(usual: Gains) -> dict[str, Spec]:
+    """Return the parameters of the laws, whose defaults are these gains."""
+    return {**{f'{PREFIX}{law.name}': Spec(getattr(usual, law.name), law.text) for law in LAWS},
+            **{f'{PREFIX}{name}': Spec(getattr(usual, name), f'{gain.text} [{gain.unit}]'
+                                       if gain.unit else gain.text, gain.low, gain.high)
+               for name, gain in GAIN_OF.items()}}
+
+
+#: Those of a Go2.
+GAINS = of_gains(Gains())
 SPECS = {**TOPICS, **GAINS}
 
 

@@ -34,6 +34,7 @@ from cpg_ros.nodes.odometry_publisher import OdometryPublisher
 from cpg_ros.nodes.parameter_spec import Spec
 from cpg_ros.nodes.sensor_input import SensorInput
 from cpg_ros.robots.robot import Robot
+import numpy as np
 from rclpy.parameter import Parameter
 
 
@@ -66,7 +67,9 @@ def usual(node: Any, robot: Robot, combined: str) -> Spec:
     """
     measured = node.get_parameter(f'{PREFIX}joint_states_topic').value
     own = combined and (node.resolve_topic_name(combined) == node.resolve_topic_name(measured))
-    return replace(feedback_parameters.SWITCH, default=not (own or uncalibrated(robot)))
+    helps = robot.feedback is None or robot.feedback.enabled
+    return replace(feedback_parameters.SWITCH,
+                   default=helps and not (own or uncalibrated(robot)))
 
 
 class FeedbackSwitch:
@@ -153,6 +156,10 @@ class FeedbackSwitch:
         """Correct the coming tick by the sensors; dt in s, stamp in ns."""
         if self.loop is not None:
             self.loop.sense(dt, 1e-9 * stamp)
+
+    def targets(self, position: np.ndarray) -> np.ndarray:
+        """Return what to send to joints that are wanted at angles, rad, shape (joints,)."""
+        return position if self.loop is None else self.loop.targets(position)
 
     def publish(self, dt: float, stamp: int) -> None:
         """Publish what is due; dt since the last call, s, and stamp, ns."""

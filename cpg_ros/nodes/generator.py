@@ -18,6 +18,7 @@ from functools import partial
 import sys
 import time
 
+from cpg_ros.feedback.froude_scaling import robot_gains
 from cpg_ros.motion.pattern import Pattern
 from cpg_ros.motion.plan import PlanError
 from cpg_ros.motion.strides import Drive
@@ -97,7 +98,8 @@ class Generator(StartedNode):
         descriptor = gait_spec(network, self._planner.offered).descriptor()
         descriptor.type = ParameterType.PARAMETER_STRING
         self.set_descriptor('gait', descriptor)
-        self._declare(feedback_parameters.SPECS)
+        self._declare({**feedback_parameters.TOPICS,
+                       **feedback_parameters.of_gains(robot_gains(robot))})
         if FORMER in self._parameter_overrides:
             raise StartError(f"there is no parameter '{FORMER}': it is '{ENABLED}'")
         self._declare({ENABLED: usual(self, robot, self._value('combined_topic'))})
@@ -281,8 +283,8 @@ class Generator(StartedNode):
             return
         self._feedback.sense(dt, stamp)
         self.pattern.advance(dt)
-        self._outputs.publish(stamp, dt, self.pattern.position, self.pattern.velocity,
-                              self.pattern.phases)
+        self._outputs.publish(stamp, dt, self._feedback.targets(self.pattern.position),
+                              self.pattern.velocity, self.pattern.phases)
         self._feedback.publish(dt, stamp)
         self._cells.publish(dt, self.pattern.state)
         if self.ticker.stopping and self.pattern.standing:

@@ -68,6 +68,7 @@ class SensorInput:
         sensor_data: of one run, filled in place with the last plausible measurements.
         monitors: of the inputs.
         feet: name of the source of the contacts.
+        measured: when the joints were at their angles, by the message's stamp, s; -inf at first.
 
     """
 
@@ -109,6 +110,7 @@ class SensorInput:
             self._inputs += [_Input(node, WrenchStamped, f'{leg}/{feet}',
                                     partial(self._read_wrench, k))
                              for k, leg in enumerate(self._legs)]
+        self.measured = -math.inf
         self._layout: JointLayout | None = None
         self._order, self._length = np.arange(len(self._legs)), 0
         self._memory = np.zeros(IMU_MEMORY)
@@ -125,6 +127,7 @@ class SensorInput:
 
     def restart(self) -> None:
         """Forget when messages came, as where simulated time jumps back."""
+        self.measured = -math.inf
         for monitor in self.monitors:
             monitor.restart()
 
@@ -169,6 +172,9 @@ class SensorInput:
         verdict = self._judge_joints(numbers_at(data, layout.position, layout.count),
                                      numbers_at(data, layout.velocity, layout.count),
                                      layout.places, *self._limits, self._angles, self._rates)
+        if not verdict:
+            stamp = stamp_of(data)
+            self.measured = -math.inf if stamp is None else stamp
         if self._contacts == 'efforts' and not verdict:
             assert layout.effort is not None
             np.take(numbers_at(data, layout.effort, layout.count), layout.places,

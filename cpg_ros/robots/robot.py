@@ -28,6 +28,7 @@ from cpg_ros.errors import InputError
 from cpg_ros.networks.registry import NETWORKS
 from cpg_ros.robots.biped_keys import BipedBody
 from cpg_ros.robots.body_keys import BodyGeometry, EfferenceTable
+from cpg_ros.robots.feedback_keys import OwnFeedback
 from cpg_ros.short_repr import ShortRepr, shown
 import numpy as np
 
@@ -139,6 +140,7 @@ class Robot(ShortRepr):
         girdles: leg -> fore or hind, the same.
         geometry: of its legs, None if the file does not have it.
         biped: links, soles and servos of a biped that stands on soles, or None.
+        feedback: what its feedback has of its own, None if everything is the usual.
 
     """
 
@@ -153,6 +155,7 @@ class Robot(ShortRepr):
     girdles: dict[str, str] = field(default_factory=dict)
     geometry: BodyGeometry | None = None
     biped: BipedBody | None = None
+    feedback: OwnFeedback | None = None
 
     def __post_init__(self) -> None:
         for key in ('sides', 'girdles'):

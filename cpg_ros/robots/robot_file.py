@@ -36,6 +36,7 @@ from cpg_ros.robots.body_keys import (
     read_efference,
     read_geometry,
 )
+from cpg_ros.robots.feedback_keys import feedback_tree, read_feedback
 from cpg_ros.robots.robot import (
     HARMONICS,
     Joint,
@@ -204,7 +205,8 @@ def read_robot(path: str | Path) -> Robot:
     path = Path(path)
     reader = _Reader(path, 'robot file', RobotError, LARGEST)
     tree = reader.keys(reader.tree(), 'file', {'network', 'legs'},
-                       {'joint_order', 'assignment', 'harmonics', 'geometry', 'biped', 'gaits'})
+                       {'joint_order', 'assignment', 'harmonics', 'geometry', 'biped',
+                        'feedback', 'gaits'})
     networks = reader.networks(tree['network'])
     first = NETWORKS[networks[0]]
     assignment = reader.text(tree.get('assignment', next(iter(first.legs))), 'assignment')
@@ -259,6 +261,7 @@ def read_robot(path: str | Path) -> Robot:
     names = {leg: [joint.name for joint in joints] for leg, joints in legs.items()}
     geometry = (read_geometry(reader, tree['geometry'], names) if 'geometry' in tree else None)
     biped = read_biped(reader, tree['biped'], names) if 'biped' in tree else None
+    feedback = read_feedback(reader, tree['feedback']) if 'feedback' in tree else None
     motions = {}
     if 'gaits' in tree:
         known = {name for network in networks for name in NETWORKS[network].presets()}
@@ -266,7 +269,7 @@ def read_robot(path: str | Path) -> Robot:
         motions = {name: reader.motion(entry, f'gaits.{name}', joints_by_name) for name, entry
                    in reader.keys(tree['gaits'], 'gaits', set(), known).items()}
     robot = Robot(path.stem, networks, assignment, harmonics, legs, tuple(order), motions, sides,
-                  girdles, geometry, biped)
+                  girdles, geometry, biped, feedback)
     if any(motion.steering for motion in motions.values()):
         for leg in legs:
             if leg not in robot.sides:
@@ -316,6 +319,8 @@ def write_robot(path: str | Path, robot: Robot, comment: str = '') -> None:
         tree['geometry'] = geometry_tree(robot.geometry)
     if robot.biped is not None:
         tree['biped'] = biped_tree(robot.biped)
+    if robot.feedback is not None:
+        tree['feedback'] = feedback_tree(robot.feedback)
     if robot.motions:
         tree['gaits'] = {name: _motion_tree(motion) for name, motion in robot.motions.items()}
     lines = ''.join(f'# {line}\n' for line in comment.splitlines())

@@ -27,6 +27,7 @@ from cpg_ros.feedback.feedback import Feedback
 from cpg_ros.feedback.gains import Gains
 from cpg_ros.feedback.kinematics import geometry_of
 from cpg_ros.feedback.timetable import Timetable
+from cpg_ros.feedback.virtual_stiffness import targets
 from cpg_ros.motion.plan import GaitPlan
 from cpg_ros.simulation.bodies import Bodies
 from cpg_ros.simulation.body import Body, FALLEN
@@ -94,7 +95,7 @@ class ClosedLoop(Bodies):
         estimated = memory.velocity if gains is not None else state_of.velocity
         pattern = PatternBatch(self.programs, self._tables, scenarios, dt)
         models = [self.model(one) for one in scenarios]
-        stiff = [] if gains is None or not gains.stiffen else [
+        stiff = [] if gains is None or not gains.stiffen or gains.virtual_stiffness else [
             self.model(one, gains.stiffen_kp) for one in scenarios]
         control, joints, force = self.controls(runs, 1)
         forces = np.stack([one.forces(steps, dt) for one in scenarios], axis=1)
@@ -113,7 +114,8 @@ class ClosedLoop(Bodies):
         going, some, all_models = np.arange(runs), slice(None), models
         record = {key: np.zeros((steps, runs, size)) for key, size in
                   (('place', 2), ('rpy', 3), ('velocity', 3), ('estimated', 3),
-                   ('angular_velocity', 3), ('phase', 1), ('kp_scale', 1))}
+                   ('angular_velocity', 3), ('phase', 1), ('kp_scale', 1), ('stiff', 1))}
+        delay = 0.0 if noise is None else noise.delay
         none, calm = np.zeros((runs, legs)), np.ones(runs)
         for k in range(steps):
             pattern.advance(*(none, calm) if gains is None
@@ -125,17 +127,21 @@ class ClosedLoop(Bodies):
                              velocity)
             noticed = senses if noisy is None else noisy(senses)
             if gains is not None:
-                angles = feedback.advance(noticed, pattern.planned, dt, 1.0, pattern.level)
+                angles = feedback.advance(noticed, pattern.planned, dt, 1.0, pattern.level, delay)
             else:
                 angles = pattern.planned.angles
                 state_of.update(noticed, dt)
             angles = pattern.confine(angles)
+            if gains is not None and gains.virtual_stiffness and memory.stiff.any():
+                angles = targets(angles, noticed.joint_positions, memory.stiff, gains,
+                                 pattern.limits)
             joints[:, 0], force[:, 0] = angles[:, places], forces[k]
             for key, value in (('place', state[:, 1 + parts.pose[:2]]), ('rpy', senses.rpy),
                                ('velocity', velocity), ('estimated', estimated),
                                ('angular_velocity', senses.angular_velocity),
                                ('phase', pattern.planned.phase[:, None]),
-                               ('kp_scale', memory.kp_scale[:, None])):
+                               ('kp_scale', memory.kp_scale[:, None]),
+                               ('stiff', memory.stiff[:, None])):
                 record[key][k] = value
             speeds = senses.joint_velocities[:, places]
             _, applied = torques(model, joints[:, 0], senses.joint_positions[:, places], speeds,
@@ -166,7 +172,7 @@ class ClosedLoop(Bodies):
         way = np.abs(record['velocity'][late, :, 0].sum(axis=0) * dt)
         done = work[late].sum(axis=0) * dt
         found = {key: rows.swapaxes(0, 1) for key, rows in record.items()}
-        for key in ('phase', 'kp_scale'):
+        for key in ('phase', 'kp_scale', 'stiff'):
             found[key] = found[key][:, :, 0]
         return Outcome(fell=fell, arrived=arrived,
                        cost=done / (self.geometry.weight * np.maximum(way, 1e-3)), **found)

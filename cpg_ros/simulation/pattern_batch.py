@@ -59,6 +59,7 @@ class PatternBatch:
     Attributes:
         planned: the motion before any correction; its arrays are overwritten by advance.
         level: 0 at the stand, 1 in the full gait.
+        limits: lowest and highest angles of the joints, rad, shape (joints,) each.
 
     """
 
@@ -71,7 +72,7 @@ class PatternBatch:
             np.stack([one.angles for one in tables]), np.stack([one.in_place for one in tables]),
             np.array([one.frequency for one in self._programs]), robot.leg_of_joint,
             robot.column('offset'))
-        self._lower, self._upper = robot.column('lower'), robot.column('upper')
+        self.limits = robot.column('lower'), robot.column('upper')
         self._reach = robot.column('velocity') * dt
         self._last = np.tile(self._gaits.offset, (runs, 1))
         self.planned = PlannedMotion(
@@ -122,7 +123,7 @@ class PatternBatch:
     def confine(self, angles: np.ndarray) -> np.ndarray:
         """Hold angles to the joints' limits and speeds."""
         near = np.clip(angles, self._last - self._reach, self._last + self._reach)
-        return np.clip(near, self._lower, self._upper, out=self._last)
+        return np.clip(near, *self.limits, out=self._last)
 
 
 @entry

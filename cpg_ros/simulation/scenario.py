@@ -105,6 +105,7 @@ class Outcome(ShortRepr):
         angular_velocity: in its own frame, rad/s, shape (runs, steps, 3).
         phase: of the first leg, cycles, shape (runs, steps).
         kp_scale: factor of the servos' proportional gain, shape (runs, steps).
+        stiff: 1 while the feedback makes servos stiff, by gains or targets, else 0, the same.
         cost: of transport after BEGINNING, shape (runs,).
 
     """
@@ -118,6 +119,7 @@ class Outcome(ShortRepr):
     angular_velocity: np.ndarray
     phase: np.ndarray
     kp_scale: np.ndarray
+    stiff: np.ndarray
     cost: np.ndarray
 
     @property

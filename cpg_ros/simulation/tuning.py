@@ -74,7 +74,7 @@ class Tuner:
                 has fewer than four legs.
 
         """
-        self._cma = _search()
+        self._cma = cma_es()
         if len(robot.legs) < 4:
             raise SimulationError(f"robot file '{robot.name}' has {len(robot.legs)} legs: bipeds "
                                   'are not tuned, as they need balance, and foot paths alone do '
@@ -312,7 +312,8 @@ def tune(robot: Robot, model: str, gaits: Sequence[str], evaluations: int, seed:
     return robot, found, missing
 
 
-def _search() -> ModuleType:
+def cma_es() -> ModuleType:
+    """Return the library of CMA-ES; raise SimulationError if it is missing."""
     try:
         import cma
     except ImportError as error:

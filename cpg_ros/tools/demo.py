@@ -193,7 +193,7 @@ def _nodes(chosen: Namespace, robot: DemoRobot) -> tuple[list[str], list[str]]:
         body += ['-p', f'film:={chosen.out / robot.name}.gif']
     generator = ['generator', '-p', f'robot:={robot.file}', '-p', f'gait:={robot.gaits[0]}',
                  '-p', f'rate:={RATE}.0', '-p', 'combined_topic:=""', '-p', 'use_sim_time:=true']
-    if robot.tuned:
+    if robot.unjudged:
         # Its gaits were tuned and judged without; the page has the switch.
         generator += ['-p', 'feedback.enabled:=false']
     if chosen.course:

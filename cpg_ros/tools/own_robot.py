@@ -69,7 +69,7 @@ class DemoRobot:
         name: for files.
         gaits: that are tuned, the one to begin with first.
         steered: whether it follows commands of speed in that one.
-        tuned: whether it is one's own, tuned without feedback.
+        unjudged: whether it is one's own, and its file does not say whether feedback helps.
 
     """
 
@@ -78,7 +78,7 @@ class DemoRobot:
     name: str
     gaits: tuple[str, ...]
     steered: bool
-    tuned: bool = False
+    unjudged: bool = False
 
 
 def add_options(parser: ArgumentParser) -> None:
@@ -188,8 +188,10 @@ def prepare(chosen: Namespace, steps: Steps) -> DemoRobot:
         own = NETWORKS[robot.networks[0]].gaits()
         gaits = chosen.tour or [gait for gait in DRIVEN if gait in own]
         _tune(chosen, steps, (file, tuned), gaits)
-    gaits, steered = _ranked(load_robot(str(tuned)).motions)
-    return DemoRobot(str(tuned.absolute()), source[1], name, gaits, steered, tuned=True)
+    robot = load_robot(str(tuned))
+    gaits, steered = _ranked(robot.motions)
+    return DemoRobot(str(tuned.absolute()), source[1], name, gaits, steered,
+                     unjudged=robot.feedback is None)
 
 
 def _again(file: Path, source: Path, option: str, chosen: Namespace) -> None:

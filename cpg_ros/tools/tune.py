@@ -26,10 +26,14 @@ import sys
 
 from cpg_ros.errors import InputError
 from cpg_ros.files.plain_text import table
+from cpg_ros.files.progress_bar import progress_bar
 from cpg_ros.fleet.options import add_options, executor_for
 from cpg_ros.networks.registry import NETWORKS
+from cpg_ros.robots.feedback_keys import OwnFeedback
 from cpg_ros.robots.robot import Robot
 from cpg_ros.robots.robot_file import LIMITS, load_robot, write_robot
+from cpg_ros.simulation.feedback_benefit import judge_feedback, judged_gaits
+from cpg_ros.simulation.feedback_tuning import tune_feedback
 from cpg_ros.simulation.gait_design import AIMS
 from cpg_ros.simulation.tuned_gait import GOOD, Tuned
 from cpg_ros.simulation.tuning import LONG, tune
@@ -40,11 +44,15 @@ DESCRIPTION = """\
 Tune a robot's gaits in simulation. CMA-ES optimises foot paths described by a few lengths and
 times, which inverse kinematics turns into the joints' readout, over runs on good and slippery
 floors, with more and less load and with pushes. Then measure how fast each gait walks and turns
-with shorter strides, for use with cmd_vel."""
+with shorter strides, for use with cmd_vel, and whether feedback saves the robot from pushes: if
+not, the file says that it is off by default."""
 EPILOG = f"""\
 exit codes: 0 written, 1 no gait is good (written if any is possible), 2 invalid arguments, 130
 stopped (nothing written). A gait is good if the robot stays upright and reaches {100 * GOOD:g} %
-of the target speed."""
+of the target speed. With --feedback, 1 means that no better gains were found, and that the file
+has those of before."""
+#: What is tried by default: designs of a gait, and sets of gains.
+DESIGNS, GAINS = 240, 120
 
 
 def _parser() -> Parser:
@@ -57,8 +65,11 @@ def _parser() -> Parser:
     parser.add_argument('--gaits', nargs='+', choices=sorted(AIMS), metavar='GAIT',
                         help="gaits to tune (default: all of these that the robot's first network "
                         'has); the file keeps its other gaits')
-    parser.add_argument('--evaluations', type=int, default=240, metavar='N',
-                        help='designs to try for each gait (default: %(default)s)')
+    parser.add_argument('--feedback', action='store_true', help="tune the feedback's gains "
+                        'instead, for the gaits of the file or those of --gaits together: over '
+                        'pushes, rough ground, speed and cost')
+    parser.add_argument('--evaluations', type=int, metavar='N', help='designs to try for each '
+                        f'gait (default: {DESIGNS}), or sets of gains (default: {GAINS})')
     parser.add_argument('--seed', type=int, default=0, metavar='N',
                         help='seed of the search; the same seed gives the same result '
                         '(default: %(default)s)')
@@ -114,23 +125,63 @@ def _refuse_options(chosen: argparse.Namespace) -> None:
     refuse_repeated('argument --gaits', chosen.gaits or [])
 
 
-def _tune(chosen: argparse.Namespace) -> int:
-    _refuse_options(chosen)
-    robot, report = load_robot(chosen.robot), partial(note, 'tune')
-    if chosen.gaits is None:
-        known = NETWORKS[robot.networks[0]].gaits()
-        chosen.gaits = [gait for gait in AIMS if gait in known]
+def _tune_feedback(chosen: argparse.Namespace, robot: Robot) -> int:
+    known = judged_gaits(robot)
+    if lacking := [gait for gait in chosen.gaits or [] if gait not in known]:
+        raise InputError(f"argument --gaits: robot file '{robot.name}' has no efference copy of "
+                         f'{" and ".join(lacking)}, or it hops: tune the gait first')
+    gaits = chosen.gaits or known
+    if not gaits:
+        raise InputError(f"argument --feedback: robot file '{robot.name}' has no gait with an "
+                         'efference copy and legs with a geometry: tune its gaits first')
+    _refuse_out(chosen)
+    report = partial(note, 'tune')
+    with (executor_for(2, chosen, 'prices of gains', report) as executor,
+          progress_bar('tuning the feedback', chosen.evaluations) as bar):
+        robot, found = tune_feedback(robot, chosen.model, gaits, chosen.evaluations, chosen.seed,
+                                     executor=executor, kp=chosen.kp, kd=chosen.kd, update=bar)
+    assert robot.feedback is not None
+    lines = ['better gains were found' if found.better else
+             'nothing better was found: the gains stay', _verdict(robot)]
+    write_robot(chosen.out, robot, '\n'.join([f'Feedback made by: ros2 run cpg_ros '
+                                              f'{chosen.command}', *lines]))
+    say('\n'.join([*lines, f'written: {chosen.out}']))
+    return 0 if found.better else 1
+
+
+def _verdict(robot: Robot) -> str:
+    own = robot.feedback or OwnFeedback()
+    return f"feedback is {'on' if own.enabled else 'off'} by default: {own.made}"
+
+
+def _refuse_out(chosen: argparse.Namespace) -> None:
     # Now, and not when the work is done.
     if not chosen.out.parent.is_dir():
         raise InputError(f'argument --out: there is no directory {chosen.out.parent}')
     if chosen.out.is_dir():
         raise InputError(f'argument --out: {chosen.out} is a directory')
+
+
+def _tune(chosen: argparse.Namespace) -> int:
+    if chosen.evaluations is None:
+        chosen.evaluations = GAINS if chosen.feedback else DESIGNS
+    _refuse_options(chosen)
+    robot, report = load_robot(chosen.robot), partial(note, 'tune')
+    if chosen.feedback:
+        return _tune_feedback(chosen, robot)
+    if chosen.gaits is None:
+        known = NETWORKS[robot.networks[0]].gaits()
+        chosen.gaits = [gait for gait in AIMS if gait in known]
+    _refuse_out(chosen)
     with executor_for(len(chosen.gaits) * chosen.seeds, chosen, 'searches', report) as executor:
         robot, found, missing = tune(
             robot, chosen.model, chosen.gaits, chosen.evaluations, chosen.seed,
             executor=executor, seeds=chosen.seeds, kp=chosen.kp, kd=chosen.kd,
             threads=1 if executor else chosen.jobs, say=report)
     lines = [*figures(found), *missing, *invented(robot)]
+    if judged := judged_gaits(robot):
+        robot, _ = judge_feedback(robot, chosen.model, judged, chosen.kp, chosen.kd, chosen.seed)
+        lines.append(_verdict(robot))
     write_robot(chosen.out, robot, '\n'.join([
         f'Gaits made by: ros2 run cpg_ros {chosen.command}',
         f'{LONG:g} s in simulation from the stand:', *lines]))

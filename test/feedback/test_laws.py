@@ -28,6 +28,7 @@ from cpg_ros.feedback import (
     speed,
     stiffen,
     touchdown,
+    virtual_stiffness,
 )
 from cpg_ros.feedback.gains import Gains
 from go2 import DT
@@ -108,6 +109,33 @@ def test_servos_are_stiff_while_the_error_is_large_and_for_a_while_after():
         stiff.append(left > 0.0)
     assert np.flatnonzero(stiff).tolist() == list(range(
         100, 150 + round(GAINS.stiffen_hold / DT) - 1))
+
+
+def test_virtual_stiffness_acts_for_a_limited_time_and_rests_after_it():
+    spent, acted = 0.0, []
+    for _ in range(round(2.0 * (GAINS.stiffen_longest + GAINS.stiffen_rest) / DT)):
+        acting = virtual_stiffness.acts(spent, True, 0.002, GAINS)
+        spent = virtual_stiffness.spend(spent, acting, GAINS, DT)
+        acted.append(acting)
+    edges = np.flatnonzero(np.diff(acted)) + 1
+    assert np.diff([0, *edges]) * DT == pytest.approx(
+        [GAINS.stiffen_longest, GAINS.stiffen_rest, GAINS.stiffen_longest], abs=1.5 * DT)
+
+
+def test_virtual_stiffness_does_not_act_on_old_angles():
+    for delay, acts in ((0.0, True), (0.0099, True), (0.0101, False), (math.inf, False)):
+        assert virtual_stiffness.acts(0.0, True, delay, GAINS) is acts
+    assert not virtual_stiffness.acts(0.0, False, 0.0, GAINS)
+
+
+def test_virtual_targets_give_the_torque_of_stiffer_servos():
+    """kp (target - angle) is s kp (wanted - angle), unless a limit holds the target."""
+    wanted, measured = np.array([[0.2, -0.1], [0.2, -0.1]]), np.array([[0.1, 0.4], [0.1, 0.4]])
+    limits = np.array([-10.0, -0.3]), np.array([10.0, 10.0])
+    found = virtual_stiffness.targets(wanted, measured, np.array([True, False]), GAINS, limits)
+    factor = GAINS.stiffen_distance
+    assert 60.0 * (found[0, 0] - 0.1) == pytest.approx(60.0 * factor * (0.2 - 0.1))
+    assert found[0, 1] == -0.3 and (found[1] == wanted[1]).all()
 
 
 def test_feet_that_stumble_are_lifted_higher_and_lower_again_later():

@@ -72,6 +72,41 @@ def test_late_senses_do_not_keep_servos_stiff(loop, expected):
     assert ran.upright.sum() >= 15 and (ran.kp_scale[ran.upright, -1] == 1.0).all()
 
 
+def test_servos_that_take_positions_only_recover_from_pushes_that_soft_ones_do_not(loop, expected):
+    trials = [Scenario(phase=phase, pushes=(
+        impulse(2.0, 42.0 * math.cos(way), 42.0 * math.sin(way)),))
+              for way, phase in np.random.default_rng(9).uniform(0.0, [2.0 * math.pi, 1.0],
+                                                                 (24, 2))]
+    gains = GAINS._replace(virtual_stiffness=True)
+    ran = loop.run(trials, 5.0, gains, expected)
+    soft = loop.run(trials, 5.0, GAINS._replace(stiffen=False), expected)
+    assert ran.upright.sum() >= soft.upright.sum() + 6
+    assert (ran.kp_scale == 1.0).all() and not soft.stiff.any()
+    assert not ran.stiff[:, :round(2.0 / DT)].any()
+    assert longest(ran.stiff) <= gains.stiffen_longest
+
+
+def longest(stiff):
+    """Return the longest time for which a run's servos are stiff without a break, s."""
+    edges = np.diff(np.pad(stiff, ((0, 0), (1, 1))), axis=1)
+    return DT * max((np.flatnonzero(row < 0) - np.flatnonzero(row > 0)).max(initial=0)
+                    for row in edges)
+
+
+def test_late_senses_leave_positions_alone(loop, expected):
+    """Stiffness that is made of late angles shakes the body: 42 of 48 such pushes are survived."""
+    late = SensorNoise(0.02, 0.1, 0.05, math.radians(0.5), 0.02)
+    trials = [Scenario(phase=k / 16, pushes=(impulse(2.0, 20.0 * math.cos(k * math.pi / 8.0),
+                                                     20.0 * math.sin(k * math.pi / 8.0)),))
+              for k in range(16)]
+    gains = GAINS._replace(virtual_stiffness=True)
+    ran = loop.run(trials, 4.5, gains, expected, late)
+    assert ran.upright.all() and not ran.stiff.any()
+    # Nor does it last where one allows it.
+    ran = loop.run(trials, 4.5, gains._replace(stiffen_delay=0.05), expected, late)
+    assert 0.0 < longest(ran.stiff) <= gains.stiffen_longest
+
+
 @pytest.mark.deep
 def test_rough_ground_does_not_stiffen(loop, expected):
     trials = [Scenario(terrain=Terrain('height_field', 0.08, seed)) for seed in range(8)]

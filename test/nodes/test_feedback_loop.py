@@ -17,6 +17,7 @@
 import importlib.util
 import math
 
+from cpg_ros.feedback.gains import Gains
 from cpg_ros.feedback.input_monitor import FADE, GOOD, STALE
 from cpg_ros.feedback.kinematics import geometry_of
 from cpg_ros.motion.pattern import Pattern
@@ -139,7 +140,7 @@ class Robot:
             wire.data = None if bad == 'dead' else data
         self.loop.sense(DT, 1e-9 * self.stamp)
         self.pattern.advance(DT)
-        self.body.command(self.pattern.position[GO2.places])
+        self.body.command(self.loop.targets(self.pattern.position)[GO2.places])
         self.body.step()
 
     def walk(self, topic='', how='', last=LAST):
@@ -246,6 +247,24 @@ def test_the_closed_loop_survives_the_push_that_fells_the_open_one(monkeypatch):
             robot.tick()
         fell[wanted] = robot.body.fallen
     assert fell == {True: False, False: True}
+
+
+@pytest.mark.parametrize('lag', [0, 10])
+def test_targets_go_too_far_after_a_push_where_measurements_are_young(monkeypatch, lag):
+    robot, acted = Robot(monkeypatch, lag=lag), []
+    gains = robot.loop.feedback.gains = Gains(virtual_stiffness=True)
+    for k in range(round(4.5 / DT)):
+        if k == round(2.5 / DT):
+            robot.body.push(np.array([0.0, 200.0, 0.0]), 0.1)
+        robot.tick()
+        sent = robot.loop.targets(robot.pattern.position)
+        assert (sent >= GO2.column('lower')).all() and (sent <= GO2.column('upper')).all()
+        acted.append((sent != robot.pattern.position).any())
+        assert robot.loop.kp_scale == 1.0
+    assert not robot.body.fallen
+    assert robot.loop.delay == pytest.approx(lag * DT, abs=DT)
+    assert not any(acted[:round(2.5 / DT)])
+    assert 0.0 < sum(acted) * DT <= gains.stiffen_longest if lag == 0 else not any(acted)
 
 
 def test_switched_off_from_the_start_nothing_changes_bit_for_bit(monkeypatch):

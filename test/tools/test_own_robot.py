@@ -67,6 +67,8 @@ def test_a_robot_file_is_made_then_its_gaits_are_tuned_and_both_are_used_again(t
     for words, before, gait in ((trot, file, 'trot'), (walk, tuned, 'walk')):
         assert words == ['tune', '--robot', str(before), '--model', str(URDF), '--gaits', gait,
                          '--evaluations', '7', '--out', str(tuned)]
+    # It says that its feedback helps.
+    assert not robot.unjudged
     # The shipped Go2's trot is faster than its walk.
     assert robot.file == str(tuned) and robot.gaits[:2] == ('trot', 'walk') and robot.steered
     assert capsys.readouterr().out == f'the files of the robot go into {tmp_path}\n'

