@@ -63,7 +63,7 @@ class Metronome(BipedFeedback):
 
     def _start(self) -> None:
         super()._start()
-        self._track = EvenClock(self._track.legs.copy())  # type: ignore[assignment]
+        self.track = EvenClock(self.track.legs.copy())  # type: ignore[assignment]
 
 
 class Job(NamedTuple):

@@ -103,6 +103,10 @@ SPECS = fixed({
     'orientation_bias': Spec(0.0, 'bias of roll and pitch in imu [rad]', -0.5, 0.5),
     'imu_delay': Spec(0.0, 'delay from a measurement, whose time is in the stamp, to its message '
                       '[s]', 0.0, 1.0),
+    'joint_delay': Spec(0.0, 'the same of joint_states, foot_contacts and odom [s]', 0.0, 1.0),
+    'force_noise': Spec(0.0, 'standard deviation of the noise of foot_contacts, as a share of the '
+                        'force', 0.0, 1.0),
+    'noise_seed': Spec(0, 'seed of all noise', 0, 2**31 - 1),
     'duration': Spec(0.0, 'simulated time after which the node exits [s]; 0 for never', 0.0, 1e6)})
 
 
@@ -144,11 +148,13 @@ class RobotSim(StartedNode):
                                   self._body.stand)
         self._approach = Approach(round(APPROACH / timestep), self._body.stand,
                                   robot.leg_of_joint[robot.places])
-        self._measurements = Measurements(self, self._body, InertialUnit(
-            self._body, 1.0 / self._rate, SensorNoise(self._value('imu_delay'), **{
+        unit = InertialUnit(self._body, 1.0 / self._rate, SensorNoise(
+            self._value('imu_delay'), seed=self._value('noise_seed'), **{
                 name: self._value(name) for name in (
                     'gyroscope_noise', 'gyroscope_bias', 'accelerometer_noise',
-                    'accelerometer_bias', 'orientation_bias')})))
+                    'accelerometer_bias', 'orientation_bias')}))
+        self._measurements = Measurements(self, self._body, unit,
+                                          *map(self._value, ('joint_delay', 'force_noise')))
         self._requests: deque = deque()
         self._last = round(self._value('duration') * self._rate)
         self._now, self._began, self._since = 0, 0.0, 0

@@ -71,14 +71,14 @@ class SensorInput:
 
     """
 
-    def __init__(self, node: Node, robot: Robot, geometry: Geometry, imu: str, joints: str,
-                 contacts: str, feet: str) -> None:
+    def __init__(self, node: Node, robot: Robot, geometry: Geometry | float, imu: str,
+                 joints: str, contacts: str, feet: str) -> None:
         """Subscribe.
 
         Args:
             node: that subscribes.
             robot: that has the sensors.
-            geometry: of its legs.
+            geometry: of its legs; of a robot whose efforts cannot be the contacts, its weight, N.
             imu: topic of its sensor_msgs/Imu.
             joints: topic of its measured sensor_msgs/JointState.
             contacts: one of CONTACTS.
@@ -86,7 +86,11 @@ class SensorInput:
                 WrenchStamped.
 
         """
-        self._geometry, self._legs = geometry, tuple(robot.legs)
+        if isinstance(geometry, Geometry):
+            self._geometry, self._weight = geometry, geometry.weight
+        else:
+            self._weight = geometry
+        self._legs = tuple(robot.legs)
         self._names = [joint.name for joint in robot.joints]
         self._limits = robot.column('lower'), robot.column('upper'), robot.column('velocity')
         count = len(self._names)
@@ -175,7 +179,7 @@ class SensorInput:
                     out=self._efforts)
             loads_of(self._geometry.rows, self._geometry.columns, self._angles, self._efforts,
                      *self._lean[:2], self._loads)
-            verdict = self._judge_loads(self._loads, self._order, self._geometry.weight, gap,
+            verdict = self._judge_loads(self._loads, self._order, self._weight, gap,
                                         self._heavy[0], self._felt)
         return VERDICTS[verdict], data[layout.position:], False
 
@@ -183,7 +187,7 @@ class SensorInput:
         if self._length != len(data):
             self._order, self._length = legs_of(data, self._legs), len(data)
         verdict = self._judge_loads(last_numbers(data, len(self._legs)), self._order,
-                                    self._geometry.weight, gap, self._heavy[0], self._felt)
+                                    self._weight, gap, self._heavy[0], self._felt)
         content = data[-8 * len(self._legs):]
         return VERDICTS[verdict], content, not any(content)
 
@@ -191,6 +195,6 @@ class SensorInput:
         x, y, z = last_numbers(data, WRENCH)[:3].tolist()
         # Its frame turns with the leg, but the length of the force is the same in every frame.
         self._loads[foot] = load = math.sqrt(x * x + y * y + z * z)
-        verdict = self._judge_loads(self._loads[foot:foot + 1], FIRST, self._geometry.weight, gap,
+        verdict = self._judge_loads(self._loads[foot:foot + 1], FIRST, self._weight, gap,
                                     self._heavy[foot], self._felt[foot:foot + 1])
         return VERDICTS[verdict], data[-8 * WRENCH:], not load

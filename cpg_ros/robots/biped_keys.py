@@ -28,6 +28,8 @@ import numpy as np
 
 BASE = 'base'
 NUMBERS = ('mass', 'kp', 'kd', 'effort', 'armature')
+#: Gaits in which feedback keeps a biped up, and the speeds forward that were tried, m/s.
+SPEEDS = {'walk': (-0.3, 0.6)}
 
 
 @dataclass(frozen=True)
@@ -80,6 +82,11 @@ class BipedBody(ShortRepr):
     soles: dict[str, tuple[float, ...]]
     sole_size: tuple[float, ...]
     gains: dict[str, float] = field(default_factory=dict)
+
+    @property
+    def total(self) -> float:
+        """Mass of all of it, kg."""
+        return self.mass + sum(link.mass for link in self.links.values())
 
     @property
     def held(self) -> dict[str, float]:

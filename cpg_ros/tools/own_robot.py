@@ -69,6 +69,7 @@ class DemoRobot:
         name: for files.
         gaits: that are tuned, the one to begin with first.
         steered: whether it follows commands of speed in that one.
+        network: that drives it, '' for the generator's own choice.
         tuned: whether it is one's own, tuned without feedback.
 
     """
@@ -78,6 +79,7 @@ class DemoRobot:
     name: str
     gaits: tuple[str, ...]
     steered: bool
+    network: str = ''
     tuned: bool = False
 
 

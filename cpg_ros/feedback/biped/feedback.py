@@ -45,6 +45,10 @@ class BipedFeedback:
         memory: state and output of the laws.
         mode: STAND, SHIFT or WALK.
         order: names of the joints in the order of the sensors and links.
+        rows: place of each joint of ``robot.order`` in that order, shape (joints,).
+        program: the gait whose orbit is the clock.
+        track: the network that runs it.
+        faults: how often the network left its orbit and was put back.
         torques: wanted of the joints in ``robot.order``, N m, shape (joints,).
         positions: the same as targets of servos, rad.
 
@@ -74,21 +78,25 @@ class BipedFeedback:
             network = NETWORKS[robot.networks[0]]
             preset = network.presets()[network.usual_gait]
             program = plan(robot, preset.gait, preset, preset.network, 0.0)
-        self.program = program
+        self.program, self.track, self.faults = program, Track(program, 0.0), 0
         self.memory, self.mode = BipedMemory.empty(self.links), STAND
         self.order = list(biped.links)
-        #: Row of each joint in robot.order, among the sensors and among the legs' torques.
-        self._rows = np.array([self.order.index(name) for name in robot.order])
+        self.rows = np.array([self.order.index(name) for name in robot.order])
+        # Their places among the legs' torques.
         chained = (self.links.chains - 1).ravel().tolist()
-        self._places = np.array([chained.index(row) for row in self._rows])
+        self._places = np.array([chained.index(row) for row in self.rows])
         self._kp = np.array([biped.links[name].kp for name in robot.order])
         self.torques, self.positions = np.zeros((2, len(robot.order)))
         self._command, self._walks = np.zeros(3), False
         self._time = 0.0
         self._ready = False
-        self._track: Track = Track(program, 0.0)
         self._tick: Callable | None = None
         self._bound: BipedGains | None = None
+
+    def restart(self) -> None:
+        """Stand, and know nothing of what has been, as after a fall."""
+        self.memory, self.mode = BipedMemory.empty(self.links), STAND
+        self._time, self._ready = 0.0, False
 
     def walk(self, forward: float, left: float = 0.0, turn: float = 0.0) -> None:
         """Walk with this velocity, m/s, and rate of turning, rad/s, from now on."""
@@ -120,17 +128,25 @@ class BipedFeedback:
         self._tick(*arguments)
         if self.mode == WALK:
             quick, leap = memory.clock
-            self._track.advance(leap + quick * self.gains.frequency * dt)
+            if not self.track.advance(leap + quick * self.gains.frequency * dt):
+                self.faults += 1
+                self.track.reseed()
         np.take(memory.torque, self._places, out=self.torques)
         np.divide(self.torques, self._kp, out=self.positions)
-        self.positions += sensors.joint_positions[0, self._rows]
+        self.positions += sensors.joint_positions[0, self.rows]
         return self.positions
+
+    def follow(self, track: Track) -> None:
+        """Take another plan's network as the clock, at its frequency, in the phase that it is."""
+        track.align(self.track.phase)
+        self.track, self.program = track, track.program
+        self.gains = self.gains._replace(frequency=self.program.frequency)
 
     def _choose(self, dt: float) -> None:
         """Change the mode where it is time, and read the clock."""
         memory = self.memory
         if self.mode == WALK:
-            legs = self._track.legs
+            legs = self.track.legs
             half = 0.5 * (1.0 - self.gains.duty)
             memory.phases[0], memory.phases[1] = (legs[0] + half) % 1.0, (legs[1] + half) % 1.0
             if not self._walks and self._slow():
@@ -157,6 +173,6 @@ class BipedFeedback:
         self.mode = WALK
         memory.wanted[:] = memory.integral[:] = 0.0
         memory.clock[:] = 1.0, 0.0
-        self._track = Track(self.program, 0.0)
-        self._track.align((1.0 - 0.5 * (duty - 0.5) - 0.5 * (1.0 - duty)) % 1.0)
+        self.track.reseed()
+        self.track.align((1.0 - 0.5 * (duty - 0.5) - 0.5 * (1.0 - duty)) % 1.0)
         self._choose(0.0)
