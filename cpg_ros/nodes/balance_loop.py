@@ -16,7 +16,6 @@
 
 from cpg_ros.feedback.biped.balance import BalancedPattern
 from cpg_ros.feedback.biped.feedback import BipedFeedback
-from cpg_ros.feedback.estimate import SensorData
 from cpg_ros.motion.plan import GaitPlan
 from cpg_ros.nodes.feedback_loop import Motion
 from cpg_ros.nodes.sensor_input import SensorInput
@@ -52,13 +51,12 @@ class BalanceLoop:
         self._pattern, self._inputs, self._motion = pattern, inputs, motion
         self.feedback = BipedFeedback(robot, program=pattern.program)
         self.wanted, self.waiting, self.faults = False, True, ''
+        self._balanced = False
         order = self.feedback.order
-        names = [joint.name for joint in robot.joints]
-        #: Joints that are held are not measured: they are taken to be where they are held.
+        names = [*(joint.name for joint in robot.joints), *robot.held]
         self._rows = np.array([order.index(name) for name in names])
-        joints, rates = np.zeros((2, 1, len(order)))
-        joints[0] = [robot.held.get(name, 0.0) for name in order]
-        self._sensors = SensorData(joints, rates, *inputs.sensor_data[2:])
+        self._sensors = inputs.sensor_data._replace(
+            joint_positions=np.zeros((1, len(order))), joint_velocities=np.zeros((1, len(order))))
         # Compiles, or loads what has been compiled.
         self.feedback.advance(self._sensors, 1e-3)
         self.feedback.restart()
@@ -88,6 +86,18 @@ class BalanceLoop:
             return 'on'
         return ('the robot has fallen: put it on its feet' if pattern.fallen else
                 'holding the stand until the robot stands on its feet')
+
+    def news(self) -> str:
+        """Return how the robot has lost its balance since the last call, or ''."""
+        pattern, before = self._pattern, self._balanced
+        self._balanced = pattern.balancing
+        if not before or pattern.balancing:
+            return ''
+        if self.faults:
+            return f'the robot is not balanced any more: {self.faults}'
+        if pattern.fallen:
+            return 'the robot has fallen: holding the stand until it is on its feet'
+        return 'the robot was moved by somebody: standing it up again'
 
     def sense(self, _: float, now: float) -> None:
         """Read the sensors for the coming tick; now in s."""

@@ -18,10 +18,12 @@ from typing import cast
 
 from cpg_ros.feedback.biped.balance import BalancedPattern
 from cpg_ros.feedback.kinematics import GRAVITY
+from cpg_ros.motion.plan import GaitPlan
 from cpg_ros.nodes import feedback_parameters
 from cpg_ros.nodes.balance_loop import BalanceLoop
 from cpg_ros.nodes.feedback_switch import FeedbackSwitch
 from cpg_ros.nodes.kernels import announced, BALANCE
+from cpg_ros.robots.biped_keys import SPEEDS
 
 
 class BalanceSwitch(FeedbackSwitch):
@@ -49,12 +51,19 @@ class BalanceSwitch(FeedbackSwitch):
         with announced(self._node, 'the feedback', BALANCE):
             return BalanceLoop(pattern, inputs, self._motion)
 
+    def refuses(self, program: GaitPlan) -> str:
+        """Return why a gait cannot be run, or ''."""
+        if program.balanced or not self._value('enabled'):
+            return ''
+        return f'no law balances the {program.gait}: {", ".join(SPEEDS)} are those there are'
+
     def _set_gains(self) -> None:
-        self.loop.feedback.gains = feedback_parameters.biped_gains(
-            self._value, self._pattern.program.frequency)
+        self.loop.feedback.set_gains('walk', feedback_parameters.biped_gains(self._value))
 
     def publish(self, dt: float, stamp: int) -> None:
-        """Publish nothing besides the joints."""
+        """Publish nothing besides the joints; log what became of the balance."""
+        if self.loop is not None and (news := self.loop.news()):
+            self._node.get_logger().warning(news)
 
     def _text(self) -> str:
         return str(self.loop.state)

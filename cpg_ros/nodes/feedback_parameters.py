@@ -86,7 +86,6 @@ def gains(value: Callable[[str], Any]) -> Gains:
     return Gains(*map(value, Gains._fields))
 
 
-def biped_gains(value: Callable[[str], Any], frequency: float) -> BipedGains:
-    """Return a biped's gains, the same way, at a frequency in Hz."""
-    return BipedGains(**{'frequency': frequency, **{
-        name: value(name) for name in BIPED_GAIN_OF if name != 'frequency'}})
+def biped_gains(value: Callable[[str], Any]) -> BipedGains:
+    """Return a biped's gains in its walk, the same way."""
+    return BipedGains(**{name: value(name) for name in BIPED_GAIN_OF if name != 'frequency'})

@@ -118,6 +118,10 @@ class FeedbackSwitch:
         obstacle = self.obstacle() if switched_on else ''
         return f'no feedback: {obstacle}' if obstacle else ''
 
+    def refuses(self, program: GaitPlan) -> str:
+        """Return why a gait cannot be run, or '': feedback without an efference copy waits."""
+        return ''
+
     def apply(self) -> None:
         """Apply the parameters."""
         wanted = self._node.get_parameter(ENABLED).value and not self.obstacle()

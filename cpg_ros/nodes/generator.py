@@ -154,9 +154,11 @@ class Generator(StartedNode):
         """Return whether a batch can run as a whole; change nothing."""
         if any(p.name in self._planner.names for p in parameters):
             try:
-                self._planner.plan(self._values(parameters))
+                program = self._planner.plan(self._values(parameters))
             except PlanError as error:
                 return SetParametersResult(successful=False, reason=str(error))
+            if reason := self._feedback.refuses(program):
+                return SetParametersResult(successful=False, reason=reason)
         reason = self._feedback.judge(parameters)
         return SetParametersResult(successful=not reason, reason=reason)
 

@@ -29,7 +29,8 @@ import numpy as np
 BASE = 'base'
 NUMBERS = ('mass', 'kp', 'kd', 'effort', 'armature')
 #: Gaits in which feedback keeps a biped up, and the speeds forward that were tried, m/s.
-SPEEDS = {'walk': (-0.3, 0.6)}
+SPEEDS = {'walk': (-0.3, 0.6), 'run': (0.0, 1.0), 'two_legged_hop': (-0.05, 0.05),
+          'two_legged_jump': (-0.05, 0.05)}
 
 
 @dataclass(frozen=True)

@@ -44,9 +44,10 @@ from rclpy.utilities import try_shutdown
 
 TOUR = ('trot', 'walk', 'pace', 'bound', 'jump', 'pronk', 'trot')
 SIX_LEGS = ('tripod', 'ripple', 'wave', 'tripod')
+TWO_LEGS = ('walk', 'run', 'walk', 'two_legged_hop', 'walk')
 GO2 = DemoRobot('unitree_go2', 'go2', 'go2', TOUR, steered=True)
 #: The Unitree G1 is in a package of its own; the other humanoid is ours.
-BIPEDS = {name: DemoRobot(name, name, name, ('walk',), steered=True, network='biped')
+BIPEDS = {name: DemoRobot(name, name, name, TWO_LEGS, steered=True, network='biped')
           for name in ('unitree_g1', 'humanoid')}
 HEXAPOD = DemoRobot('hexapod', 'hexapod', 'hexapod', SIX_LEGS, steered=True)
 #: A node must answer within this time, s, and the page, for which nothing is compiled: a first

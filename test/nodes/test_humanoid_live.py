@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A humanoid over the graph: generator and robot_sim make it stand, walk, fall and stand again."""
+"""A humanoid over the graph: generator and robot_sim make it stand, walk, run and fall."""
 
 import importlib.util
 import re
@@ -89,6 +89,14 @@ def test_it_walks_by_cmd_vel_survives_a_push_falls_and_is_reset(stage):
     stage.drive(0.3)
     stage.pass_time(5.0)
     assert stage.pass_time(6.0) == pytest.approx(0.3, abs=0.03)
+    done = stage.watcher.set(gait='run')[0]
+    assert done.successful
+    stage.pass_time(2.0)
+    assert stage.pass_time(3.0) == pytest.approx(0.3, abs=0.03)
+    refused = stage.watcher.set(gait='skip')[0]
+    assert not refused.successful and 'skip' in refused.reason
+    assert stage.watcher.set(gait='walk')[0].successful
+    stage.pass_time(3.0)
     stage.push(200.0)  # 20 N s
     stage.pass_time(4.0)
     stage.drive(0.0)

@@ -98,6 +98,11 @@ class BalancedPattern(Pattern):
             return super().standing
         return not (self.enabled or self.level or self._requests)
 
+    @property
+    def in_transition(self) -> bool:
+        """Tell whether another gait is wanted than that in force."""
+        return self.balance.changing if self.balance is not None else super().in_transition
+
     def restart(self, ramp: float, enabled: bool = True) -> None:
         """Begin anew, from where the joints are."""
         super().restart(ramp, enabled)
