@@ -22,6 +22,7 @@ from cpg_ros.motion.plan import GaitPlan
 from cpg_ros.nodes import feedback_parameters
 from cpg_ros.nodes.balance_loop import BalanceLoop
 from cpg_ros.nodes.feedback_switch import FeedbackSwitch
+from cpg_ros.nodes.held_joints import HeldPublisher
 from cpg_ros.nodes.kernels import announced, BALANCE
 from cpg_ros.robots.biped_keys import SPEEDS
 
@@ -33,6 +34,8 @@ class BalanceSwitch(FeedbackSwitch):
         loop: a BalanceLoop; None as long as it has not been on.
 
     """
+
+    _held: HeldPublisher | None = None
 
     def obstacle(self) -> str:
         """Return why the feedback cannot be on, or ''."""
@@ -61,7 +64,11 @@ class BalanceSwitch(FeedbackSwitch):
         self.loop.feedback.set_gains('walk', feedback_parameters.biped_gains(self._value))
 
     def publish(self, dt: float, stamp: int) -> None:
-        """Publish nothing besides the joints; log what became of the balance."""
+        """Publish where joints of no leg go; log what became of the balance."""
+        if self.loop is not None and self.loop.feedback.arms.swing:
+            if self._held is None:
+                self._held = HeldPublisher(self._node, self._pattern.robot)
+            self._held.publish(stamp, cast(BalancedPattern, self._pattern).held_angles)
         if self.loop is not None and (news := self.loop.news()):
             self._node.get_logger().warning(news)
 

@@ -23,6 +23,7 @@ import time
 from cpg_ros.nodes.command_topics import Commands, KINDS
 from cpg_ros.nodes.deadline_thread import Ticker
 from cpg_ros.nodes.health_publisher import Health, HealthPublisher
+from cpg_ros.nodes.held_joints import HeldSubscription
 from cpg_ros.nodes.kp_scale import KpScaleSubscription
 from cpg_ros.nodes.lockstep import Lockstep
 from cpg_ros.nodes.node_base import run, StartedNode, StartError
@@ -146,6 +147,7 @@ class RobotSim(StartedNode):
         self._diary = RunLog(self._body, self._rate, film, footfalls, terrain)
         self._commands = Commands(self, robot, self._value('command'), 1.0 / self._rate,
                                   self._body.stand)
+        self._held = HeldSubscription(self, robot) if robot.held else None
         self._approach = Approach(round(APPROACH / timestep), self._body.stand,
                                   robot.leg_of_joint[robot.places])
         unit = InertialUnit(self._body, 1.0 / self._rate, SensorNoise(
@@ -245,6 +247,8 @@ class RobotSim(StartedNode):
         body.scale_kp(self._kp_scale.take(self._now / self._rate))
         while self._requests:
             self._requests.popleft()()
+        if self._held is not None and (angles := self._held.take()) is not None:
+            body.hold(angles)
         for _ in range(self._steps):
             body.command(self._approach.towards(self._commands.angles))
             body.step()

@@ -139,6 +139,7 @@ class BipedRun:
             true = self.measure(before)
             before[0] = body.rates
             body.command(feedback.advance(senses(true), dt))
+            body.hold(feedback.arms.positions)
             body.step()
             outcome.steps += int((was & ~feedback.memory.swinging).sum())
             was[:] = feedback.memory.swinging

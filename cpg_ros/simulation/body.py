@@ -125,6 +125,10 @@ class Body:
         """Let the joints be driven to these angles, rad, shape (joints,), from now on."""
         self._control[:] = angles
 
+    def hold(self, angles: np.ndarray) -> None:
+        """Let joints of no leg be driven to these angles, rad, in the order of ``robot.held``."""
+        self.data.ctrl[len(self.stand):] = angles
+
     def scale_kp(self, scale: float) -> None:
         """Let the joints have their proportional gain times this."""
         if scale != self._kp_scale:

@@ -115,6 +115,35 @@ def test_it_changes_between_walk_run_hop_and_stand():
     assert np.ptp(x[running]) == pytest.approx(0.9, abs=0.1)
 
 
+def test_arms_swing_by_the_cells_and_take_yaw_from_the_walk():
+    run, found = runner(), {}
+    robot = run.robot
+    links = {name: replace(link, swing=0.0) for name, link in robot.biped.links.items()}
+    still = replace(robot, biped=replace(robot.biped, links=links))
+    for key, one in (('swinging', robot), ('still', still)):
+        feedback, angles, rates = BipedFeedback(one), [], []
+        advance = feedback.advance
+
+        def noted(sensors, dt, advance=advance, feedback=feedback, angles=angles, rates=rates):
+            command = advance(sensors, dt)
+            angles.append((feedback.arms.positions.copy(), feedback.track.legs.copy()))
+            rates.append(feedback.memory.turning[2])
+            return command
+
+        feedback.advance = noted
+        assert math.isinf(run.run(10.0, ((1.0, 0.4, 0.0, 0.0),), feedback=feedback, seed=15).fell)
+        found[key] = angles, np.array(rates[2000:])
+    left = list(robot.held).index('left_shoulder_joint')
+    angles, legs = map(np.array, zip(*found['swinging'][0][2000:], strict=True))
+    assert angles[:, left].min() == pytest.approx(-0.2, abs=0.01)
+    assert angles[:, left].max() == pytest.approx(0.2, abs=0.01)
+    # Forward is negative: an arm is furthest forward after the other leg's flexor has peaked.
+    forward = legs[np.argmin(angles[:, left]), 1]
+    assert 0.1 < forward < 0.4
+    assert not np.ptp(np.array([one for one, _ in found['still'][0]]), axis=0).any()
+    assert found['swinging'][1].std() < 0.9 * found['still'][1].std()
+
+
 @pytest.mark.parametrize('number', range(4))
 def test_it_survives_pushes_by_placing_its_feet(number):
     push = impulse(6.0, *(20.0 * np.array(DIRECTIONS[number])))
@@ -145,8 +174,9 @@ def test_the_velocity_is_estimated_without_bias():
 def test_the_robot_file_is_what_the_model_says():
     robot = load_robot('humanoid')
     read = read_biped('humanoid', robot)
-    # The shipped one walks with the usual gains.
-    assert replace(read, gains={}) == robot.biped
+    # The shipped one walks with the usual gains, and its arms swing, which no model says.
+    links = {name: replace(link, cell=0, swing=0.0) for name, link in robot.biped.links.items()}
+    assert replace(read, gains={}) == replace(robot.biped, links=links)
 
 
 @pytest.mark.parametrize('joints', [6, 5])

@@ -70,6 +70,7 @@ class BalancedPattern(Pattern):
         self._before: np.ndarray | None = None
         self._places = self.robot.places
         self._stand = self._offset[self._places]
+        self._rest = np.array(list(self.robot.held.values()))
 
     def steer(self, stride: np.ndarray, pace: float) -> None:
         """Do nothing: feet are placed for the wished speed."""
@@ -97,6 +98,13 @@ class BalancedPattern(Pattern):
         if self.balance is None:
             return super().standing
         return not (self.enabled or self.level or self._requests)
+
+    @property
+    def held_angles(self) -> np.ndarray:
+        """Where joints of no leg are to be driven, rad, in the order of ``robot.held``."""
+        if self.balance is None:
+            return self._rest
+        return self.balance.arms.positions if self.balancing else self.balance.arms.rest
 
     @property
     def in_transition(self) -> bool:

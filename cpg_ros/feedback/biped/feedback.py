@@ -17,6 +17,7 @@
 from collections.abc import Callable
 
 from cpg_ros.errors import InputError
+from cpg_ros.feedback.biped.arms import Arms
 from cpg_ros.feedback.biped.flight import HOPS, RUNS, WALKS
 from cpg_ros.feedback.biped.gains import BipedGains
 from cpg_ros.feedback.biped.links import links_of
@@ -73,6 +74,7 @@ class BipedFeedback:
         order: names of the joints in the order of the sensors and links.
         rows: place of each joint of ``robot.order`` in that order, shape (joints,).
         track: the network in force, whose orbit is the clock.
+        arms: where the joints that are no leg's are to be driven.
         faults: how often the network left its orbit and was put back.
         torques: wanted of the joints in ``robot.order``, N m, shape (joints,).
         positions: the same as targets of servos, rad.
@@ -112,6 +114,8 @@ class BipedFeedback:
         #: What is wanted, what is in force, and a walk to stop with.
         self._goal = self.track = Track(program, 0.0)
         self._walk, self.faults = Track(walk, 0.0), 0
+        self.arms = Arms(robot)
+        self.arms.follow(program)
         self.memory, self.mode = BipedMemory.empty(self.links), STAND
         self.order = list(biped.links)
         self.rows = np.array([self.order.index(name) for name in robot.order])
@@ -201,6 +205,8 @@ class BipedFeedback:
             if not self.track.advance(leap + quick * self.gains.frequency * dt):
                 self.faults += 1
                 self.track.reseed()
+        # In a run the same swing costs more than it saves.
+        self.arms.advance(dt, self.mode == WALK and self.kind == WALKS, self.track.stepper.now[0])
         np.take(memory.torque, self._places, out=self.torques)
         np.divide(self.torques, self._kp, out=self.positions)
         self.positions += sensors.joint_positions[0, self.rows]
@@ -212,6 +218,7 @@ class BipedFeedback:
 
     def _adopt(self, track: Track) -> None:
         self.track = track
+        self.arms.follow(track.program)
         self.gains = self._gains[track.program.gait]
 
     @property
