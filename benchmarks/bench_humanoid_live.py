@@ -148,6 +148,8 @@ def pushed(robot: str, strength: float, seed: int) -> int:
         stage.spend(5.0)
         for k in range(DIRECTIONS * ROUNDS):
             angle, force = 2.0 * math.pi * (k % DIRECTIONS) / DIRECTIONS, strength / PUSH
+            # Or it would stop: a command counts for a minute.
+            stage.drive(0.3)
             stage.push(force * math.cos(angle), force * math.sin(angle))
             # No multiple of a stride's duration.
             stage.spend(EVERY + 0.2 * (k // DIRECTIONS))
