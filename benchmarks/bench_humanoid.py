@@ -12,13 +12,14 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A humanoid in simulation, clocked by the biped network: walks, pushes, and what each law adds.
+"""A humanoid in simulation, clocked by the biped network: gaits, pushes, what each law adds.
 
 In process, physics and feedback at 500 Hz, friction 0.6, the velocity estimated, noise of the
-inertial unit and of the foot forces, 4 ms of delay. Walks of 61 s at 0, 0.3 and 0.5 m/s, each with
-a seed of its own; pushes of 0.1 s on the base at 0.3 m/s in 8 directions at 3 phases of a stride,
-survived if the robot is upright 6 s later. Ablations get the same pushes. 'even clock' has phases
-that grow evenly in place of the network: it says what the network's dynamics add to the balance.
+inertial unit and of the foot forces, 4 ms of delay. Every run has a seed of its own. Goings last
+61 s, or 31 s. Pushes of 0.1 s on the base come in 8 directions at 3 phases of a stride, at 0.3 m/s
+in the walk and 0.5 m/s in the run, survived if the robot is upright 6 s later. Ablations get the
+same pushes. 'even clock' has phases that grow evenly, as those of a sine, in place of the network:
+it says what the network's dynamics add to the balance. 'ten times' walks, runs, walks and stands.
 """
 
 import argparse
@@ -26,32 +27,50 @@ from concurrent.futures import ProcessPoolExecutor
 from functools import cache
 import math
 import multiprocessing
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from common import emit, log
-from cpg_ros.feedback.biped.feedback import BipedFeedback
+from cpg_ros.feedback.biped.feedback import BipedFeedback, gait_plan
 from cpg_ros.feedback.biped.gains import BipedGains
 from cpg_ros.robots.robot_file import load_robot
 from cpg_ros.simulation.biped_run import BipedRun
 from cpg_ros.simulation.scenario import impulse, SensorNoise
 import numpy as np
 
-SPEEDS, IMPULSES = (0.0, 0.3, 0.5), (20.0, 30.0, 40.0)
 NOISE = SensorNoise(delay=0.004, gyroscope_noise=0.02, accelerometer_noise=0.1, force_noise=0.05)
 DIRECTIONS, PHASES, AFTER = 8, 3, 6.0
+#: Gait, speed forward and left in m/s, turn in rad/s, s.
+GOINGS = {'0': ('walk', 0.0, 0.0, 0.0, 61.0), '0.3': ('walk', 0.3, 0.0, 0.0, 61.0),
+          '0.5': ('walk', 0.5, 0.0, 0.0, 61.0), 'backward': ('walk', -0.2, 0.0, 0.0, 31.0),
+          'sideways': ('walk', 0.0, 0.1, 0.0, 31.0), 'turning': ('walk', 0.2, 0.0, 0.3, 31.0),
+          'run 0.5': ('run', 0.5, 0.0, 0.0, 31.0), 'run 1.0': ('run', 1.0, 0.0, 0.0, 31.0),
+          'hop': ('two_legged_hop', 0.0, 0.0, 0.0, 31.0),
+          'jump': ('two_legged_jump', 0.0, 0.0, 0.0, 31.0)}
+IMPULSES = {'walk': (20.0, 30.0, 40.0), 'run': (15.0, 20.0, 25.0)}
+SPEEDS = {'walk': 0.3, 'run': 0.5}
 #: Changes of the gains that take a law away.
 ABLATIONS = {'without placement': {'place_x': 0.0, 'place_y': 0.0},
              'without speed-up': {'speed_up': 0.0},
              'without pressure': {'pressure_x': 0.0, 'pressure_y': 0.0}}
 EVEN = 'even clock'
 TARGETS = {'speed_error': 0.1, 'survived_20': 22, 'survived_30': 12}
+#: A round of 'ten times', s, and its gaits and commands from their times on.
+ROUND, CHANGES = 16.0, ((5.0, 'run'), (9.0, 'walk'))
 
 
 class EvenClock:
     """Phases of two legs that grow evenly."""
 
-    def __init__(self, legs: np.ndarray) -> None:
-        self.legs = legs
+    def __init__(self, track: Any) -> None:
+        self.program, self.legs, self.phase = track.program, track.legs.copy(), track.phase
+        # The cells stand still, and the arms with them.
+        self.stepper = track.stepper
+
+    def reseed(self) -> None:
+        pass
+
+    def align(self, phase: float) -> None:
+        self.legs[:] = phase, (phase + 0.5) % 1.0
 
     def advance(self, strides: float) -> bool:
         self.legs[:] = (self.legs + strides) % 1.0
@@ -61,18 +80,20 @@ class EvenClock:
 class Metronome(BipedFeedback):
     """The same laws without the network."""
 
-    def _start(self) -> None:
-        super()._start()
-        self._track = EvenClock(self._track.legs.copy())  # type: ignore[assignment]
+    def __init__(self, *given: Any, **named: Any) -> None:
+        super().__init__(*given, **named)
+        self.track = self._goal = EvenClock(self.track)  # type: ignore[assignment]
 
 
 class Job(NamedTuple):
-    """A run: seed, speed in m/s, impulse in N s, its number, what is taken away."""
+    """A run: what it is, its seed, what it does, impulse in N s, its number, what is missing."""
 
     robot: str
     model: str
     seed: int
-    speed: float
+    name: str
+    gait: str
+    wish: tuple[float, float, float]
     duration: float
     impulse: float = 0.0
     number: int = 0
@@ -84,25 +105,49 @@ def runner(robot: str, model: str) -> BipedRun:
     return BipedRun(model, load_robot(robot), NOISE)
 
 
-def measure(job: Job) -> tuple[Job, float, tuple[float, float], float, float]:
+def measure(job: Job) -> tuple[Job, dict[str, float]]:
     run = runner(job.robot, job.model)
     robot = run.robot
-    gains = BipedGains.of({**(robot.biped.gains if robot.biped else {}),
-                      **ABLATIONS.get(job.ablation, {})})
-    feedback = (Metronome if job.ablation == EVEN else BipedFeedback)(robot, gains)
+    assert robot.biped is not None
+    gains = BipedGains.of({**robot.biped.gains, **ABLATIONS.get(job.ablation, {})}, job.gait)
+    feedback = (Metronome if job.ablation == EVEN else BipedFeedback)(
+        robot, gains, gait_plan(robot, job.gait))
     pushes: tuple[tuple[float, float, float], ...] = ()
     if job.impulse:
         direction, phase = divmod(job.number, PHASES)
         angle = 2.0 * math.pi * direction / DIRECTIONS
         when = job.duration - AFTER + phase / PHASES / gains.frequency
         pushes = (impulse(when, job.impulse * math.cos(angle), job.impulse * math.sin(angle)),)
-    found = run.run(job.duration, ((1.0, job.speed, 0.0, 0.0),), pushes, feedback, job.seed)
-    return job, found.fell, found.speed, found.tilt, found.cost
+    commands: tuple[tuple[float, float, float, float], ...] = ((1.0, *job.wish),)
+    gaits: tuple[tuple[float, str], ...] = ()
+    if job.name == 'ten times':
+        begins = [ROUND * k for k in range(10)]
+        gaits = tuple((begin + when, gait) for begin in begins for when, gait in CHANGES)
+        commands = tuple(one for begin in begins for one in (
+            (begin + 1.0, *job.wish), (begin + 12.0, math.nan, 0.0, 0.0)))
+    found = run.run(job.duration, commands, pushes, feedback, job.seed, gaits)
+    late = found.path[:, 0] > 5.0
+    yaw = np.unwrap(found.path[:, 4])
+    turn = np.polyfit(found.path[late, 0], yaw[late], 1)[0] if late.sum() > 1 else 0.0
+    return job, {'fell': found.fell, 'forward': found.speed[0], 'left': found.speed[1],
+                 'turn': float(turn), 'tilt': found.tilt, 'cost': found.cost,
+                 'flight': found.flight}
 
 
-def pushed(robot: str, model: str, seed: int, strength: float, ablation: str = '') -> list[Job]:
-    return [Job(robot, model, seed + k, 0.3, 5.0 + AFTER, strength, k, ablation)
-            for k in range(DIRECTIONS * PHASES)]
+def pushed(robot: tuple[str, str], seed: int, gait: str, strength: float, ablation: str = ''
+           ) -> list[Job]:
+    return [Job(*robot, seed + k, 'push', gait, (SPEEDS[gait], 0.0, 0.0), 5.0 + AFTER, strength,
+                k, ablation) for k in range(DIRECTIONS * PHASES)]
+
+
+def summary(own: list[dict[str, float]], wish: tuple[float, float, float]) -> dict[str, Any]:
+    def mean(key: str) -> float:
+        return float(np.mean([one[key] for one in own]))
+    made = {'falls': sum(math.isfinite(one['fell']) for one in own), 'runs': len(own),
+            **{key: mean(key) for key in ('forward', 'left', 'turn')},
+            'error': max(abs(one['forward'] - wish[0]) for one in own),
+            'tilt_rad': max(one['tilt'] for one in own), 'flight': mean('flight')}
+    return made | ({'cost_of_transport': mean('cost')} if abs(wish[0]) > 0.1 else {})
 
 
 def main() -> None:
@@ -111,43 +156,39 @@ def main() -> None:
     parser.add_argument('--model', help='the name of the robot if not given')
     parser.add_argument('--seeds', type=int, default=5)
     parser.add_argument('--first-seed', type=int, default=1000)
-    parser.add_argument('--seconds', type=float, default=61.0)
     parser.add_argument('--jobs', type=int, default=2)
     parser.add_argument('--quick', action='store_true', help='no ablations')
     chosen = parser.parse_args()
-    robot, model, seed = chosen.robot, chosen.model or chosen.robot, chosen.first_seed
-    jobs = [Job(robot, model, seed + k, speed, chosen.seconds) for speed in SPEEDS
-            for k in range(chosen.seeds)]
-    for strength in IMPULSES:
-        jobs += pushed(robot, model, seed, strength)
-    for ablation in () if chosen.quick else (*ABLATIONS, EVEN):
-        for strength in IMPULSES[:2]:
-            jobs += pushed(robot, model, seed, strength, ablation)
+    robot, seed = (chosen.robot, chosen.model or chosen.robot), chosen.first_seed
+    jobs = [Job(*robot, seed + k, name, gait, tuple(wish), seconds)
+            for name, (gait, *wish, seconds) in GOINGS.items() for k in range(chosen.seeds)]
+    jobs += [Job(*robot, seed + k, 'ten times', 'walk', (0.3, 0.0, 0.0), 10.0 * ROUND)
+             for k in range(2)]
+    for gait, strengths in IMPULSES.items():
+        for strength in strengths:
+            jobs += pushed(robot, seed, gait, strength)
+    ablations = () if chosen.quick else (*ABLATIONS, EVEN)
+    for ablation in ablations:
+        for strength in IMPULSES['walk'][:2]:
+            jobs += pushed(robot, seed, 'walk', strength, ablation)
     log(f'{len(jobs)} runs')
     with ProcessPoolExecutor(chosen.jobs, multiprocessing.get_context('spawn')) as pool:
         found = list(pool.map(measure, jobs, chunksize=4))
-    walks, survived = {}, {}
-    for speed in SPEEDS:
-        own = [one for one in found if one[0].speed == speed and not one[0].impulse]
-        speeds = np.array([one[2] for one in own])
-        walks[str(speed)] = {
-            'falls': sum(math.isfinite(one[1]) for one in own), 'runs': len(own),
-            'speed': float(speeds[:, 0].mean()), 'sideways': float(speeds[:, 1].mean()),
-            'error': float(np.abs(speeds[:, 0] - speed).max()),
-            'tilt_rad': max(one[3] for one in own)}
-        if speed:
-            walks[str(speed)]['cost_of_transport'] = float(np.mean([one[4] for one in own]))
-    for ablation in ('', *(() if chosen.quick else (*ABLATIONS, EVEN))):
-        survived[ablation or 'all laws'] = {
-            f'{strength:g}': sum(math.isinf(one[1]) for one in found
-                                 if one[0].impulse == strength and one[0].ablation == ablation)
-            for strength in (IMPULSES[:2] if ablation else IMPULSES)}
-    whole = survived['all laws']
-    passed = (not any(one['falls'] for one in walks.values())
-              and all(walks[str(speed)]['error'] <= TARGETS['speed_error'] * speed
-                      for speed in SPEEDS[1:])
+    goings = {name: summary([one for job, one in found if job.name == name], tuple(wish))
+              for name, (_, *wish, _) in GOINGS.items()}
+    ten = [one['fell'] for job, one in found if job.name == 'ten times']
+    survived = {label: {f'{strength:g}': sum(math.isinf(one['fell']) for job, one in found if (
+        job.name, job.gait, job.ablation, job.impulse) == ('push', gait, ablation, strength))
+        for strength in IMPULSES[gait][:2 if ablation else None]}
+        for label, gait, ablation in (('walk', 'walk', ''), ('run', 'run', ''),
+                                      *((one, 'walk', one) for one in ablations))}
+    whole = survived['walk']
+    passed = (not any(one['falls'] for one in goings.values()) and all(map(math.isinf, ten))
+              and all(goings[name]['error'] <= TARGETS['speed_error'] * abs(GOINGS[name][1])
+                      for name in ('0.3', '0.5', 'backward', 'run 0.5', 'run 1.0'))
               and whole['20'] >= TARGETS['survived_20'] and whole['30'] >= TARGETS['survived_30'])
-    emit(benchmark='humanoid', robot=robot, seconds=chosen.seconds, walks=walks,
+    emit(benchmark='humanoid', robot=chosen.robot, goings=goings,
+         walk_run_walk_stand_ten_times={'runs': len(ten), 'falls': sum(map(math.isfinite, ten))},
          pushes_of=DIRECTIONS * PHASES, survived=survived, targets=TARGETS, passed=passed)
 
 

@@ -29,6 +29,7 @@ from cpg_ros.motion.phase_readout import PhaseReadout
 from cpg_ros.motion.readout import extremes, WaveReadout
 from cpg_ros.motion.runnable import obstacle
 from cpg_ros.networks.network import Network, Preset
+from cpg_ros.robots.biped_keys import SPEEDS
 from cpg_ros.robots.robot import Joint, Motion, Robot, SteeringTable
 from cpg_ros.short_repr import ShortRepr
 import numpy as np
@@ -113,8 +114,15 @@ class GaitPlan(ShortRepr):
     @property
     def speeds(self) -> tuple[float, float]:
         """Slowest and fastest forward speed that steering allows, m/s."""
+        if self.balanced:
+            return SPEEDS[self.gait]
         speed = self._steering.speed
         return speed[0], speed[-1]
+
+    @property
+    def balanced(self) -> bool:
+        """Whether it is a gait of a biped whose feedback places the feet, and so steers it."""
+        return self.robot.biped is not None and self.gait in SPEEDS
 
     @property
     def own_speed(self) -> float:
@@ -136,6 +144,8 @@ class GaitPlan(ShortRepr):
             PlanError: the robot file does not say how to steer this gait.
 
         """
+        if self.balanced:
+            return np.ones(len(self.robot.legs)), 1.0
         left, right, frequency = self._steering.ask(speed, turn)
         strides = np.where(self.robot.left, left, right)
         # The table is for the gait's own frequency; a wanted one scales it.

@@ -17,14 +17,14 @@
 Imports every subpackage but ``tools``.
 """
 
-__all__ = ['bag_recorder', 'bounded_request', 'bridge_base', 'bridge_interface', 'bridge_loop',
-           'bridge_parameters', 'bridge_start', 'cmd_vel', 'command_topics', 'console',
-           'deadline_thread', 'diagnostics', 'feedback_loop', 'feedback_parameters',
-           'feedback_switch', 'generator', 'generator_parameters', 'health_publisher',
-           'inversion_node', 'joint_publishers', 'kernels', 'kp_scale', 'launch_arguments',
-           'lifecycle', 'local_socket', 'lockstep', 'log_queue', 'measured_pose', 'message_block',
-           'message_types', 'node_base', 'node_client', 'odometry_messages', 'odometry_publisher',
-           'other_publishers', 'parameter_services', 'parameter_spec', 'polled_group',
-           'qos_profiles', 'raw_messages', 'real_time', 'robot_sim', 'sensor_input',
-           'sensor_publishers', 'servos', 'shutdown', 'start_progress', 'unitree', 'watchdog',
-           'watchdog_link']
+__all__ = ['bag_recorder', 'balance_loop', 'balance_switch', 'bounded_request', 'bridge_base',
+           'bridge_interface', 'bridge_loop', 'bridge_parameters', 'bridge_start', 'cmd_vel',
+           'command_topics', 'console', 'deadline_thread', 'diagnostics', 'feedback_loop',
+           'feedback_parameters', 'feedback_switch', 'generator', 'generator_parameters',
+           'health_publisher', 'held_joints', 'inversion_node', 'joint_publishers', 'kernels',
+           'kp_scale', 'launch_arguments', 'lifecycle', 'local_socket', 'lockstep', 'log_queue',
+           'measured_pose', 'message_block', 'message_types', 'node_base', 'node_client',
+           'odometry_messages', 'odometry_publisher', 'other_publishers', 'parameter_services',
+           'parameter_spec', 'polled_group', 'qos_profiles', 'raw_messages', 'real_time',
+           'robot_sim', 'sensor_input', 'sensor_publishers', 'servos', 'shutdown',
+           'start_progress', 'unitree', 'watchdog', 'watchdog_link']

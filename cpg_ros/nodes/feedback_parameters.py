@@ -15,12 +15,17 @@
 """The parameters of the feedback: its laws, their gains, and the topics that it listens to."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
+from cpg_ros.feedback.biped.gains import BipedGains
+from cpg_ros.feedback.biped.gains import GAINS as BIPED_GAIN_OF
+from cpg_ros.feedback.froude_scaling import robot_gains
 from cpg_ros.feedback.gains import GAINS as GAIN_OF
 from cpg_ros.feedback.gains import Gains, LAWS
 from cpg_ros.nodes.parameter_spec import fixed, one_of, Spec
 from cpg_ros.nodes.sensor_input import CONTACTS
+from cpg_ros.robots.robot import Robot
 
 PREFIX = 'feedback.'
 #: The switch, which has been PREFIX without its dot: no name is the beginning of another, or
@@ -65,8 +70,31 @@ def of_gains(usual: Gains) -> dict[str, Spec]:
 #: Those of a Go2.
 GAINS = of_gains(Gains())
 SPECS = {**TOPICS, **GAINS}
+#: The same of bipeds with soles; the generator's parameter ``frequency`` is their clock's.
+BIPED_GAINS = {f'{PREFIX}{name}': Spec(gain.default, f'{gain.text} [{gain.unit}]' if gain.unit
+                                       else gain.text, gain.low, gain.high)
+               for name, gain in BIPED_GAIN_OF.items() if name != 'frequency'}
+
+
+def specs(robot: Robot) -> dict[str, Spec]:
+    """Return all parameters of a robot's feedback but its switch.
+
+    Raises:
+        InputError: the robot file has gains of a biped that cannot be used.
+
+    """
+    if robot.biped is None:
+        return {**TOPICS, **of_gains(robot_gains(robot))}
+    own = BipedGains.of(robot.biped.gains)
+    return {**TOPICS, **{name: replace(spec, default=getattr(own, name.removeprefix(PREFIX)))
+                         for name, spec in BIPED_GAINS.items()}}
 
 
 def gains(value: Callable[[str], Any]) -> Gains:
     """Return the gains; ``value`` returns that of a parameter, by its name behind PREFIX."""
     return Gains(*map(value, Gains._fields))
+
+
+def biped_gains(value: Callable[[str], Any]) -> BipedGains:
+    """Return a biped's gains in its walk, the same way."""
+    return BipedGains(**{name: value(name) for name in BIPED_GAIN_OF if name != 'frequency'})

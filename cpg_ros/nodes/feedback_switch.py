@@ -18,7 +18,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
-from cpg_ros.feedback.kinematics import geometry_of
+from cpg_ros.feedback.kinematics import Geometry, geometry_of
 from cpg_ros.feedback.odometry import Odometry
 from cpg_ros.feedback.warm_up import warm_up
 from cpg_ros.motion.pattern import Pattern
@@ -40,6 +40,8 @@ from rclpy.parameter import Parameter
 
 def uncalibrated(robot: Robot) -> str:
     """Return what feedback needs and a robot file lacks, or ''."""
+    if robot.biped is not None:
+        return ''
     if robot.geometry is None:
         return f"robot file '{robot.name}' has no geometry of the legs (part geometry)"
     if all(motion.efference is None for motion in robot.motions.values()):
@@ -76,7 +78,7 @@ class FeedbackSwitch:
     """The feedback of a generator, made when it is first switched on.
 
     Attributes:
-        loop: None as long as it has not been on.
+        loop: a FeedbackLoop; None as long as it has not been on.
 
     """
 
@@ -94,7 +96,7 @@ class FeedbackSwitch:
 
         """
         self._node, self._pattern, self._motion, self._own = node, pattern, motion, own
-        self.loop: FeedbackLoop | None = None
+        self.loop: Any = None
         self._odometry: OdometryPublisher | None = None
         if refusal := self.judge([node.get_parameter(ENABLED)]):
             raise StartError(refusal)
@@ -119,33 +121,46 @@ class FeedbackSwitch:
         obstacle = self.obstacle() if switched_on else ''
         return f'no feedback: {obstacle}' if obstacle else ''
 
+    def refuses(self, program: GaitPlan) -> str:
+        """Return why a gait cannot be run, or '': feedback without an efference copy waits."""
+        return ''
+
     def apply(self) -> None:
         """Apply the parameters."""
         wanted = self._node.get_parameter(ENABLED).value and not self.obstacle()
         if wanted and self.loop is None:
-            robot, pattern = self._pattern.robot, self._pattern
-            geometry = geometry_of(robot)
-            with announced(self._node, 'the feedback', FEEDBACK):
-                warm_up(geometry, len(robot.joints))
-            inputs = SensorInput(self._node, robot, geometry, *map(self._value, (
-                'imu_topic', 'joint_states_topic', 'contacts', 'contacts_topic')))
-            loop = FeedbackLoop(pattern, geometry, inputs, self._motion)
-            if pattern.drive is None:
-                # Speed and heading are closed by the strides.
-                pattern.attach(Drive(len(robot.legs)))
-            for line in shortfalls(robot):
-                self._node.get_logger().warning(line)
-            self._kp_scale = KpScalePublisher(self._node)
-            if topic := self._value('odometry_topic'):
-                loop.odometry = Odometry(geometry, self._value('odometry_scale'))
-                self._odometry = OdometryPublisher(
-                    self._node, loop.odometry, topic,
-                    (self._value('odom_frame'), self._value('base_frame')),
-                    self._value('odometry_tf'))
-            self.loop = loop
+            self.loop = self._make()
         if self.loop is not None:
-            self.loop.feedback.gains = feedback_parameters.gains(self._value)
+            self._set_gains()
             self.loop.wanted = wanted
+
+    def _make(self) -> Any:
+        """Return the loop, its kernels compiled."""
+        robot, pattern = self._pattern.robot, self._pattern
+        geometry = geometry_of(robot)
+        with announced(self._node, 'the feedback', FEEDBACK):
+            warm_up(geometry, len(robot.joints))
+        loop = FeedbackLoop(pattern, geometry, self._inputs(geometry), self._motion)
+        if pattern.drive is None:
+            # Speed and heading are closed by the strides.
+            pattern.attach(Drive(len(robot.legs)))
+        for line in shortfalls(robot):
+            self._node.get_logger().warning(line)
+        self._kp_scale = KpScalePublisher(self._node)
+        if topic := self._value('odometry_topic'):
+            loop.odometry = Odometry(geometry, self._value('odometry_scale'))
+            self._odometry = OdometryPublisher(
+                self._node, loop.odometry, topic,
+                (self._value('odom_frame'), self._value('base_frame')),
+                self._value('odometry_tf'))
+        return loop
+
+    def _inputs(self, geometry: Geometry | float) -> SensorInput:
+        return SensorInput(self._node, self._pattern.robot, geometry, *map(self._value, (
+            'imu_topic', 'joint_states_topic', 'contacts', 'contacts_topic')))
+
+    def _set_gains(self) -> None:
+        self.loop.feedback.gains = feedback_parameters.gains(self._value)
 
     def learn(self, program: GaitPlan) -> None:
         """Tabulate a gait before the pattern changes to it."""
@@ -184,6 +199,9 @@ class FeedbackSwitch:
         loop = self.loop
         return loop.faults if loop is not None and loop.wanted and not loop.waiting else ''
 
+    def _text(self) -> str:
+        return f'{100.0 * self.loop.share:.0f} %'
+
     def state(self, now: float) -> dict[str, str]:
         """Return its state and the ages of its inputs, for /diagnostics; now in s."""
         loop = self.loop
@@ -192,7 +210,7 @@ class FeedbackSwitch:
         elif loop.faults:
             text = f'{"waiting" if loop.waiting else "out"}: {loop.faults}'
         else:
-            text = f'{100.0 * loop.share:.0f} %'
+            text = self._text()
         ages = {} if loop is None else loop.ages(now)
         return {'feedback': text, **{f'age of {name} [ms]': f'{1e3 * age:.1f}'
                                      for name, age in ages.items()}}

@@ -18,12 +18,13 @@ from functools import partial
 import sys
 import time
 
-from cpg_ros.feedback.froude_scaling import robot_gains
+from cpg_ros.feedback.biped.balance import BalancedPattern
 from cpg_ros.motion.pattern import Pattern
 from cpg_ros.motion.plan import PlanError
 from cpg_ros.motion.strides import Drive
 from cpg_ros.networks.registry import find_network, NetworkError
 from cpg_ros.nodes import feedback_parameters
+from cpg_ros.nodes.balance_switch import BalanceSwitch
 from cpg_ros.nodes.cmd_vel import CmdVel
 from cpg_ros.nodes.deadline_thread import Ticker
 from cpg_ros.nodes.diagnostics import Diagnostics
@@ -98,8 +99,7 @@ class Generator(StartedNode):
         descriptor = gait_spec(network, self._planner.offered).descriptor()
         descriptor.type = ParameterType.PARAMETER_STRING
         self.set_descriptor('gait', descriptor)
-        self._declare({**feedback_parameters.TOPICS,
-                       **feedback_parameters.of_gains(robot_gains(robot))})
+        self._declare(feedback_parameters.specs(robot))
         if FORMER in self._parameter_overrides:
             raise StartError(f"there is no parameter '{FORMER}': it is '{ENABLED}'")
         self._declare({ENABLED: usual(self, robot, self._value('combined_topic'))})
@@ -112,15 +112,18 @@ class Generator(StartedNode):
 
         steered, managed = self._value('cmd_vel'), self._value('managed')
         autostart = self._value('autostart') and not managed
-        self.pattern = Pattern(program, self._value('ramp'), autostart and not steered,
-                               Drive(len(robot.legs)) if steered else None)
+        soled = robot.biped is not None
+        self.pattern = (BalancedPattern if soled else Pattern)(
+            program, self._value('ramp'), autostart and not steered,
+            Drive(len(robot.legs)) if steered and not soled else None)
         self._cmd_vel = CmdVel(self, self.pattern, program, autostart,
                                lambda: self._value('cmd_vel_timeout'),
                                lambda: self._value('ramp'),
                                lambda: self._feedback.active) if steered else None
         self._outputs = Outputs(self, robot, self._value('combined_topic'),
                                 self._value('command'))
-        self._feedback = FeedbackSwitch(self, self.pattern, self._motion, self._outputs.topics)
+        self._feedback = (BalanceSwitch if soled else FeedbackSwitch)(
+            self, self.pattern, self._motion, self._outputs.topics)
         self._cells = CellsPublisher(self, network)
         self._measured = self._measured_pose(robot)
         self._gait = self.create_publisher(String, '~/gait', latched(),
@@ -158,9 +161,11 @@ class Generator(StartedNode):
         """Return whether a batch can run as a whole; change nothing."""
         if any(p.name in self._planner.names for p in parameters):
             try:
-                self._planner.plan(self._values(parameters))
+                program = self._planner.plan(self._values(parameters))
             except PlanError as error:
                 return SetParametersResult(successful=False, reason=str(error))
+            if reason := self._feedback.refuses(program):
+                return SetParametersResult(successful=False, reason=reason)
         reason = self._feedback.judge(parameters)
         return SetParametersResult(successful=not reason, reason=reason)
 

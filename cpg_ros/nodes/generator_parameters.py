@@ -23,12 +23,14 @@ from pathlib import Path
 from typing import Any
 
 from cpg_ros.errors import CpgError
+from cpg_ros.feedback.biped.gains import BipedGains
 from cpg_ros.motion.plan import gait_of, GaitPlan, plan, PlanError
 from cpg_ros.networks.network import Network, Preset
 from cpg_ros.networks.preset_files import read_presets
 from cpg_ros.networks.registry import find_network, NETWORKS, with_legs_of
 from cpg_ros.nodes import real_time
 from cpg_ros.nodes.parameter_spec import as_doubles, one_of, PRESETS, Spec
+from cpg_ros.robots.biped_keys import SPEEDS
 from cpg_ros.robots.robot import Robot
 from cpg_ros.robots.robot_file import load_robot
 from rclpy.parameter import Parameter
@@ -156,7 +158,8 @@ class Planner:
     def offered(self) -> dict[str, Preset]:
         """The presets that can run: of a steered robot those that it knows how to steer."""
         return {name: preset for name, preset in self.presets.items() if not self.steered
-                or self.robot.motion(name, preset.gait).steering is not None}
+                or self.robot.motion(name, preset.gait).steering is not None
+                or (self.robot.biped is not None and preset.gait in SPEEDS)}
 
     def prepare(self) -> None:
         """Solve every preset's gait ahead, so that a change to it is immediate."""
@@ -191,7 +194,11 @@ class Planner:
 
     def _frequency(self, preset: str) -> float | None:
         """Frequency for which the robot file has this gait, Hz."""
-        return self.robot.motion(preset, self.presets[preset].gait).frequency
+        gait = self.presets[preset].gait
+        frequency = self.robot.motion(preset, gait).frequency
+        if frequency is None and self.robot.biped is not None and gait in SPEEDS:
+            frequency = BipedGains.of(self.robot.biped.gains, gait).frequency
+        return frequency
 
     def _values(self, network: Network) -> dict[str, float]:
         """Parameters and groups by their bare names."""

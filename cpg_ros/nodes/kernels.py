@@ -22,8 +22,9 @@ from cpg_ros.motion.network_kernels import precompile
 from cpg_ros.nodes.start_progress import StartProgress
 from rclpy.node import Node
 
-#: How long a network's kernels and those of the feedback take, on one core of 2023, s.
-NETWORK, FEEDBACK = 20.0, 25.0
+#: How long a network's kernels, those of the feedback and those of a biped's take, on one core of
+#: 2023, s.
+NETWORK, FEEDBACK, BALANCE = 20.0, 25.0, 15.0
 
 
 def compile_kernels(network: str, node: Node) -> None:

@@ -23,6 +23,7 @@ import time
 from cpg_ros.nodes.command_topics import Commands, KINDS
 from cpg_ros.nodes.deadline_thread import Ticker
 from cpg_ros.nodes.health_publisher import Health, HealthPublisher
+from cpg_ros.nodes.held_joints import HeldSubscription
 from cpg_ros.nodes.kp_scale import KpScaleSubscription
 from cpg_ros.nodes.lockstep import Lockstep
 from cpg_ros.nodes.node_base import run, StartedNode, StartError
@@ -103,6 +104,10 @@ SPECS = fixed({
     'orientation_bias': Spec(0.0, 'bias of roll and pitch in imu [rad]', -0.5, 0.5),
     'imu_delay': Spec(0.0, 'delay from a measurement, whose time is in the stamp, to its message '
                       '[s]', 0.0, 1.0),
+    'joint_delay': Spec(0.0, 'the same of joint_states, foot_contacts and odom [s]', 0.0, 1.0),
+    'force_noise': Spec(0.0, 'standard deviation of the noise of foot_contacts, as a share of the '
+                        'force', 0.0, 1.0),
+    'noise_seed': Spec(0, 'seed of all noise', 0, 2**31 - 1),
     'duration': Spec(0.0, 'simulated time after which the node exits [s]; 0 for never', 0.0, 1e6)})
 
 
@@ -142,13 +147,16 @@ class RobotSim(StartedNode):
         self._diary = RunLog(self._body, self._rate, film, footfalls, terrain)
         self._commands = Commands(self, robot, self._value('command'), 1.0 / self._rate,
                                   self._body.stand)
+        self._held = HeldSubscription(self, robot) if robot.held else None
         self._approach = Approach(round(APPROACH / timestep), self._body.stand,
                                   robot.leg_of_joint[robot.places])
-        self._measurements = Measurements(self, self._body, InertialUnit(
-            self._body, 1.0 / self._rate, SensorNoise(self._value('imu_delay'), **{
+        unit = InertialUnit(self._body, 1.0 / self._rate, SensorNoise(
+            self._value('imu_delay'), seed=self._value('noise_seed'), **{
                 name: self._value(name) for name in (
                     'gyroscope_noise', 'gyroscope_bias', 'accelerometer_noise',
-                    'accelerometer_bias', 'orientation_bias')})))
+                    'accelerometer_bias', 'orientation_bias')}))
+        self._measurements = Measurements(self, self._body, unit,
+                                          *map(self._value, ('joint_delay', 'force_noise')))
         self._requests: deque = deque()
         self._last = round(self._value('duration') * self._rate)
         self._now, self._began, self._since = 0, 0.0, 0
@@ -239,6 +247,8 @@ class RobotSim(StartedNode):
         body.scale_kp(self._kp_scale.take(self._now / self._rate))
         while self._requests:
             self._requests.popleft()()
+        if self._held is not None and (angles := self._held.take()) is not None:
+            body.hold(angles)
         for _ in range(self._steps):
             body.command(self._approach.towards(self._commands.angles))
             body.step()

@@ -44,6 +44,8 @@ from std_msgs.msg import Float64MultiArray
 CONTACTS = ('foot_contacts', 'wrenches', 'efforts')
 #: All feet may be unloaded for this time, s.
 FLIGHT = 0.3
+#: Limits of joints that are held, rad and rad/s.
+TURNED, SWUNG = 2.0 * math.pi, 20.0
 #: Numbers of a Wrench; the place of one foot among one.
 WRENCH, FIRST = 6, np.zeros(1, dtype=int)
 #: Takes a message and the time since the last one, s; returns what is wrong with it, its numbers,
@@ -65,21 +67,22 @@ class SensorInput:
     """What a robot's sensors measure.
 
     Attributes:
-        sensor_data: of one run, filled in place with the last plausible measurements.
+        sensor_data: of one run, filled in place with the last plausible measurements; joints
+            leg by leg, then those that the robot file holds.
         monitors: of the inputs.
         feet: name of the source of the contacts.
         measured: when the joints were at their angles, by the message's stamp, s; -inf at first.
 
     """
 
-    def __init__(self, node: Node, robot: Robot, geometry: Geometry, imu: str, joints: str,
-                 contacts: str, feet: str) -> None:
+    def __init__(self, node: Node, robot: Robot, geometry: Geometry | float, imu: str,
+                 joints: str, contacts: str, feet: str) -> None:
         """Subscribe.
 
         Args:
             node: that subscribes.
             robot: that has the sensors.
-            geometry: of its legs.
+            geometry: of its legs; of a robot whose efforts cannot be the contacts, its weight, N.
             imu: topic of its sensor_msgs/Imu.
             joints: topic of its measured sensor_msgs/JointState.
             contacts: one of CONTACTS.
@@ -87,12 +90,19 @@ class SensorInput:
                 WrenchStamped.
 
         """
-        self._geometry, self._legs = geometry, tuple(robot.legs)
-        self._names = [joint.name for joint in robot.joints]
-        self._limits = robot.column('lower'), robot.column('upper'), robot.column('velocity')
+        if isinstance(geometry, Geometry):
+            self._geometry, self._weight = geometry, geometry.weight
+        else:
+            self._weight = geometry
+        self._legs = tuple(robot.legs)
+        own, held = [joint.name for joint in robot.joints], robot.held
+        # Joints that are held are measured, too, where the robot publishes them.
+        self._names, self._own = [*own, *held], len(own)
+        self._limits = tuple(np.append(robot.column(key), [limit] * len(held)) for key, limit in (
+            ('lower', -TURNED), ('upper', TURNED), ('velocity', SWUNG)))
         count = len(self._names)
         self.sensor_data = SensorData.zeros(1, len(self._legs), count)
-        self.sensor_data.joint_positions[0] = robot.column('offset')
+        self.sensor_data.joint_positions[0] = [*robot.column('offset'), *held.values()]
         self.sensor_data.acceleration[0, 2] = 9.81
         self._efforts = np.zeros(count)
         # Of the one run: rows, so that a tick need not look for them.
@@ -164,7 +174,10 @@ class SensorInput:
     def _read_joints(self, data: bytes, gap: float) -> tuple[str, bytes, bool]:
         layout = self._layout
         if layout is None or not layout.fits(data):
-            layout = self._layout = JointLayout(data, self._names)
+            layout = JointLayout(data, self._names)
+            if layout.wrong and len(self._names) > self._own:
+                layout = JointLayout(data, self._names[:self._own])
+            self._layout = layout
         if layout.wrong or layout.position is None or layout.velocity is None:
             return layout.wrong, b'', False
         if self._contacts == 'efforts' and layout.effort is None:
@@ -181,22 +194,23 @@ class SensorInput:
                     out=self._efforts)
             loads_of(self._geometry.rows, self._geometry.columns, self._angles, self._efforts,
                      *self._lean[:2], self._loads)
-            verdict = self._judge_loads(self._loads, self._order, self._geometry.weight, gap,
+            verdict = self._judge_loads(self._loads, self._order, self._weight, gap,
                                         self._heavy[0], self._felt)
         return VERDICTS[verdict], data[layout.position:], False
 
     def _read_loads(self, data: bytes, gap: float) -> tuple[str, bytes, bool]:
         if self._length != len(data):
             self._order, self._length = legs_of(data, self._legs), len(data)
-        verdict = self._judge_loads(last_numbers(data, len(self._legs)), self._order,
-                                    self._geometry.weight, gap, self._heavy[0], self._felt)
-        content = data[-8 * len(self._legs):]
-        return VERDICTS[verdict], content, not any(content)
+        loads = last_numbers(data, len(self._legs))
+        verdict = self._judge_loads(loads, self._order, self._weight, gap, self._heavy[0],
+                                    self._felt)
+        # Of numbers, not of bytes: those of -0.0, as a simulation may send it, are not all 0.
+        return VERDICTS[verdict], data[-8 * len(self._legs):], not any(loads.tolist())
 
     def _read_wrench(self, foot: int, data: bytes, gap: float) -> tuple[str, bytes, bool]:
         x, y, z = last_numbers(data, WRENCH)[:3].tolist()
         # Its frame turns with the leg, but the length of the force is the same in every frame.
         self._loads[foot] = load = math.sqrt(x * x + y * y + z * z)
-        verdict = self._judge_loads(self._loads[foot:foot + 1], FIRST, self._geometry.weight, gap,
+        verdict = self._judge_loads(self._loads[foot:foot + 1], FIRST, self._weight, gap,
                                     self._heavy[foot], self._felt[foot:foot + 1])
         return VERDICTS[verdict], data[-8 * WRENCH:], not load

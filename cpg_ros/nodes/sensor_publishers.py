@@ -14,6 +14,8 @@
 
 """The measurements that a simulated robot publishes every period."""
 
+from collections import deque
+
 from cpg_ros.nodes.joint_publishers import joint_state, labelled
 from cpg_ros.nodes.message_block import each, MessageBlock, places, Template
 from cpg_ros.nodes.odometry_messages import has_transforms, odometry, transform
@@ -28,13 +30,31 @@ from sensor_msgs.msg import Imu
 class Measurements:
     """``joint_states``, ``odom``, ``foot_contacts``, ``imu`` and, where tf2 is, ``/tf``."""
 
-    def __init__(self, node: Node, body: Body, unit: InertialUnit) -> None:
-        """Publish the motion of a body, and the measurements of an inertial unit on it."""
-        self._body, self._unit = body, unit
+    def __init__(self, node: Node, body: Body, unit: InertialUnit, delay: float = 0.0,
+                 force_noise: float = 0.0) -> None:
+        """Publish the motion of a body, and the measurements of an inertial unit on it.
+
+        Args:
+            node: that publishes.
+            body: that is measured.
+            unit: on it.
+            delay: of the measurements of joints and feet, s.
+            force_noise: standard deviation of the noise of the feet's, as a share of the force.
+
+        """
+        self._body, self._unit, self._holds = body, unit, bool(body.robot.held)
+        self._delay, self._force_noise = round(1e9 * delay), force_noise
+        self._late: deque[tuple[int, list[np.ndarray]]] = deque()
+        self._rng = np.random.default_rng(unit.seed + 1)
         names, feet = body.robot.order, legs(body.robot)
         n = len(names)
-        sizes = n, n, n, len(feet), 3, 4, 6
-        *joints, forces, base, quaternion, twist = places(sizes)
+        held = tuple(body.robot.held)
+        sizes = n, n, n, len(feet), 3, 4, 6, *(3 * [len(held)] if held else [])
+        *joints, forces, base, quaternion, twist = places(sizes[:7])
+        if held:
+            names = *names, *held
+            joints = [np.concatenate(pair) for pair in zip(joints, places(sizes)[7:],
+                                                           strict=True)]
         frames = 'odom', 'base'
         messages = [('joint_states', joint_state(names, *joints)),
                     odometry('odom', frames, base, quaternion, twist),
@@ -56,5 +76,14 @@ class Measurements:
         if arrived is not None:
             self._imu.publish(arrived[0], arrived[1:])
         body = self._body
-        self._block.publish(stamp, (body.position, body.velocity, body.torque, body.feet,
-                                    body.base, body.quaternion, body.twist))
+        feet = body.feet
+        if self._force_noise:
+            feet = feet * (1.0 + self._force_noise * self._rng.standard_normal(len(feet)))
+        found = (body.position, body.velocity, body.torque, feet, body.base, body.quaternion,
+                 body.twist, *(body.held if self._holds else ()))
+        if not self._delay:
+            self._block.publish(stamp, found)
+            return
+        self._late.append((stamp, [part.copy() for part in found]))
+        while self._late and self._late[0][0] <= stamp - self._delay:
+            self._block.publish(*self._late.popleft())

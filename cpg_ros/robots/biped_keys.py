@@ -23,11 +23,15 @@ from dataclasses import asdict, dataclass, field
 from typing import Any
 
 from cpg_ros.files.yaml_reader import YamlReader
+from cpg_ros.networks.biped import CELLS
 from cpg_ros.short_repr import ShortRepr
 import numpy as np
 
 BASE = 'base'
 NUMBERS = ('mass', 'kp', 'kd', 'effort', 'armature')
+#: Gaits in which feedback keeps a biped up, and the speeds forward that were tried, m/s.
+SPEEDS = {'walk': (-0.3, 0.6), 'run': (0.0, 1.0), 'two_legged_hop': (-0.05, 0.05),
+          'two_legged_jump': (-0.05, 0.05)}
 
 
 @dataclass(frozen=True)
@@ -45,6 +49,8 @@ class BipedLink:
         effort: the most it can, N m.
         armature: inertia of its rotor at the joint, kg m^2.
         angle: where a joint that is no leg's is held, rad; None of the legs' joints.
+        cell: of the network that swings such a joint, from 1; 0 for none.
+        swing: by how much it does at the peak of the cell's recovery variable, rad.
 
     """
 
@@ -58,6 +64,8 @@ class BipedLink:
     effort: float
     armature: float = 0.0
     angle: float | None = None
+    cell: int = 0
+    swing: float = 0.0
 
 
 @dataclass(frozen=True, repr=False)
@@ -80,6 +88,11 @@ class BipedBody(ShortRepr):
     soles: dict[str, tuple[float, ...]]
     sole_size: tuple[float, ...]
     gains: dict[str, float] = field(default_factory=dict)
+
+    @property
+    def total(self) -> float:
+        """Mass of all of it, kg."""
+        return self.mass + sum(link.mass for link in self.links.values())
 
     @property
     def held(self) -> dict[str, float]:
@@ -121,7 +134,8 @@ def _link(reader: YamlReader, tree: Any, where: str, before: Collection[str], dr
           ) -> BipedLink:
     places = ('axis', 'anchor', 'center')
     tree = reader.keys(tree, where, {'parent', *places, *NUMBERS[:4]}
-                       | (set() if driven else {'angle'}), {'armature'})
+                       | (set() if driven else {'angle'}),
+                       {'armature'} | (set() if driven else {'cell', 'swing'}))
     parent = reader.text(tree['parent'], f'{where}.parent')
     if parent != BASE and parent not in before:
         raise reader.fail(f'{where}.parent', f"'{parent}' is neither {BASE} nor a link before")
@@ -136,14 +150,20 @@ def _link(reader: YamlReader, tree: Any, where: str, before: Collection[str], dr
             raise reader.fail(f'{where}.{key}', f'{value:g} must be '
                               + ('positive' if key in ('kp', 'effort') else 'at least 0'))
     angle = None if driven else reader.number(tree['angle'], f'{where}.angle')
+    cell, swing = tree.get('cell', 0), reader.number(tree.get('swing', 0.0), f'{where}.swing')
+    if not (isinstance(cell, int) and 0 <= cell <= CELLS):
+        raise reader.fail(f'{where}.cell', f'{cell!r} is not the number of a cell, 1 to {CELLS}')
+    if swing and not cell:
+        raise reader.fail(where, 'a swing needs a cell')
     return BipedLink(parent, tuple(value / length for value in axis), anchor, mass, center, kp, kd,
-                effort, armature, angle)
+                     effort, armature, angle, cell, swing)
 
 
 def biped_tree(biped: BipedBody) -> dict[str, Any]:
     """Return a biped as the tree that read_biped takes."""
     links = {name: {key: list(value) if isinstance(value, tuple) else value
-                    for key, value in asdict(link).items() if value is not None}
+                    for key, value in asdict(link).items()
+                    if value is not None and not (key in ('cell', 'swing') and not link.cell)}
              for name, link in biped.links.items()}
     tree = {'base': {'mass': biped.mass, 'center': list(biped.center)}, 'links': links,
             'soles': {leg: list(place) for leg, place in biped.soles.items()},

@@ -17,9 +17,10 @@
 from dataclasses import dataclass, field
 import math
 
-from cpg_ros.feedback.biped.feedback import BipedFeedback
+from cpg_ros.feedback.biped.feedback import BipedFeedback, gait_plan
 from cpg_ros.feedback.estimate import SensorData
 from cpg_ros.feedback.kinematics import GRAVITY
+from cpg_ros.motion.track import Track
 from cpg_ros.robots.robot import Robot
 from cpg_ros.short_repr import ShortRepr
 from cpg_ros.simulation.body import Body
@@ -43,6 +44,7 @@ class BipedOutcome(ShortRepr):
         speed: mean velocity forward and left, heading's axes, m/s, after SETTLING.
         tilt: largest angle of the base to the vertical, rad.
         steps: touchdowns by the clock.
+        flight: share of the time after SETTLING in which no foot touches the ground.
         cost: of transport: mechanical work, taken positive, by weight and way.
         path: time, place of the base (x y z) and its yaw, every 10 ms, shape (n, 5).
         poses: all of ``qpos`` at these times, shape (n, ...), as ``camera.shoot`` takes it.
@@ -53,6 +55,7 @@ class BipedOutcome(ShortRepr):
     speed: tuple[float, float] = (0.0, 0.0)
     tilt: float = 0.0
     steps: int = 0
+    flight: float = 0.0
     cost: float = math.inf
     path: np.ndarray = field(default_factory=lambda: np.zeros((0, 5)))
     poses: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
@@ -96,7 +99,8 @@ class BipedRun:
 
     def run(self, duration: float, commands: tuple[tuple[float, float, float, float], ...] = (),
             pushes: tuple[tuple[float, float, float], ...] = (),
-            feedback: BipedFeedback | None = None, seed: int = 0) -> BipedOutcome:
+            feedback: BipedFeedback | None = None, seed: int = 0,
+            gaits: tuple[tuple[float, str], ...] = ()) -> BipedOutcome:
         """Stand up and follow commands.
 
         Args:
@@ -105,6 +109,7 @@ class BipedRun:
             pushes: each (s, N forward, N left) on the base for PUSH seconds.
             feedback: of the robot, not used before; one with its own gains if not given.
             seed: of the noise.
+            gaits: each (s, gait) to change to then; the first one is the feedback's own.
 
         """
         body, dt = self.body, self.dt
@@ -112,8 +117,11 @@ class BipedRun:
         feedback = feedback or BipedFeedback(self.robot)
         senses = NoisySenses(SensorNoise(**{**vars(self.noise), 'seed': seed}), 1, 2, dt)
         before, outcome = body.rates[None].copy(), BipedOutcome()
-        path, poses, work, moved, count, began = [], [], 0.0, np.zeros(2), 0, math.inf
+        path, poses, work, moved, began = [], [], 0.0, np.zeros(2), math.inf
+        count = flown = 0
         wishes, forces = sorted(commands), sorted(pushes)
+        changes = [(when, Track(gait_plan(self.robot, gait), 0.0))
+                   for when, gait in sorted(gaits, key=lambda change: change[0])]
         was = feedback.memory.swinging.copy()
         for k in range(round(duration / dt)):
             time = k * dt
@@ -124,11 +132,14 @@ class BipedRun:
                 else:
                     feedback.walk(forward, left, turn)
                     began = min(began, time)
+            while changes and changes[0][0] <= time:
+                feedback.follow(changes.pop(0)[1])
             while forces and forces[0][0] <= time:
                 body.push(np.array([*forces.pop(0)[1:], 0.0]), PUSH)
             true = self.measure(before)
             before[0] = body.rates
             body.command(feedback.advance(senses(true), dt))
+            body.hold(feedback.arms.positions)
             body.step()
             outcome.steps += int((was & ~feedback.memory.swinging).sum())
             was[:] = feedback.memory.swinging
@@ -140,6 +151,7 @@ class BipedRun:
                 x, y = body.rates[:2]
                 moved += c * x + s * y, c * y - s * x
                 count += 1
+                flown += not body.feet.any()
             if k % round(0.01 / dt) == 0:
                 path.append((time, *body.base, body.yaw))
                 poses.append(body.data.qpos.copy())
@@ -150,6 +162,7 @@ class BipedRun:
         outcome.path, outcome.poses = np.array(path), np.array(poses)
         if count:
             outcome.speed = float(moved[0] / count), float(moved[1] / count)
+            outcome.flight = flown / count
         way = float(np.linalg.norm(outcome.path[-1, 1:3] - outcome.path[0, 1:3]))
         if way > 0.5:
             outcome.cost = work / (body.mass * GRAVITY * way)

@@ -66,6 +66,7 @@ class Body:
         joints = self.model.actuator_trnid[:n, 0]
         self._held = list(robot.held.values())
         self._held_angles = self.model.jnt_qposadr[self.model.actuator_trnid[n:, 0]]
+        self._held_speeds = self.model.jnt_dofadr[self.model.actuator_trnid[n:, 0]]
         self._angles = self.model.jnt_qposadr[joints]
         self._speeds = self.model.jnt_dofadr[joints]
         self._base = int(self.model.body_rootid[self.model.jnt_bodyid[joints[0]]])
@@ -123,6 +124,10 @@ class Body:
     def command(self, angles: np.ndarray) -> None:
         """Let the joints be driven to these angles, rad, shape (joints,), from now on."""
         self._control[:] = angles
+
+    def hold(self, angles: np.ndarray) -> None:
+        """Let joints of no leg be driven to these angles, rad, in the order of ``robot.held``."""
+        self.data.ctrl[len(self.stand):] = angles
 
     def scale_kp(self, scale: float) -> None:
         """Let the joints have their proportional gain times this."""
@@ -190,6 +195,13 @@ class Body:
     def torque(self) -> np.ndarray:
         """Torques of the motors in the last step, N m."""
         return np.take(self.data.qfrc_actuator, self._speeds, out=self._torque)
+
+    @property
+    def held(self) -> np.ndarray:
+        """Angles, speeds and torques of the joints that are held, rad, rad/s, N m: (3, joints)."""
+        data, speeds = self.data, self._held_speeds
+        return np.array([data.qpos[self._held_angles], data.qvel[speeds],
+                         data.qfrc_actuator[speeds]])
 
     @property
     def feet(self) -> np.ndarray:

@@ -24,11 +24,17 @@ import numpy as np
 
 
 class InertialUnit:
-    """Measures a body period by period."""
+    """Measures a body period by period.
+
+    Attributes:
+        seed: of its noise.
+
+    """
 
     def __init__(self, body: Body, period: float, noise: SensorNoise) -> None:
         """Be ready to measure a body at a period in s."""
         self._body, self._period, self._noise = body, period, noise
+        self.seed = noise.seed
         self._rng = np.random.default_rng(noise.seed)
         half = 0.5 * noise.orientation_bias
         turned = np.array([1.0, half, half, 0.0])

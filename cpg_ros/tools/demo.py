@@ -44,7 +44,11 @@ from rclpy.utilities import try_shutdown
 
 TOUR = ('trot', 'walk', 'pace', 'bound', 'jump', 'pronk', 'trot')
 SIX_LEGS = ('tripod', 'ripple', 'wave', 'tripod')
+TWO_LEGS = ('walk', 'run', 'walk', 'two_legged_hop', 'walk')
 GO2 = DemoRobot('unitree_go2', 'go2', 'go2', TOUR, steered=True)
+#: The Unitree G1 is in a package of its own; the other humanoid is ours.
+BIPEDS = {name: DemoRobot(name, name, name, TWO_LEGS, steered=True, network='biped')
+          for name in ('unitree_g1', 'humanoid')}
 HEXAPOD = DemoRobot('hexapod', 'hexapod', 'hexapod', SIX_LEGS, steered=True)
 #: A node must answer within this time, s, and the page, for which nothing is compiled: a first
 #: start compiles for about a minute.
@@ -156,11 +160,13 @@ def wait_for(operator: Operator, interruption: Interruption) -> None:
 def parser() -> Parser:
     """Arguments of the executable."""
     made = Parser(prog='demo', formatter_class=HelpFormatter, description='Drive a simulated '
-                  'Unitree Go2, a hexapod, or a robot of your own, from a page in the browser or '
-                  'by cmd_vel. Type the name of a gait and Enter to switch to it, q or Ctrl-C to '
-                  'end.')
+                  'Unitree Go2, a hexapod, a humanoid, or a robot of your own, from a page in the '
+                  'browser or by cmd_vel. Type the name of a gait and Enter to switch to it, q or '
+                  'Ctrl-C to end.')
     robot = made.add_mutually_exclusive_group()
     robot.add_argument('--hexapod', action='store_true', help='use a robot with six legs')
+    robot.add_argument('--humanoid', action='store_true', help='use a Unitree G1, or, without the '
+                       'package mjlab, which has its model, a humanoid of our own')
     robot.add_argument('--urdf', type=Path, metavar='FILE', help='use the robot of this URDF: '
                        'make its robot file, tune its gaits in simulation, which takes minutes, '
                        'and drive it; the files go into the folder of --out, and are used again')
@@ -175,8 +181,8 @@ def parser() -> Parser:
                       help='seconds of simulated time per gait of the tour (default: 6)')
     made.add_argument('--course', action='store_true', help='first walk over rough ground, a ramp '
                       'and blocks with feedback, and get pushed on the way')
-    made.add_argument('--film', action='store_true', help='write a film, go2.gif or hexapod.gif, '
-                      'and footfalls.png of the last minute')
+    made.add_argument('--film', action='store_true', help='write a film, such as go2.gif, and '
+                      'footfalls.png of the last minute')
     made.add_argument('--out', type=Path, metavar='DIR', help='folder for these files, and for '
                       'what the page records (default: out; for your own robot NAME_robot)')
     made.add_argument('--no-panel', action='store_true', help='do not serve the browser page')
@@ -193,6 +199,8 @@ def _nodes(chosen: Namespace, robot: DemoRobot) -> tuple[list[str], list[str]]:
         body += ['-p', f'film:={chosen.out / robot.name}.gif']
     generator = ['generator', '-p', f'robot:={robot.file}', '-p', f'gait:={robot.gaits[0]}',
                  '-p', f'rate:={RATE}.0', '-p', 'combined_topic:=""', '-p', 'use_sim_time:=true']
+    if robot.network:
+        generator += ['-p', f'network:={robot.network}']
     if robot.unjudged:
         # Its gaits were tuned and judged without; the page has the switch.
         generator += ['-p', 'feedback.enabled:=false']
@@ -201,6 +209,14 @@ def _nodes(chosen: Namespace, robot: DemoRobot) -> tuple[list[str], list[str]]:
     elif chosen.tour is None and robot.steered:
         generator += ['-p', 'cmd_vel:=true']
     return body, generator
+
+
+def _humanoid() -> DemoRobot:
+    """Return the Unitree G1 if its model is there, or else our own humanoid."""
+    if find_spec('mjlab') is not None:
+        return BIPEDS['unitree_g1']
+    say('the humanoid is our own; for a Unitree G1: pip install --no-deps mjlab==1.6.0')
+    return BIPEDS['humanoid']
 
 
 def _own(chosen: Namespace, interruption: Interruption) -> DemoRobot:
@@ -224,9 +240,10 @@ def demonstrate(chosen: Namespace) -> int:
     if not chosen.every > 0.0:
         raise InputError(f'argument --every: {chosen.every:g} must be positive')
     name = own_robot.name_of(chosen)
-    if chosen.course and (chosen.hexapod or name or chosen.tour is not None):
+    if chosen.course and (chosen.hexapod or chosen.humanoid or name or chosen.tour is not None):
         raise InputError('argument --course: not with ' + (
             '--hexapod, which has no feedback' if chosen.hexapod else
+            '--humanoid, which walks on even ground' if chosen.humanoid else
             'a robot of your own' if name else '--tour'))
     chosen.out = chosen.out or Path(f'{name}_robot' if name else 'out')
     chosen.out.mkdir(parents=True, exist_ok=True)
@@ -251,7 +268,7 @@ def demonstrate(chosen: Namespace) -> int:
                 address()
                 robot = _own(chosen, interruption)
             else:
-                robot = HEXAPOD if chosen.hexapod else GO2
+                robot = (HEXAPOD if chosen.hexapod else _humanoid() if chosen.humanoid else GO2)
             robot = replace(robot, gaits=tuple(chosen.tour or robot.gaits))
             operator = Operator(robot.gaits[0])
             for node in _nodes(chosen, robot):

@@ -67,7 +67,7 @@ class Operator(Node):
             DemoError: there is another one, perhaps from before ours.
 
         """
-        for topic, who in (('lh/joint_states', 'generator'), ('odom', 'robot')):
+        for topic, who in (('cpg_generator/phase', 'generator'), ('odom', 'robot')):
             if self.count_publishers(topic) > 1:
                 raise DemoError(f'there is another {who} in this ROS domain: stop it, or set '
                                 'another ROS_DOMAIN_ID')

@@ -69,6 +69,7 @@ class DemoRobot:
         name: for files.
         gaits: that are tuned, the one to begin with first.
         steered: whether it follows commands of speed in that one.
+        network: that drives it, '' for the generator's own choice.
         unjudged: whether it is one's own, and its file does not say whether feedback helps.
 
     """
@@ -78,6 +79,7 @@ class DemoRobot:
     name: str
     gaits: tuple[str, ...]
     steered: bool
+    network: str = ''
     unjudged: bool = False
 
 

@@ -93,6 +93,8 @@ def parameters(what: str) -> str:
         return table(HEAD, parameter_rows(feedback_parameters.TOPICS))
     if what == 'feedback_gains':
         return table(HEAD, parameter_rows(feedback_parameters.GAINS))
+    if what == 'biped_gains':
+        return table(HEAD, parameter_rows(feedback_parameters.BIPED_GAINS))
     if what == 'inversion':
         return table(HEAD, parameter_rows(inversion_node.SPECS))
     usual = SHIPPED['delayed' if what == 'generator' else what]

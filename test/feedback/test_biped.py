@@ -19,9 +19,12 @@ import subprocess
 import sys
 
 from cpg_ros.errors import InputError
-from cpg_ros.feedback.biped import clock, placement, stance, swing
+from cpg_ros.feedback.biped import clock, flight, placement, stance, swing
+from cpg_ros.feedback.biped.feedback import gait_plan, KINDS
 from cpg_ros.feedback.biped.gains import BipedGains
 from cpg_ros.feedback.biped.links import add_torques, blank_pose, kinematics, links_of, rotation
+from cpg_ros.networks.biped import Biped
+from cpg_ros.robots.biped_keys import SPEEDS
 from cpg_ros.robots.robot_file import load_robot
 import numpy as np
 import pytest
@@ -181,14 +184,70 @@ def test_the_clock_shares_the_weight():
 
 def test_the_ground_force_turns_the_body_by_what_is_wanted():
     gains, mass = BipedGains(), 33.0
-    center, velocity = np.array([0.02, -0.03, 0.0]), np.zeros(3)
+    center = np.array([0.02, -0.03, 0.0])
     pressure = (0.01, 0.02, -gains.height)
     moment = (7.0, -5.0)
-    force = np.array(stance.ground_force(center, velocity, pressure, -gains.height, mass, moment,
-                                         gains))
+    up = stance.upward_force(gains.height, gains.height, 0.0, mass, gains)
+    force = np.array(stance.ground_force(center, pressure, up, moment, gains))
     about = np.cross(np.array(pressure) - center, force)
     np.testing.assert_allclose(about[:2], moment, atol=1e-9)
     assert force[2] == pytest.approx(mass * G)
+
+
+@pytest.mark.parametrize(('gait', 'kind'), [('run', flight.RUNS), ('two_legged_hop', flight.HOPS)])
+def test_a_stance_throws_the_body_as_far_as_its_flight_takes(gait, kind):
+    gains, dt = BipedGains.of({}, gait), 1e-4
+    stance_time, cycle = flight.spans(kind, gains)
+    flying = cycle - stance_time
+    assert stance_time == pytest.approx(gains.duty / gains.frequency) and flying > 0.0
+    shares = np.linspace(0.0, 1.0, 2001)
+    heights, rises, forces = np.array([flight.course(share, kind, gains) for share in shares]).T
+    # Newton: the force less the weight accelerates, from falling to rising for half the flight.
+    assert rises[[0, -1]] == pytest.approx([-0.5 * G * flying, 0.5 * G * flying])
+    np.testing.assert_allclose(np.gradient(rises, stance_time * shares)[1:-1],
+                               G * (forces - 1.0)[1:-1], atol=dt * G)
+    np.testing.assert_allclose(np.gradient(heights, stance_time * shares)[1:-1], rises[1:-1],
+                               atol=1e-5)
+    # The impulse bears the weight through the whole cycle; height at the end is as at the start.
+    assert forces.mean() * stance_time == pytest.approx(cycle, rel=1e-3)
+    assert heights[0] == pytest.approx(heights[-1], abs=1e-12)
+    assert heights[0] == pytest.approx(gains.height * gains.flight_height)
+    assert heights[1000] == heights.min()
+
+
+def test_the_force_of_a_stance_corrects_the_height_and_never_pulls():
+    gains = BipedGains.of({}, 'run')
+    at, speed, force = flight.course(0.5, flight.RUNS, gains)
+    on_course = flight.upward_force(0.5, flight.RUNS, at, speed, 33.0, gains)
+    assert on_course == pytest.approx(33.0 * G * force)
+    lower = flight.upward_force(0.5, flight.RUNS, at - 0.01, speed, 33.0, gains)
+    assert lower - on_course == pytest.approx(0.01 * gains.flight_kp)
+    assert flight.upward_force(0.5, flight.RUNS, at + 9.0, speed, 33.0, gains) == 0.0
+    assert flight.upward_force(0.5, flight.RUNS, at - 9.0, speed, 33.0, gains) == pytest.approx(
+        flight.MOST * 33.0 * G)
+
+
+def test_a_foot_in_flight_lands_below_where_the_body_will_be():
+    gains = BipedGains.of({}, 'run')._replace(place_offset=0.0)
+    stance_time = gains.duty / gains.frequency
+    ahead, left = flight.foothold((0.5, 0.0), (0.5, 0.0), 1, 0.1, gains)
+    assert ahead == pytest.approx(0.5 * (0.1 + gains.flight_ahead * stance_time))
+    assert left == pytest.approx(0.5 * gains.flight_width * gains.step_width)
+    faster, _ = flight.foothold((0.6, 0.0), (0.5, 0.0), 1, 0.1, gains)
+    # Too fast: the foot is further ahead, which brakes.
+    assert faster - ahead == pytest.approx(0.1 * (0.1 + gains.flight_ahead * stance_time
+                                                  + gains.flight_x))
+    _, right = flight.foothold((0.0, 0.0), (0.0, 0.0), -1, 0.1, gains)
+    assert right == pytest.approx(-left)
+
+
+def test_every_gait_with_a_law_has_speeds_and_a_preset():
+    assert set(KINDS) == set(SPEEDS) <= set(Biped.presets())
+    with pytest.raises(InputError, match="no balance of 'humanoid' in the gait 'skip', only in"):
+        gait_plan(load_robot('humanoid'), 'skip')
+    # Gains of a robot file are for the walk; they spare what only another gait has.
+    assert BipedGains.of({'duty': 0.55}).duty == 0.55
+    assert BipedGains.of({'duty': 0.55}, 'run').duty == 0.353
 
 
 def test_a_foots_path_is_as_smooth_as_its_derivatives_say():

@@ -275,3 +275,15 @@ def test_switched_off_from_the_start_nothing_changes_bit_for_bit(monkeypatch):
         alone.advance(DT)
         assert (robot.pattern.position == alone.position).all()
         assert (robot.pattern.velocity == alone.velocity).all()
+
+
+def test_feet_in_the_air_may_be_minus_zero(monkeypatch):
+    """As a simulation sends them that turns a sign: such bytes are not all 0."""
+    monkeypatch.setattr(sensor_input, 'PolledSubscription', Wire)
+    inputs = SensorInput(None, GO2, geometry_of(GO2), 'imu', 'measured', 'foot_contacts',
+                         'foot_contacts')
+    monitor = inputs.monitors[-1]
+    for k in range(100):
+        Wire.wires['foot_contacts'].data = serialize_message(Float64MultiArray(data=[-0.0] * 4))
+        inputs.take(0.002 * k, True)
+    assert not monitor.fault(0.2)

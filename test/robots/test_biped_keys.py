@@ -60,6 +60,9 @@ def test_what_is_written_is_read_back(tmp_path):
     (f'{KNEE}.parent', 'left_ankle_roll_joint', "'left_ankle_roll_joint' is neither base nor a "
      'link before'),
     ('biped.links.waist_joint.angle', None, 'biped.links.waist_joint.angle: is missing'),
+    ('biped.links.left_shoulder_joint.cell', 5, 'cell: 5 is not the number of a cell, 1 to 4'),
+    ('biped.links.left_shoulder_joint.cell', None, 'left_shoulder_joint: a swing needs a cell'),
+    (f'{KNEE}.cell', 1, f'{KNEE}.cell: unknown key'),
     (KNEE, None, f'{KNEE}: is missing'),
     ('biped.soles.left', None, 'biped.soles.left: is missing'),
     ('biped.sole_size', [0.2], 'biped.sole_size: takes 2 numbers, not 1'),

@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A humanoid in physics walks, turns, stops and survives pushes, clocked by the biped network."""
+"""A humanoid in physics walks, turns, stops and survives pushes, runs and hops by the network."""
 
 from dataclasses import replace
 from functools import cache
@@ -20,8 +20,9 @@ import importlib.util
 import math
 import re
 
-from cpg_ros.feedback.biped.feedback import BipedFeedback
+from cpg_ros.feedback.biped.feedback import BipedFeedback, gait_plan
 from cpg_ros.feedback.biped.gains import BipedGains
+from cpg_ros.feedback.biped.memory import WALK
 from cpg_ros.robots.robot_file import load_robot
 from cpg_ros.tools import check_robot
 import numpy as np
@@ -84,6 +85,65 @@ def test_it_stands_walks_and_stands_ten_times():
     assert x[-1] > 10 * 0.6
 
 
+@pytest.mark.parametrize('name', ['humanoid', 'unitree_g1'])
+@pytest.mark.parametrize(('gait', 'speed', 'flight'), [('run', 0.5, 0.3), ('run', 1.0, 0.3),
+                                                       ('two_legged_hop', 0.0, 0.25)])
+def test_it_runs_and_hops_off_the_ground(name, gait, speed, flight):
+    run = runner(name)
+    feedback = BipedFeedback(run.robot, program=gait_plan(run.robot, gait))
+    found = run.run(10.0, ((1.0, speed, 0.0, 0.0),), feedback=feedback, seed=13)
+    assert math.isinf(found.fell) and not feedback.faults
+    assert found.speed[0] == pytest.approx(speed, abs=0.03)
+    assert found.flight > flight and found.tilt < 0.25
+
+
+def test_it_changes_between_walk_run_hop_and_stand():
+    run = runner()
+    feedback = BipedFeedback(run.robot)
+    gaits = ((4.0, 'run'), (10.0, 'walk'), (16.0, 'two_legged_hop'), (22.0, 'run'),
+             (28.0, 'walk'))
+    commands = ((1.0, 0.3, 0.0, 0.0), (12.0, *STOP), (15.0, 0.0, 0.0, 0.0), (22.0, 0.3, 0.0, 0.0),
+                (26.0, *STOP), (30.0, 0.2, 0.0, 0.0))
+    found = run.run(34.0, commands, feedback=feedback, seed=14, gaits=gaits)
+    assert math.isinf(found.fell) and found.tilt < 0.25
+    assert feedback.program.gait == 'walk' and feedback.mode == WALK and not feedback.changing
+    time, x = found.path[:, 0], found.path[:, 1]
+    # It stands still before the hop, and after the run that was told to stand.
+    for begin, end in ((14.5, 15.0), (29.5, 30.0)):
+        assert np.ptp(x[(time > begin) & (time < end)]) < 0.03
+    running = (time > 7.0) & (time < 10.0)
+    assert np.ptp(x[running]) == pytest.approx(0.9, abs=0.1)
+
+
+def test_arms_swing_by_the_cells_and_take_yaw_from_the_walk():
+    run, found = runner(), {}
+    robot = run.robot
+    links = {name: replace(link, swing=0.0) for name, link in robot.biped.links.items()}
+    still = replace(robot, biped=replace(robot.biped, links=links))
+    for key, one in (('swinging', robot), ('still', still)):
+        feedback, angles, rates = BipedFeedback(one), [], []
+        advance = feedback.advance
+
+        def noted(sensors, dt, advance=advance, feedback=feedback, angles=angles, rates=rates):
+            command = advance(sensors, dt)
+            angles.append((feedback.arms.positions.copy(), feedback.track.legs.copy()))
+            rates.append(feedback.memory.turning[2])
+            return command
+
+        feedback.advance = noted
+        assert math.isinf(run.run(10.0, ((1.0, 0.4, 0.0, 0.0),), feedback=feedback, seed=15).fell)
+        found[key] = angles, np.array(rates[2000:])
+    left = list(robot.held).index('left_shoulder_joint')
+    angles, legs = map(np.array, zip(*found['swinging'][0][2000:], strict=True))
+    assert angles[:, left].min() == pytest.approx(-0.2, abs=0.01)
+    assert angles[:, left].max() == pytest.approx(0.2, abs=0.01)
+    # Forward is negative: an arm is furthest forward after the other leg's flexor has peaked.
+    forward = legs[np.argmin(angles[:, left]), 1]
+    assert 0.1 < forward < 0.4
+    assert not np.ptp(np.array([one for one, _ in found['still'][0]]), axis=0).any()
+    assert found['swinging'][1].std() < 0.9 * found['still'][1].std()
+
+
 @pytest.mark.parametrize('number', range(4))
 def test_it_survives_pushes_by_placing_its_feet(number):
     push = impulse(6.0, *(20.0 * np.array(DIRECTIONS[number])))
@@ -114,8 +174,9 @@ def test_the_velocity_is_estimated_without_bias():
 def test_the_robot_file_is_what_the_model_says():
     robot = load_robot('humanoid')
     read = read_biped('humanoid', robot)
-    # The shipped one walks with the usual gains.
-    assert replace(read, gains={}) == robot.biped
+    # The shipped one walks with the usual gains, and its arms swing, which no model says.
+    links = {name: replace(link, cell=0, swing=0.0) for name, link in robot.biped.links.items()}
+    assert replace(read, gains={}) == replace(robot.biped, links=links)
 
 
 @pytest.mark.parametrize('joints', [6, 5])

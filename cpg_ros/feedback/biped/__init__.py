@@ -18,5 +18,5 @@ Imports ``motion``, ``robots`` and what is below, and from ``feedback`` how laws
 knows nothing of ROS, and of no physics engine.
 """
 
-__all__ = ['clock', 'feedback', 'gains', 'links', 'memory', 'placement', 'stance', 'swing',
-           'tick', 'velocity']
+__all__ = ['arms', 'balance', 'clock', 'feedback', 'flight', 'gains', 'links', 'memory',
+           'placement', 'stance', 'swing', 'tick', 'velocity']

@@ -12,11 +12,13 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A biped that stands and walks by a network's clock: sensors in, joint positions out."""
+"""A biped that stands, walks, runs and hops by a network's clock: sensors in, positions out."""
 
 from collections.abc import Callable
 
 from cpg_ros.errors import InputError
+from cpg_ros.feedback.biped.arms import Arms
+from cpg_ros.feedback.biped.flight import HOPS, RUNS, WALKS
 from cpg_ros.feedback.biped.gains import BipedGains
 from cpg_ros.feedback.biped.links import links_of
 from cpg_ros.feedback.biped.memory import BipedMemory, SHIFT, STAND, WALK
@@ -33,18 +35,47 @@ import numpy as np
 SHIFTING, FIRST_STEP = 0.8, 1.0
 #: At most this fast, m/s, and with this error of the capture point, m, a walk ends on two feet.
 STILL, CAUGHT = 0.15, 0.05
+#: How the legs go in the gaits that there are laws for.
+KINDS = {'walk': WALKS, 'run': RUNS, 'two_legged_hop': HOPS, 'two_legged_jump': HOPS}
+WALK_GAIT = 'walk'
+#: Phase of the left flexor, cycles, with which each kind begins.
+STARTS = {WALKS: 0.75, RUNS: 0.0, HOPS: 0.5}
+
+
+def gait_plan(robot: Robot, gait: str) -> GaitPlan:
+    """Return a gait at the frequency that a robot's feedback has for it.
+
+    Raises:
+        InputError: no law is for it, the network does not have it, or the robot has no soles.
+        PlanError: it cannot be run.
+
+    """
+    presets = NETWORKS[robot.networks[0]].presets()
+    if gait not in KINDS or gait not in presets or robot.biped is None:
+        raise InputError(f"there is no balance of '{robot.name}' in the gait '{gait}', only in "
+                         + ', '.join(KINDS))
+    preset = presets[gait]
+    return plan(robot, gait, preset, preset.network,
+                BipedGains.of(robot.biped.gains, gait).frequency)
 
 
 class BipedFeedback:
     """Balance of one biped with soles; a tick allocates nothing but what the network's clock does.
 
+    Walk and run change into one another in the middle of a stance, where the body rises no more
+    and falls no more. Whatever else changes does so on two feet.
+
     Attributes:
         robot: whose feedback it is.
         links: of the robot.
-        gains: of the laws; may be replaced between ticks.
+        gains: of the laws in the gait that is in force.
         memory: state and output of the laws.
         mode: STAND, SHIFT or WALK.
         order: names of the joints in the order of the sensors and links.
+        rows: place of each joint of ``robot.order`` in that order, shape (joints,).
+        track: the network in force, whose orbit is the clock.
+        arms: where the joints that are no leg's are to be driven.
+        faults: how often the network left its orbit and was put back.
         torques: wanted of the joints in ``robot.order``, N m, shape (joints,).
         positions: the same as targets of servos, rad.
 
@@ -56,12 +87,12 @@ class BipedFeedback:
 
         Args:
             robot: whose robot file has the part ``biped``.
-            gains: of the laws; the robot file's if not given.
+            gains: of the laws in the program's gait; the robot file's if not given.
             program: gait whose orbit is the clock; the walk of the robot's first network if not
                 given.
 
         Raises:
-            InputError: the robot file has no such part, or bad gains.
+            InputError: the robot file has no such part, bad gains, or no law is for the gait.
             PlanError: the gait cannot be run.
 
         """
@@ -69,36 +100,86 @@ class BipedFeedback:
         biped = robot.biped
         if biped is None or len(robot.legs) != 2:
             raise InputError(f"robot '{robot.name}' has no two legs with soles")
-        self.gains = gains or BipedGains.of(biped.gains)
-        if program is None:
-            network = NETWORKS[robot.networks[0]]
-            preset = network.presets()[network.usual_gait]
-            program = plan(robot, preset.gait, preset, preset.network, 0.0)
-        self.program = program
+        self._gains = {gait: BipedGains.of(biped.gains, gait) for gait in KINDS}
+        walk = gait_plan(robot, WALK_GAIT)
+        program = program or walk
+        if program.gait not in KINDS:
+            raise InputError(f"there is no balance in the gait '{program.gait}', only in "
+                             + ', '.join(KINDS))
+        if gains is not None:
+            self._gains[program.gait] = gains
+        else:
+            self._set_frequency(program)
+        self.gains = self._gains[program.gait]
+        #: What is wanted, what is in force, and a walk to stop with.
+        self._goal = self.track = Track(program, 0.0)
+        self._walk, self.faults = Track(walk, 0.0), 0
+        self.arms = Arms(robot)
+        self.arms.follow(program)
         self.memory, self.mode = BipedMemory.empty(self.links), STAND
         self.order = list(biped.links)
-        #: Row of each joint in robot.order, among the sensors and among the legs' torques.
-        self._rows = np.array([self.order.index(name) for name in robot.order])
+        self.rows = np.array([self.order.index(name) for name in robot.order])
+        # Their places among the legs' torques.
         chained = (self.links.chains - 1).ravel().tolist()
-        self._places = np.array([chained.index(row) for row in self._rows])
+        self._places = np.array([chained.index(row) for row in self.rows])
         self._kp = np.array([biped.links[name].kp for name in robot.order])
         self.torques, self.positions = np.zeros((2, len(robot.order)))
-        self._command, self._walks = np.zeros(3), False
+        self._command, self._walks, self._rest = np.zeros(3), False, np.zeros(3)
         self._time = 0.0
         self._ready = False
-        self._track: Track = Track(program, 0.0)
+        self._before = np.zeros(2)
         self._tick: Callable | None = None
         self._bound: BipedGains | None = None
 
+    @property
+    def program(self) -> GaitPlan:
+        """The gait in force."""
+        return self.track.program
+
+    @property
+    def kind(self) -> int:
+        """How its legs go: WALKS, RUNS or HOPS."""
+        return KINDS[self.program.gait]
+
+    @property
+    def changing(self) -> bool:
+        """Whether another gait than that in force is wanted."""
+        return self.track is not self._goal
+
+    def restart(self) -> None:
+        """Stand, and know nothing of what has been, as after a fall."""
+        self.memory, self.mode = BipedMemory.empty(self.links), STAND
+        self._time, self._ready = 0.0, False
+
     def walk(self, forward: float, left: float = 0.0, turn: float = 0.0) -> None:
-        """Walk with this velocity, m/s, and rate of turning, rad/s, from now on."""
+        """Go with this velocity, m/s, and rate of turning, rad/s, from now on."""
         self._command[:] = forward, left, turn
         self._walks = True
 
     def stand(self) -> None:
-        """Stop walking, and stand on both legs as soon as the body is slow enough."""
+        """Stop, and stand on both legs as soon as the body is slow enough."""
         self._command[:] = 0.0
         self._walks = False
+
+    def set_gains(self, gait: str, gains: BipedGains) -> None:
+        """Replace the gains of a gait but its frequency, which is the plan's."""
+        self._gains[gait] = gains._replace(frequency=self._gains[gait].frequency)
+        if gait == self.program.gait:
+            self.gains = self._gains[gait]
+
+    def follow(self, track: Track) -> None:
+        """Change to the gait of a network that has not moved yet, at its frequency.
+
+        Raises:
+            KeyError: no law is for its gait.
+
+        """
+        gait, same = track.program.gait, self.track is self._goal
+        self._goal = track
+        self._set_frequency(track.program)
+        if gait == self.program.gait and same:
+            track.align(self.track.phase)
+            self._adopt(track)
 
     def advance(self, sensors: SensorData, dt: float) -> np.ndarray:
         """Return where the servos are to be driven, rad, shape (joints,), by ``robot.order``.
@@ -113,30 +194,54 @@ class BipedFeedback:
             memory.heading[0] = sensors.rpy[0, 2]
             self._ready = True
         self._choose(dt)
-        step = dt, min(self._time / SHIFTING, 1.0)
-        arguments = (self.links, self.gains, memory, sensors, self._command, self.mode, step)
+        step = dt, min(self._time / SHIFTING, 1.0), self.kind
+        command = self._rest if self._stops else self._command
+        arguments = (self.links, self.gains, memory, sensors, command, self.mode, step)
         if self._tick is None or self._bound is not self.gains:
             self._tick, self._bound = bound(tick, *arguments), self.gains
         self._tick(*arguments)
         if self.mode == WALK:
             quick, leap = memory.clock
-            self._track.advance(leap + quick * self.gains.frequency * dt)
+            if not self.track.advance(leap + quick * self.gains.frequency * dt):
+                self.faults += 1
+                self.track.reseed()
+        # In a run the same swing costs more than it saves.
+        self.arms.advance(dt, self.mode == WALK and self.kind == WALKS, self.track.stepper.now[0])
         np.take(memory.torque, self._places, out=self.torques)
         np.divide(self.torques, self._kp, out=self.positions)
-        self.positions += sensors.joint_positions[0, self._rows]
+        self.positions += sensors.joint_positions[0, self.rows]
         return self.positions
 
+    def _set_frequency(self, program: GaitPlan) -> None:
+        known = self._gains[program.gait]
+        self._gains[program.gait] = known._replace(frequency=program.frequency)
+
+    def _adopt(self, track: Track) -> None:
+        self.track = track
+        self.arms.follow(track.program)
+        self.gains = self._gains[track.program.gait]
+
+    @property
+    def _stops(self) -> bool:
+        """Whether it has to come to a stand, be it for another gait."""
+        wanted = KINDS[self._goal.program.gait]
+        return not self._walks or (self.changing and HOPS in (wanted, self.kind))
+
     def _choose(self, dt: float) -> None:
-        """Change the mode where it is time, and read the clock."""
+        """Change mode and gait where it is time, and read the clock."""
         memory = self.memory
         if self.mode == WALK:
-            legs = self._track.legs
             half = 0.5 * (1.0 - self.gains.duty)
-            memory.phases[0], memory.phases[1] = (legs[0] + half) % 1.0, (legs[1] + half) % 1.0
-            if not self._walks and self._slow():
+            self._before[:] = memory.phases
+            np.mod(self.track.legs + half, 1.0, out=memory.phases)
+            if self._stops and self._ends(half):
                 self.mode, self._time = STAND, 0.0
+            elif self.kind != HOPS:
+                self._change(half)
             return
         self._time += dt
+        if self.mode == STAND and self.changing:
+            self._adopt(self._goal)
         if not self._walks:
             self.mode, self._time = STAND, 0.0
         elif self.mode == STAND:
@@ -144,19 +249,48 @@ class BipedFeedback:
         elif self._time >= FIRST_STEP:
             self._start()
 
-    def _slow(self) -> bool:
+    def _ends(self, half: float) -> bool:
+        """Return whether to stand now: in a walk once it is slow, in a hop at the bottom."""
         memory = self.memory
+        if self.kind == HOPS:
+            return bool(self._before[0] < half + 0.5 <= memory.phases[0])
         both = not memory.swinging.any() and bool((memory.shares > 0.0).all())
-        return (both and np.abs(memory.wanted).max() < 1e-6
+        return (self.kind == WALKS and both and np.abs(memory.wanted).max() < 1e-6
                 and np.abs(memory.center[1, :2]).max() < 2.0 * STILL
                 and np.abs(memory.error).max() < CAUGHT)
 
+    def _change(self, half: float) -> None:
+        """Change between walk and run where a leg is in the middle of its swing."""
+        memory, wanted = self.memory, self._goal
+        if self._stops:
+            wanted = self._walk if self.kind == RUNS else self.track
+        if wanted is self.track or KINDS[wanted.program.gait] == HOPS:
+            return
+        for leg in range(2):
+            if memory.swinging[leg] and self._before[leg] < half <= memory.phases[leg]:
+                # There its flexor peaks, in any gait; swings begin from the other sole in a walk.
+                sign = 1.0 if self.kind == WALKS else -1.0
+                memory.lift_off[leg] += sign * memory.pose.soles[1 - leg]
+                memory.ground[0] = memory.pose.soles[1 - leg, 2]
+                wanted.reseed()
+                wanted.align(0.5 * leg)
+                self._adopt(wanted)
+                half = 0.5 * (1.0 - self.gains.duty)
+                np.mod(wanted.legs + half, 1.0, out=memory.phases)
+                memory.clock[:] = 1.0, 0.0
+                return
+
     def _start(self) -> None:
-        """Start the clock in the middle of both feet's stance before the left one lifts off."""
-        memory, duty = self.memory, self.gains.duty
-        self.mode = WALK
+        """Start the clock.
+
+        A walk begins in the middle of both feet's stance, before the left one lifts off, a run
+        in the middle of the right foot's, a hop in that of both.
+        """
+        memory, self.mode = self.memory, WALK
         memory.wanted[:] = memory.integral[:] = 0.0
         memory.clock[:] = 1.0, 0.0
-        self._track = Track(self.program, 0.0)
-        self._track.align((1.0 - 0.5 * (duty - 0.5) - 0.5 * (1.0 - duty)) % 1.0)
+        memory.lift_off[:] = memory.pose.soles
+        memory.ground[0] = memory.pose.soles[:, 2].mean()
+        self.track.reseed()
+        self.track.align(STARTS[self.kind])
         self._choose(0.0)

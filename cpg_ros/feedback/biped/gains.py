@@ -18,11 +18,38 @@ from collections.abc import Mapping
 from typing import Any
 
 from cpg_ros.errors import InputError
-from cpg_ros.feedback.biped import clock, placement, stance, swing, velocity
+from cpg_ros.feedback.biped import (
+    clock,
+    flight,
+    placement,
+    stance,
+    swing,
+    velocity,
+)
 from cpg_ros.feedback.law import Gain, named_tuple
 
-GAINS: Mapping[str, Gain] = {name: gain for law in (clock, placement, stance, swing, velocity)
+GAINS: Mapping[str, Gain] = {name: gain for law in (
+                                 clock, flight, placement, stance, swing, velocity)
                              for name, gain in law.GAINS.items()}
+#: Gains that differ from the walk's, by gait; found on a simulated Unitree G1.
+_HOP = {
+    'frequency': 2.626, 'duty': 0.597, 'lift': 0.0535, 'swing_end': 0.8685,
+    'height_kp': 3979.0, 'height_kd': 354.5, 'roll_kp': 879.3, 'roll_kd': 50.2,
+    'pitch_kp': 820.6, 'pitch_kd': 25.3, 'yaw_kp': 40.9, 'yaw_kd': 5.52, 'lean': -0.0216,
+    'swing_kp': 3104.0, 'swing_kd': 126.8, 'swing_mass': 4.613, 'sole_kp': 130.1,
+    'sole_kd': 1.558, 'stance_damping': 0.3, 'speed_integral': 0.318, 'place_offset': 0.02,
+    'reaction': 0.2228, 'reaction_yaw': 0.681, 'flight_height': 0.9914, 'flight_kp': 5162.0,
+    'flight_kd': 353.6, 'flight_width': 0.898, 'flight_ahead': 0.488, 'flight_x': 0.1152,
+    'flight_y': 0.03}
+OF_GAIT: Mapping[str, Mapping[str, float]] = {
+    'run': {
+        'frequency': 2.206, 'duty': 0.353, 'lift': 0.0792, 'swing_end': 0.9576,
+        'height_kp': 3979.0, 'height_kd': 354.5, 'roll_kp': 271.4, 'roll_kd': 81.5,
+        'pitch_kp': 133.7, 'pitch_kd': 16.3, 'yaw_kp': 32.4, 'yaw_kd': 6.78, 'lean': -0.0174,
+        'swing_kp': 2610.0, 'swing_kd': 151.5, 'swing_mass': 2.115, 'sole_kp': 68.0,
+        'sole_kd': 0.33, 'stance_damping': 0.3, 'speed_integral': 0.793, 'place_offset': 0.0082,
+        'reaction': 0.0689, 'reaction_yaw': 0.639},
+    'two_legged_hop': _HOP, 'two_legged_jump': _HOP}
 _Fields: Any = named_tuple('BipedGains', GAINS, (gain.default for gain in GAINS.values()))
 
 
@@ -32,8 +59,8 @@ class BipedGains(_Fields):  # type: ignore[misc]
     __slots__ = ()
 
     @classmethod
-    def of(cls, changes: Mapping[str, float]) -> 'BipedGains':
-        """Return the usual gains with changes.
+    def of(cls, changes: Mapping[str, float], gait: str = 'walk') -> 'BipedGains':
+        """Return the usual gains of a gait with changes, which spare those that only it has.
 
         Raises:
             InputError: no gain has this name, or it is not within its limits.
@@ -46,4 +73,5 @@ class BipedGains(_Fields):  # type: ignore[misc]
             if not gain.low <= value <= gain.high:
                 raise InputError(f'biped.gains.{name}: {value:g} is not from {gain.low:g} to '
                                  f'{gain.high:g} {gain.unit}'.rstrip())
-        return cls(**{name: float(value) for name, value in changes.items()})
+        return cls(**{name: float(value)
+                      for name, value in {**changes, **OF_GAIT.get(gait, {})}.items()})

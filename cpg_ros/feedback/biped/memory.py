@@ -19,7 +19,7 @@ from typing import NamedTuple
 from cpg_ros.feedback.biped.links import blank_pose, Links, Pose
 import numpy as np
 
-#: Modes: standing on both legs, shifting the weight to the right foot, walking.
+#: Modes: standing on both legs, shifting the weight to the right foot, following the clock.
 STAND, SHIFT, WALK = 0, 1, 2
 
 
@@ -39,8 +39,10 @@ class BipedMemory(NamedTuple):
         phases: of the legs from their lift-off on, cycles, shape (2,).
         swinging: whether each leg swings, shape (2,).
         landed: whether it has landed early, shape (2,).
-        lift_off: where each swing began, from the other sole, m, shape (2, 3).
-        target: where it is to end, from the other sole, m, shape (2, 3).
+        lift_off: where each swing began, from the other sole, or, in gaits with flight, from the
+            base, m, shape (2, 3).
+        target: where it is to end, likewise.
+        ground: height of the ground, m, shape (1,).
         shares: of the weight that each leg is to bear, shape (2,).
         error: of the capture point, forward and left, m, shape (2,).
         reaction: moment that the swing leg takes, N m, shape (3,).
@@ -64,6 +66,7 @@ class BipedMemory(NamedTuple):
     landed: np.ndarray
     lift_off: np.ndarray
     target: np.ndarray
+    ground: np.ndarray
     shares: np.ndarray
     error: np.ndarray
     reaction: np.ndarray
@@ -77,5 +80,6 @@ class BipedMemory(NamedTuple):
         return cls(blank_pose(links), np.zeros(3), np.zeros((2, 3)), np.zeros(3),
                    np.zeros((2, 6)), np.zeros(2), np.zeros(2), np.zeros(1), np.zeros(1),
                    np.zeros(2), np.zeros(2, dtype=bool), np.zeros(2, dtype=bool),
-                   np.zeros((2, 3)), np.zeros((2, 3)), np.full(2, 0.5), np.zeros(2), np.zeros(3),
-                   np.zeros((3, 3)), np.array([1.0, 0.0]), np.zeros((2, links.chains.shape[1])))
+                   np.zeros((2, 3)), np.zeros((2, 3)), np.zeros(1), np.full(2, 0.5), np.zeros(2),
+                   np.zeros(3), np.zeros((3, 3)), np.array([1.0, 0.0]),
+                   np.zeros((2, links.chains.shape[1])))

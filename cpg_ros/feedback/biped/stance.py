@@ -35,7 +35,8 @@ GAINS = {
     'pitch_kd': Gain(15.5, 500.0, 'N m s/rad', 'the same by its rate'),
     'yaw_kp': Gain(121.4, 5e3, 'N m/rad', 'moment by the heading'),
     'yaw_kd': Gain(18.7, 500.0, 'N m s/rad', 'the same by its rate'),
-    'lean': Gain(0.0662, 0.5, 'rad', 'pitch that the base is to have, positive forward'),
+    'lean': Gain(0.0662, 0.5, 'rad', 'pitch that the base is to have, positive forward',
+                 low=-0.5),
     'pressure_x': Gain(2.60, 10.0, '', "centre of pressure's shift by the capture point's error"),
     'pressure_y': Gain(0.769, 10.0, '', 'the same sideways'),
     'pressure_reach_x': Gain(0.0566, 0.3, 'm', 'its largest shift from the middle of a sole'),
@@ -67,23 +68,34 @@ def pressure_shift(error, half, gains):
 
 
 @jit
-def ground_force(center, velocity, pressure, level, mass, moment, gains):
-    """Return the force that the ground is to exert, N.
+def upward_force(wanted, height, rise, mass, gains):
+    """Return the upward force that holds the body at a height, N.
 
     Args:
-        center: of mass, m.
-        velocity: of it, m/s.
-        pressure: centre of it, m.
-        level: height of the soles that bear, m.
+        wanted: height of the centre of mass over the soles that bear, m.
+        height: that it has, m.
+        rise: its upward speed, m/s.
         mass: of the robot, kg.
-        moment: that is to turn the body, about x and y, N m.
         gains: BipedGains.
 
     """
     weight = mass * GRAVITY
-    up = (weight + gains.height_kp * (gains.height - (center[2] - level))
-          - gains.height_kd * velocity[2])
-    up = min(max(up, LEAST * weight), MOST * weight)
+    up = weight + gains.height_kp * (wanted - height) - gains.height_kd * rise
+    return min(max(up, LEAST * weight), MOST * weight)
+
+
+@jit
+def ground_force(center, pressure, up, moment, gains):
+    """Return the force that the ground is to exert, N.
+
+    Args:
+        center: of mass, m.
+        pressure: centre of it, m.
+        up: the upward force, N.
+        moment: that is to turn the body, about x and y, N m.
+        gains: BipedGains.
+
+    """
     arm = max(center[2] - pressure[2], 0.3)
     x = ((center[0] - pressure[0]) * up - moment[1]) / arm
     y = ((center[1] - pressure[1]) * up + moment[0]) / arm

@@ -16,7 +16,7 @@
 
 import math
 
-from cpg_ros.feedback.biped import clock, placement, stance, swing, velocity
+from cpg_ros.feedback.biped import clock, flight, placement, stance, swing, velocity
 from cpg_ros.feedback.biped.links import (
     add_torques,
     carry,
@@ -67,7 +67,7 @@ def _approach(gains, memory, command, dt):
 
 
 @jit
-def _follow_clock(gains, memory):
+def _follow_clock(gains, memory, kind):
     """Let legs lift off and land by their phases, and early by the load on them."""
     soles, swing_share = memory.pose.soles, clock.swing_share(gains)
     memory.clock[1] = 0.0
@@ -76,7 +76,8 @@ def _follow_clock(gains, memory):
         if phase < swing_share and not memory.swinging[leg]:
             memory.swinging[leg], memory.landed[leg] = True, False
             for k in range(3):
-                memory.lift_off[leg, k] = soles[leg, k] - soles[1 - leg, k]
+                memory.lift_off[leg, k] = soles[leg, k] - (
+                    soles[1 - leg, k] if kind == flight.WALKS else 0.0)
         if phase >= swing_share and memory.swinging[leg]:
             memory.swinging[leg] = memory.landed[leg] = False
         if (memory.swinging[leg] and not memory.landed[leg] and phase > clock.LATE * swing_share
@@ -128,7 +129,53 @@ def _stand(gains, memory, xi, axes, rate, shifted):
 
 
 @jit
-def _bear(links, gains, memory, sensors, shift):
+def _fly(gains, memory, axes, kind, dt):
+    """Fill shares, ground and targets of feet that swing, in a gait with flight."""
+    soles, base, phases, (c, s) = memory.pose.soles, memory.base, memory.phases, axes
+    center, velocity, shares = memory.center[0], memory.center[1], memory.shares
+    for leg in range(2):
+        shares[leg] = 1.0 if phases[leg] >= clock.swing_share(gains) else 0.0
+    total = shares[0] + shares[1]
+    if total > 1.5:
+        shares[0] = shares[1] = 0.5
+    if total > 0.5:
+        memory.ground[0] = shares[0] * soles[0, 2] + shares[1] * soles[1, 2]
+    else:
+        memory.ground[0] -= dt * base[2]
+    memory.error[:] = 0.0
+    memory.clock[0] = 1.0
+    speed = c * velocity[0] + s * velocity[1], c * velocity[1] - s * velocity[0]
+    wanted = (memory.wanted[0] + gains.speed_integral * memory.integral[0], memory.wanted[1])
+    for leg in range(2):
+        if memory.swinging[leg]:
+            for k in range(3):
+                memory.lift_off[leg, k] -= dt * base[k]
+            remaining = (clock.swing_share(gains) - phases[leg]) / gains.frequency
+            ahead, left = flight.foothold(speed, wanted, _side(leg), remaining, gains)
+            memory.target[leg, 0] = center[0] + c * ahead - s * left
+            memory.target[leg, 1] = center[1] + s * ahead + c * left
+            memory.target[leg, 2] = memory.lift_off[leg, 2]
+
+
+@jit
+def _upward(gains, memory, mass, mode, kind, level):
+    """Return the upward force on all legs, N; level of the soles that bear."""
+    center, rise, shares = memory.center[0, 2], memory.center[1, 2], memory.shares
+    if kind == flight.WALKS or mode != WALK:
+        wanted = gains.height
+        if mode == SHIFT and kind != flight.WALKS:
+            # The body begins in the middle of a stance.
+            wanted = flight.course(0.5, kind, gains)[0]
+        return stance.upward_force(wanted, center - level, rise, mass, gains)
+    if shares[0] + shares[1] < 0.5:
+        return 0.0
+    leads = 0 if shares[0] >= shares[1] else 1
+    return flight.upward_force(flight.stance_share(memory.phases[leads], gains), kind,
+                               center - memory.ground[0], rise, mass, gains)
+
+
+@jit
+def _bear(links, gains, memory, sensors, shift, mode, kind):
     """Fill the torques of the legs that stand; shift of the centre of pressure in soles, m."""
     pose, shares = memory.pose, memory.shares
     turns = (pose.turns[links.chains[0, -1]], pose.turns[links.chains[1, -1]])
@@ -140,11 +187,14 @@ def _bear(links, gains, memory, sensors, shift):
     a, b = shares[0], shares[1]
     pressure = (a * points[0][0] + b * points[1][0], a * points[0][1] + b * points[1][1],
                 a * points[0][2] + b * points[1][2])
-    moment = stance.attitude_moment(sensors.rpy[0], memory.turning,
-                                    wrapped(memory.heading[0] - sensors.rpy[0, 2]),
-                                    memory.reaction, gains)
-    force = stance.ground_force(memory.center[0], memory.center[1], pressure,
-                                a * first[2] + b * second[2], pose.carried[0], moment, gains)
+    up = _upward(gains, memory, pose.carried[0], mode, kind, a * first[2] + b * second[2])
+    x, y, z = stance.attitude_moment(sensors.rpy[0], memory.turning,
+                                     wrapped(memory.heading[0] - sensors.rpy[0, 2]),
+                                     memory.reaction, gains)
+    # Where feet are pressed little, they cannot turn the body.
+    firm = 1.0 if kind == flight.WALKS else min(up / (pose.carried[0] * GRAVITY), 1.0)
+    moment = (firm * x, firm * y, firm * z)
+    force = stance.ground_force(memory.center[0], pressure, up, moment, gains)
     for leg in range(2):
         torque, bears = memory.torque[leg], shares[leg] > 0.0
         damping = gains.stance_damping * (1.0 if bears else swing.SWUNG)
@@ -160,15 +210,16 @@ def _bear(links, gains, memory, sensors, shift):
 
 
 @jit
-def _swing(links, gains, memory, leg):
+def _swing(links, gains, memory, leg, kind):
     """Add the torques of a leg that swings, and fill the moment that it takes."""
     pose, other, way = memory.pose, 1 - leg, memory.path
     duration = clock.swing_share(gains) / gains.frequency
     share = min(max(memory.phases[leg] / clock.swing_share(gains), 0.0), 1.0)
     swing.path(share, duration, memory.lift_off[leg], memory.target[leg], gains, way)
     foot, still, moving = pose.soles[leg], pose.soles[other], memory.soles[leg]
-    for k in range(3):
-        way[0, k] += still[k]
+    if kind == flight.WALKS:
+        for k in range(3):
+            way[0, k] += still[k]
     now = (moving[0] + memory.base[0], moving[1] + memory.base[1], moving[2] + memory.base[2])
     strength = swing.LANDED if memory.landed[leg] else 1.0
     x, y, z = swing.foot_force(way, foot, now, gains)
@@ -194,10 +245,11 @@ def tick(links, gains, memory, sensors, command, mode, step):
         sensors: SensorData of one run, joints in the order of the links.
         command: velocity forward and left, m/s, and rate of turning, rad/s, shape (3,).
         mode: STAND, SHIFT or WALK.
-        step: time since the last tick, s, and the share of the weight's shift that is done.
+        step: time since the last tick, s, the share of the weight's shift that is done, and how
+            legs go: WALKS, RUNS or HOPS of ``flight``.
 
     """
-    dt, shifted = step
+    dt, shifted, kind = step
     _sense(links, gains, memory, sensors, dt)
     soles, center = memory.pose.soles, memory.center
     rate = placement.growth_rate(center[0, 2] - min(soles[0, 2], soles[1, 2]))
@@ -205,18 +257,23 @@ def tick(links, gains, memory, sensors, command, mode, step):
     axes = (math.cos(memory.heading[0]), math.sin(memory.heading[0]))
     if mode == WALK:
         _approach(gains, memory, command, dt)
-        _follow_clock(gains, memory)
-        _step(gains, memory, xi, axes, rate)
+        _follow_clock(gains, memory, kind)
+        if kind == flight.WALKS:
+            _step(gains, memory, xi, axes, rate)
+        else:
+            _fly(gains, memory, axes, kind, dt)
         ahead = axes[0] * center[1, 0] + axes[1] * center[1, 1]
         memory.integral[0] = placement.integrate(memory.integral[0], memory.wanted[0] - ahead, dt)
-        shift = stance.pressure_shift(memory.error, links.half, gains)
+        shift = (stance.pressure_shift(memory.error, links.half, gains) if kind == flight.WALKS
+                 else (0.0, 0.0))
     else:
-        _stand(gains, memory, xi, axes, rate, shifted if mode == SHIFT else 0.0)
+        _stand(gains, memory, xi, axes, rate,
+               shifted if mode == SHIFT and kind != flight.HOPS else 0.0)
         reach = links.half[0]
         shift = (min(max(gains.stand * memory.error[0], -reach), reach), 0.0)
         memory.swinging[:] = False
-    _bear(links, gains, memory, sensors, (shift[0], shift[1], 0.0))
+    _bear(links, gains, memory, sensors, (shift[0], shift[1], 0.0), mode, kind)
     memory.reaction[:] = 0.0
     for leg in range(2):
         if memory.swinging[leg]:
-            _swing(links, gains, memory, leg)
+            _swing(links, gains, memory, leg, kind)

@@ -1,0 +1,193 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The pattern of a biped whose feedback bears it: joints go where balance wants them."""
+
+import math
+
+from cpg_ros.feedback.biped.feedback import BipedFeedback
+from cpg_ros.feedback.biped.memory import WALK
+from cpg_ros.feedback.estimate import SensorData
+from cpg_ros.feedback.kinematics import GRAVITY
+from cpg_ros.motion.pattern import Pattern
+from cpg_ros.motion.plan import GaitPlan
+from cpg_ros.motion.strides import Drive
+from cpg_ros.motion.track import Track
+from cpg_ros.robots.biped_keys import SPEEDS
+import numpy as np
+
+#: A base that leans more than this, rad, or a centre of mass lower than this share of its height
+#: has fallen.
+LEANS, LOW = 1.0, 0.6
+#: It stands on its feet if the base leans less than this and no joint is further from the stand,
+#: rad, and if the feet bear this share of the weight, all for this time, s.
+UPRIGHT, NEAR, BORNE, STEADY = 0.2, 0.35, 0.4, 0.04
+#: Joints that move further than this from tick to tick, rad and rad/s, were moved by somebody.
+JUMP, FASTEST = 0.15, 40.0
+#: From the stand's angles to those of the feedback, s.
+TAKEOVER = 0.1
+#: Fastest sideways, m/s, and fastest turn, rad/s.
+ASIDE, TURN = 0.2, 0.5
+
+
+class BalancedPattern(Pattern):
+    """A pattern whose joints a biped's feedback moves.
+
+    Without feedback it is the open-loop pattern. With it, it holds the stand's angles until the
+    robot stands on its feet, then balances: it stands while disabled, and walks as wished while
+    enabled. After a fall it holds the stand until somebody has put the robot on its feet.
+
+    Attributes:
+        balance: the feedback, None for the open-loop pattern.
+        sensors: what is measured now, joints in the feedback's order; None if that is not known.
+        wish: speeds forward and to the left, m/s, and rate of turning, rad/s.
+        balancing: whether the feedback bears the robot now.
+        fallen: whether it fell, and has not been put on its feet yet.
+        falls: how often it fell.
+
+    """
+
+    def __init__(self, program: GaitPlan, ramp: float = 1.0, enabled: bool = True,
+                 drive: Drive | None = None) -> None:
+        """Stand; arguments as of Pattern, but a drive has nothing to do here."""
+        super().__init__(program, ramp, enabled)
+        self.balance: BipedFeedback | None = None
+        self.sensors: SensorData | None = None
+        self.wish = 0.0, 0.0, 0.0
+        self.balancing, self.fallen, self.falls = False, False, 0
+        self._stood, self._share = 0.0, 0.0
+        self._before: np.ndarray | None = None
+        self._places = self.robot.places
+        self._stand = self._offset[self._places]
+        self._rest = np.array(list(self.robot.held.values()))
+
+    def steer(self, stride: np.ndarray, pace: float) -> None:
+        """Do nothing: feet are placed for the wished speed."""
+
+    def apply(self, program: GaitPlan, transition: float) -> None:
+        """Change to a program; with feedback at once, whatever the transition."""
+        if self.balance is None:
+            super().apply(program, transition)
+        else:
+            self._requests.append((program, Track(program, 0.0)))
+
+    def attach(self, drive: Drive) -> None:
+        """Do nothing, likewise."""
+
+    @property
+    def level(self) -> float:
+        """0 in the stand, 1 in the gait."""
+        if self.balance is None:
+            return self._ramp.level
+        return 1.0 if self.balancing and self.balance.mode == WALK else 0.0
+
+    @property
+    def standing(self) -> bool:
+        """Tell whether it is disabled and has come to a stand."""
+        if self.balance is None:
+            return super().standing
+        return not (self.enabled or self.level or self._requests)
+
+    @property
+    def held_angles(self) -> np.ndarray:
+        """Where joints of no leg are to be driven, rad, in the order of ``robot.held``."""
+        if self.balance is None:
+            return self._rest
+        return self.balance.arms.positions if self.balancing else self.balance.arms.rest
+
+    @property
+    def in_transition(self) -> bool:
+        """Tell whether another gait is wanted than that in force."""
+        return self.balance.changing if self.balance is not None else super().in_transition
+
+    def restart(self, ramp: float, enabled: bool = True) -> None:
+        """Begin anew, from where the joints are."""
+        super().restart(ramp, enabled)
+        self.balancing, self._stood = False, 0.0
+
+    def release(self) -> None:
+        """Forget the balance, as where the sensors are out: the stand's angles are held."""
+        self.balancing, self._stood = False, 0.0
+
+    def advance(self, dt: float) -> None:
+        """Advance by dt in s and fill position, velocity and phases."""
+        balance, sensors = self.balance, self.sensors
+        if balance is None:
+            super().advance(dt)
+            return
+        self._take(balance)
+        if sensors is None:
+            self.release()
+        else:
+            self._watch(balance, sensors, dt)
+        self.velocity[:] = 0.0
+        if not self.balancing or sensors is None:
+            self.position[:] = self._offset
+            return
+        if self.enabled:
+            forward, left, turn = self.wish
+            slowest, fastest = SPEEDS[balance.program.gait]
+            balance.walk(min(max(forward, slowest), fastest), min(max(left, -ASIDE), ASIDE),
+                         min(max(turn, -TURN), TURN))
+        else:
+            balance.stand()
+        wanted = balance.advance(sensors, dt)
+        if not np.isfinite(wanted).all():
+            self._fall()
+            self.position[:] = self._offset
+            return
+        self.faults = balance.faults
+        self._share = min(1.0, self._share + dt / TAKEOVER)
+        self.position[self._places] = self._stand + self._share * (wanted - self._stand)
+        height = balance.memory.center[0, 2] - balance.memory.pose.soles[:, 2].min()
+        if height < LOW * balance.gains.height:
+            self._fall()
+
+    def _take(self, balance: BipedFeedback) -> None:
+        """Take requests of other threads."""
+        while self._requests:
+            what, how = self._requests.popleft()
+            if isinstance(what, bool):
+                self.enabled = what
+                self._ramp.go(float(what), how)
+            else:
+                balance.follow(how)
+        self._tracks[:] = [balance.track]
+
+    def _watch(self, balance: BipedFeedback, sensors: SensorData, dt: float) -> None:
+        """Find out whether the robot has fallen, was moved, or stands on its feet again."""
+        joints = sensors.joint_positions[0]
+        lean = math.acos(min(max(math.cos(sensors.rpy[0, 0]) * math.cos(sensors.rpy[0, 1]),
+                                 -1.0), 1.0))
+        moved = (self._before is not None
+                 and float(np.abs(joints - self._before).max()) > JUMP + FASTEST * dt)
+        self._before = joints.copy()
+        if self.balancing:
+            if lean > LEANS:
+                self._fall()
+            elif moved:
+                self.release()
+            return
+        off = np.abs(joints[balance.rows] - self._stand).max()
+        weight = GRAVITY * balance.links.masses.sum()
+        stands = lean < UPRIGHT and off < NEAR and sensors.foot_forces.sum() > BORNE * weight
+        self._stood = self._stood + dt if stands and not moved else 0.0
+        if self._stood >= STEADY:
+            balance.restart()
+            self.balancing, self.fallen, self._share = True, False, 0.0
+
+    def _fall(self) -> None:
+        self.release()
+        self.falls += 1
+        self.fallen = True

@@ -1,0 +1,165 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""A biped's pattern with its feedback: it stands, walks, falls, is put on its feet, walks."""
+
+import math
+
+from cpg_ros.errors import InputError
+from cpg_ros.feedback.biped.balance import BalancedPattern
+from cpg_ros.feedback.biped.feedback import BipedFeedback
+from cpg_ros.motion.plan import plan
+from cpg_ros.networks.biped import Biped
+from cpg_ros.robots.robot_file import load_robot
+import numpy as np
+import pytest
+
+pytest.importorskip('mujoco')
+
+from cpg_ros.simulation.biped_run import BipedRun  # noqa: E402
+from cpg_ros.simulation.scenario import PUSH  # noqa: E402
+
+DT = 0.002
+
+
+class Walker:
+    """A simulated humanoid that a balanced pattern moves."""
+
+    def __init__(self):
+        self.run = BipedRun('humanoid', load_robot('humanoid'))
+        robot, preset = self.run.robot, Biped.presets()['walk']
+        program = plan(robot, 'walk', preset, preset.network, 1.65)
+        self.pattern = BalancedPattern(program, 1.0, enabled=False)
+        self.pattern.balance = BipedFeedback(robot, program=program)
+        self.before = self.run.body.rates[None].copy()
+        self.blind, self.tilt = False, 0.0
+
+    def go(self, seconds):
+        """Go on; return by how much the base moved forward, m."""
+        body, pattern = self.run.body, self.pattern
+        start, self.tilt = body.base[0], 0.0
+        for _ in range(round(seconds / DT)):
+            sensors = self.run.measure(self.before)
+            self.before[0] = body.rates
+            pattern.sensors = None if self.blind else sensors
+            pattern.advance(DT)
+            body.command(pattern.position[pattern.robot.places])
+            body.step()
+            self.tilt = max(self.tilt, math.acos(min(body.axes[2, 2], 1.0)))
+        return body.base[0] - start
+
+
+@pytest.fixture
+def walker():
+    return Walker()
+
+
+def test_it_stands_walks_as_wished_and_stops(walker):
+    pattern = walker.pattern
+    assert abs(walker.go(1.0)) < 0.03 and pattern.balancing and pattern.standing
+    pattern.wish = 0.3, 0.0, 0.0
+    pattern.enable(True, 1.0)
+    walker.go(3.0)
+    assert pattern.level == 1.0 and not pattern.standing
+    assert walker.go(5.0) == pytest.approx(1.5, rel=0.1)
+    pattern.enable(False, 1.0)
+    walker.go(4.0)
+    assert pattern.standing and abs(walker.go(2.0)) < 0.02
+    assert walker.tilt < 0.1 and not pattern.falls
+
+
+def test_wishes_keep_to_what_was_tried(walker):
+    pattern = walker.pattern
+    pattern.wish = 9.0, -9.0, 9.0
+    pattern.enable(True, 1.0)
+    walker.go(0.2)
+    assert pattern.balance._command == pytest.approx([0.6, -0.2, 0.5])
+
+
+def test_after_a_fall_it_holds_the_stand_until_it_is_put_on_its_feet(walker):
+    pattern, body = walker.pattern, walker.run.body
+    pattern.wish = 0.2, 0.0, 0.0
+    pattern.enable(True, 1.0)
+    walker.go(4.0)
+    body.push(np.array([0.0, 1200.0, 0.0]), PUSH)
+    walker.go(2.5)
+    assert pattern.falls == 1 and pattern.fallen and not pattern.balancing
+    np.testing.assert_allclose(pattern.position, pattern.robot.column('offset'))
+    assert not pattern.velocity.any()
+    # Like robot_sim's ~/reset.
+    body.reset()
+    walker.go(1.0)
+    assert pattern.balancing and not pattern.fallen
+    walker.go(3.0)
+    assert walker.go(4.0) > 0.5 and pattern.falls == 1
+
+
+def test_a_robot_that_is_moved_in_mid_stride_starts_from_the_stand(walker):
+    pattern, body = walker.pattern, walker.run.body
+    pattern.wish = 0.3, 0.0, 0.0
+    pattern.enable(True, 1.0)
+    walker.go(5.05)
+    body.reset()
+    walker.go(0.02)
+    assert not pattern.balancing and not pattern.falls
+    walker.go(4.0)
+    assert walker.go(3.0) > 0.6 and not pattern.falls
+
+
+def test_without_sensors_it_holds_the_stand(walker):
+    pattern = walker.pattern
+    walker.blind = True
+    walker.go(0.3)
+    np.testing.assert_allclose(pattern.position, pattern.robot.column('offset'))
+    assert not pattern.balancing and pattern.level == 0.0
+    walker.blind = False
+    walker.go(2.0)
+    assert pattern.balancing and walker.tilt < 0.1
+
+
+def test_without_feedback_it_is_the_open_loop_pattern(walker):
+    pattern = walker.pattern
+    pattern.balance = None
+    pattern.enable(True, 0.1)
+    for _ in range(1000):
+        pattern.advance(DT)
+    angles = []
+    for _ in range(303):
+        pattern.advance(DT)
+        angles.append(pattern.position.copy())
+    # The hips swing as the robot file says: by the weight of the waveform, which is -1 to 1.
+    hip = [joint.name for joint in pattern.robot.joints].index('left_hip_pitch_joint')
+    weight = pattern.robot.joints[hip].weights[0]
+    assert np.ptp(np.array(angles)[:, hip]) == pytest.approx(2.0 * abs(weight), rel=0.02)
+
+
+def test_another_frequency_keeps_the_phase(walker):
+    pattern = walker.pattern
+    pattern.wish = 0.2, 0.0, 0.0
+    pattern.enable(True, 1.0)
+    walker.go(4.0)
+    phase, preset = pattern.phases[0], Biped.presets()['walk']
+    pattern.apply(plan(pattern.robot, 'walk', preset, preset.network, 1.8), 1.0)
+    walker.go(DT)
+    assert (pattern.phases[0] - phase - 1.8 * DT + 0.5) % 1.0 == pytest.approx(0.5, abs=0.01)
+    assert pattern.balance.gains.frequency == 1.8
+    walker.go(4.0)
+    assert walker.tilt < 0.2 and not pattern.falls
+
+
+def test_a_robot_without_soles_has_no_balance():
+    robot = load_robot('biped')
+    preset = Biped.presets()['walk']
+    with pytest.raises(InputError, match='no part biped'):
+        BipedFeedback(robot, program=plan(robot, 'walk', preset, preset.network, 1.0))
