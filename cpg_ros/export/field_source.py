@@ -21,14 +21,42 @@ the rates; see integration.field_code.
 from textwrap import fill
 from typing import Any, NamedTuple
 
-from cpg_ros.export.c_text import CPrinter, WIDTH
+from cpg_ros.export.c_text import WIDTH
 from cpg_ros.integration.field_code import lowered_parts, LoweredPart
 from cpg_ros.networks.equations import Equations
 import sympy
+from sympy.printing.c import C99CodePrinter
 
 HEADS = {'drive': 'static void drive(const cpg_real *past, const cpg_real *p, cpg_real *driven)',
          'field': 'static void field(const cpg_real *z, const cpg_real *driven, const cpg_real *p,'
                   '\n                  cpg_real *out)'}
+
+
+class _Printer(C99CodePrinter):  # type: ignore[misc]
+    """C in the type that the macros R (of a number) and F (of a function) stand for."""
+
+    def _print_Float(self, value: Any) -> str:
+        return f'R({float(value)!r})'
+
+    _print_Integer = _print_Rational = _print_Pi = _print_Half = _print_One = _print_Float
+    _print_NegativeOne = _print_Zero = _print_Exp1 = _print_Float
+
+    def _print_Pow(self, power: Any) -> str:
+        base, exponent = power.args
+        if exponent.is_Integer and 0 < abs(exponent) <= 4:
+            text = '*'.join([self.parenthesize(base, 100)] * abs(int(exponent)))
+            return f'({text})' if exponent > 0 else f'R(1.0)/({text})'
+        if abs(float(exponent)) == 0.5:
+            root = f'F(sqrt)({self._print(base)})'
+            return root if exponent > 0 else f'R(1.0)/{root}'
+        return f'F(pow)({self._print(base)}, {self._print(exponent)})'
+
+    def _print_Function(self, call: Any) -> str:
+        name = {'Abs': 'fabs'}.get(type(call).__name__, type(call).__name__.lower())
+        return f'F({name})({", ".join(map(self._print, call.args))})'
+
+    _print_Abs = _print_exp = _print_sin = _print_cos = _print_tanh = _print_Function
+    _print_cosh = _print_log = _print_Function
 
 
 class FieldSource(NamedTuple):
@@ -37,7 +65,7 @@ class FieldSource(NamedTuple):
     Attributes:
         text: C.
         driven: arrays, of one number for each cell, that drive fills in.
-        parameters: numbers in p: one of each row, or one for each cell.
+        parameters: numbers in p, row by row: one, or one for each cell.
 
     """
 
@@ -49,15 +77,15 @@ class FieldSource(NamedTuple):
 class _Names:
     """What symbols are called in C, at cell i."""
 
-    def __init__(self, equations: Equations, cells: int) -> None:
+    def __init__(self, equations: Equations, cells: int, each: bool) -> None:
         self._p: dict[str, str] = {}
         self.size = 0
         for row in equations.rows:
-            own = row in equations.by_cell
+            own = each or row in equations.by_cell
             self._p[f'p_{row}'] = f'p[{self.size} + i]' if own else f'p[{self.size}]'
             self.size += cells if own else 1
         self.sources: dict[tuple[int, ...], int] = {}
-        self._printer = CPrinter()
+        self._printer = _Printer()
 
     def element(self, part: LoweredPart, expression: Any, place: str = 'i') -> str:
         """Return C of an expression at a place."""
@@ -117,10 +145,17 @@ def _function(part: LoweredPart, names: _Names) -> str:
     return '\n'.join([HEADS[part.name], '{', *arrays, body, '}'])
 
 
-def field_source(equations: Equations, cells: int) -> FieldSource:
-    """Write the functions of a network of so many cells."""
+def field_source(equations: Equations, cells: int, each: bool = False) -> FieldSource:
+    """Write the functions of a network of so many cells.
+
+    Args:
+        equations: of the network.
+        cells: that it has.
+        each: every row of p has one number for each cell.
+
+    """
     parts = lowered_parts(equations)
-    names = _Names(equations, cells)
+    names = _Names(equations, cells, each)
     functions = [_function(part, names) for part in parts]
     sources = [f'static CPG_ROM uint8_t source_{number}[CPG_CELLS] = '
                f'{{{", ".join(map(str, source))}}};' for source, number in names.sources.items()]

@@ -17,10 +17,5 @@
 Imports ``networks`` and what is below; knows nothing of ROS.
 """
 
-from cpg_ros.errors import needed
-
-# Before any of its modules: one line where numba is missing, not a traceback.
-needed('numba')
-
-__all__ = ['compilation', 'field_code', 'jit', 'kernel', 'kernel_arguments', 'loops',
-           'simulate', 'stepper']
+__all__ = ['field_code', 'jit', 'kernel', 'kernel_arguments', 'loops',
+           'machine_code', 'plain_code', 'simulate', 'stepper']

@@ -12,73 +12,26 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""How the numerical kernels are compiled, and the elementary functions they share."""
+"""How the numerical kernels are compiled, and the elementary functions they share.
 
+By numba; where that is missing they are plain Python, whose steps are made in C
+(integration.kernel), and which is too slow for feedback and simulation (see ``compiled``).
+"""
+
+from importlib.util import find_spec
 import math
-from pathlib import Path
-from typing import Any
 
-from cpg_ros.files.cache_folder import writing
-from cpg_ros.networks import generated
-from numba import config, njit, typeof
-from numba.core.caching import FunctionCache
 import numpy as np
 
-#: No division checks (they keep loops from being vectorised), fused multiply-add allowed,
-#: and the interpreter lock released: the publishing thread must not wait for parameters.
-OPTIONS: dict[str, Any] = {'error_model': 'numpy', 'fastmath': {'contract'}, 'nogil': True}
+#: Whether kernels are machine code.
+COMPILED = find_spec('numba') is not None
+if COMPILED:
+    from cpg_ros.integration.machine_code import bound, entry, jit, kept, noticing, part, prange
+else:
+    from cpg_ros.integration.plain_code import bound, entry, jit, kept, noticing, part, prange
 
-jit = njit(**OPTIONS)
-#: For what is built into its caller, where a loop of known length can be unrolled.
-part = njit(inline='always', **OPTIONS)
-
-
-class _Disk(FunctionCache):
-    """Machine code on disk, as far as there is room: numba would end with a full disk."""
-
-    def save_overload(self, sig, data):
-        with writing():
-            super().save_overload(sig, data)
-
-
-def kept(function, folder: Path | None, **options):
-    """Compile a function when it is first called, and keep its machine code on disk.
-
-    Args:
-        function: not compiled yet.
-        folder: which is another one whenever something that the function calls has changed;
-            without one, nothing is kept.
-        options: of numba, beside those of every kernel.
-
-    """
-    if folder is not None:
-        # Read here and now: what others compile with numba is kept where it was.
-        numba: Any = config
-        others, numba.CACHE_DIR = numba.CACHE_DIR, str(folder)
-        try:
-            compiled = njit(**OPTIONS, **options)(function)
-            compiled._cache = _Disk(function)
-        finally:
-            numba.CACHE_DIR = others
-        # Where the folder cannot be written numba tries others, whose code may be out of date.
-        if Path(compiled.stats.cache_path).is_relative_to(folder):
-            return compiled
-    return njit(**OPTIONS, **options)(function)
-
-
-def entry(function):
-    """Compile an entry point of the package, whose machine code is kept on disk."""
-    return kept(function, generated.folder())
-
-
-def bound(kernel, *arguments):
-    """Return a kernel's machine code for arguments like these, to be called as it is.
-
-    A call of a kernel looks at the type of every argument; with tuples of arrays that takes longer
-    than a small kernel does. The machine code does not look: the arguments it is called with must
-    be of these types, arrays of these numbers of dimensions and orders in memory.
-    """
-    return kernel.compile(tuple(typeof(argument) for argument in arguments))
+__all__ = ['COMPILED', 'bound', 'bound_by_first_call', 'entry', 'exp', 'fetch', 'jit', 'kept',
+           'noticing', 'part', 'prange', 'renamed', 'tanh']
 
 
 def bound_by_first_call(kernel):

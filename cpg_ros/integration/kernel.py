@@ -34,12 +34,12 @@ import math
 from types import FunctionType
 from typing import Any
 
-from cpg_ros.integration.jit import bound_by_first_call, jit, kept, part, renamed
+from cpg_ros.errors import needed
+from cpg_ros.integration.jit import bound_by_first_call, jit, kept, part, prange, renamed
 from cpg_ros.integration.kernel_arguments import Ring, Samples, System
 from cpg_ros.networks import generated
 from cpg_ros.networks.equations import equations_of
 from cpg_ros.networks.network import Network
-from numba import prange
 import numpy as np
 
 
@@ -290,12 +290,17 @@ class Kernels:
 
 
 @cache
-def kernels(network: type[Network]) -> Kernels:
+def numba_kernels(network: type[Network]) -> Kernels:
     """Return the compiled entry points of a kind of network, compiled when they are first used.
 
     A trajectory by itself has code of its own, built in one piece, its loops unrolled; lanes run
     through loops of any length in vector registers, which need functions of their own.
+
+    Raises:
+        MissingLibraryError: numba is not installed.
+
     """
+    needed('numba')
     _, _, steps_of_one = _compiled(part, network, alone=True)
     past_state, restart, steps = _compiled(jit, network)
     names = {'_past_state': past_state, '_restart': restart, '_steps': steps,
@@ -314,3 +319,18 @@ def kernels(network: type[Network]) -> Kernels:
 
     return Kernels(of_network(set_slope), of_network(advance), of_network(integrate_one),
                    of_network(integrate), of_network(integrate_many, parallel=True))
+
+
+# What makes the kernels of this process.
+_maker: Callable[[type[Network]], Kernels] = numba_kernels
+
+
+def use(maker: Callable[[type[Network]], Kernels]) -> None:
+    """Let others than numba make the kernels from now on, in all of this process."""
+    global _maker
+    _maker = maker
+
+
+def kernels(network: type[Network]) -> Kernels:
+    """Return the entry points of a kind of network, made when they are first used."""
+    return _maker(network)

@@ -17,11 +17,6 @@
 Imports ``dynamics``, ``robots`` and what is below; knows nothing of ROS.
 """
 
-from cpg_ros.errors import needed
-
-# Before any of its modules: one line where numba is missing, not a traceback.
-needed('numba')
-
 __all__ = [
            'absorption',
            'duty',

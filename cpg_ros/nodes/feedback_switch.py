@@ -21,6 +21,7 @@ from typing import Any
 from cpg_ros.feedback.kinematics import Geometry, geometry_of
 from cpg_ros.feedback.odometry import Odometry
 from cpg_ros.feedback.warm_up import warm_up
+from cpg_ros.integration.jit import COMPILED
 from cpg_ros.motion.pattern import Pattern
 from cpg_ros.motion.plan import GaitPlan
 from cpg_ros.motion.strides import Drive
@@ -38,8 +39,10 @@ import numpy as np
 from rclpy.parameter import Parameter
 
 
-def uncalibrated(robot: Robot) -> str:
-    """Return what feedback needs and a robot file lacks, or ''."""
+def lacking(robot: Robot) -> str:
+    """Return what feedback needs, and this machine or the robot file lacks, or ''."""
+    if not COMPILED:
+        return 'it needs numba, which is not installed'
     if robot.biped is not None:
         return ''
     if robot.geometry is None:
@@ -70,8 +73,7 @@ def usual(node: Any, robot: Robot, combined: str) -> Spec:
     measured = node.get_parameter(f'{PREFIX}joint_states_topic').value
     own = combined and (node.resolve_topic_name(combined) == node.resolve_topic_name(measured))
     helps = robot.feedback is None or robot.feedback.enabled
-    return replace(feedback_parameters.SWITCH,
-                   default=helps and not (own or uncalibrated(robot)))
+    return replace(feedback_parameters.SWITCH, default=helps and not (own or lacking(robot)))
 
 
 class FeedbackSwitch:
@@ -107,7 +109,7 @@ class FeedbackSwitch:
 
     def obstacle(self) -> str:
         """Return why the feedback cannot be on, or ''."""
-        if missing := uncalibrated(self._pattern.robot):
+        if missing := lacking(self._pattern.robot):
             return missing
         topic = self._node.resolve_topic_name(self._value('joint_states_topic'))
         if topic in self._own:

@@ -18,6 +18,7 @@ from functools import partial
 import sys
 import time
 
+from cpg_ros.export.c_kernel import KERNELS
 from cpg_ros.feedback.biped.balance import BalancedPattern
 from cpg_ros.motion.pattern import Pattern
 from cpg_ros.motion.plan import PlanError
@@ -34,6 +35,7 @@ from cpg_ros.nodes.generator_parameters import (
     COMMANDS,
     exclusive,
     gait_spec,
+    KERNEL,
     NETWORK,
     network_for,
     Planner,
@@ -79,12 +81,13 @@ class Generator(StartedNode):
         given = {name: one.value for name, one in self._parameter_overrides.items()}
         self._parameter_overrides['network'] = Parameter('network', value=network_for(
             given.get('network', NETWORK.default), given.get('robot')))
-        self._declare({'network': NETWORK})
+        self._declare({'network': NETWORK, 'kernel': KERNEL})
+        self._one_of('kernel', KERNELS)
         try:
             network = find_network(self._value('network'))
         except NetworkError as error:
             raise StartError(f'network {error}') from error
-        compile_kernels(self._value('network'), self)
+        compile_kernels(self._value('network'), self._value('kernel'), self)
         self._declare(specs(network))
         self._declare({'exclusive': exclusive(self._value('command'))})
         presets = presets_of(network, self._value('presets'))
@@ -335,7 +338,7 @@ class Generator(StartedNode):
 
 def main(args: list[str] | None = None) -> int:
     """Run the node until a signal ends it; return the exit code."""
-    known = {'network': NETWORK, **specs(find_network(NETWORK.default)),
+    known = {'network': NETWORK, 'kernel': KERNEL, **specs(find_network(NETWORK.default)),
              ENABLED: feedback_parameters.SWITCH, **feedback_parameters.TOPICS}
     return run(Generator, NAME, 'Publishes the joint states of a gait; the parameters of the '
                "networks and the feedback's gains are listed by ros2 param describe.", known, args,

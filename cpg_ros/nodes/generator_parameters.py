@@ -23,6 +23,7 @@ from pathlib import Path
 from typing import Any
 
 from cpg_ros.errors import CpgError
+from cpg_ros.export.c_kernel import KERNELS
 from cpg_ros.feedback.biped.gains import BipedGains
 from cpg_ros.motion.plan import gait_of, GaitPlan, plan, PlanError
 from cpg_ros.networks.network import Network, Preset
@@ -41,6 +42,9 @@ NETWORK = Spec('delayed', 'network of cells that generates the rhythm', read_onl
                                   'append a number of legs, as in delayed6, for a variant; '
                                   "without one, the robot file's number of legs is used where the "
                                   'file asks for that variant'))
+KERNEL = Spec('auto', 'what steps the network: code compiled by numba, or the exported C (c), for '
+              'which a C compiler is needed; auto takes numba where it is installed',
+              read_only=True, constraints=one_of(KERNELS))
 
 
 def specs(network: type[Network]) -> dict[str, Spec]:

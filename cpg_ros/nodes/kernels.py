@@ -17,7 +17,8 @@
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from cpg_ros.integration.compilation import noticing
+from cpg_ros.export.c_kernel import choose
+from cpg_ros.integration.jit import COMPILED, noticing
 from cpg_ros.motion.network_kernels import precompile
 from cpg_ros.nodes.start_progress import StartProgress
 from rclpy.node import Node
@@ -27,8 +28,22 @@ from rclpy.node import Node
 NETWORK, FEEDBACK, BALANCE = 20.0, 25.0, 15.0
 
 
-def compile_kernels(network: str, node: Node) -> None:
-    """Compile or load the kernels of a network, named as for find_network."""
+def compile_kernels(network: str, kernel: str, node: Node) -> None:
+    """Compile or load the kernels of a network, named as for find_network.
+
+    Args:
+        network: its name.
+        kernel: one of KERNELS, by which they are made.
+        node: that waits for them.
+
+    Raises:
+        CpgError: what they are made by is not installed.
+
+    """
+    choose(kernel)
+    if not COMPILED:
+        node.get_logger().info('numba is not installed: the network is stepped in C, and there is '
+                               'no feedback')
     with announced(node, f"the network '{network}'", NETWORK):
         precompile(network)
 

@@ -24,7 +24,7 @@ import sys
 from types import FrameType
 from typing import NoReturn
 
-from cpg_ros.errors import MissingLibraryError
+from cpg_ros.errors import MissingLibraryError, needed
 
 #: The signals by which users, terminals and launch files end a process.
 ENDINGS = signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT
@@ -37,6 +37,8 @@ EXECUTABLES = {'generator': 'nodes.generator', 'robot_sim': 'nodes.robot_sim',
                **{name: f'tools.{name}'
                   for name in ('inversion', 'cpg', 'demo', 'analyze', 'check_robot', 'optimize',
                                'reproduce', 'tune', 'calibrate', 'atlas', 'export')}}
+#: What does with kernels in plain Python, and steps in C; for the others that is far too slow.
+WITHOUT_NUMBA = ('generator', 'export', 'unitree_bridge', 'check_robot')
 
 
 def command(name: str) -> list[str]:
@@ -59,6 +61,8 @@ def start(name: str) -> int:
         os.environ.setdefault('AMENT_PREFIX_PATH', sys.prefix)
     try:
         main = import_module(f'cpg_ros.{EXECUTABLES[name]}').main
+        if 'cpg_ros.integration.jit' in sys.modules and name not in WITHOUT_NUMBA:
+            needed('numba')
     except MissingLibraryError as error:
         print(f'{name}: {error}', file=sys.stderr)
         return error.exit_code

@@ -26,6 +26,7 @@ from pathlib import Path
 import sys
 
 from cpg_ros.errors import CpgError, InputError
+from cpg_ros.export.c_kernel import choose
 from cpg_ros.export.c_project import CProject, SUBSTEP
 from cpg_ros.export.fixed_point import FixedData, FixedProject
 from cpg_ros.export.gait_data import CFormat, GaitData
@@ -168,6 +169,7 @@ def _project(chosen: argparse.Namespace, plans: Sequence[GaitPlan]) -> tuple[CPr
 
 def _export(chosen: argparse.Namespace) -> int:
     _refuse_options(chosen)
+    choose()
     plans = _plans(chosen)
     if chosen.target == 'petoi':
         _write(chosen.out, {'petoi_skills.h': skills(plans, _title(plans))})

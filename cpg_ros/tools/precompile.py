@@ -24,8 +24,10 @@ import subprocess
 import sys
 import time
 
+from cpg_ros.export.c_kernel import choose
 from cpg_ros.feedback.kinematics import geometry_of
 from cpg_ros.feedback.warm_up import warm_up
+from cpg_ros.integration.jit import COMPILED
 from cpg_ros.motion.network_kernels import precompile
 from cpg_ros.robots.robot_file import load_robot
 from cpg_ros.tools.command_line import say
@@ -38,7 +40,10 @@ ROBOT = 'unitree_go2'
 
 def compile_part(part: str) -> None:
     """Compile or load the kernels of a network, or those of the feedback."""
+    choose()
     if part == 'feedback':
+        if not COMPILED:
+            return
         robot = load_robot(ROBOT)
         warm_up(geometry_of(robot), len(robot.joints))
     else:

@@ -16,7 +16,8 @@
 
 import math
 
-from cpg_ros.integration.jit import OPTIONS, tanh
+from cpg_ros.integration.jit import tanh
+from cpg_ros.integration.machine_code import OPTIONS
 from depth import examples
 from hypothesis import given
 from hypothesis import strategies as st

@@ -18,7 +18,8 @@ from dataclasses import replace
 from itertools import pairwise
 import math
 
-from cpg_ros.integration.jit import exp, OPTIONS
+from cpg_ros.integration.jit import exp
+from cpg_ros.integration.machine_code import OPTIONS
 from cpg_ros.integration.simulate import simulate
 from cpg_ros.networks.biped import Biped
 from cpg_ros.networks.quadruped import Quadruped

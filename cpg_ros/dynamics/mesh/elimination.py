@@ -15,11 +15,12 @@
 """The compiled part of collocation: every interval's linear equations, and their chain.
 
 They are small and many. Gaussian elimination written out, with the right-hand sides as further
-columns, takes a fraction of the time of a call of LAPACK for each.
+columns, takes a fraction of the time of a call of LAPACK for each. Where numba is missing it is
+LAPACK nevertheless.
 """
 
 from cpg_ros.dynamics.mesh import collocation
-from cpg_ros.integration.jit import entry
+from cpg_ros.integration.jit import COMPILED, entry
 import numpy as np
 
 
@@ -123,6 +124,12 @@ def transfer(jacobians: np.ndarray, lengths: np.ndarray, sources: np.ndarray) ->
 
     """
     n, s, d = jacobians.shape[:3]
+    if not COMPILED:
+        matrices = np.eye(s * d) - np.einsum('i,pq,iqrc->iprqc', lengths, collocation.A, jacobians
+                                             ).reshape(n, s * d, s * d)
+        ones = np.broadcast_to(np.tile(np.eye(d), (s, 1)), (n, s * d, d))
+        sides = np.concatenate([ones, sources.reshape(n, s * d, -1)], axis=2)
+        return np.linalg.solve(matrices, sides).reshape(n, s, d, -1)
     answers = np.empty((n, s, d, d + sources.shape[-1]))
     if not _solved(collocation.A, lengths, np.ascontiguousarray(jacobians),
                    np.ascontiguousarray(sources), answers):
@@ -132,6 +139,9 @@ def transfer(jacobians: np.ndarray, lengths: np.ndarray, sources: np.ndarray) ->
 
 def summed(jacobians: np.ndarray, lengths: np.ndarray, answers: np.ndarray) -> np.ndarray:
     """Integrate ``J dY`` over every interval, dY the answers at the nodes, (n, d, k)."""
+    if not COMPILED:
+        weights = np.multiply.outer(lengths, collocation.WEIGHTS)[..., None, None]
+        return (weights * jacobians @ answers).sum(axis=1)
     steps = np.zeros((jacobians.shape[0], jacobians.shape[2], answers.shape[-1]))
     _summed(collocation.WEIGHTS, lengths, np.ascontiguousarray(jacobians), answers, steps)
     return steps
@@ -147,5 +157,10 @@ def chained(steps: np.ndarray) -> np.ndarray:
     n, d, width = steps.shape
     reached = np.zeros((n + 1, d, width))
     reached[0, :, :d] = np.eye(d)
-    _chained(steps, reached)
+    if COMPILED:
+        _chained(steps, reached)
+        return reached
+    for i in range(n):
+        reached[i + 1] = steps[i, :, :d] @ reached[i]
+        reached[i + 1, :, d:] += steps[i, :, d:]
     return reached

@@ -24,7 +24,7 @@ iteration. Those of about one size stay together in a block.
 
 from itertools import pairwise
 
-from cpg_ros.integration.jit import entry
+from cpg_ros.integration.jit import COMPILED, entry
 import numpy as np
 
 #: Two spaces this close are one.
@@ -79,6 +79,15 @@ def _round(factors, columns, whole):
                 whole[i, j] = total
 
 
+def _round_by_lapack(factors: np.ndarray, columns: np.ndarray, whole: np.ndarray) -> None:
+    """Do what _round does, where numba is missing."""
+    for factor in factors:
+        columns[:], upper = np.linalg.qr(factor @ columns)
+        signs = np.sign(np.diag(upper))
+        columns *= signs
+        whole[:] = signs[:, np.newaxis] * upper @ whole
+
+
 def eigenvalues(factors: np.ndarray) -> np.ndarray:
     """Return the eigenvalues of ``F_n ... F_2 F_1``.
 
@@ -94,7 +103,7 @@ def eigenvalues(factors: np.ndarray) -> np.ndarray:
     columns = np.linalg.qr(np.random.default_rng(0).normal(size=(d, d)))[0]
     for _ in range(ROUNDS):
         start, whole = columns.copy(), np.eye(d)
-        _round(factors, columns, whole)
+        (_round if COMPILED else _round_by_lapack)(factors, columns, whole)
         back = start.T @ columns
         if not np.isfinite(back).all():
             return np.full(d, np.nan, dtype=complex)

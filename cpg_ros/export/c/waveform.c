@@ -7,7 +7,7 @@ static void observe(const cpg_track *t, cpg_real now[3][CPG_COMPONENTS])
     CPG_ROM cpg_gait *gait = &cpg_gaits[t->gait];
     const cpg_real s = R(1.0) - t->ahead / CPG_STEP, left = R(1.0) - s;
     const int16_t start = t->head > 0 ? (int16_t)(t->head - 1) : (int16_t)(CPG_NODES - 1);
-    const cpg_real *before = t->head == t->kink ? t->before : t->slope[t->head];
+    const cpg_real *before = arriving(t, t->head);
     /* Weights of both slopes and of the rise in between, for x' and x''. */
     const cpg_real one = gait->period / TURN / gait->peak;
     const cpg_real two = one * gait->period / TURN / CPG_STEP;
