@@ -65,12 +65,14 @@ JUDGED, FRESH = 64, 10_000_019
 
 @dataclass(frozen=True)
 class PriceJob:
-    """Prices of some gains: attributes as the arguments of tune_feedback.
+    """Prices of some gains.
 
     Attributes:
+        robot, model, gaits: as the arguments of tune_feedback.
         candidates: their gains.
         seed: of pushes and ground.
         costs: of transport without feedback, by gait.
+        kp, kd: gains of all joints, None for the robot's own.
 
     """
 
