@@ -109,7 +109,8 @@ def main() -> int:
     still = SimpleNamespace(program=program, robot=robot, faults=0, held=0, recovering=False,
                             standing=True)
     deaf = SimpleNamespace(out='', active=False, state=lambda now: {})
-    diagnostics = Diagnostics(node, still, ticker, OtherPublishers(node, ()), None, deaf)
+    diagnostics = Diagnostics(node, still, ticker, OtherPublishers(node, ()), None, deaf,
+                              '~/enable')
     node.create_service(SetBool, '~/enable', lambda request, response: response)
     executor = SingleThreadedExecutor()
     executor.add_node(node)

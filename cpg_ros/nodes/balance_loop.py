@@ -99,6 +99,11 @@ class BalanceLoop:
             return 'the robot has fallen: holding the stand until it is on its feet'
         return 'the robot was moved by somebody: standing it up again'
 
+    @staticmethod
+    def targets(position: np.ndarray) -> np.ndarray:
+        """Return what to send to joints that are wanted at angles: the torques are in them."""
+        return position
+
     def sense(self, _: float, now: float) -> None:
         """Read the sensors for the coming tick; now in s."""
         pattern, inputs = self._pattern, self._inputs
