@@ -74,8 +74,8 @@ def fold_curves(job: tuple[Chart, str, list[Edge]]) -> list[Boundary]:
         for fold in branch.folds:
             if not _known(chart, found, one, fold.value):
                 found.append(fold_curve(chart, gait, fold.place, one))
-        if not all(end.why != 'period' or _known(chart, found, one, end.value)
-                   for end in branch.ends):
+        if any(end.why == 'period' and not _known(chart, found, one, end.value)
+               for end in branch.ends):
             found += infinite_periods(chart, gait, branch, one)
     return found
 

@@ -97,8 +97,8 @@ def _compiled(network: type[Network], library: Path) -> None:
         done = subprocess.run([name, *OPTIONS, 'cpg.c', '-lm', '-o', 'cpg.so'], cwd=folder,
                               capture_output=True, text=True)
         if done.returncode:
-            said = [line for line in done.stderr.splitlines() if 'error' in line]
-            line = next(iter(said), f'it ended with {done.returncode}')
+            line = next((line for line in done.stderr.splitlines() if 'error' in line),
+                        f'it ended with {done.returncode}')
             raise NoCompiler(f"the C compiler '{name}' cannot make the kernels of the network "
                              f"'{network.name}': {line}")
         os.replace(Path(folder) / 'cpg.so', library)

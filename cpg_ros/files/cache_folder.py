@@ -33,7 +33,7 @@ from typing import IO
 
 _LOGGER = logging.getLogger(__name__)
 #: Folders that are kept, the last used ones, of about 1 MB; those of running processes always are.
-#: The package's own tests use 40, and each edit of a source makes new ones.
+#: The package's own tests use 31, and each edit of a source makes new ones.
 KEPT = 128
 #: In each folder: locked by the processes that use it, its time is that of the last start.
 _LOCK = 'in_use'

@@ -76,7 +76,7 @@ class BalanceLoop:
 
     def ages(self, now: float) -> dict[str, float]:
         """Return name -> time since the last plausible message, s; inf for none."""
-        return {monitor.name: now - monitor.believed for monitor in self._inputs.monitors}
+        return self._inputs.ages(now)
 
     @property
     def state(self) -> str:
@@ -111,11 +111,7 @@ class BalanceLoop:
             pattern.balance = None
             return
         inputs.take(now, pattern.enabled)
-        found, self.waiting = [], False
-        for monitor in inputs.monitors:
-            if fault := monitor.fault(now):
-                found.append(f'{monitor.name}: {fault} for {now - monitor.since:.1f} s')
-                self.waiting = self.waiting or monitor.believed == -np.inf
+        found, self.waiting = inputs.faults(now)
         self.faults = '; '.join(found)
         measured, sensors = inputs.sensor_data, self._sensors
         sensors.joint_positions[0, self._rows] = measured.joint_positions[0]

@@ -105,7 +105,7 @@ class FeedbackLoop:
 
     def ages(self, now: float) -> dict[str, float]:
         """Return name -> time since the last plausible message, s; inf for none."""
-        return {monitor.name: now - monitor.believed for monitor in self._inputs.monitors}
+        return self._inputs.ages(now)
 
     def sense(self, dt: float, now: float) -> None:
         """Read the sensors and correct the coming tick by them; dt and now in s."""
@@ -134,11 +134,8 @@ class FeedbackLoop:
 
     def _judge(self, now: float) -> None:
         """Find out what interrupts the feedback."""
-        inputs, found, self.waiting = self._inputs, [], False
-        for monitor in inputs.monitors:
-            if fault := monitor.fault(now):
-                found.append(f'{monitor.name}: {fault} for {now - monitor.since:.1f} s')
-                self.waiting = self.waiting or monitor.believed == -math.inf
+        inputs = self._inputs
+        found, self.waiting = inputs.faults(now)
         pattern = self._pattern
         program = pattern.program
         if program.motion.efference is None:

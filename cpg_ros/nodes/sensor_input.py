@@ -141,6 +141,19 @@ class SensorInput:
         for monitor in self.monitors:
             monitor.restart()
 
+    def ages(self, now: float) -> dict[str, float]:
+        """Return name -> time since the last plausible message, s; inf for none."""
+        return {monitor.name: now - monitor.believed for monitor in self.monitors}
+
+    def faults(self, now: float) -> tuple[list[str], bool]:
+        """Return what is wrong with inputs, and whether a faulty one has never arrived."""
+        found, waiting = [], False
+        for monitor in self.monitors:
+            if fault := monitor.fault(now):
+                found.append(f'{monitor.name}: {fault} for {now - monitor.since:.1f} s')
+                waiting = waiting or monitor.believed == -math.inf
+        return found, waiting
+
     def take(self, now: float, moving: bool) -> None:
         """Read the messages that have arrived.
 
