@@ -29,7 +29,7 @@ from typing import Any, Protocol
 from cpg_ros.errors import CpgError
 from cpg_ros.short_repr import ShortRepr
 import numpy as np
-from scipy.optimize import brentq
+import scipy
 
 #: Newton stops at steps this short; what is left then is of the order of its square.
 TOLERANCE = 1e-9
@@ -219,8 +219,9 @@ def next_crossing(here: CurvePoint, way: float, value: float) -> CurvePoint | No
         while sign * gap(reach) > 0.0:
             reach *= 2.0
         # Newton's method may put the point itself beyond a value that is next to it.
-        near = predict_and_correct(here, way * brentq(gap, 0.0, reach, xtol=1e-2 * reach)
-                                   if sign * gap(0.0) > 0.0 else 0.0)
+        ahead = (scipy.optimize.brentq(gap, 0.0, reach, xtol=1e-2 * reach)
+                 if sign * gap(0.0) > 0.0 else 0.0)
+        near = predict_and_correct(here, way * ahead)
     except np.linalg.LinAlgError:
         return None
     return point_at_value(near, value) if near is not None and near.rate else None
@@ -241,9 +242,9 @@ def locate_fold(after: CurvePoint, step: float) -> CurvePoint | None:
             return None
         for reach in (1.1, 1.4, 2.0):
             if rate(-reach * step) * after.rate < 0.0:
-                found = predict_and_correct(after,
-                                            brentq(rate, -reach * step, last, xtol=1e-9 * step,
-                                                   rtol=1e-12))
+                back = scipy.optimize.brentq(rate, -reach * step, last, xtol=1e-9 * step,
+                                             rtol=1e-12)
+                found = predict_and_correct(after, back)
                 return None if found is None else resolve_point(found.curve, found.z,
                                                                 found.tangent)
     except (np.linalg.LinAlgError, NoOrbit):

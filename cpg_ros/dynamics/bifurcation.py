@@ -31,7 +31,7 @@ from cpg_ros.dynamics.floquet import Multipliers, multipliers
 from cpg_ros.dynamics.periodic import NoOrbit
 from cpg_ros.short_repr import ShortRepr
 import numpy as np
-from scipy.optimize import brentq
+import scipy
 
 #: Share of the way between two points of a branch to which a crossing is located.
 EXACT = 1e-7
@@ -170,7 +170,7 @@ def _located(gap: _Gap, part: int, rank: int, exact: float) -> Bifurcation | Non
 
     if size(0.0) * size(1.0) >= 0.0:
         return None
-    point, spectrum = gap.at(float(brentq(size, 0.0, 1.0, xtol=exact)))
+    point, spectrum = gap.at(float(scipy.optimize.brentq(size, 0.0, 1.0, xtol=exact)))
     mu = complex(spectrum[part][rank])
     if abs(mu.imag) > REAL:
         kind, mu = 'torus', complex(mu.real, abs(mu.imag))

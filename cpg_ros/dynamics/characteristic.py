@@ -23,7 +23,7 @@ det Delta.
 """
 
 import numpy as np
-from scipy.special import lambertw
+import scipy
 
 #: Beyond this exponent exp leaves the range of doubles, and W is taken from a logarithm.
 LARGEST = 690.0
@@ -89,7 +89,7 @@ def _branches(a: complex, b: complex, tau: float, n: np.ndarray) -> np.ndarray:
     """W_n(b tau exp(-a tau)), shape like n."""
     exponent = -a * tau
     if abs(exponent.real) <= LARGEST:
-        return lambertw(b * tau * np.exp(exponent), n)
+        return scipy.special.lambertw(b * tau * np.exp(exponent), n)
     # W_n(z) = L - log L + ... with L = log z + 2 pi i n large (Corless et al. 1996);
     # Newton's method on w + log w = L, whatever the sheet of the logarithm.
     argument = np.angle(b * np.exp(1j * exponent.imag))

@@ -25,7 +25,7 @@ import cmath
 import math
 
 import numpy as np
-from scipy.linalg import eigvals
+import scipy
 
 #: How far from the unit circle, and from the axis, a solution may lie by rounding.
 ON_CIRCLE = 1e-7
@@ -72,7 +72,7 @@ def delay_crossings(now: np.ndarray, past: np.ndarray) -> list[tuple[float, floa
     left = np.block([[np.zeros((size, size)), np.eye(size)], [-last, -middle]])
     right = np.block([[np.eye(size), np.zeros((size, size))], [np.zeros((size, size)), first]])
     with np.errstate(all='ignore'):
-        values = eigvals(left, right)
+        values = scipy.linalg.eigvals(left, right)
     for z in values[np.isfinite(values) & (np.abs(np.abs(values) - 1.0) < ON_CIRCLE)]:
         z = complex(z / abs(z))
         for root in np.linalg.eigvals(now + past * z):

@@ -24,7 +24,7 @@ from cpg_ros.dynamics.orbit_method import orbit_method
 from cpg_ros.dynamics.periodic import Orbit
 from cpg_ros.short_repr import ShortRepr
 import numpy as np
-from scipy.optimize import brentq
+import scipy
 
 #: From here on a multiplier cannot be distinguished from 1.
 ATTRACTS = 1.0 - 1e-7
@@ -143,7 +143,7 @@ def smallest_gain(orbit: Orbit) -> float:
             if growth(gain) < 0.0:
                 enough = gain
                 continue
-            return float(brentq(growth, gain, enough, xtol=1e-8))
+            return float(scipy.optimize.brentq(growth, gain, enough, xtol=1e-8))
         enough = gain
     return 0.0
 

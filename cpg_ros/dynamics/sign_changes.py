@@ -17,7 +17,7 @@
 from collections.abc import Callable
 
 import numpy as np
-from scipy.optimize import brentq, minimize_scalar
+import scipy
 
 #: Places are refined to this, absolute and relative to them.
 EXACT = 1e-13
@@ -48,8 +48,9 @@ def crossings(function: Callable[[float], float], grid: np.ndarray,
                            & (np.sign(values[1:-1]) == np.sign(values[2:]))) + 1
     for k in turns[::-1]:
         side = np.sign(values[k])
-        lowest = minimize_scalar(lambda x, side=side: side * function(x), method='bounded',
-                                 bounds=(grid[k - 1], grid[k + 1]), options={'xatol': 1e-9})
+        lowest = scipy.optimize.minimize_scalar(
+            lambda x, side=side: side * function(x), method='bounded',
+            bounds=(grid[k - 1], grid[k + 1]), options={'xatol': 1e-9})
         if lowest.fun < 0.0:
             at = int(np.searchsorted(places, lowest.x))
             places.insert(at, float(lowest.x))
@@ -57,5 +58,6 @@ def crossings(function: Callable[[float], float], grid: np.ndarray,
     signs = np.sign(found)
     signs[signs == 0.0] = 1.0
     # Not a number where there is no value, whose product differs from -1.
-    return [float(brentq(function, places[k], places[k + 1], xtol=EXACT, rtol=EXACT))
-            for k in np.flatnonzero(signs[:-1] * signs[1:] == -1.0)]
+    crossed = np.flatnonzero(signs[:-1] * signs[1:] == -1.0)
+    return [float(scipy.optimize.brentq(function, *places[k:k + 2], xtol=EXACT, rtol=EXACT))
+            for k in crossed]

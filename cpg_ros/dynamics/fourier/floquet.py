@@ -29,7 +29,7 @@ from cpg_ros.dynamics.fourier.orbit import FourierOrbit
 from cpg_ros.dynamics.isotypic_split import split
 from cpg_ros.networks.field import Field
 import numpy as np
-from scipy.sparse.linalg import ArpackError, eigs, LinearOperator
+import scipy
 
 #: Polynomial degree on an element, and how much of a period one holds at most.
 DEGREE, SPAN = 20, 0.4
@@ -163,11 +163,14 @@ class Variation:
         """Return the modulus of the largest in a subspace outside, by Arnoldi's method if many."""
         size, later = self.period_map(self.outside[which], gain)
         if size > FEW:
-            operator = LinearOperator((size, size), matvec=lambda x: later(x.reshape(-1, 1))[:, 0])
+            arpack = scipy.sparse.linalg
+            operator = arpack.LinearOperator((size, size),
+                                             matvec=lambda x: later(x.reshape(-1, 1))[:, 0])
             # The last gain's answer is a good start.
             start = self._vectors.get(which, np.random.default_rng(0).standard_normal(size))
-            with suppress(ArpackError):
-                found, vectors = eigs(operator, k=2, ncv=24, tol=exact, v0=start, maxiter=20)
+            with suppress(arpack.ArpackError):
+                found, vectors = arpack.eigs(operator, k=2, ncv=24, tol=exact, v0=start,
+                                             maxiter=20)
                 self._vectors[which] = vectors.real.sum(axis=1)
                 return float(np.abs(found).max())
         return float(np.abs(np.linalg.eigvals(later(np.eye(size)))).max())

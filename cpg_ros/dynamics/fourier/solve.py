@@ -28,7 +28,7 @@ from cpg_ros.networks.equations import equations_of, values_of
 from cpg_ros.networks.network import Network, Preset
 from cpg_ros.networks.symmetry import Symmetry
 import numpy as np
-from scipy.optimize import brentq
+import scipy
 
 #: Points of a cycle on which describing functions are worked out.
 POINTS = 32
@@ -85,7 +85,7 @@ def _first_harmonic(network: Network, symmetry: Symmetry) -> tuple[np.ndarray, f
     low = max(low, 1e-6)
     if excess(low) >= 0.0:
         return None
-    amplitude = brentq(excess, low, high, rtol=1e-3)
+    amplitude = scipy.optimize.brentq(excess, low, high, rtol=1e-3)
     omega = onset(amplitude)[1]
     if not omega:
         return None
