@@ -30,6 +30,7 @@ from cpg_ros.robots.feedback_keys import OwnFeedback
 from cpg_ros.robots.robot import Robot
 from cpg_ros.simulation.feedback_benefit import (
     FeedbackTrial,
+    judge_feedback,
     UNDISTURBED,
     WALKED,
     WATCHED,
@@ -170,13 +171,14 @@ def tune_feedback(robot: Robot, model: str, gaits: Sequence[str], evaluations: i
 
     Returns:
         The robot whose file has the gains, and what fresh pushes make of them; where they are no
-        better than those before, it keeps these.
+        better than those before, it keeps these. Whether its feedback is on is what
+        ``judge_feedback`` says of them.
 
     Raises:
         SimulationError: CMA-ES is missing, or the model cannot be used.
 
     """
-    library = cma_es()
+    cma_es()
     trials = [FeedbackTrial(robot, model, gait, kp, kd) for gait in gaits]
     costs = [float(np.median(trial.loop.run(trial.calm(), WALKED).cost)) for trial in trials]
     compute = map if executor is None else executor.map
@@ -193,14 +195,29 @@ def tune_feedback(robot: Robot, model: str, gaits: Sequence[str], evaluations: i
     cheapest = int(np.argmin(price(usual, seed)))
     own, before = starts[cheapest], usual[cheapest]
     names = [name for law, listed in SEARCHED.items() if getattr(before, law) for name in listed]
+    after, tried = _search(before, names, price, evaluations, seed, len(starts), update)
+    found = _compared(trials, before, after, seed)
+    if found.better:
+        listed = dimensionless(after, leg_length(geometry_of(robot)))
+        own = replace(own, gains={**own.gains, **{name: listed[name] for name in names}})
+    robot, _ = judge_feedback(replace(robot, feedback=own), model, gaits, kp, kd, seed)
+    judged = robot.feedback or own
+    return replace(robot, feedback=replace(
+        judged, made=f'tune --feedback, {", ".join(gaits)}, seed {seed}, {tried} sets of gains; '
+        f'{found}; {judged.made}')), found
 
+
+def _search(before: Gains, names: Sequence[str], price: Callable[[Sequence[Gains], int], list],
+            evaluations: int, seed: int, tried: int, update: Callable[[int], None]
+            ) -> tuple[Gains, int]:
+    """Return the gains that CMA-ES finds, those named changed, and how many sets were tried."""
     def changed(logs: Sequence[float]) -> Gains:
         return before._replace(**{
             name: min(max(getattr(before, name) * math.exp(log), GAINS[name].low),
                       GAINS[name].high) for name, log in zip(names, logs, strict=True)})
 
-    most, tried = math.log(FACTOR), len(starts)
-    search = library.CMAEvolutionStrategy(np.zeros(len(names)), SPREAD, {
+    most = math.log(FACTOR)
+    search = cma_es().CMAEvolutionStrategy(np.zeros(len(names)), SPREAD, {
         'bounds': [-most, most], 'seed': seed + 1, 'popsize': GENERATION, 'verbose': -9})
     draws = np.random.default_rng([seed, 1])
     while tried < evaluations:
@@ -209,7 +226,12 @@ def tune_feedback(robot: Robot, model: str, gaits: Sequence[str], evaluations: i
         tried += len(logs)
         update(min(tried, evaluations))
     # The middle of the last generation: its best one was lucky, too.
-    after = changed(search.result.xfavorite)
+    return changed(search.result.xfavorite), tried
+
+
+def _compared(trials: Sequence[FeedbackTrial], before: Gains, after: Gains, seed: int
+              ) -> TunedFeedback:
+    """Return what pushes that no generation has met make of gains before and after a search."""
     fresh = [trial.pushed(np.random.default_rng(FRESH + seed), JUDGED, IMPULSES)
              for trial in trials]
 
@@ -218,17 +240,6 @@ def tune_feedback(robot: Robot, model: str, gaits: Sequence[str], evaluations: i
                                for trial, pushed in zip(trials, fresh, strict=True)])
 
     old, new = survivors(before), survivors(after)
-    found = TunedFeedback(len(old), int(survivors(None).sum()), int(old.sum()), int(new.sum()),
-                          int((old & ~new).sum()), sum(
-                              UNDISTURBED - trial.upright(after) for trial in trials))
-    gains = after if found.better else before
-    fell = found.fell if found.better else sum(UNDISTURBED - trial.upright(before)
-                                               for trial in trials)
-    helps = not fell and max(found.before, found.after if found.better else 0) > found.without
-    length = leg_length(geometry_of(robot))
-    listed = dimensionless(gains, length)
-    own = replace(own, enabled=helps, gains={**own.gains, **{name: listed[name] for name in names}}
-                  if found.better else own.gains,
-                  made=f'tune --feedback, {", ".join(gaits)}, seed {seed}, {tried} sets of gains; '
-                  f'{found}')
-    return replace(robot, feedback=own), found
+    return TunedFeedback(len(old), int(survivors(None).sum()), int(old.sum()), int(new.sum()),
+                         int((old & ~new).sum()),
+                         sum(UNDISTURBED - trial.upright(after) for trial in trials))

@@ -29,7 +29,7 @@ import pytest
 if any(importlib.util.find_spec(name) is None for name in ('mujoco', 'cma')):
     pytest.skip('the extra [sim] is not installed', allow_module_level=True)
 
-from cpg_ros.simulation import feedback_tuning  # noqa: I100
+from cpg_ros.simulation import feedback_benefit, feedback_tuning  # noqa: I100
 from cpg_ros.simulation.feedback_benefit import FeedbackTrial, UNDISTURBED
 from cpg_ros.simulation.feedback_tuning import tune_feedback
 
@@ -42,7 +42,7 @@ TIME = math.sqrt(0.426 / 9.81)
 class Body(FeedbackTrial):
     """Survives a push of a draw from 0 to 1 the likelier, the nearer its step is to BEST."""
 
-    flat, falls_undisturbed = False, False
+    flat, falls_undisturbed, alone = False, False, 0.1
     draws: list = []
 
     def __init__(self, robot, model, gait, kp, kd):
@@ -55,7 +55,7 @@ class Body(FeedbackTrial):
 
     def run(self, scenarios, duration, gains=None):
         off = 0.0 if gains is None or self.flat else math.log(gains.step / BEST)
-        share = 0.1 if gains is None else math.exp(-2.0 * off * off)
+        share = self.alone if gains is None else math.exp(-2.0 * off * off)
         upright = [one < share if isinstance(one, float) else
                    gains is None or not self.falls_undisturbed for one in scenarios]
         return SimpleNamespace(upright=np.array(upright), cost=np.ones(len(scenarios)),
@@ -64,7 +64,8 @@ class Body(FeedbackTrial):
 
 @pytest.fixture
 def body(monkeypatch):
-    monkeypatch.setattr(feedback_tuning, 'FeedbackTrial', Body)
+    for module in (feedback_benefit, feedback_tuning):
+        monkeypatch.setattr(module, 'FeedbackTrial', Body)
     monkeypatch.setattr(Body, 'draws', [])
     return Body
 
@@ -82,8 +83,9 @@ def test_the_search_finds_gains_that_survive_more_on_draws_that_it_has_not_seen(
     assert own.enabled and 'trot, walk, seed 5' in own.made and str(found) in own.made
     # A law that is off has no gains of its own, and stays off.
     assert not own.laws['speed'] and 'speed_share' not in own.gains and 'roll' in own.gains
-    judged, trained = body.draws[-1], body.draws[:-2]
-    assert body.draws[-2] == judged and len(judged) == found.pushes // 2
+    # Of two gaits each: pushes that compare, and those that judge whether feedback helps at all.
+    *trained, judged, again, _, _ = body.draws
+    assert judged == again and len(judged) == found.pushes // 2
     assert not any(set(judged) & set(draw) for draw in trained)
     # Every generation meets others, each of its jobs and gaits the same ones.
     assert len({tuple(draw) for draw in trained}) == 1 + math.ceil(157 / 12)
@@ -104,6 +106,13 @@ def test_feedback_that_fells_undisturbed_robots_is_off(body, monkeypatch):
     robot, found = tune_feedback(ROBOT, 'go2', ['trot'], 20, 5)
     assert found.fell == UNDISTURBED and not found.better and not robot.feedback.enabled
     assert '4 undisturbed runs fell' in robot.feedback.made
+
+
+def test_better_gains_of_a_feedback_that_does_not_help_leave_it_off(body, monkeypatch):
+    monkeypatch.setattr(body, 'alone', 1.0)
+    robot, found = tune_feedback(ROBOT, 'go2', ['trot'], 160, 5)
+    assert found.better and 'step' in robot.feedback.gains and not robot.feedback.enabled
+    assert '(without feedback 24)' in robot.feedback.made
 
 
 @pytest.mark.parametrize('after, lost, fell, better', [
