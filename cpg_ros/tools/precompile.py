@@ -33,7 +33,7 @@ from cpg_ros.robots.robot_file import load_robot
 from cpg_ros.tools.command_line import say
 
 #: What is compiled, those that the demonstration needs first, and the longest it may take, s.
-PARTS, LIMIT = ('delayed', 'feedback', 'quadruped', 'biped'), 85.0
+PARTS, LIMIT = ('delayed', *(['feedback'] if COMPILED else []), 'quadruped', 'biped'), 85.0
 #: Of the feedback: its kernels are the same for every robot with such legs.
 ROBOT = 'unitree_go2'
 
@@ -42,8 +42,6 @@ def compile_part(part: str) -> None:
     """Compile or load the kernels of a network, or those of the feedback."""
     choose()
     if part == 'feedback':
-        if not COMPILED:
-            return
         robot = load_robot(ROBOT)
         warm_up(geometry_of(robot), len(robot.joints))
     else:
