@@ -28,7 +28,6 @@ from cpg_ros.networks.equations import equations_of, values_of
 from cpg_ros.networks.network import Network, Preset
 from cpg_ros.networks.symmetry import Symmetry
 import numpy as np
-import scipy
 
 #: Points of a cycle on which describing functions are worked out.
 POINTS = 32
@@ -85,11 +84,14 @@ def _first_harmonic(network: Network, symmetry: Symmetry) -> tuple[np.ndarray, f
     low = max(low, 1e-6)
     if excess(low) >= 0.0:
         return None
-    amplitude = scipy.optimize.brentq(excess, low, high, rtol=1e-3)
-    omega = onset(amplitude)[1]
+    # Bisection suffices for a guess, and spares a generator's start the loading of an optimizer.
+    while high - low > 1e-3 * high:
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if excess(middle) < 0.0 else (low, middle)
+    omega = onset(high)[1]
     if not omega:
         return None
-    return amplitude * np.cos(2.0 * np.pi * THETA)[None], 2.0 * np.pi / omega
+    return high * np.cos(2.0 * np.pi * THETA)[None], 2.0 * np.pi / omega
 
 
 def _guess(network: Network, gait: str) -> tuple[np.ndarray, float] | None:
