@@ -42,6 +42,8 @@ STATE = 10.0
 DISCOVERY = 1.0
 #: The network forgets a bridge that was killed after this time, s.
 FORGOTTEN = 25.0
+#: Signals within this time, s, are one: Ctrl-C comes from the terminal and from what launched us.
+ONE_PRESS = 0.5
 
 
 class BridgeNode(BridgeLoop):
@@ -62,6 +64,7 @@ class BridgeNode(BridgeLoop):
         super().__init__(state)
         self._start: StartSequence | None = None
         self._refusal = self._hazard = ''
+        self._ended_at = 0.0
         self.create_service(Trigger, '~/stop', self._stop)
         self.create_service(Trigger, '~/start', self._start_again)
         self._before = 0, 0, 0
@@ -240,9 +243,12 @@ class BridgeNode(BridgeLoop):
             self._begin_start()
 
     def _leave(self, number: int, _: Any) -> None:
-        """Sit down, damp, and end; at a second signal, damp at once."""
-        name = signal.Signals(number).name
+        """Sit down, damp, and end; at a signal that was given once more, damp at once."""
+        name, now = signal.Signals(number).name, time.monotonic()
         again, self._ending = self._ending, True
+        if again and now < self._ended_at + ONE_PRESS:
+            return
+        self._ended_at = now
         self._requests.append(lambda now: self._halt(f'{name} again', now) if again
                               else self._sit_down(name, now))
 

@@ -29,17 +29,11 @@ import rclpy
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from sensor_msgs.msg import JointState
-from servo_chain import ServoChain
+from servo_chain import calibrated, JOINTS, LYING, ServoChain, STEPS
 from std_msgs.msg import Float64MultiArray, String
 from std_srvs.srv import Trigger
 
 BRIDGE, BUS = EXECUTABLE.with_name('servo_bridge'), EXECUTABLE.with_name('servo_bus')
-#: In the order of the servos, which is not that of the robot file.
-JOINTS = ('right_ankle_joint', 'right_knee_joint', 'left_ankle_joint', 'left_knee_joint')
-#: Pose that the biped sits down to, rad.
-LYING = (-0.8, 1.8, -0.8, 1.8)
-#: Steps a radian of a servo with 4096 a turn.
-STEPS = 4096 / (2.0 * np.pi)
 BIPED = load_robot('biped')
 #: The stand of the robot file, in motor order: knees 0.5 rad, ankles -0.1 rad.
 STAND = np.array([-0.1, 0.5, -0.1, 0.5])
@@ -116,15 +110,6 @@ def calibration(tmp_path):
     return calibrated(tmp_path, '/dev/none')
 
 
-def calibrated(folder, device):
-    path = folder / 'servos.yaml'
-    path.write_text(f'board: feetech_sts\ndevice: {device}\nservos:\n' + ''.join(
-        f'  {name}: {{channel: {k + 1}, centre: 2048, direction: {1 - 2 * (k % 2)}, '
-        f'per_rad: {STEPS}, lower: 100, upper: 4000, rest: {LYING[k]}}}\n'
-        for k, name in enumerate(JOINTS)))
-    return path
-
-
 def started(domain, calibration, *parameters, executable=BRIDGE):
     given = [f'calibration:={calibration}', *parameters]
     if executable == BRIDGE:
@@ -162,9 +147,12 @@ def test_it_rises_follows_sits_and_leaves_a_killed_bridge_to_the_watchdog(calibr
         biped.states.clear()
         bridge = started(domain, calibration)
         biped.rise()
+        # Ctrl-C from the terminal, and from what launched it, is one.
+        bridge.signal(signal.SIGINT)
         bridge.signal(signal.SIGINT)
         assert bridge.wait() == 0, bridge.log
         biped.wait_for('standing', 'sitting', 'damping')
+        assert 'damping: it has sat down: SIGINT' in bridge.log
         with pytest.raises(ConnectionRefusedError):
             end_watchdog(domain)
     finally:
@@ -172,6 +160,22 @@ def test_it_rises_follows_sits_and_leaves_a_killed_bridge_to_the_watchdog(calibr
         biped.end()
         with contextlib.suppress(ConnectionRefusedError):
             end_watchdog(domain)
+
+
+def test_who_presses_ctrl_c_once_more_lets_go_on_the_way_down(calibration):
+    domain = free_domain()
+    biped, bridge = Biped(domain), started(domain, calibration)
+    try:
+        biped.rise()
+        bridge.signal(signal.SIGINT)
+        biped.wait_for('standing', 'sitting')
+        time.sleep(0.6)
+        bridge.signal(signal.SIGINT)
+        assert bridge.wait() == 0 and 'damping: SIGINT again' in bridge.log, bridge.log
+        until(lambda: not biped.driven, 'damping')
+    finally:
+        bridge.end()
+        biped.end()
 
 
 def end_watchdog(domain):
@@ -192,17 +196,45 @@ def test_what_cannot_be_used_is_refused_in_one_line(calibration, parameter, word
     assert words in bridge.log and len(bridge.lines) == 1
 
 
-def test_a_bridge_drives_servos_on_a_serial_bus_which_are_let_go_whatever_fails(tmp_path):
-    domain = free_domain()
-    signs = np.array([1.0, -1.0, 1.0, -1.0])
+def steps(angles):
+    """Return the servos' steps at angles, rad."""
+    return np.round(2048 + np.array([1.0, -1.0, 1.0, -1.0]) * STEPS * np.array(angles))
 
-    def steps(angles):
-        return np.round(2048 + signs * STEPS * np.array(angles))
+
+@pytest.fixture
+def chain():
+    """Serve Feetech servos that lie."""
+    servos = ServoChain(dict(zip((1, 2, 3, 4), steps(LYING).astype(int).tolist(), strict=True)))
+    yield servos
+    servos.end()
+
+
+def test_a_bus_that_ends_with_its_bridge_waits_for_its_way_down(tmp_path, chain):
+    domain, path = free_domain(), calibrated(tmp_path, chain.path)
+    bus = started(domain, path, 'command_timeout:=1.0', 'end_timeout:=30.0', executable=BUS)
+    bridge = started(domain, path)
+    try:
+        bridge.wait_for('standing: it has risen')
+        assert all(chain.torque.values())
+        # As Ctrl-C in a terminal, or ros2 launch, to all.
+        bus.signal(signal.SIGINT)
+        bridge.signal(signal.SIGINT)
+        assert bridge.wait() == 0 and bus.wait() == 0, bridge.log + bus.log
+        assert not any(chain.torque.values())
+        assert np.abs([chain.goals[k] for k in (1, 2, 3, 4)] - steps(LYING)).max() <= 1
+    finally:
+        for process in (bridge, bus):
+            process.end()
+        with contextlib.suppress(ConnectionRefusedError):
+            end_watchdog(domain)
+
+
+def test_a_bridge_drives_servos_on_a_serial_bus_which_are_let_go_whatever_fails(tmp_path, chain):
+    domain = free_domain()
 
     def goals():
         return np.array([chain.goals[k] for k in (1, 2, 3, 4)])
 
-    chain = ServoChain(dict(zip((1, 2, 3, 4), steps(LYING).astype(int).tolist(), strict=True)))
     path = calibrated(tmp_path, chain.path)
     # A bus of this machine may be late for a quarter of a second.
     bus = started(domain, path, 'command_timeout:=1.0', executable=BUS)
@@ -228,6 +260,5 @@ def test_a_bridge_drives_servos_on_a_serial_bus_which_are_let_go_whatever_fails(
     finally:
         for process in filter(None, (bridge, bus)):
             process.end()
-        chain.end()
         with contextlib.suppress(ConnectionRefusedError):
             end_watchdog(domain)

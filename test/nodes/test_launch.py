@@ -19,6 +19,8 @@ from pathlib import Path
 
 from cpg_ros.networks.registry import NETWORKS
 from cpg_ros.nodes.inversion_node import Inversion
+from cpg_ros.nodes.servos.bridge import SPECS as SERVO_BRIDGE
+from cpg_ros.nodes.servos.bus import SPECS as SERVO_BUS
 from cpg_ros.nodes.unitree.parameters import SPECS as BRIDGE
 from graph import free_domain
 from launch_files import (
@@ -228,6 +230,20 @@ def test_go2_robot_is_on_the_robots_network(described, given, domain, switch, co
     assert bag[:5] == ['ros2', 'bag', 'record', '-o', 'bag'] and '/dog/joint_states' in bag
 
 
+def test_a_robot_of_servos_lies_still_and_its_bus_outlives_the_bridge(described):
+    found = described('servo_robot', robot='mine.yaml', calibration='servos.yaml', rate='100.0')
+    bus, bridge, generator = (parameters(found, node_of(found, name)) for name in (
+        'servo_bus', 'servo_bridge', 'generator'))
+    assert set(bus) <= set(SERVO_BUS) and set(bridge) <= set(SERVO_BRIDGE)
+    assert bus['rate'] == bridge['rate'] == generator['rate'] == 100.0
+    assert bus['calibration'] == bridge['calibration'] == 'servos.yaml'
+    assert bridge['robot'] == generator['robot'] == 'mine.yaml'
+    assert bridge['command'] == generator['command'] == 'forward_position'
+    assert bridge['autostart'] is False and 5.0 < bus['end_timeout'] <= 10.0
+    assert not set(generator) - set(of_generator('delayed')) - {'network'}
+    assert all('on_exit' in node_of(found, name).options for name in ('servo_bus', 'servo_bridge'))
+
+
 def test_rviz_shows_the_urdf_of_the_robot(described, tmp_path):
     urdf = tmp_path / 'my.urdf'
     text = ('<robot name="mine"><joint name="a" type="continuous"><parent link="trunk"/>'
@@ -277,6 +293,7 @@ def test_with_launch_itself(name):
     from launch.actions import OpaqueFunction
     from launch.launch_context import LaunchContext
     from launch.launch_description_sources import PythonLaunchDescriptionSource
+    from launch_ros.actions import Node
     context = LaunchContext()
     source = PythonLaunchDescriptionSource(str(SHARE / 'launch' / f'{name}.launch.py'))
     description = source.get_launch_description(context)
@@ -286,8 +303,11 @@ def test_with_launch_itself(name):
         return  # these start what may not be installed
     for argument in description.get_launch_arguments():
         argument.execute(context)
-    (node,) = (node for entity in description.entities
-               if isinstance(entity, OpaqueFunction)
-               for node in entity.execute(context))
-    node._perform_substitutions(context)
-    assert node.node_name == f'/cpg_{name}'
+    found = [node for entity in description.entities if isinstance(entity, OpaqueFunction)
+             for node in entity.execute(context) if isinstance(node, Node)]
+    for node in found:
+        node._perform_substitutions(context)
+    assert {node.node_name for node in found} == {
+        'go2_robot': {'/unitree_bridge', '/cpg_generator'},
+        'servo_robot': {'/servo_bus', '/servo_bridge', '/cpg_generator'},
+    }.get(name, {f'/cpg_{name}'})

@@ -20,6 +20,7 @@ from graph import EXECUTABLE, Process, until
 from lxml import etree
 import pytest
 import rclpy
+from servo_chain import calibrated, ServoChain
 
 ROOT = Path(__file__).resolve().parents[2]
 POLICY = etree.parse(ROOT / 'security' / 'policy.xml')
@@ -48,9 +49,14 @@ def allowed(executable, kind, what):
     ('robot_sim', 'robot_sim', 'Go2|go2', []),
     ('inversion', 'cpg_inversion', 'listening', []),
     ('panel', 'cpg_panel', 'http://', ['port:=0']),
-    ('unitree_bridge', 'unitree_bridge', 'heard|hears|wait|state', ['dry_run:=true'])])
-def test_a_running_node_needs_no_more_than_its_policy(executable, node, sign, words):
-    given = [part for word in words for part in ('-p', word)]
+    ('unitree_bridge', 'unitree_bridge', 'heard|hears|wait|state', ['dry_run:=true']),
+    ('servo_bridge', 'servo_bridge', 'dry run', [
+        'dry_run:=true', 'robot:=biped', 'command:=forward_position', 'calibration:={servos}']),
+    ('servo_bus', 'servo_bus', '4 servos', ['calibration:={servos}'])])
+def test_a_running_node_needs_no_more_than_its_policy(executable, node, sign, words, tmp_path):
+    chain = ServoChain(dict.fromkeys((1, 2, 3, 4), 2048))
+    servos = calibrated(tmp_path, chain.path)
+    given = [part for word in words for part in ('-p', word.format(servos=servos))]
     process = Process(*given, executable=EXECUTABLE.with_name(executable))
     context = rclpy.Context()
     rclpy.init(context=context, domain_id=process.domain)
@@ -66,6 +72,7 @@ def test_a_running_node_needs_no_more_than_its_policy(executable, node, sign, wo
         looker.destroy_node()
         rclpy.shutdown(context=context)
         process.end()
+        chain.end()
     assert published and published <= allowed(executable, 'topic', 'publish')
     assert heard <= allowed(executable, 'topic', 'subscribe')
     assert services and services <= allowed(executable, 'service', 'reply')

@@ -27,7 +27,7 @@ from cpg_ros.robots.robot_file import load_robot
 
 SOURCE = Path(__file__).resolve().parents[2]
 SHARE = Path(get_package_share_directory('cpg_ros'))
-FILES = ('generator', 'inversion', 'go2', 'go2_robot', 'rviz')
+FILES = ('generator', 'inversion', 'go2', 'go2_robot', 'servo_robot', 'rviz')
 
 
 def executables():

@@ -12,12 +12,31 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Feetech STS servos on a pseudo terminal: a chain that reaches its goals at once."""
+"""Feetech STS servos of a biped on a pseudo terminal: a chain that reaches its goals at once."""
 
 import os
 import pty
 import select
 import threading
+
+import numpy as np
+
+#: In the order of the servos, which is not that of the robot file.
+JOINTS = ('right_ankle_joint', 'right_knee_joint', 'left_ankle_joint', 'left_knee_joint')
+#: Pose that the biped sits down to, rad.
+LYING = (-0.8, 1.8, -0.8, 1.8)
+#: Steps a radian of a servo with 4096 a turn.
+STEPS = 4096 / (2.0 * np.pi)
+
+
+def calibrated(folder, device):
+    """Write the calibration file of these servos; return its path."""
+    path = folder / 'servos.yaml'
+    path.write_text(f'board: feetech_sts\ndevice: {device}\nservos:\n' + ''.join(
+        f'  {name}: {{channel: {k + 1}, centre: 2048, direction: {1 - 2 * (k % 2)}, '
+        f'per_rad: {STEPS}, lower: 100, upper: 4000, rest: {LYING[k]}}}\n'
+        for k, name in enumerate(JOINTS)))
+    return path
 
 
 class ServoChain:

@@ -43,7 +43,10 @@ SPECS = fixed({
     'rate': Spec(50.0, 'times that servos are commanded, and asked where they are, a second [Hz]',
                  10.0, 200.0),
     'command_timeout': Spec(0.25, 'time without a command after which the servos are let go [s]',
-                            0.05, 5.0)})
+                            0.05, 5.0),
+    'end_timeout': Spec(0.0, 'time for which Ctrl-C or SIGTERM waits for the commands to stop, as '
+                        'they do when the bridge has made the robot sit down [s]; 0 lets the '
+                        'servos go at once', 0.0, 30.0)})
 #: Least time between two warnings that a servo does not answer, s.
 QUIET = 5.0
 
@@ -132,6 +135,9 @@ class ServoBus(StartedNode):
 
     def finish(self) -> None:
         """End the thread, and let the servos go, whatever has failed."""
+        longest = time.monotonic() + self._value('end_timeout')
+        while self._driven and self.failure is None and time.monotonic() < longest:
+            time.sleep(0.02)
         self._ticker.end()
         self._ticker.join(timeout=1.0)
         try:
