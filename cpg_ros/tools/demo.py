@@ -193,6 +193,9 @@ def _nodes(chosen: Namespace, robot: DemoRobot) -> tuple[list[str], list[str]]:
     """Return the arguments of the simulation and of the generator."""
     body = ['robot_sim', '-p', 'lockstep:=true', '-p', f'rate:={RATE}.0',
             '-p', f'robot:={robot.file}', '-p', f'model:={robot.model}']
+    for name in own_robot.SERVO_GAINS:
+        if (gain := getattr(chosen, name)) is not None:
+            body += ['-p', f'{name}:={gain!r}']
     if chosen.film or chosen.tour is not None:
         body += ['-p', f'footfalls:={chosen.out / "footfalls.png"}']
     if chosen.film:

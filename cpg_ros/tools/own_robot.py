@@ -47,6 +47,8 @@ DRIVEN = ('trot', 'walk', 'tripod', 'wave')
 MADE, BESIDES, PLANNED, SIMULATED = 5.0, 30.0, 0.3, 0.6
 #: Designs that are tried for each gait.
 EVALUATIONS = 120
+#: Options of gains, which the simulation takes as well.
+SERVO_GAINS = 'kp', 'kd'
 #: How long a step that is stopped may take to end, s.
 PATIENCE = 10.0
 
@@ -89,6 +91,11 @@ def add_options(parser: ArgumentParser) -> None:
                         "velocity limit of all joints instead of the file's")
     parser.add_argument('--evaluations', type=int, metavar='N', help='with --urdf or --mjcf: '
                         f'designs to try for each gait (default: {EVALUATIONS})')
+    parser.add_argument('--kp', type=number, metavar='NM', help='with --urdf or --mjcf: '
+                        'proportional gain of the joints, N m/rad, to tune and to drive it with '
+                        "(default: a Go2's, scaled to the robot's mass; servos are stiffer)")
+    parser.add_argument('--kd', type=number, metavar='NMS', help='damping gain of the joints, '
+                        'N m s/rad, likewise')
 
 
 def name_of(chosen: Namespace) -> str:
@@ -99,7 +106,7 @@ def name_of(chosen: Namespace) -> str:
 
     """
     if chosen.urdf is None and chosen.mjcf is None:
-        for option in ('velocity', 'evaluations'):
+        for option in ('velocity', 'evaluations', *SERVO_GAINS):
             if getattr(chosen, option) is not None:
                 raise InputError(f'argument --{option}: only with --urdf or --mjcf')
         return ''
@@ -211,17 +218,22 @@ def _tune(chosen: Namespace, steps: Steps, files: tuple[Path, Path], gaits: Sequ
     """Tune gaits one by one: each on all cores, and with a progress of its own."""
     file, tuned = files
     source, evaluations = str(chosen.urdf or chosen.mjcf), chosen.evaluations or EVALUATIONS
+    gains = [word for name in SERVO_GAINS if (gain := getattr(chosen, name)) is not None
+             for word in (f'--{name}', f'{gain:g}')]
     seconds = BESIDES + evaluations * (PLANNED + SIMULATED / (os.cpu_count() or 1))
-    code = 0
+    codes = []
     for gait in gaits:
-        code = steps.take(
+        codes.append(steps.take(
             f'tuning the {gait} in simulation', seconds,
             ['tune', '--robot', str(tuned if tuned.exists() else file), '--model', source,
-             '--gaits', gait, '--evaluations', str(evaluations), '--out', str(tuned)])
-        if code not in (0, 1):
+             '--gaits', gait, '--evaluations', str(evaluations), '--out', str(tuned), *gains]))
+        if codes[-1] not in (0, 1):
             break
     if not tuned.exists():
-        raise StepFailed(code)
+        raise StepFailed(codes[-1])
+    if 0 not in codes:
+        say(f'no gait is good: delete {tuned}, and --evaluations {2 * evaluations} searches for '
+            'longer, --kp and --kd give stiffer joints')
 
 
 def _ranked(motions: dict[str, Motion]) -> tuple[tuple[str, ...], bool]:

@@ -42,21 +42,21 @@ URDF = SOURCE / 'urdf' / 'quadruped.urdf'
 class Made:
     """Steps that write what the executables would: a file that exists, or none."""
 
-    def __init__(self, *codes):
-        self.codes, self.words = list(codes), []
+    def __init__(self, *codes, writing=(0,)):
+        self.codes, self.words, self.writing = list(codes), [], writing
 
     def take(self, what, seconds, words):
         assert what and seconds > 0.0
         self.words.append(words)
         code = self.codes.pop(0) if self.codes else 0
-        if code == 0:
-            shutil.copy(FILE, words[-1] if words[0] == 'tune' else words[4])
+        if code in self.writing:
+            shutil.copy(FILE, words[words.index('--out' if words[0] == 'tune' else '--make') + 1])
         return code
 
 
 def chosen(folder, **changes):
     return Namespace(**{'urdf': URDF, 'mjcf': None, 'velocity': None, 'evaluations': None,
-                        'tour': None, 'out': folder, **changes})
+                        'kp': None, 'kd': None, 'tour': None, 'out': folder, **changes})
 
 
 def test_a_robot_file_is_made_then_its_gaits_are_tuned_and_both_are_used_again(tmp_path, capsys):
@@ -80,6 +80,15 @@ def test_a_robot_file_is_made_then_its_gaits_are_tuned_and_both_are_used_again(t
             own_robot.prepare(chosen(tmp_path, **{option: 5}), steps)
 
 
+def test_gains_of_servos_tune_the_robot_and_drive_it(tmp_path):
+    given = chosen(tmp_path, kp=14.0, kd=0.35, film=False, course=False)
+    steps = Made()
+    robot = own_robot.prepare(given, steps)
+    assert all(words[-4:] == ['--kp', '14', '--kd', '0.35'] for words in steps.words[1:])
+    body, _ = tool._nodes(given, robot)
+    assert 'kp:=14.0' in body and 'kd:=0.35' in body
+
+
 def test_an_old_file_is_used_again_and_that_it_is_old_is_said(tmp_path, capsys):
     for name in ('quadruped.yaml', 'quadruped_tuned.yaml'):
         shutil.copy(FILE, tmp_path / name)
@@ -98,8 +107,16 @@ def test_what_fails_ends_the_steps_with_its_code(tmp_path, codes, code, count):
     assert error.value.code == code and len(steps.words) == count
 
 
-def test_a_gait_that_cannot_be_had_does_not_stop_the_other(tmp_path):
+def test_a_gait_that_cannot_be_had_does_not_stop_the_other(tmp_path, capsys):
     assert own_robot.prepare(chosen(tmp_path), Made(0, 1)).gaits
+    assert 'no gait is good' not in capsys.readouterr().out
+
+
+def test_where_no_gait_is_good_it_says_what_to_try(tmp_path, capsys):
+    assert own_robot.prepare(chosen(tmp_path), Made(0, 1, 1, writing=(0, 1))).gaits
+    assert capsys.readouterr().out.endswith(
+        f"no gait is good: delete {tmp_path / 'quadruped_tuned.yaml'}, and --evaluations 240 "
+        'searches for longer, --kp and --kd give stiffer joints\n')
 
 
 @pytest.mark.parametrize(('arguments', 'words'), [
@@ -109,6 +126,7 @@ def test_a_gait_that_cannot_be_had_does_not_stop_the_other(tmp_path):
     (['--urdf', str(URDF), '--evaluations', '0'], '0 is not positive'),
     (['--urdf', str(URDF), '--mjcf', 'go2'], 'not allowed with'),
     (['--urdf', str(URDF), '--course'], 'not with a robot of your own'),
+    (['--kp', '8'], '--kp: only with --urdf or --mjcf'),
     (['--velocity', '8'], 'only with --urdf or --mjcf')])
 def test_what_cannot_be_used_ends_in_one_line_before_anything_is_written(
         arguments, words, tmp_path, monkeypatch, capsys):
