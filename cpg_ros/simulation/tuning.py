@@ -187,6 +187,14 @@ class Tuner:
             update(min(tried, evaluations))
             if prices.min() < cheapest:
                 best, cheapest = designs[int(prices.argmin())], float(prices.min())
+        near = self._nearest
+        if cheapest >= REFUSED and near is not None and near.share < 1.0:
+            # The nearest one, by so much slower that its joints follow.
+            share = ROOM * near.share
+            slower = replace(near.design, frequency=share * near.design.frequency)
+            if share * aim.speed >= SLOWEST * AIMS[gait].speed:
+                best, aim, tried = slower, aim.slower(share), tried + 1
+                cheapest = float(self.prices(gait, [best], aim)[0])
         if cheapest >= REFUSED:
             raise NoDesign(f"{gait}: none of {tried} designs keeps to the joints' limits"
                            + (f'; {self._nearest}' if self._nearest else ''))

