@@ -49,6 +49,7 @@ examples:
   cpg param set frequency 2
   cpg topic hz joint_states
   cpg disable
+  cpg call /unitree_bridge/stop
   cpg record walk_bag
   cpg run inversion --bag walk_bag --out fitted.yaml
 
@@ -95,6 +96,9 @@ def parser() -> Parser:
     for name, text in (('enable', 'ramp into the gait'), ('disable', 'ramp down to the stand'),
                        ('reset', 'reset robot_sim to its start (--node /robot_sim)')):
         add(actions, name, text)
+    add(actions, 'call', 'call a service of the type std_srvs/Trigger').add_argument(
+        'service', metavar='SERVICE', help="such as /unitree_bridge/stop; one of the node's own "
+        'has no slash in front')
 
     parameters = add(actions, 'param', "a node's parameters").add_subparsers(
         dest='what', required=True, metavar='{set,get,list}')
@@ -158,6 +162,8 @@ def rate(text: str) -> float:
 
 def _called(chosen: Namespace, node: 'Node') -> str:
     from cpg_ros.nodes.node_client import CallError, NodeClient, NoService, ServiceClients
+    if chosen.action == 'call' and '/' in chosen.service:
+        chosen.node, _, chosen.service = chosen.service.rpartition('/')
     running = 'is a generator running?' if chosen.node == NODE else 'is it running?'
     services = ServiceClients(node, search=chosen.wait, late=lambda: note(
         'cpg', f'waiting for {chosen.node} ({running})'))
@@ -174,8 +180,9 @@ async def _call(chosen: Namespace, other: 'NodeClient') -> str:
     if chosen.action in ('enable', 'disable'):
         return await other.command(SetBool, 'enable', ANSWER,
                                    data=chosen.action == 'enable')
-    if chosen.action == 'reset':
-        return await other.command(Trigger, 'reset', ANSWER)
+    if chosen.action in ('reset', 'call'):
+        service = 'reset' if chosen.action == 'reset' else chosen.service
+        return await other.command(Trigger, service, ANSWER)
     if chosen.action == 'gait':
         await other.set_parameters({'gait': chosen.gait}, ANSWER)
     elif chosen.what == 'set':
@@ -223,7 +230,8 @@ def _played(chosen: Namespace, node: 'Node') -> str:
 
 
 _DOERS = {'param': _called, 'gait': _called, 'enable': _called, 'disable': _called,
-          'reset': _called, 'topic': _listened, 'record': _recorded, 'play': _played}
+          'reset': _called, 'call': _called, 'topic': _listened, 'record': _recorded,
+          'play': _played}
 
 
 @contextmanager

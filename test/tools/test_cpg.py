@@ -17,6 +17,7 @@
 import os
 import signal
 import subprocess
+import threading
 import time
 
 from bags import joint_state, write_bag
@@ -26,7 +27,10 @@ from diagnostic_msgs.msg import DiagnosticStatus, KeyValue
 from graph import EXECUTABLE, free_domain, until
 import numpy as np
 import pytest
+import rclpy
+from rclpy.executors import SingleThreadedExecutor
 from sensor_msgs.msg import Imu, JointState
+from std_srvs.srv import Trigger
 import yaml
 
 CPG = EXECUTABLE.with_name('cpg')
@@ -102,11 +106,14 @@ def test_a_shell_completes_actions_gaits_parameters_and_topics(unhurried):
 
 
 def test_what_is_recorded_is_what_the_generator_publishes(unhurried, tmp_path):
-    domain = unhurried[0].domain
+    process, watcher = unhurried
+    domain, before = process.domain, watcher.node.count_subscribers('/joint_states')
     recorder = subprocess.Popen([CPG, 'record', tmp_path / 'bag', 'joint_states'],
                                 env=variables(domain), text=True, stdout=subprocess.PIPE,
                                 stderr=subprocess.PIPE)
     assert recorder.stderr.readline() == 'recording /joint_states\n'
+    # A loaded machine takes longer than a moment to find the recorder.
+    until(lambda: watcher.node.count_subscribers('/joint_states') > before, 'the recorder')
     time.sleep(2.0)
     assert not (tmp_path / 'bag').exists()
     recorder.send_signal(signal.SIGINT)
@@ -184,7 +191,33 @@ def test_what_is_waited_for_is_named():
         assert len(found.stderr.splitlines()) == 2
 
 
+def test_a_bridge_is_stopped_by_its_service():
+    domain, context = free_domain(), rclpy.Context()
+    rclpy.init(context=context, domain_id=domain)
+    node = rclpy.create_node('unitree_bridge', context=context)
+    executor = SingleThreadedExecutor(context=context)
+    executor.add_node(node)
+    answers = [(True, 'damping'), (True, 'damping'), (False, 'not before a start')]
+
+    def stop(_, response):
+        response.success, response.message = answers.pop(0)
+        return response
+
+    node.create_service(Trigger, '~/stop', stop)
+    thread = threading.Thread(target=executor.spin, daemon=True)
+    thread.start()
+    try:
+        assert ask(domain, 'call', '/unitree_bridge/stop') == (0, 'damping', '')
+        assert ask(domain, 'call', 'stop', '--node', '/unitree_bridge') == (0, 'damping', '')
+        assert ask(domain, 'call', '/unitree_bridge/stop') == (1, '', 'cpg: not before a start')
+    finally:
+        executor.shutdown()
+        thread.join()
+        rclpy.shutdown(context=context)
+
+
 @pytest.mark.parametrize(('words', 'code', 'said'), [
+    (['--wait', '0.2', 'call', '/b/stop'], 1, '/b does not answer (no service /b/stop)'),
     (['--wait', '0.2', 'param', 'get', 'gait'], 1, '/cpg_generator does not answer'),
     (['--wait', '0.2', 'topic', 'echo', 'joint_states'], 1, 'nobody publishes on /joint_states'),
     (['param', 'set', 'gait', '{a: 1}'], 2, "'{a: 1}' is not a parameter value"),
