@@ -95,7 +95,7 @@ def parser() -> Parser:
     gait.add_argument('gait', metavar='NAME').completer = completion.gaits
     for name, text in (('enable', 'ramp into the gait'), ('disable', 'ramp down to the stand'),
                        ('reset', 'reset robot_sim to its start (--node /robot_sim)')):
-        add(actions, name, text)
+        add(actions, name, text).set_defaults(service='reset')
     add(actions, 'call', 'call a service of the type std_srvs/Trigger').add_argument(
         'service', metavar='SERVICE', help="such as /unitree_bridge/stop; one of the node's own "
         'has no slash in front')
@@ -181,8 +181,7 @@ async def _call(chosen: Namespace, other: 'NodeClient') -> str:
         return await other.command(SetBool, 'enable', ANSWER,
                                    data=chosen.action == 'enable')
     if chosen.action in ('reset', 'call'):
-        service = 'reset' if chosen.action == 'reset' else chosen.service
-        return await other.command(Trigger, service, ANSWER)
+        return await other.command(Trigger, chosen.service, ANSWER)
     if chosen.action == 'gait':
         await other.set_parameters({'gait': chosen.gait}, ANSWER)
     elif chosen.what == 'set':
