@@ -1,5 +1,5 @@
 # make run | demo | shell | test | test-deep | test-export | browser | mutants | docs | figures |
-# coverage | bench | build | wheel | unitree | clean; all is set up in .venv and install/.
+# coverage | bench | build | wheel | messages | clean; all is set up in .venv and install/.
 PYTHON ?= python3
 SHELL := /bin/bash
 comma := ,
@@ -39,7 +39,7 @@ KERNELS := feedback delayed quadruped biped phase hopf matsuoka
 test test-deep test-export browser coverage mutants docs: export NUMBA_CACHE_DIR ?= $(CURDIR)/.numba
 
 .PHONY: build run demo shell test test-deep test-export browser mutants docs figures coverage \
-	bench wheel unitree clean
+	bench wheel messages unitree clean
 
 build: install/.built install/.compiled
 
@@ -56,7 +56,7 @@ shell: install/.built
 		bash --rcfile <(cat ~/.bashrc 2>/dev/null; echo "PATH=$$PATH"; cpg completion) -i || :
 
 # The tables of topics are read from running nodes, the bridge among them.
-docs: install/.built unitree
+docs: install/.built messages
 	@$(ENTER); $(VENV)/bin/sphinx-build -W --keep-going -q -b html docs docs/_build
 	@echo 'built: docs/_build/index.html'
 
@@ -75,7 +75,7 @@ coverage: install/.built
 
 # What is run before every commit; with COVERAGE=yes it measures that, too, and takes a minute
 # longer. The kernels of all networks are compiled while linters run.
-test: install/.built unitree
+test: install/.built messages
 	@$(ENTER); $(VENV)/bin/python -P -m cpg_ros.tools.precompile $(KERNELS) & \
 		$(VENV)/bin/ruff check . && $(VENV)/bin/mypy && $(VENV)/bin/lint-imports --no-logo && wait $$!
 	@$(ENTER); for part in '$(OFFLINE) -m "not (live or deep or browser)" $(if $(COVERAGE),$(COVER))' \
@@ -83,7 +83,7 @@ test: install/.built unitree
 		eval $(PYTEST) $$part $(ARGS) || [ $$? = 5 ]; done  # 5: none selected
 
 # All tests, all examples of properties; and what measures the machine, by itself.
-test-deep: install/.built unitree
+test-deep: install/.built messages
 	@$(ENTER); for part in '$(OFFLINE) -m "not (live or browser)" --hypothesis-profile=deep' \
 		'$(ONLINE) -m "live and not (alone or browser)"' '-m "alone and not browser"'; do \
 		eval $(PYTEST) $$part $(ARGS) || [ $$? = 5 ]; done
@@ -94,7 +94,7 @@ test-export: install/.built
 	@$(ENTER); $(VENV)/bin/pytest test/export test/tools/test_export_tool.py --timeout 600 -s $(ARGS)
 
 # Small faults, one at a time in a copy of the tree, each of which some test has to notice.
-mutants: install/.built unitree
+mutants: install/.built messages
 	@$(ENTER); $(VENV)/bin/python test/mutants/run.py $(ARGS)
 
 # The panel's page in Chromium, by playwright; none of its own browsers is downloaded.
@@ -113,13 +113,13 @@ wheel: $(INSTALLED)
 		--no-build-isolation --wheel-dir out/wheel .
 	@ls out/wheel/cpg_ros-*.whl
 
-# Messages of Unitree's robots, for unitree_bridge on ROS 2 as pip installs it.
-unitree: $(VENV)/.unitree
+# Messages that PyPI does not have, for ROS 2 as pip installs it: of Unitree's robots, and of /tf.
+messages unitree: $(VENV)/.messages
 
-$(VENV)/.unitree: $(INSTALLED) interfaces/build.py $(wildcard interfaces/unitree_*/msg/*.msg)
-	@$(VENV)/bin/python interfaces/build.py interfaces/unitree_go interfaces/unitree_api >$(VENV)/unitree.log 2>&1 || \
-		{ tail -n 5 $(VENV)/unitree.log >&2; exit 1; }
-	@tail -n 2 $(VENV)/unitree.log
+$(VENV)/.messages: $(INSTALLED) interfaces/build.py $(wildcard interfaces/*/msg/*.msg)
+	@$(VENV)/bin/python interfaces/build.py $(wildcard interfaces/*/) >$(VENV)/messages.log 2>&1 || \
+		{ tail -n 5 $(VENV)/messages.log >&2; exit 1; }
+	@grep ^built $(VENV)/messages.log
 	@touch $@
 
 $(INSTALLED): requirements.txt requirements-numba.txt requirements-docs.txt requirements-models.txt $(WHEELS)

@@ -16,7 +16,8 @@
 
 Robots walk at changing speeds and turning rates, half of them on a height field, some pushed, with
 noisy sensors that are 4 ms late. NEES is the squared error of x and y over its covariance, 2 on
-average where that is true. ``--robot`` and ``--model`` take another robot, as ``tune`` wrote it.
+average where that is true; both come for a robot as it is, and for one whose scale was measured
+along a tape first. ``--robot`` and ``--model`` take another robot, as ``tune`` wrote it.
 """
 
 import argparse
@@ -33,7 +34,7 @@ from cpg_ros.networks.registry import PRESETS
 from cpg_ros.robots.robot_file import read_robot
 from cpg_ros.simulation.closed_loop import ClosedLoop
 from cpg_ros.simulation.efference_measurement import measure_efference
-from cpg_ros.simulation.scenario import impulse, Scenario, SensorNoise
+from cpg_ros.simulation.scenario import impulse, Outcome, Scenario, SensorNoise
 from cpg_ros.simulation.terrain import Terrain
 import numpy as np
 from scipy.stats import chi2
@@ -41,6 +42,8 @@ from scipy.stats import chi2
 #: Way in m, longest time for it in s, time between changes of the command, s, largest push, N s.
 WAY, LONGEST, CHANGE, PUSHED = 100.0, 420.0, 4.0, 12.0
 SPEEDS, LEFT, TURN = (0.15, 0.4), 0.1, 0.4
+#: How long it walks along the tape, s, and the standard deviation of a scale that was measured so.
+TAPE, MEASURED = 60.0, 0.015
 NOISE = {'delay': 0.004, 'force_bias': 0.05, 'force_noise': 0.05, 'orientation_bias': 0.005,
          'gyroscope_noise': 0.02, 'gyroscope_bias': 0.002, 'accelerometer_noise': 0.1,
          'accelerometer_bias': 0.05}
@@ -58,29 +61,45 @@ def scenarios(rng: np.random.Generator, runs: int) -> list[Scenario]:
         for k in range(runs)]
 
 
-def measure(loop: ClosedLoop, runs: int, seed: int) -> dict[str, object]:
+def tape(loop: ClosedLoop, expected: object, seed: int) -> float:
+    """Return true way over estimated way, as a user measures it: straight on beside a tape."""
+    ran = loop.run([Scenario(speed=float(np.mean(SPEEDS)))], TAPE, Gains(), expected,
+                   SensorNoise(**NOISE, seed=seed))
+    walked = loop.timestep * ran.estimated[0, :, 0].sum()
+    return float(np.hypot(*(ran.place[0, -1] - ran.place[0, 0])) / walked)
+
+
+def measure(loop: ClosedLoop, expected: object, runs: int, seed: int, scale: float
+            ) -> dict[str, object]:
     """Return drift in percent and NEES at the end of the way, of runs that did not fall."""
-    expected = measure_efference(loop, SPEEDS)
     ran = loop.run(scenarios(np.random.default_rng(seed), runs), LONGEST, Gains(), expected,
                    SensorNoise(**NOISE, seed=seed))
+    found: dict[str, object] = {'runs': runs, 'fell': int(runs - ran.upright.sum())}
+    for name, how in (('as_it_is', ()), ('measured', (scale, MEASURED))):
+        drifts, errors = [], []
+        for k in np.flatnonzero(ran.upright):
+            made, reached = _follow(loop, ran, k, how)
+            off = made.pose[:2] - (reached - ran.place[k, 0])
+            drifts.append(float(100.0 * np.hypot(*off) / made.pose[5]))
+            errors.append(float(off @ np.linalg.solve(made.covariance[:2, :2], off)))
+        bounds = chi2.ppf([0.025, 0.975], 2 * len(errors)) / len(errors)
+        found[name] = {'drift_percent': sorted(drifts), 'nees': float(np.mean(errors)),
+                       'nees_bounds': bounds.tolist()}
+    return found
+
+
+def _follow(loop: ClosedLoop, ran: Outcome, k: int, how: tuple[float, ...]
+            ) -> tuple[Odometry, np.ndarray]:
+    """Return the odometry at the end of one run's way, and where the base is then, m, (2,)."""
     legs, joints = len(loop.program.robot.legs), len(loop.program.robot.joints)
     sensors, nothing = SensorData.zeros(1, legs, joints), np.zeros(legs, dtype=bool)
-    drifts, errors = [], []
-    for k in np.flatnonzero(ran.upright):
-        made = Odometry(loop.geometry)
-        for rpy, velocity, place in zip(ran.rpy[k], ran.estimated[k], ran.place[k], strict=True):
-            sensors.rpy[0], reached = rpy, place
-            made.advance(sensors, velocity, nothing, loop.timestep)
-            if made.pose[5] >= WAY:
-                break
-        off = made.pose[:2] - (reached - ran.place[k, 0])
-        drifts.append(float(100.0 * np.hypot(*off) / made.pose[5]))
-        errors.append(float(off @ np.linalg.solve(made.covariance[:2, :2], off)))
-    walked = ran.velocity[ran.upright, :, 0].sum() / ran.estimated[ran.upright, :, 0].sum()
-    bounds = chi2.ppf([0.025, 0.975], 2 * len(errors)) / len(errors)
-    return {'runs': runs, 'fell': int(runs - ran.upright.sum()), 'drift_percent': sorted(drifts),
-            'true_over_estimated': float(walked), 'nees': float(np.mean(errors)),
-            'nees_bounds': bounds.tolist()}
+    made = Odometry(loop.geometry, *how)
+    step = 0
+    while step < len(ran.rpy[k]) - 1 and made.pose[5] < WAY:
+        sensors.rpy[0] = ran.rpy[k, step]
+        made.advance(sensors, ran.estimated[k, step], nothing, loop.timestep)
+        step += 1
+    return made, ran.place[k, step]
 
 
 def main() -> None:
@@ -92,13 +111,22 @@ def main() -> None:
     parser.add_argument('--runs', type=int, default=8)
     parser.add_argument('--seed', type=int, default=secrets.randbelow(2**31))
     chosen = parser.parse_args()
-    robot, found = read_robot(chosen.robot), {}
+    robot, loops = read_robot(chosen.robot), {}
     for gait in chosen.gaits:
-        began, preset = time.perf_counter(), PRESETS['delayed'][gait]
+        preset = PRESETS['delayed'][gait]
         made = plan(robot, gait, preset, preset.network, robot.motion(gait, gait).frequency)
-        found[gait] = measure(ClosedLoop(chosen.model, made), chosen.runs, chosen.seed)
+        loop = ClosedLoop(chosen.model, made)
+        loops[gait] = loop, measure_efference(loop, SPEEDS)
+    scales = {gait: tape(*loops[gait], chosen.seed + 1) for gait in loops}
+    log(f'by the tape: {scales}')
+    found = {}
+    for gait in loops:
+        began = time.perf_counter()
+        found[gait] = measure(*loops[gait], chosen.runs, chosen.seed,
+                              float(np.mean(list(scales.values()))))
         log(f'{gait}: {found[gait]} ({time.perf_counter() - began:.0f} s)')
-    emit(benchmark='odometry', model=chosen.model, seed=chosen.seed, way_m=WAY, **found)
+    emit(benchmark='odometry', model=chosen.model, seed=chosen.seed, way_m=WAY, scales=scales,
+         scale_error=MEASURED, **found)
 
 
 if __name__ == '__main__':

@@ -23,6 +23,7 @@ into the Python that runs it, and only once all of it is made.
 from concurrent.futures import ThreadPoolExecutor
 import os
 from pathlib import Path
+import re
 import shutil
 import subprocess
 import sys
@@ -32,6 +33,8 @@ import tempfile
 PREFIX = Path(sys.prefix)
 #: The type supports that rmw_fastrtps asks for; it opens their libraries by name.
 SUPPORTS = ('rosidl_typesupport_fastrtps_c', 'rosidl_typesupport_introspection_c')
+#: What else a package's messages are made of.
+PARTS = ('rosidl_typesupport_c', 'rosidl_generator_c', 'rosidl_generator_py')
 LIBRARIES = (*SUPPORTS, 'rosidl_typesupport_fastrtps_cpp', 'rosidl_typesupport_c',
              'rosidl_runtime_c', 'fastcdr', 'rmw', 'rcutils')
 
@@ -78,6 +81,13 @@ def compiled(work: Path) -> list[Path]:
         return list(pool.map(object_of, sources))
 
 
+def contained(source: Path) -> set[str]:
+    """Return the other packages whose messages a package's messages contain."""
+    found = {name for file in (source / 'msg').glob('*.msg')
+             for name in re.findall(r'^(\w+)/', file.read_text(), re.MULTILINE)}
+    return found - {source.name}
+
+
 def build(source: Path) -> None:
     """Build a package and put it where this Python finds it."""
     name = source.name
@@ -93,7 +103,9 @@ def build(source: Path) -> None:
         library = f'{name}_s__rosidl_typesupport_c.so'
         subprocess.run(['g++', '-shared', '-o', made / library, *compiled(work),
                         f'-L{PREFIX}/lib', f'-Wl,-rpath,{PREFIX}/lib',
-                        *(f'-l{one}' for one in LIBRARIES)], check=True)
+                        *(f'-l{one}' for one in LIBRARIES),
+                        *(f'-l{other}__{support}' for other in contained(source)
+                          for support in (*SUPPORTS, *PARTS))], check=True)
         shutil.rmtree(place, ignore_errors=True)
         made.rename(place)
     for support in SUPPORTS:

@@ -16,9 +16,11 @@
 
 x forward, y left, z up (REP 103). In each leg the joints that turn about y are, down the leg,
 the one that swings it, the knee and the ankle; others hold still. The stand has the knees bent
-and the end of the leg below its hip, if upper and lower leg are equally long.
+and the end of the leg below its hip, if upper and lower leg are equally long. A leg without such
+joints may reach to the side, as those of insects: the coxa swings it, the femur lifts it.
 """
 
+from collections.abc import Callable
 from dataclasses import replace
 from math import copysign, inf, pi
 
@@ -29,6 +31,7 @@ from cpg_ros.networks.registry import NETWORKS, numbered
 from cpg_ros.robots.description import DescriptionError, JointDescription, RobotDescription
 from cpg_ros.robots.robot import HARMONICS, Joint, Robot
 from cpg_ros.robots.robot_file import LARGEST, LIMITS
+from cpg_ros.robots.sprawled_stand import first_stand, sprawls
 import numpy as np
 
 #: How far the knees are bent at the stand, rad, on two legs and on more.
@@ -41,8 +44,15 @@ UNBOUNDED, SPEED = pi, 20.0
 MARGIN, USED = 0.1, 0.8
 
 
-def robot_from(known: RobotDescription, name: str) -> tuple[Robot, str]:
+def robot_from(known: RobotDescription, name: str,
+               feet: Callable[[Robot], dict[str, np.ndarray]]) -> tuple[Robot, str]:
     """Make a first robot from a description; return it and how its joints were interpreted.
+
+    Args:
+        known: the description.
+        name: of the robot.
+        feet: returns where the feet are with all joints at 0, from the last joint of each leg, m,
+            shape (3,); called where legs reach to the side, with a robot whose joints are at 0.
 
     Raises:
         LegsError: the joints' names do not tell two or four legs.
@@ -54,30 +64,39 @@ def robot_from(known: RobotDescription, name: str) -> tuple[Robot, str]:
     usual = {kind.name: next(iter(kind.legs.items())) for kind in numbered(len(legs))}
     assignment, cells = next(one for one in usual.values() if set(one[1]) == set(legs))
     networks = tuple(name for name, one in usual.items() if one == (assignment, cells))
-    joints, notes = {}, []
+    joints, notes, aside = {}, {}, []
     for leg in legs:
-        joints[leg], note = _leg(known, legs, leg, cells[leg][0])
-        notes.append(note)
+        joints[leg], notes[leg] = _leg(known, legs, leg, cells[leg][0])
+        if not notes[leg]:
+            aside.append(leg)
     driven = {joint.name for one in joints.values() for joint in one}
     robot = Robot(name, networks, assignment, HARMONICS, joints,
                   tuple(joint for joint in known.joints if joint in driven))
-    return _fitting(robot), '\n'.join(notes)
+    places = feet(robot) if aside else {}
+    for leg in aside:
+        joints[leg], notes[leg] = _reaching(known, leg, joints[leg], places[leg])
+    return _fitting(replace(robot, legs=joints)), '\n'.join(notes.values())
 
 
 def _leg(known: RobotDescription, legs: Legs, leg: str, cell: int
          ) -> tuple[tuple[Joint, ...], str]:
+    """Return a leg's joints and what they do; of a leg that reaches to the side '', all at 0."""
     described = known.joints
     names = sorted(legs[leg], key=lambda joint: len(known.chain(joint)))
     # About y: positive angles of an axis along +y swing what is below backward.
     turns = {joint: float(known.direction(joint)[1]) for joint in names}
     pitching = [joint for joint in names if abs(turns[joint]) > 0.7]
-    if not pitching:
+    aside = sprawls(np.array([known.direction(joint) for joint in names]))
+    if not (pitching or aside):
         raise DescriptionError(f"no joint of the leg {leg} turns about the y axis of the "
-                               f"{known.format}'s root, which points to the left (REP 103): "
-                               'nothing would swing it')
+                               f"{known.format}'s root, which points to the left (REP 103), nor "
+                               'do an upright axis and two level ones follow each other, as in '
+                               'the legs of insects: nothing would swing it')
     stand = {joint: _inside(described[joint], 0.0) for joint in names}
     weights: dict[str, tuple[float, ...]] = dict.fromkeys(names, (0.0,))
     roles = dict.fromkeys(names, 'holds still')
+    if aside:
+        return _joints(known, leg, cell, dict.fromkeys(legs[leg], 0.0), weights), ''
     ways = {joint: copysign(1.0, turns[joint]) for joint in pitching}
     swings, knee, ankle = (*pitching[:3], '', '')[:3]
     if knee:
@@ -93,11 +112,41 @@ def _leg(known: RobotDescription, legs: Legs, leg: str, cell: int
         tilt = ways[swings] * stand[swings] + ways[knee] * stand[knee]
         stand[ankle] = _inside(described[ankle], -ways[ankle] * tilt)
         roles[ankle] = 'keeps the foot level'
-    speed = {joint: min(described[joint].velocity, LARGEST)
-             if described[joint].velocity < inf else SPEED for joint in names}
-    made = tuple(Joint(joint, leg, cell, stand[joint], weights[joint], *_range(described[joint]),
-                       speed[joint], _missing(described[joint])) for joint in legs[leg])
-    return made, f'{leg}: ' + ', '.join(f'{joint} {roles[joint]}' for joint in names)
+    made = _joints(known, leg, cell, {joint: stand[joint] for joint in legs[leg]}, weights)
+    return made, _note(leg, names, roles)
+
+
+def _reaching(known: RobotDescription, leg: str, joints: tuple[Joint, ...], foot: np.ndarray
+              ) -> tuple[tuple[Joint, ...], str]:
+    """Return the joints of a leg that reaches to the side, and what they do."""
+    names = sorted((joint.name for joint in joints), key=lambda one: len(known.chain(one)))
+    three = names[-3:]
+    places = [known.frame(joint)[0] for joint in three]
+    angles, ways = first_stand(np.array([*places, places[-1] + foot]),
+                               np.array([known.direction(joint) for joint in three]))
+    stand = {joint.name: _inside(known.joints[joint.name], 0.0) for joint in joints}
+    stand.update((joint, _inside(known.joints[joint], angle))
+                 for joint, angle in zip(three, angles, strict=True))
+    weights: dict[str, tuple[float, ...]] = dict.fromkeys(names, (0.0,))
+    weights[three[0]], weights[three[1]] = (SWING * ways[0],), (0.0, LIFT * ways[1])
+    roles = {**dict.fromkeys(names, 'holds still'), three[0]: 'swings', three[1]: 'lifts'}
+    return _joints(known, leg, joints[0].cell, stand, weights), _note(leg, names, roles)
+
+
+def _note(leg: str, names: list[str], roles: dict[str, str]) -> str:
+    return f'{leg}: ' + ', '.join(f'{joint} {roles[joint]}' for joint in names)
+
+
+def _joints(known: RobotDescription, leg: str, cell: int, stand: dict[str, float],
+            weights: dict[str, tuple[float, ...]]) -> tuple[Joint, ...]:
+    """Return joints with the limits that are described, in the order of the stand's."""
+    made = []
+    for name, angle in stand.items():
+        joint = known.joints[name]
+        fastest = min(joint.velocity, LARGEST) if joint.velocity < inf else SPEED
+        made.append(Joint(name, leg, cell, angle, weights[name], *_range(joint), fastest,
+                          _missing(joint)))
+    return tuple(made)
 
 
 def _range(joint: JointDescription) -> tuple[float, float]:

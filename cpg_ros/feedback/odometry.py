@@ -32,7 +32,8 @@ import numpy as np
 #: Standard deviation of the slow velocity error: at rest, m/s, and as a share of the speed; its
 #: correlation time, s. Of a simulated Go2 that trots, walks, turns and is pushed.
 STILL, SHARE, SLOWLY = 0.001, 0.015, 15.0
-#: Standard deviation of the constant share by which a robot's velocity is wrong.
+#: Standard deviation of the constant share by which the velocity is wrong of a robot whose way was
+#: never measured.
 SCALE = 0.05
 #: White noise of the position, m/sqrt(s), and of the heading, rad/sqrt(s): an IMU drifts by half a
 #: degree in a minute.
@@ -106,15 +107,17 @@ class Odometry:
 
     """
 
-    def __init__(self, geometry: Geometry, scale: float = 1.0) -> None:
+    def __init__(self, geometry: Geometry, scale: float = 1.0, scale_error: float = SCALE) -> None:
         """Begin where the base is.
 
         Args:
             geometry: of the legs.
             scale: by which estimated velocities are multiplied: true way over estimated way.
+            scale_error: its standard deviation.
 
         """
         self._legs, self._scale, self._velocity = geometry.arrays, scale, np.zeros(3)
+        self._scale_error = scale_error
         self.pose = np.zeros(6)
         self.covariance = np.zeros((STATES, STATES))
         self._scratch = np.zeros((STATES, STATES))
@@ -142,7 +145,7 @@ class Odometry:
         if not self._started:
             self.pose[4], self._started = rpy[2], True
             self.covariance[3, 3] = self.covariance[4, 4] = STILL**2
-            self.covariance[5, 5] = SCALE**2
+            self.covariance[5, 5] = self._scale_error**2
         np.multiply(velocity, self._scale, out=self._velocity)
         arguments = (self._legs, sensors.joint_positions[0], contact, (self._velocity, rpy, dt),
                      self.pose, self.covariance, self._scratch)

@@ -23,6 +23,7 @@ from cpg_ros.feedback.biped.gains import GAINS as BIPED_GAIN_OF
 from cpg_ros.feedback.froude_scaling import robot_gains
 from cpg_ros.feedback.gains import GAINS as GAIN_OF
 from cpg_ros.feedback.gains import Gains, LAWS
+from cpg_ros.feedback.odometry import SCALE
 from cpg_ros.nodes.parameter_spec import fixed, one_of, Spec
 from cpg_ros.nodes.sensor_input import CONTACTS
 from cpg_ros.robots.robot import Robot
@@ -52,6 +53,9 @@ TOPICS = fixed({
                                     "robot's legs and IMU, such as odom; none by default"),
     f'{PREFIX}odometry_scale': Spec(1.0, 'true way over the way by odometry, of the robot and its '
                                     'ground', 0.5, 2.0),
+    f'{PREFIX}odometry_scale_error': Spec(SCALE, 'standard deviation of that scale, for the '
+                                          'covariance: about 0.015 where it was measured', 0.0,
+                                          0.5),
     f'{PREFIX}odom_frame': Spec('odom', 'frame of that odometry, which begins where the base is'),
     f'{PREFIX}base_frame': Spec('base_link', "frame of the robot's base"),
     f'{PREFIX}odometry_tf': Spec(True, 'publish the transform between these frames on /tf, too, '

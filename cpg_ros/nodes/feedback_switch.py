@@ -150,7 +150,8 @@ class FeedbackSwitch:
             self._node.get_logger().warning(line)
         self._kp_scale = KpScalePublisher(self._node)
         if topic := self._value('odometry_topic'):
-            loop.odometry = Odometry(geometry, self._value('odometry_scale'))
+            loop.odometry = Odometry(geometry, self._value('odometry_scale'),
+                                     self._value('odometry_scale_error'))
             self._odometry = OdometryPublisher(
                 self._node, loop.odometry, topic,
                 (self._value('odom_frame'), self._value('base_frame')),

@@ -26,7 +26,7 @@ POSE, ORIENTATION, TWIST, COVARIANCE = 3, 4, 6, 36
 
 
 def has_transforms() -> bool:
-    """Return whether transforms can be published: tf2_msgs is not on PyPI."""
+    """Return whether transforms can be published: PyPI has no tf2_msgs."""
     return util.find_spec('tf2_msgs') is not None
 
 

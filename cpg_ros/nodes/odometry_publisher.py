@@ -54,7 +54,8 @@ class OdometryPublisher:
             messages.append(transform(frames, *parts[:2]))
         elif transforms:
             node.get_logger().warning(
-                f'no transform from {frames[0]} to {frames[1]}: tf2_msgs is not installed')
+                f'no transform from {frames[0]} to {frames[1]}: tf2_msgs is not installed '
+                "('make messages' or ros-jazzy-tf2-msgs)")
         self._source, self._elapsed = source, 0.0
         self._block = MessageBlock(node, sizes, messages)
         self._pose = np.zeros((6, 6))

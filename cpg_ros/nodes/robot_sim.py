@@ -108,6 +108,8 @@ SPECS = fixed({
     'force_noise': Spec(0.0, 'standard deviation of the noise of foot_contacts, as a share of the '
                         'force', 0.0, 1.0),
     'noise_seed': Spec(0, 'seed of all noise', 0, 2**31 - 1),
+    'base_frame': Spec('base', "frame of the robot's base in odom, imu and /tf; by default the "
+                       "root of the shipped URDFs and of Unitree's"),
     'duration': Spec(0.0, 'simulated time after which the node exits [s]; 0 for never', 0.0, 1e6)})
 
 
@@ -156,7 +158,8 @@ class RobotSim(StartedNode):
                     'gyroscope_noise', 'gyroscope_bias', 'accelerometer_noise',
                     'accelerometer_bias', 'orientation_bias')}))
         self._measurements = Measurements(self, self._body, unit,
-                                          *map(self._value, ('joint_delay', 'force_noise')))
+                                          *map(self._value, ('base_frame', 'joint_delay',
+                                                               'force_noise')))
         self._requests: deque = deque()
         self._last = round(self._value('duration') * self._rate)
         self._now, self._began, self._since = 0, 0.0, 0

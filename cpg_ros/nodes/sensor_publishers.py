@@ -30,14 +30,15 @@ from sensor_msgs.msg import Imu
 class Measurements:
     """``joint_states``, ``odom``, ``foot_contacts``, ``imu`` and, where tf2 is, ``/tf``."""
 
-    def __init__(self, node: Node, body: Body, unit: InertialUnit, delay: float = 0.0,
-                 force_noise: float = 0.0) -> None:
+    def __init__(self, node: Node, body: Body, unit: InertialUnit, frame: str,
+                 delay: float = 0.0, force_noise: float = 0.0) -> None:
         """Publish the motion of a body, and the measurements of an inertial unit on it.
 
         Args:
             node: that publishes.
             body: that is measured.
             unit: on it.
+            frame: of its base.
             delay: of the measurements of joints and feet, s.
             force_noise: standard deviation of the noise of the feet's, as a share of the force.
 
@@ -55,7 +56,7 @@ class Measurements:
             names = *names, *held
             joints = [np.concatenate(pair) for pair in zip(joints, places(sizes)[7:],
                                                            strict=True)]
-        frames = 'odom', 'base'
+        frames = 'odom', frame
         messages = [('joint_states', joint_state(names, *joints)),
                     odometry('odom', frames, base, quaternion, twist),
                     ('foot_contacts', labelled(tuple(feet), forces))]
@@ -63,7 +64,7 @@ class Measurements:
             messages.append(transform(frames, base, quaternion))
         self._block = MessageBlock(node, sizes, messages)
         imu = Imu()
-        imu.header.frame_id = 'base'
+        imu.header.frame_id = frame
         self._imu = MessageBlock(node, [10], [('imu', Template(imu, [imu.header.stamp], numbers=[
             *each(imu.orientation, 'xyzw', np.arange(4)),
             *each(imu.angular_velocity, 'xyz', np.arange(4, 7)),

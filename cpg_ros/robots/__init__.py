@@ -18,4 +18,4 @@ Imports ``networks`` and ``files``; knows nothing of ROS.
 """
 
 __all__ = ['biped_keys', 'body_keys', 'description', 'feedback_keys', 'mesh_files', 'mesh_paths',
-           'robot', 'robot_file', 'urdf']
+           'robot', 'robot_file', 'sprawled_stand', 'urdf']

@@ -29,11 +29,12 @@ from cpg_ros.feedback.kinematics import bend_of
 from cpg_ros.motion.duty import Duty
 from cpg_ros.motion.joint_readout import joint_readout, standing
 from cpg_ros.robots.robot import Joint, JointMotion
+from cpg_ros.robots.sprawled_stand import sprawls
 from cpg_ros.simulation.body import Body
 from cpg_ros.simulation.leg_geometry import at_zero, chain_of, two_link_angles, wrapped
 from cpg_ros.simulation.model_indices import Anatomy
 from cpg_ros.simulation.robot_model import legs, SimulationError
-from cpg_ros.simulation.sprawled_leg import SprawledLeg, sprawls
+from cpg_ros.simulation.sprawled_leg import SprawledLeg
 import numpy as np
 
 #: Points of a cycle at which curves are fitted.
@@ -180,8 +181,8 @@ class Feet:
         """Look at all legs; errors as of Leg."""
         self.robot = body.robot
         self.legs: dict[str, LegPath | SprawledLeg] = {
-            leg: (SprawledLeg if sprawls(body, leg) else LegPath)(body, parts, leg)
-            for leg in legs(body.robot)}
+            leg: (SprawledLeg if sprawls(at_zero(body).xaxis[chain_of(body, leg)[1]])
+                  else LegPath)(body, parts, leg) for leg in legs(body.robot)}
 
     @property
     def length(self) -> float:

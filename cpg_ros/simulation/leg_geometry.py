@@ -18,10 +18,10 @@ import math
 from typing import Any
 
 from cpg_ros.robots.body_keys import body_geometry, BodyGeometry, LegChain
-from cpg_ros.robots.robot import Joint
+from cpg_ros.robots.robot import Joint, Robot
 from cpg_ros.simulation.body import Body
 from cpg_ros.simulation.model_indices import Anatomy
-from cpg_ros.simulation.robot_model import engine, legs
+from cpg_ros.simulation.robot_model import engine, legs, SimulationError
 import numpy as np
 
 #: Share up to which the centre of mass counts as above the middle of the feet.
@@ -87,3 +87,44 @@ def read_geometry(body: Body, parts: Anatomy) -> BodyGeometry:
                                data.xanchor[ids] - base, data.geom_xpos[foot] - base,
                                body.model.geom_size[foot, 0])
     return body_geometry(body.mass, chains)
+
+
+def feet_at_zero(name: str, robot: Robot) -> dict[str, np.ndarray]:
+    """Return where each leg's foot is from its last joint with all joints at 0, m, shape (3,).
+
+    It is the middle of a ball, or else the furthest that what the last joint moves reaches.
+
+    Args:
+        name: of the model, as of ``find_model``.
+        robot: whose legs' joints count, not its stand.
+
+    Raises:
+        SimulationError: MuJoCo is missing, the model cannot be used, or a leg has no shape.
+
+    """
+    body = Body(name, robot)
+    model, data, found = body.model, at_zero(body), {}
+    for leg in legs(robot):
+        last = chain_of(body, leg)[1][-1]
+        points = [data.geom_xpos[geom] + _ends(model, geom) @ data.geom_xmat[geom].reshape(3, 3).T
+                  for geom in range(model.ngeom) if model.geom_contype[geom]
+                  and model.geom_bodyid[geom] == model.jnt_bodyid[last]]
+        if not points:
+            raise SimulationError(f'model: leg {leg} has no shape that could touch the floor')
+        balls = [point for point in points if len(point) == 1]
+        reach = np.concatenate(balls or points) - data.xanchor[last]
+        found[leg] = reach[np.linalg.norm(reach, axis=1).argmax()]
+    return found
+
+
+def _ends(model: Any, geom: int) -> np.ndarray:
+    """Return a ball's middle, a mesh's vertices, or both ends of another shape, in its frame."""
+    mujoco, kind = engine(), model.geom_type[geom]
+    if kind == mujoco.mjtGeom.mjGEOM_SPHERE:
+        return np.zeros((1, 3))
+    if kind == mujoco.mjtGeom.mjGEOM_MESH:
+        mesh = model.geom_dataid[geom]
+        return model.mesh_vert[model.mesh_vertadr[mesh]:][:model.mesh_vertnum[mesh]]
+    middle, half = np.split(model.geom_aabb[geom], 2)
+    longest = np.where(half == half.max(), half, 0.0)
+    return np.array([middle - longest, middle + longest])

@@ -12,10 +12,10 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A leg that reaches to the side, as those of insects: coxa, femur and tibia, read off a model.
+"""A leg that reaches to the side (see robots.sprawled_stand): its angles, read off a model.
 
-The coxa turns the leg about a vertical axis, femur and tibia move the foot in the leg's plane.
-The foot goes along the body at the distance from it that it has in the stand.
+Femur and tibia move the foot in the leg's plane, which the coxa turns. The foot goes along the
+body at the distance from it that it has in the stand.
 """
 
 import math
@@ -28,15 +28,8 @@ from cpg_ros.simulation.model_indices import Anatomy
 from cpg_ros.simulation.robot_model import legs, SimulationError
 import numpy as np
 
-
-def sprawls(body: Body, leg: str) -> bool:
-    """Tell whether a leg's last three joints turn about an upright and two level axes."""
-    _, ids = chain_of(body, leg)
-    if len(ids) < 3:
-        return False
-    axes = at_zero(body).xaxis[ids[-3:]]
-    return bool(abs(axes[0, 2]) > 0.99 and np.abs(axes[1:, 2]).max() < 0.01
-                and abs(axes[1] @ axes[2]) > 0.99)
+#: How far a joint or the foot may be beside the leg's plane, as a share of the leg's length.
+BESIDE = 0.1
 
 
 class SprawledLeg:
@@ -52,7 +45,7 @@ class SprawledLeg:
         """Look at a leg with all joints at 0.
 
         Raises:
-            SimulationError: its foot is not in the plane that the coxa turns.
+            SimulationError: its foot is far beside the plane that the coxa turns.
 
         """
         data, (chain, ids) = at_zero(body), chain_of(body, leg)
@@ -64,9 +57,11 @@ class SprawledLeg:
         axis = data.xaxis[ids[1]]
         out = np.array([-axis[1], axis[0]]) / math.hypot(axis[0], axis[1])
         out = out if corners[3, :2] @ out >= 0.0 else -out
-        if np.abs(corners[:, :2] @ np.array([-out[1], out[0]])).max() > 1e-3:
-            raise SimulationError(f'leg {leg}: its foot is not in the plane in which '
-                                  f'{self.joints[1].name} and {self.joints[2].name} move it')
+        beside = np.abs(corners[:, :2] @ np.array([-out[1], out[0]])).max()
+        if beside > BESIDE * np.linalg.norm(np.diff(corners, axis=0), axis=1).sum():
+            raise SimulationError(f'leg {leg}: its foot is {100.0 * beside:.1f} cm beside the '
+                                  f'plane in which {self.joints[1].name} and '
+                                  f'{self.joints[2].name} move it')
         # As complex numbers out + i up; turns of femur and tibia by what they do to out.
         points = corners[:, :2] @ out + 1j * corners[:, 2]
         self._coxa, self._upper, self._lower = np.diff(points)

@@ -194,6 +194,7 @@ def _weigh(robot: ElementTree.Element, say: Say) -> float:
     total = sum(masses.values())
     if not total:
         say(f'no link has a mass: they get those of their collision shapes at {HOLLOW:g} kg/m^3')
+    repaired: dict[tuple[str, str], list[str]] = {}
     for name, mass in masses.items():
         link, inertial = links[name], links[name].find('inertial')
         if mass and inertial is not None:
@@ -201,7 +202,7 @@ def _weigh(robot: ElementTree.Element, say: Say) -> float:
             if wrong:
                 numbers = ', '.join(f'{key} {value:.3g}' for key, value in
                                     zip(_KEYS, made[np.triu_indices(3)], strict=True))
-                say(f"link '{name}': its inertia {wrong}; it gets {numbers} kg m^2")
+                repaired.setdefault((wrong, numbers), []).append(name)
             _write(inertial, mass, made)
             continue
         # As the format has it, no <inertial> means none; MuJoCo would take the shapes'.
@@ -215,6 +216,9 @@ def _weigh(robot: ElementTree.Element, say: Say) -> float:
             moment = ball(mass)
             say(f"link '{name}': has no mass, but a joint moves it; it gets {mass:.3g} kg")
         _write(ElementTree.SubElement(link, 'inertial'), mass, moment * np.eye(3))
+    for (wrong, numbers), names in repaired.items():
+        say(f"link '{names[0]}': its inertia {wrong}; it gets {numbers} kg m^2"
+            + (f', and so do {", ".join(names[1:])}' if names[1:] else ''))
     return total
 
 

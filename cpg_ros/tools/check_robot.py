@@ -22,6 +22,7 @@ takes a MuJoCo model instead.
 from argparse import Namespace
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 from math import isfinite
 from pathlib import Path
 import sys
@@ -39,7 +40,7 @@ from cpg_ros.robots.robot_file import LARGEST, load_robot, write_robot
 from cpg_ros.robots.urdf import load_urdf
 from cpg_ros.simulation.biped_description import read_biped, soled
 from cpg_ros.simulation.body import Body
-from cpg_ros.simulation.leg_geometry import read_geometry
+from cpg_ros.simulation.leg_geometry import feet_at_zero, read_geometry
 from cpg_ros.simulation.mjcf_description import load_mjcf
 from cpg_ros.simulation.model_indices import Anatomy
 from cpg_ros.simulation.robot_model import find_model, SimulationError
@@ -118,7 +119,8 @@ def _made(chosen: Namespace, known: RobotDescription) -> Robot:
         raise InputError(f'--make: {chosen.make} does not end in .yaml')
     if chosen.make.exists():
         raise InputError(f'--make: {chosen.make} already exists')
-    robot, notes = robot_from(known, chosen.make.stem)
+    model = chosen.mjcf or str(chosen.urdf)
+    robot, notes = robot_from(known, chosen.make.stem, partial(feet_at_zero, model))
     try:
         geometry, feet = usable(robot, _geometry(chosen, robot, known), known.format)
     except SimulationError as error:

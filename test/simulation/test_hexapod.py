@@ -18,6 +18,7 @@ from functools import cache
 from itertools import pairwise
 import math
 from pathlib import Path
+import re
 
 from cpg_ros.checks.description_match import checked
 from cpg_ros.checks.robot_template import robot_from
@@ -26,12 +27,14 @@ from cpg_ros.motion.plan import plan
 from cpg_ros.networks.registry import find_network
 from cpg_ros.robots.robot_file import load_robot, read_robot, write_robot
 from cpg_ros.robots.urdf import load_urdf
+from cpg_ros.tools.check_robot import main
 import numpy as np
 import pytest
 
 mujoco = pytest.importorskip('mujoco')
 
 from cpg_ros.simulation.body import Body  # noqa: E402
+from cpg_ros.simulation.model_indices import Anatomy  # noqa: E402
 from cpg_ros.simulation.robot_model import find_model, legs  # noqa: E402
 
 ROOT = Path(__file__).parents[2]
@@ -110,11 +113,54 @@ def test_its_files_agree():
 def test_a_robot_file_is_made_from_a_urdf_of_six_legs(tmp_path):
     text = (ROOT / 'urdf' / 'hexapod.urdf').read_text()
     path = tmp_path / 'six.urdf'
-    # Legs that swing about y, as the template knows them.
+    # Legs that swing about y, as those of quadrupeds do.
     path.write_text(text.replace('axis xyz="0 0 1"', 'axis xyz="0 1 0"').replace(
         'axis xyz="0 0 -1"', 'axis xyz="0 1 0"'))
-    robot, says = robot_from(load_urdf(path), 'six')
+    robot, says = robot_from(load_urdf(path), 'six', {}.get)
     assert robot.networks[0] == 'delayed6' and len(robot.joints) == 18
     assert 'lm_coxa_joint swings' in says
     write_robot(tmp_path / 'six.yaml', robot)
     assert read_robot(tmp_path / 'six.yaml') == robot
+
+
+@pytest.mark.parametrize('source', ['urdf', 'turned', 'mjcf'])
+def test_legs_that_reach_to_the_side_stand_swing_and_lift(tmp_path, source, capsys):
+    path, out = tmp_path / 'six.urdf', tmp_path / 'six.yaml'
+    text = (ROOT / 'urdf' / 'hexapod.urdf').read_text()
+    if source == 'turned':
+        # The same robot with joints that count the other way round.
+        text = re.sub(r'axis xyz="([^"]+)"', lambda axis: 'axis xyz="{}"'.format(
+            ' '.join(str(-float(one)) for one in axis[1].split())), text)
+        text = re.sub(r'lower="(\S+)" upper="(\S+)" effort', lambda limits: (
+            f'lower="{-float(limits[2])}" upper="{-float(limits[1])}" effort'), text)
+    path.write_text(text)
+    model = ['--mjcf', 'hexapod'] if source == 'mjcf' else ['--urdf', str(path)]
+    assert main([*model, '--make', str(out)]) == 0
+    assert 'lm_coxa_joint swings, lm_femur_joint lifts' in capsys.readouterr().err
+    robot = read_robot(out)
+    body = Body(model[1], robot)
+    parts = Anatomy(body)
+
+    def feet(column, order):
+        """Where the feet are where joints have what their weights of an order add."""
+        body.reset()
+        for joint in robot.joints:
+            weights = (*joint.weights, 0.0)[:2]
+            body.data.qpos[body.model.jnt_qposadr[body.model.joint(joint.name).id]] = (
+                joint.offset + column * weights[order])
+        mujoco.mj_kinematics(body.model, body.data)
+        return parts.places(body.data) - body.data.xpos[parts.base]
+
+    stand = feet(0.0, 0)
+    side = np.array([1.0 if leg[0] == 'l' else -1.0 for leg in legs(robot)])
+    # All feet on one level below the trunk's belly, outside of it; x forward, y up in swing.
+    assert np.ptp(stand[:, 2]) < 1e-3 and stand[0, 2] < -0.05 - 0.035
+    assert (stand[:, 1] * side > 0.12).all()
+    assert (feet(1.0, 0)[:, 0] - stand[:, 0] > 0.01).all()
+    assert (feet(1.0, 1)[:, 2] - stand[:, 2] > 0.005).all()
+    # The shipped file, which was written by hand, has femora and tibiae at these angles.
+    own = {joint.name: joint.offset for joint in HEXAPOD.joints}
+    sign = -1.0 if source == 'turned' else 1.0
+    for joint in robot.joints:
+        if 'coxa' not in joint.name:
+            assert joint.offset == pytest.approx(sign * own[joint.name], abs=2e-3)

@@ -46,7 +46,7 @@ def test_crc_of_200_random_commands_is_the_table_driven_one():
 
 
 def test_a_command_is_what_rclpy_serialises():
-    messages = pytest.importorskip('unitree_go.msg', reason='make unitree has not been run')
+    messages = pytest.importorskip('unitree_go.msg', reason='make messages has not been run')
     from rclpy.serialization import deserialize_message, serialize_message
     command = filled(7)
     sealed = command.encode()
@@ -84,7 +84,7 @@ def state_bytes(**given):
 
 
 def test_a_state_is_read_as_rclpy_reads_it():
-    messages = pytest.importorskip('unitree_go.msg', reason='make unitree has not been run')
+    messages = pytest.importorskip('unitree_go.msg', reason='make messages has not been run')
     from rclpy.serialization import deserialize_message
     _, data = state_bytes()
     message, state = deserialize_message(data, messages.LowState), LowState()

@@ -38,7 +38,7 @@ def message(name: str) -> type:
         wheels = Path(rclpy.__file__).is_relative_to(sys.prefix)
         raise MissingLibraryError(
             f'the messages of {package} are missing ({error}): ' + (
-                "'make unitree' builds them" if wheels else
+                "'make messages' builds them" if wheels else
                 'build unitree_go and unitree_api of '
                 'https://github.com/unitreerobotics/unitree_ros2 with colcon, and source that '
                 'workspace')) from error
