@@ -50,7 +50,7 @@ class BalanceSwitch(FeedbackSwitch):
         assert biped is not None
         inputs = self._inputs(GRAVITY * biped.total)
         if self._value('odometry_topic'):
-            self._node.get_logger().warning('no odometry: that of legs with soles is not there')
+            self._node.get_logger().warning('no odometry: there is none for legs with soles yet')
         with announced(self._node, 'the feedback', BALANCE):
             return BalanceLoop(pattern, inputs, self._motion)
 

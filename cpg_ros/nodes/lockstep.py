@@ -84,8 +84,8 @@ class Lockstep(TickThread):
                 self.late += 1
                 if self._commands.connected:
                     logger.warning(f'no command came for {1e-9 * now:.3f} s of simulated time: '
-                                   'the robot holds the last one; whatever commands it should '
-                                   f'publish at {self.rate:g} Hz', throttle_duration_sec=10.0)
+                                   'the robot holds the last one; it expects them at '
+                                   f'{self.rate:g} Hz', throttle_duration_sec=10.0)
                 else:
                     logger.info('nothing commands the robot any more: it holds the last command',
                                 throttle_duration_sec=10.0)

@@ -259,8 +259,8 @@ class RobotSim(StartedNode):
         # MuJoCo resets itself then: its time shows that, at little cost.
         if body.time <= self._time and body.diverged:
             self.get_logger().error(
-                'the physics has diverged, from too hard a push, or because kp and kd do not go '
-                'with the timestep: standing at the origin again', throttle_duration_sec=1.0)
+                'the physics has diverged, by too hard a push, or because kp and kd are too high '
+                'for the timestep: standing at the origin again', throttle_duration_sec=1.0)
             self._begin_again()
         self._time = body.time
         self._measurements.publish(stamp)

@@ -52,7 +52,7 @@ def gait_plan(robot: Robot, gait: str) -> GaitPlan:
     """
     presets = NETWORKS[robot.networks[0]].presets()
     if gait not in KINDS or gait not in presets or robot.biped is None:
-        raise InputError(f"there is no balance of '{robot.name}' in the gait '{gait}', only in "
+        raise InputError(f"'{robot.name}' cannot be balanced in the gait '{gait}', only in "
                          + ', '.join(KINDS))
     preset = presets[gait]
     return plan(robot, gait, preset, preset.network,
@@ -104,7 +104,7 @@ class BipedFeedback:
         walk = gait_plan(robot, WALK_GAIT)
         program = program or walk
         if program.gait not in KINDS:
-            raise InputError(f"there is no balance in the gait '{program.gait}', only in "
+            raise InputError(f"a biped cannot be balanced in the gait '{program.gait}', only in "
                              + ', '.join(KINDS))
         if gains is not None:
             self._gains[program.gait] = gains

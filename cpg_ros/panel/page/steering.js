@@ -24,6 +24,7 @@ export class Steering {
   hold(speed, turn) {
     if (!this.able) return;
     this.held = [speed, turn];
+    this.pad.classList.add('held');
     // Both at full reach are in a corner: the knob stays in its circle.
     const reach = REACH / Math.max(1, Math.hypot(speed, turn));
     this.knob.style.transform = `translate(${-reach * turn}rem, ${-reach * speed}rem)`;
@@ -34,6 +35,7 @@ export class Steering {
   release() {
     this.keys.clear();
     this.knob.style.transform = '';
+    this.pad.classList.remove('held');
     if (this.held) this.send(null);
     this.held = null;
     this.released();
