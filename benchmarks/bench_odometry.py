@@ -15,12 +15,14 @@
 """Leg odometry over 100 m: drift in percent of the way, and whether its covariance is true.
 
 Robots walk at changing speeds and turning rates, half of them on a height field, some pushed, with
-noisy sensors that are 4 ms late. NEES is the squared error of x and y over its covariance, 2 on
-average where that is true; both come for a robot as it is, and for one whose scale was measured
-along a tape first. ``--robot`` and ``--model`` take another robot, as ``tune`` wrote it.
+noisy sensors that are 4 ms late and an IMU whose heading drifts by half a degree a minute. NEES is
+the squared error of x and y over its covariance, 2 on average where that is true; both come for a
+robot as it is, and for one whose scale was measured along a tape first. ``--robot`` and
+``--model`` take another robot, as ``tune`` wrote it.
 """
 
 import argparse
+import math
 from pathlib import Path
 import secrets
 import time
@@ -42,8 +44,11 @@ from scipy.stats import chi2
 #: Way in m, longest time for it in s, time between changes of the command, s, largest push, N s.
 WAY, LONGEST, CHANGE, PUSHED = 100.0, 420.0, 4.0, 12.0
 SPEEDS, LEFT, TURN = (0.15, 0.4), 0.1, 0.4
-#: How long it walks along the tape, s, and the standard deviation of a scale that was measured so.
-TAPE, MEASURED = 60.0, 0.015
+#: How long it walks along the tape at each of three speeds, s, and the standard deviation of a
+#: scale that was measured so.
+TAPE, MEASURED = 40.0, 0.015
+#: Drift of the IMU's heading, rad/sqrt(s).
+HEADING = math.radians(0.5) / math.sqrt(60.0)
 NOISE = {'delay': 0.004, 'force_bias': 0.05, 'force_noise': 0.05, 'orientation_bias': 0.005,
          'gyroscope_noise': 0.02, 'gyroscope_bias': 0.002, 'accelerometer_noise': 0.1,
          'accelerometer_bias': 0.05}
@@ -63,10 +68,11 @@ def scenarios(rng: np.random.Generator, runs: int) -> list[Scenario]:
 
 def tape(loop: ClosedLoop, expected: object, seed: int) -> float:
     """Return true way over estimated way, as a user measures it: straight on beside a tape."""
-    ran = loop.run([Scenario(speed=float(np.mean(SPEEDS)))], TAPE, Gains(), expected,
-                   SensorNoise(**NOISE, seed=seed))
-    walked = loop.timestep * ran.estimated[0, :, 0].sum()
-    return float(np.hypot(*(ran.place[0, -1] - ran.place[0, 0])) / walked)
+    ran = loop.run([Scenario(speed=speed) for speed in np.linspace(*SPEEDS, 3)], TAPE, Gains(),
+                   expected, SensorNoise(**NOISE, seed=seed))
+    walked = loop.timestep * ran.estimated[:, :, 0].sum(axis=1)
+    ways = np.linalg.norm(ran.place[:, -1] - ran.place[:, 0], axis=1)
+    return float(np.mean(ways / walked))
 
 
 def measure(loop: ClosedLoop, expected: object, runs: int, seed: int, scale: float
@@ -78,7 +84,7 @@ def measure(loop: ClosedLoop, expected: object, runs: int, seed: int, scale: flo
     for name, how in (('as_it_is', ()), ('measured', (scale, MEASURED))):
         drifts, errors = [], []
         for k in np.flatnonzero(ran.upright):
-            made, reached = _follow(loop, ran, k, how)
+            made, reached = _follow(loop, ran, k, how, np.random.default_rng((seed, k)))
             off = made.pose[:2] - (reached - ran.place[k, 0])
             drifts.append(float(100.0 * np.hypot(*off) / made.pose[5]))
             errors.append(float(off @ np.linalg.solve(made.covariance[:2, :2], off)))
@@ -88,15 +94,16 @@ def measure(loop: ClosedLoop, expected: object, runs: int, seed: int, scale: flo
     return found
 
 
-def _follow(loop: ClosedLoop, ran: Outcome, k: int, how: tuple[float, ...]
-            ) -> tuple[Odometry, np.ndarray]:
+def _follow(loop: ClosedLoop, ran: Outcome, k: int, how: tuple[float, ...],
+            rng: np.random.Generator) -> tuple[Odometry, np.ndarray]:
     """Return the odometry at the end of one run's way, and where the base is then, m, (2,)."""
     legs, joints = len(loop.program.robot.legs), len(loop.program.robot.joints)
     sensors, nothing = SensorData.zeros(1, legs, joints), np.zeros(legs, dtype=bool)
     made = Odometry(loop.geometry, *how)
+    off = HEADING * math.sqrt(loop.timestep) * np.cumsum(rng.standard_normal(len(ran.rpy[k])))
     step = 0
     while step < len(ran.rpy[k]) - 1 and made.pose[5] < WAY:
-        sensors.rpy[0] = ran.rpy[k, step]
+        sensors.rpy[0] = ran.rpy[k, step] + [0.0, 0.0, off[step]]
         made.advance(sensors, ran.estimated[k, step], nothing, loop.timestep)
         step += 1
     return made, ran.place[k, step]

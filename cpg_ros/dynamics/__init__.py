@@ -18,8 +18,9 @@ Imports ``integration`` and what is below; knows nothing of ROS.
 """
 
 __all__ = ['arclength', 'bifurcation', 'branch_end', 'branch_orbits', 'characteristic',
-           'coexisting_orbits', 'continuation', 'deflation', 'delay_crossings', 'equilibrium',
+           'coexisting_orbits', 'continuation', 'critical_disturbances', 'deflation',
+           'delay_crossings', 'equilibrium',
            'expansion', 'floquet', 'fourier', 'gait_assessment', 'hopf_point',
            'hopf_search', 'isotypic', 'isotypic_split', 'mesh', 'normal_form', 'orbit',
-           'orbit_method', 'periodic', 'phase_reduction', 'phase_response', 'seek',
-           'sign_changes', 'stability', 'switching']
+           'orbit_method', 'orbit_normal_form', 'periodic', 'phase_reduction', 'phase_response',
+           'seek', 'sign_changes', 'stability', 'switching']

@@ -25,10 +25,12 @@ from cpg_ros.dynamics.fourier import adjoint as fourier_adjoint
 from cpg_ros.dynamics.fourier import curve as fourier_curve
 from cpg_ros.dynamics.fourier import floquet as fourier_floquet
 from cpg_ros.dynamics.fourier import solve as fourier_solve
+from cpg_ros.dynamics.fourier import variational as fourier_variational
 from cpg_ros.dynamics.mesh import adjoint as mesh_adjoint
 from cpg_ros.dynamics.mesh import curve as mesh_curve
 from cpg_ros.dynamics.mesh import floquet as mesh_floquet
 from cpg_ros.dynamics.mesh import solve as mesh_solve
+from cpg_ros.dynamics.mesh import variational as mesh_variational
 from cpg_ros.networks.network import Network
 
 
@@ -39,10 +41,12 @@ class OrbitMethod(NamedTuple):
     curve: ModuleType
     floquet: ModuleType
     adjoint: ModuleType
+    variational: ModuleType
 
 
-FOURIER = OrbitMethod(fourier_solve, fourier_curve, fourier_floquet, fourier_adjoint)
-MESH = OrbitMethod(mesh_solve, mesh_curve, mesh_floquet, mesh_adjoint)
+FOURIER = OrbitMethod(fourier_solve, fourier_curve, fourier_floquet, fourier_adjoint,
+                      fourier_variational)
+MESH = OrbitMethod(mesh_solve, mesh_curve, mesh_floquet, mesh_adjoint, mesh_variational)
 
 
 def orbit_method(network: Network) -> OrbitMethod:

@@ -18,11 +18,15 @@ Where a symmetry makes cells equal, or equal but for the sign, one cell of each 
 all: the equations are the same, and what a cell hears is found among the classes.
 """
 
+from itertools import permutations
 from typing import Generic
 
 from cpg_ros.networks.equations import equations_of, values_of
 from cpg_ros.networks.network_definition import AnyDefinition
 import numpy as np
+
+#: States now and a delay ago, shape (..., d) each; None where there is no delay.
+States = tuple[np.ndarray, np.ndarray | None]
 
 
 class Field(Generic[AnyDefinition]):
@@ -101,6 +105,25 @@ class Field(Generic[AnyDefinition]):
             into = by_past if self._equations.arguments[k].delayed else by_now
             into[..., i + v * self.size, self._heard[k]] += slope
         return self._filled(rates, now.shape), by_now, by_past
+
+    def multilinear(self, at: States, *sets: States) -> np.ndarray:
+        """Return the second or third derivative of the rates, B(a, b) or C(a, b, c), (..., d).
+
+        Args:
+            at: the states.
+            sets: two or three disturbances of them, which may be complex.
+
+        """
+        find = self._equations.second if len(sets) == 2 else self._equations.third
+        heard = [self._arguments(*one) for one in sets]
+        out = np.zeros(sets[0][0].shape, dtype=complex)
+        found = find(self._arguments(*at), self._p)
+        for (v, *places), value in found.items():
+            into = out[..., v * self.size:(v + 1) * self.size]
+            for order in set(permutations(places)):
+                into += value * np.prod([one[k] for one, k in zip(heard, order, strict=True)],
+                                        axis=0)
+        return out
 
     def by_parameter(self, now: np.ndarray, past: np.ndarray | None = None) -> np.ndarray:
         """Return the rates' derivative by the network's parameters, shape (..., d, parameters).

@@ -80,7 +80,8 @@ class _Reader(YamlReader):
         if word not in words:
             raise self.fail(f'{where}.{key}', f"'{word}' is not one of {', '.join(words)}")
         if stated not in (None, word):
-            raise self.fail(f'{where}.{key}', f"'{word}' does not agree with the network, which has {stated}")
+            raise self.fail(f'{where}.{key}', f"'{word}' does not agree with the network, which "
+                                              f'has {stated}')
         return {where.removeprefix('legs.'): word}
 
     def joint(self, tree: Any, where: str, leg: str, cells: tuple[int, ...]) -> Joint:

@@ -18,8 +18,8 @@ Imports every subpackage; nothing imports it.
 """
 
 __all__ = ['analysis_plot', 'analysis_report', 'analyze', 'arguments', 'atlas', 'bag_playing',
-           'bag_recording', 'basin_report', 'calibrate', 'check_robot', 'command_line',
-           'completion', 'cpg', 'demo', 'demo_course', 'demo_operator', 'demo_processes',
-           'executables', 'export', 'gait_diagram', 'graph_topics', 'inversion',
+           'bag_recording', 'basin_report', 'branch_report', 'calibrate', 'check_robot',
+           'command_line', 'completion', 'cpg', 'demo', 'demo_course', 'demo_operator',
+           'demo_processes', 'executables', 'export', 'gait_diagram', 'graph_topics', 'inversion',
            'network_options', 'optimize', 'own_robot', 'phase_plot', 'phase_report', 'precompile',
            'reading_options', 'reproduce', 'reproduction_report', 'tune']

@@ -14,21 +14,18 @@
 
 """The picture of ``analyze --plot``: branches, roots, trajectories and footfalls."""
 
+from collections.abc import Sequence
 from functools import cache
 import io
 from itertools import chain, count, pairwise
 from typing import Literal
 
-from cpg_ros.dynamics.bifurcation import bifurcations
-from cpg_ros.dynamics.continuation import Branch, continue_from_hopf, continue_orbit
-from cpg_ros.dynamics.floquet import ATTRACTS, multipliers
-from cpg_ros.dynamics.hopf_point import HopfPoint
-from cpg_ros.dynamics.orbit import NoOrbit, Orbit
+from cpg_ros.dynamics.continuation import Branch
 from cpg_ros.errors import InputError
-from cpg_ros.files.progress_bar import progress_bar
 from cpg_ros.networks.network import Network
 from cpg_ros.tools import gait_diagram as footfall
 from cpg_ros.tools.analysis_report import Analysis
+from cpg_ros.tools.branch_report import JudgedBranch, on_line
 import matplotlib
 from matplotlib.axes import Axes
 from matplotlib.colors import hsv_to_rgb, to_hex
@@ -49,15 +46,10 @@ GREY = '#4a5568'
 #: Lines of what attracts by itself, with a symmetry lock, and not at all.
 STYLES: tuple[tuple[Literal['-', '--', ':'], str], ...] = (
     ('-', 'stable'), ('--', 'stable with a lock'), (':', 'unstable'))
-#: Marks of places where an orbit's stability changes other than in a fold.
+#: Marks of places where an orbit's stability changes other than in a fold, filled where softly.
 CROSSINGS = {'torus': 'o', 'period doubling': '^', 'branch point': 'P'}
 #: Lines between two points of a branch.
 BETWEEN = 8
-#: Points of a branch at most, how far apart in arclength, how many times the first period the
-#: last may be (beyond, near a homoclinic orbit, branches wind), and how many branches are drawn.
-POINTS, LONGEST, SLOWEST, BRANCHES = 80, 0.3, 5.0, 12
-#: Share of the way between two points of a branch to which its crossings are drawn.
-VISIBLE = 0.05
 #: Roots that are drawn of each class, at most.
 ROOTS = 7
 
@@ -78,53 +70,6 @@ def colours(network: type[Network]) -> dict[str, str]:
 
 def _colour(analysis: Analysis, gait: str) -> str:
     return colours(type(analysis.network)).get(gait, GREY)
-
-
-def branches(analysis: Analysis) -> list[tuple[str, Branch]]:
-    """Follow the gaits from their Hopf points within the span, and from the set's orbits.
-
-    An orbit that lies on the branch of a Hopf point is not followed again.
-    """
-    low, high = analysis.span
-    value = analysis.along.value(analysis.network)
-    found: list[tuple[str, Branch]] = []
-    for point in _on_line(analysis)[:BRANCHES]:
-        found.extend((point.gait, branch) for branch in _born(point, analysis))
-    for verdict in analysis.existing:
-        orbit = verdict.orbit
-        if low <= value <= high and orbit is not None and not any(
-                gait == verdict.gait and _holds(branch, value, orbit) for gait, branch in found):
-            found.append((verdict.gait,
-                          continue_orbit(orbit, analysis.along, low, high, most=POINTS,
-                                         longest_step=LONGEST, longest=SLOWEST)))
-    return found
-
-
-def _holds(branch: Branch, value: float, orbit: Orbit) -> bool:
-    """Whether a branch passes through an orbit."""
-    try:
-        return any(abs(other.period / orbit.period - 1.0) < 1e-6 for other in branch.at(value))
-    except NoOrbit:
-        return False
-
-
-def _on_line(analysis: Analysis) -> list[HopfPoint]:
-    """Hopf points that lie on the line along which branches are drawn."""
-    low, high = analysis.span
-    return [point for point in analysis.hopf
-            if analysis.line == analysis.along and low <= point.value <= high]
-
-
-def _born(point: HopfPoint, analysis: Analysis) -> list[Branch]:
-    """Return the branch of a Hopf point; none where the first orbit cannot be found."""
-    low, high = analysis.span
-    try:
-        return [continue_from_hopf(point.network, point.block.symmetry, point.omega,
-                                   analysis.along, low, high, rest=point.state,
-                                   vector=point.eigenvector, most=POINTS, longest=SLOWEST,
-                                   longest_step=LONGEST)]
-    except NoOrbit:
-        return []
 
 
 def _smooth(branch: Branch) -> np.ndarray:
@@ -152,35 +97,27 @@ def _draw_branch(axes: Axes, branch: Branch, kinds: list[int], colour: str) -> N
         axes.plot(branch.values[k], branch.amplitudes[k], marker='s', color=colour, markersize=5)
 
 
-def _draw_branches(axes: Axes, analysis: Analysis) -> None:
-    shown, found = set(), branches(analysis)
+def _draw_branches(axes: Axes, analysis: Analysis, judged: Sequence[JudgedBranch]) -> None:
+    shown: set[str] = set()
     met: dict[str, str] = {}
-    total = sum(len(branch.points) for _, branch in found)
-    done = 0
-    with progress_bar('stability along the branches', total) as bar:
-        for gait, branch in found:
-            kinds, spectra = [], []
-            for place in branch.points:
-                spectra.append(multipliers(place.orbit))
-                kinds.append(0 if spectra[-1].attracts else
-                             1 if spectra[-1].leading_within < ATTRACTS else 2)
-                done += 1
-                bar(done)
-            _draw_branch(axes, branch, kinds, _colour(analysis, gait))
-            shown.add(gait)
-            for one in bifurcations(branch, spectra, VISIBLE):
-                axes.plot(one.value, one.point.amplitude, marker=CROSSINGS[one.kind], markersize=6,
-                          color=_colour(analysis, gait), markerfacecolor=axes.get_facecolor())
-                met[one.kind] = CROSSINGS[one.kind]
-            for end, last in zip(branch.ends, (branch.points[0], branch.points[-1]), strict=True):
-                if end.why == 'period':
-                    axes.plot(last.value, last.amplitude, marker='x',
-                              color=_colour(analysis, gait))
-                    met['period grows'] = 'x'
-    for point in _on_line(analysis):
-        axes.plot(point.value, 0.0, marker='o', color=_colour(analysis, point.gait), markersize=5,
+    for one in judged:
+        gait, branch, colour = one.gait, one.branch, _colour(analysis, one.gait)
+        _draw_branch(axes, branch, one.kinds, colour)
+        shown.add(gait)
+        soft = {loss.point for loss in one.losses if loss.form.soft}
+        for point in one.crossings:
+            axes.plot(point.value, point.point.amplitude, marker=CROSSINGS[point.kind],
+                      markersize=6, color=colour,
+                      markerfacecolor=colour if point in soft else axes.get_facecolor())
+            met[point.kind + (' (soft)' if point in soft else '')] = CROSSINGS[point.kind]
+        for end, last in zip(branch.ends, (branch.points[0], branch.points[-1]), strict=True):
+            if end.why == 'period':
+                axes.plot(last.value, last.amplitude, marker='x', color=colour)
+                met['period grows'] = 'x'
+    for start in on_line(analysis):
+        axes.plot(start.value, 0.0, marker='o', color=_colour(analysis, start.gait), markersize=5,
                   clip_on=False)
-        shown.add(point.gait)
+        shown.add(start.gait)
     here = analysis.along.value(analysis.network)
     axes.axvline(here, color='#a0aec0', linewidth=1.0, zorder=0)
     for verdict in analysis.existing:
@@ -197,7 +134,8 @@ def _draw_branches(axes: Axes, analysis: Analysis) -> None:
     handles += [Line2D([], [], color=plain, marker=marker, linestyle='', label=label)
                 for marker, label in (('o', 'Hopf point'), ('s', 'fold'), ('D', 'this set'))]
     handles += [Line2D([], [], color=plain, marker=marker, linestyle='', label=label,
-                       markerfacecolor=axes.get_facecolor()) for label, marker in met.items()]
+                       markerfacecolor=plain if label.endswith('(soft)') else
+                       axes.get_facecolor()) for label, marker in met.items()]
     # Above the axes, where it hides nothing.
     axes.legend(handles=handles, fontsize=7, ncols=5, frameon=False, title='Branches of gaits',
                 title_fontsize=10, alignment='left', loc='lower left', bbox_to_anchor=(0.0, 1.0),
@@ -260,11 +198,12 @@ def written(figure: Figure, suffix: str) -> bytes:
     return out.getvalue()
 
 
-def picture(analysis: Analysis, suffix: str) -> bytes:
+def picture(analysis: Analysis, judged: Sequence[JudgedBranch], suffix: str) -> bytes:
     """Draw an analysis.
 
     Args:
         analysis: of a parameter set.
+        judged: its branches.
         suffix: of the file, such as '.png'.
 
     """
@@ -273,7 +212,7 @@ def picture(analysis: Analysis, suffix: str) -> bytes:
     count = max(1, len(analysis.existing))
     figure = pyplot.figure(figsize=(12.0, 7.4 + 1.7 * max(0, count - 3)), layout='constrained')
     outer = figure.add_gridspec(2, 2)
-    _draw_branches(figure.add_subplot(outer[0, 0]), analysis)
+    _draw_branches(figure.add_subplot(outer[0, 0]), analysis, judged)
     _draw_roots(figure.add_subplot(outer[0, 1]), analysis)
     _draw_trajectories(figure.add_subplot(outer[1, 0]), analysis)
     inner = outer[1, 1].subgridspec(count, 1)

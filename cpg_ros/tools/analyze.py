@@ -131,10 +131,15 @@ def _analyze(chosen: Namespace) -> int:
             from cpg_ros.tools.analysis_plot import check_suffix
             check_suffix(option, path.suffix)
     found = _analysed(chosen)
+    answer, text = found.as_dict() if chosen.json else {}, [] if chosen.json else [found.text()]
     if chosen.plot is not None:
         from cpg_ros.tools.analysis_plot import picture
-        write_atomically(chosen.plot, picture(found, chosen.plot.suffix))
-    answer, text = found.as_dict() if chosen.json else {}, [] if chosen.json else [found.text()]
+        from cpg_ros.tools.branch_report import judged_branches
+        judged = judged_branches(found)
+        write_atomically(chosen.plot, picture(found, judged, chosen.plot.suffix))
+        losses = [loss for one in judged for loss in one.losses]
+        answer['stability_losses'] = [loss.as_dict() for loss in losses]
+        text += ['', *(loss.text(str(found.along)) for loss in losses)] if losses else []
     if chosen.prc is not None:
         from cpg_ros.tools.phase_report import PhaseReport
         response = PhaseReport.of(found)

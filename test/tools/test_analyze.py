@@ -299,6 +299,20 @@ def test_pictures(capsys, tmp_path, name, head):
     assert path.read_bytes().startswith(head) and list(tmp_path.iterdir()) == [path]
 
 
+def test_how_gaits_lose_their_stability_is_printed_and_drawn(capsys, tmp_path):
+    """The biped's run: a torus, of which test_orbit_normal_form shows that it is hard."""
+    arguments = ['--network', 'biped', '--preset', 'run', '--along', 'w_a', '--range=-0.54:-0.5',
+                 '--set', 'w_21=-0.52', 'w_12=-0.52', 'w_43=-0.52', 'w_34=-0.52',
+                 '--plot', str(tmp_path / 'run.png')]
+    (loss,) = (one for one in as_json(capsys, *arguments)['stability_losses']
+               if one['kind'] == 'torus')
+    assert loss['value'] == pytest.approx(-0.5328, abs=1e-4)
+    assert loss['gait'] == 'run' and loss['soft'] is False and loss['cubic'] > 0.0
+    assert main(arguments) == 0
+    assert ('run loses stability at w_21=w_12=w_43=w_34 -0.532807 (torus), hard: nothing beside '
+            'it attracts, the gait jumps') in capsys.readouterr().out
+
+
 def test_phase_responses_are_printed_and_drawn(capsys, tmp_path):
     picture = tmp_path / 'prc.png'
     said = as_json(capsys, '--network', 'biped', '--prc', str(picture))

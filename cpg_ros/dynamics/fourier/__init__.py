@@ -14,4 +14,5 @@
 
 """Periodic orbits as trigonometric polynomials: for networks with a delay."""
 
-__all__ = ['adjoint', 'collocation', 'curve', 'floquet', 'newton', 'orbit', 'solve']
+__all__ = ['adjoint', 'collocation', 'curve', 'floquet', 'newton', 'orbit', 'solve',
+           'variational']

@@ -69,7 +69,7 @@ def evaluate(values: np.ndarray, theta: np.ndarray, order: int = 0,
 def tail(values: np.ndarray) -> float:
     """Largest of the last six harmonics over the largest of all: how well it is resolved."""
     size = np.abs(np.fft.rfft(values))
-    return float(size[-6:].max() / size.max())
+    return float(size[-6:].max() / (size.max() or 1.0))
 
 
 def resample(values: np.ndarray, n: int) -> np.ndarray:

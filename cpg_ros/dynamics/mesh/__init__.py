@@ -15,4 +15,4 @@
 """Periodic orbits as polynomials on a mesh: for networks without delay."""
 
 __all__ = ['adaptation', 'adjoint', 'collocation', 'curve', 'elimination', 'floquet', 'kinks',
-           'newton', 'orbit', 'periodic_schur', 'solve']
+           'newton', 'orbit', 'periodic_schur', 'solve', 'variational']

@@ -141,25 +141,10 @@ def mode(orbit: MeshOrbit, part: int, multiplier: complex
         States, shape (points, components), as a function of times in cycles, shape (points,).
 
     """
-    inside, outside = split(orbit.symmetry)
-    columns, m = (inside, *outside)[part], orbit.symmetry.order
-    flow = Flow(orbit)
+    columns, nu, left = returning(orbit, part, multiplier)
+    flow, m = Flow(orbit), orbit.symmetry.order
     jacobians, answers = flow.solved(columns)
-    steps, change = flow.on(columns)
-    whole = np.eye(columns.shape[1])
-    for step in steps:
-        whole = step @ whole
-    roots, vectors = np.linalg.eig((change.T @ whole).astype(complex))
-    again = np.linalg.matrix_power(change, m)
-    shares = np.einsum('ik,ij,jk->k', vectors.conj(), again, vectors)
-    gaps = np.abs(shares * roots**m - multiplier)
-    if part == 0:
-        # The disturbance along the orbit.
-        gaps[np.abs(roots - 1.0).argmin()] = np.inf
-    nu, w = roots[gaps.argmin()], [vectors[:, gaps.argmin()]]
-    for step in steps:
-        w.append(step @ w[-1])
-    left = np.array(w)
+    change = flow.on(columns)[1]
     inner = np.einsum('nsij,nj->nsi', answers, left[:-1])
     slopes = np.einsum('nsij,nsj->nsi', jacobians, inner)
     coefficients = collocation.power_coefficients(left[:-1], slopes, flow.lengths)
@@ -180,3 +165,36 @@ def mode(orbit: MeshOrbit, part: int, multiplier: complex
         return out @ columns.T / size
 
     return path
+
+
+def returning(orbit: MeshOrbit, part: int, multiplier: complex
+              ) -> tuple[np.ndarray, complex, np.ndarray]:
+    """Return the disturbance with a multiplier, and what it is multiplied by over T/m.
+
+    Args:
+        orbit: as of mode.
+        part: as of mode.
+        multiplier: as of mode.
+
+    Returns:
+        Orthonormal columns of the subspace, shape (components, d); nu; and w of mode at the
+        mesh points in these columns, shape (n + 1, d).
+
+    """
+    inside, outside = split(orbit.symmetry)
+    columns, m = (inside, *outside)[part], orbit.symmetry.order
+    steps, change = Flow(orbit).on(columns)
+    whole = np.eye(columns.shape[1])
+    for step in steps:
+        whole = step @ whole
+    roots, vectors = np.linalg.eig((change.T @ whole).astype(complex))
+    again = np.linalg.matrix_power(change, m)
+    shares = np.einsum('ik,ij,jk->k', vectors.conj(), again, vectors)
+    gaps = np.abs(shares * roots**m - multiplier)
+    if part == 0:
+        # The disturbance along the orbit.
+        gaps[np.abs(roots - 1.0).argmin()] = np.inf
+    nu, w = roots[gaps.argmin()], [vectors[:, gaps.argmin()]]
+    for step in steps:
+        w.append(step @ w[-1])
+    return columns, complex(nu), np.array(w)
