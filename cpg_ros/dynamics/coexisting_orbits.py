@@ -95,8 +95,8 @@ def coexisting_orbits(network: Network, gait: str, near: Orbit | None = None, *,
         near: a known orbit of the gait, from which to start and to whose period the one that
             comes first is nearest.
         starts: simulate from states in the gait's class.
-        everything: simulate from more states, follow the branches of the class's Hopf points and
-            deflate Newton's method about each orbit.
+        everything: simulate from more states and for longer, follow the branches of the class's
+            Hopf points and deflate Newton's method about each orbit.
 
     Raises:
         InputError: an unknown gait, or parameters that are not finite or a delay not positive.
@@ -108,7 +108,7 @@ def coexisting_orbits(network: Network, gait: str, near: Orbit | None = None, *,
     search = _Search(network, gait)
     why = search.reach(near)
     if everything or (not search.starts and (starts or not search.attracting)):
-        search.simulate(MORE_RANDOM if everything else RANDOM)
+        search.simulate(MORE_RANDOM if everything else RANDOM, everything)
     if everything or not search.attracting:
         # Without a delay branches take longer than anything else.
         if everything or network.delay_parameter:
@@ -163,10 +163,10 @@ class _Search:
         self._growth.append(leading_within(orbit))
         return True
 
-    def simulate(self, random: int) -> None:
-        """Let the network settle in the gait's class from many states."""
+    def simulate(self, random: int, thorough: bool) -> None:
+        """Let the network settle in the gait's class from many states, for longer if thorough."""
         try:
-            for path, period in find_orbit(self.network, self.gait, random):
+            for path, period in find_orbit(self.network, self.gait, random, thorough):
                 if len(self.orbits) < MOST and not any(
                         _near(path, period, one) for one in self.orbits):
                     self.add(solve_from_path(self.network, self.symmetry, path, period))

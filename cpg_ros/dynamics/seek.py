@@ -29,9 +29,9 @@ SETTLING, HOLD = 30, 1.0
 #: Where no start is known, gaits are sought from waves about the equilibrium of these sizes, and
 #: from so many states in the gait's class at random about it, this far in the mean.
 SIZES, RANDOM, SCATTER = (0.5, 0.1, 2.0), 12, 0.3
-#: After how many steps it is looked whether a start has settled, twice as many each time, and how
-#: many of them are taken at once where there is no delay.
-LOOKED, COARSER = (3125, 6250, 12_500, 25_000), 2.0
+#: After how many steps it is looked whether a start has settled, twice as many each time, the
+#: last of them in a thorough search only; how many are taken at once where there is no delay.
+LOOKED, THOROUGH, COARSER = (3125, 6250, 12_500, 25_000), (50_000, 100_000), 2.0
 #: Rates below which a network rests, 1/model time, and what its cycles differ by at most, over
 #: their size, where they repeat: neither changes any more.
 RESTING, REPEATING = 1e-9, 1e-3
@@ -136,7 +136,7 @@ def starts(network: Network, symmetry: Symmetry, random: int = RANDOM) -> np.nda
     return np.repeat(equilibrium(network), network.cells) + np.concatenate([waves, inside])
 
 
-def find_orbit(network: Network, gait: str, random: int = RANDOM
+def find_orbit(network: Network, gait: str, random: int = RANDOM, thorough: bool = False
                ) -> Iterator[tuple[Path, float]]:
     """Yield what the network settles on in the gait's class, where it has the gait's symmetry.
 
@@ -144,18 +144,20 @@ def find_orbit(network: Network, gait: str, random: int = RANDOM
         network: parameters.
         gait: one of its gaits.
         random: number of states at random, besides the waves.
+        thorough: wait longer, as slow relaxation oscillations need it.
 
     Yields:
         States over cycles, and the period in model time.
 
     """
     symmetry = network.symmetry(gait)
+    looked = LOOKED + THOROUGH * thorough
     step = network.step * (1.0 if network.delay_parameter else COARSER)
     # As many at a time as advance together.
     for some in np.array_split(starts(network, symmetry, random), (len(SIZES) + random) // LANES):
         histories: list[History] = list(some)
         before = 0
-        for steps in LOOKED:
+        for steps in looked:
             batch = simulate(network, histories, (steps - before) * step, step,
                              lock=(HOLD, symmetry), progress=False)
             histories = []
@@ -163,7 +165,7 @@ def find_orbit(network: Network, gait: str, random: int = RANDOM
                 run = Trajectory(batch.t, x, slopes)
                 first = steps * 3 // 4 - before
                 found = _cycle(run, first)
-                if steps < LOOKED[-1] and not _ends(run, first) and (
+                if steps < looked[-1] and not _ends(run, first) and (
                         found is None or found.drift > REPEATING):
                     histories.append(_Past(run))
                 elif found is not None and _fits(found.path, symmetry):

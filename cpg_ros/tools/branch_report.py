@@ -118,7 +118,7 @@ def _branches(analysis: Analysis) -> list[tuple[str, Branch]]:
 
     An orbit that lies on the branch of a Hopf point is not followed again.
     """
-    low, high = analysis.span
+    low, high = _span(analysis)
     value = analysis.along.value(analysis.network)
     found: list[tuple[str, Branch]] = []
     for point in on_line(analysis)[:BRANCHES]:
@@ -131,6 +131,14 @@ def _branches(analysis: Analysis) -> list[tuple[str, Branch]]:
                           continue_orbit(orbit, analysis.along, low, high, most=POINTS,
                                          longest_step=LONGEST, longest=SLOWEST)))
     return found
+
+
+def _span(analysis: Analysis) -> tuple[float, float]:
+    """Return from where to where branches are followed: delays are above 0."""
+    low, high = analysis.span
+    if analysis.along.names == (analysis.delay,):
+        low = max(low, type(analysis.network).ranges[analysis.delay].low)
+    return low, high
 
 
 def _holds(branch: Branch, value: float, orbit: Orbit) -> bool:
@@ -150,7 +158,7 @@ def on_line(analysis: Analysis) -> list[HopfPoint]:
 
 def _born(point: HopfPoint, analysis: Analysis) -> list[Branch]:
     """Return the branch of a Hopf point; none where the first orbit cannot be found."""
-    low, high = analysis.span
+    low, high = _span(analysis)
     try:
         return [continue_from_hopf(point.network, point.block.symmetry, point.omega,
                                    analysis.along, low, high, rest=point.state,

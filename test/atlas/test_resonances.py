@@ -24,7 +24,8 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-FILE = str(Path(__file__).parents[1] / 'support' / 'septic_legs.py')
+SUPPORT = Path(__file__).parents[1] / 'support'
+FILE, HALF = str(SUPPORT / 'septic_legs.py'), str(SUPPORT / 'half_turns.py')
 K, OMEGA = 0.2, 6.0
 
 
@@ -53,3 +54,20 @@ def test_resonances_are_where_the_angle_says():
     assert found.keys() == wanted.keys()
     for kind, kappa in wanted.items():
         assert found[kind] == pytest.approx((kappa, mu), abs=1e-9)
+
+
+def test_a_torus_curve_ends_where_both_multipliers_are_minus_one():
+    """1:2: growth = -h, nu = omega / 2 + m; beyond, the pair is real and periods double."""
+    network = find_network(HALF)
+    h, m, omega = 0.6, 0.5, 6.0
+    chart = chart_of(HALF, network(-1.0, 3.8, m, h, 0.4, omega),
+                     [('nu', (3.2, 3.9)), ('growth', (-0.9, -0.3))], (9, 9))
+    orbit = solve_orbit(network(-0.8, 3.8, m, h, 0.4, omega), 'hop')
+    assert orbit.period == pytest.approx(2.0 * np.pi / omega)
+    here, there = ((np.array([3.8, -h + way]) - chart.low) / chart.size for way in (-0.1, 0.1))
+    found = orbit_curves((chart, 'hop', [Edge(
+        here, there, orbit(np.arange(65) / 65 * orbit.period).tolist(), orbit.period)]))
+    (curve,) = (one for one in found if one.kind == 'torus')
+    (point,) = curve.codimension_two
+    assert point.kind == '1:2 resonance'
+    assert point.values == pytest.approx((omega / 2.0 + m, -h), abs=1e-8)

@@ -137,3 +137,13 @@ def test_what_simulations_settle_on_is_found_and_attracts(seed):
                 assert leading_within(orbits[0]) < 1.0
                 seen += 1
     assert seen
+
+
+def test_slow_relaxation_oscillations_are_found_when_all_orbits_are_asked_for():
+    """A jump below its critical delay, on which every start settles; no branch leads to it."""
+    network = Delayed(-4.4405, 0.5554, 6.0639, 2.361, 0.7308)
+    periods = settled(network, 'jump', np.random.default_rng(11), 300.0)
+    assert periods and max(periods) - min(periods) < 1e-3
+    found = coexisting_orbits(network, 'jump').orbits
+    assert found[0].period == pytest.approx(periods[0], abs=1e-3)
+    assert leading_within(found[0]) < 1.0
