@@ -28,7 +28,7 @@ from common import emit, log
 from cpg_ros.dynamics.coexisting_orbits import coexisting_orbits
 from cpg_ros.dynamics.floquet import leading_within
 from cpg_ros.dynamics.orbit import NoOrbit
-from cpg_ros.dynamics.periodic import added_symmetry
+from cpg_ros.dynamics.periodic import added_symmetry, check_values
 from cpg_ros.integration.simulate import simulate, Trajectory
 from cpg_ros.networks.biped import Biped
 from cpg_ros.networks.delayed import Delayed
@@ -149,6 +149,11 @@ def settles_on(name: str, network: Network, rng: np.random.Generator) -> dict[st
     found = {}
     for gait in network.gaits():
         symmetry = network.symmetry(gait)
+        try:
+            check_values(network, gait)
+        except NoOrbit:
+            # Its weights lack the symmetry: the lock would make the gait.
+            continue
         starts = rng.uniform(low, high, (STARTS, network.components))
         starts = starts @ symmetry.basis.T @ symmetry.basis
         run = simulate(network, starts, span, network.step, lock=(HOLD, symmetry), every=5,
