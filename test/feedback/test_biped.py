@@ -243,7 +243,7 @@ def test_a_foot_in_flight_lands_below_where_the_body_will_be():
 
 def test_every_gait_with_a_law_has_speeds_and_a_preset():
     assert set(KINDS) == set(SPEEDS) <= set(Biped.presets())
-    with pytest.raises(InputError, match="no balance of 'humanoid' in the gait 'skip', only in"):
+    with pytest.raises(InputError, match="cannot be balanced in the gait 'skip', only in"):
         gait_plan(load_robot('humanoid'), 'skip')
     # Gains of a robot file are for the walk; they spare what only another gait has.
     assert BipedGains.of({'duty': 0.55}).duty == 0.55

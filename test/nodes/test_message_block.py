@@ -22,6 +22,7 @@ from cpg_ros.nodes.message_block import MessageBlock, Template
 from cpg_ros.nodes.sensor_publishers import Measurements
 from cpg_ros.robots.robot_file import load_robot
 from depth import examples
+from geometry_msgs.msg import TransformStamped
 from hypothesis import given
 from hypothesis import strategies as st
 from nav_msgs.msg import Odometry
@@ -30,6 +31,7 @@ import pytest
 from rclpy.serialization import deserialize_message, serialize_message
 from sensor_msgs.msg import Imu, JointState
 from std_msgs.msg import Float64MultiArray, Header, MultiArrayDimension, MultiArrayLayout
+from tf2_msgs.msg import TFMessage
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 ROBOTS = [load_robot(name) for name in ('quadruped', 'goat', 'biped', 'unitree_go2')]
@@ -157,13 +159,13 @@ def test_what_a_simulated_robot_publishes(values):
                            'twist'), parts, strict=True):
         setattr(body, name, part)
     unit = SimpleNamespace(measure=lambda stamp: (stamp - 30, felt), seed=0)
-    Measurements(graph, body, unit).publish(12_000_000_034)
+    Measurements(graph, body, unit, 'trunk').publish(12_000_000_034)
     stamp = Time(sec=12, nanosec=34)
     position, velocity, torque, feet, base, quaternion, twist = (part.tolist() for part in parts)
     same(graph.sent['joint_states'],
          JointState(header=Header(stamp=stamp), name=list(robot.order), position=position,
                     velocity=velocity, effort=torque))
-    odometry = Odometry(header=Header(stamp=stamp, frame_id='odom'), child_frame_id='base')
+    odometry = Odometry(header=Header(stamp=stamp, frame_id='odom'), child_frame_id='trunk')
     pose, moving = odometry.pose.pose, odometry.twist.twist
     pose.position.x, pose.position.y, pose.position.z = base
     (pose.orientation.w, pose.orientation.x, pose.orientation.y,
@@ -171,7 +173,12 @@ def test_what_a_simulated_robot_publishes(values):
     moving.linear.x, moving.linear.y, moving.linear.z = twist[:3]
     moving.angular.x, moving.angular.y, moving.angular.z = twist[3:]
     same(graph.sent['odom'], odometry)
-    imu = Imu(header=Header(stamp=Time(sec=12, nanosec=4), frame_id='base'))
+    moved = TransformStamped(header=odometry.header, child_frame_id='trunk')
+    moved.transform.rotation = pose.orientation
+    at = moved.transform.translation
+    at.x, at.y, at.z = base
+    same(graph.sent['/tf'], TFMessage(transforms=[moved]))
+    imu = Imu(header=Header(stamp=Time(sec=12, nanosec=4), frame_id='trunk'))
     for part, names, numbers in ((imu.orientation, 'xyzw', felt[:4]),
                                  (imu.angular_velocity, 'xyz', felt[4:7]),
                                  (imu.linear_acceleration, 'xyz', felt[7:])):
