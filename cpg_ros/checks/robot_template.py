@@ -16,8 +16,8 @@
 
 x forward, y left, z up (REP 103). In each leg the joints that turn about y are, down the leg,
 the one that swings it, the knee and the ankle; others hold still. The stand has the knees bent
-and the end of the leg below its hip, if upper and lower leg are equally long. A leg without such
-joints may reach to the side, as those of insects: the coxa swings it, the femur lifts it.
+and the end of the leg below its hip, if upper and lower leg are equally long. A leg may also reach
+to the side, as those of insects (robots.sprawled_stand): the coxa swings it, the femur lifts it.
 """
 
 from collections.abc import Callable
@@ -55,7 +55,7 @@ def robot_from(known: RobotDescription, name: str,
             shape (3,); called where legs reach to the side, with a robot whose joints are at 0.
 
     Raises:
-        LegsError: the joints' names do not tell two or four legs.
+        LegsError: the joints' names do not tell two, four or six legs.
         DescriptionError: the links make no tree, a leg has no joint that could swing it, or a
             joint has no room to move.
 

@@ -21,10 +21,9 @@ cell s as ``h chi(s)``, and a delay ago as ``exp(-lambda tau)`` times that.
 
 from collections.abc import Mapping
 from functools import cached_property
-from itertools import permutations
 from typing import Any
 
-from cpg_ros.networks.equations import equations_of, values_of
+from cpg_ros.networks.equations import equations_of, multilinear, values_of
 from cpg_ros.networks.network import Network
 from cpg_ros.networks.parameter_line import ParameterLine
 import numpy as np
@@ -101,9 +100,8 @@ class Expansion:
     def _multilinear(self, derivatives: Mapping[Any, float], *sets: np.ndarray
                      ) -> np.ndarray:
         out = np.zeros(self.network.variables, dtype=complex)
-        for (v, *places), value in derivatives.items():
-            for order in set(permutations(places)):
-                out[v] += value * np.prod([one[k] for one, k in zip(sets, order, strict=True)])
+        for v, rate in multilinear(derivatives, list(sets)).items():
+            out[v] = rate
         return out
 
     def _moving(self, line: ParameterLine) -> dict[int, float]:

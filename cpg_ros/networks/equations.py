@@ -19,9 +19,11 @@ written once for a cell (``Network.equations``); here they are read as texts, an
 rates and their derivatives, exactly, as numpy code that is kept on disk.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import cache, cached_property
 import hashlib
+from itertools import permutations
+from math import prod
 import re
 from types import ModuleType
 from typing import Any
@@ -116,6 +118,22 @@ class Equations:
               ) -> dict[tuple[int, int, int, int], Any]:
         """Return (variable, three arguments) -> third derivative, arguments rising."""
         return dict(zip(self._higher.THIRD, self._higher.third(*x, *p), strict=True))
+
+
+def multilinear(derivatives: Mapping[Any, Any], sets: Sequence[Any]) -> dict[int, Any]:
+    """Return variable -> second or third derivative of its rate at two or three disturbances.
+
+    Args:
+        derivatives: as ``second`` and ``third`` return them.
+        sets: disturbances of the arguments.
+
+    """
+    out: dict[int, Any] = {}
+    for (v, *places), value in derivatives.items():
+        for order in set(permutations(places)):
+            out[v] = out.get(v, 0.0) + value * prod(
+                one[k] for one, k in zip(sets, order, strict=True))
+    return out
 
 
 def _derivation() -> ModuleType:

@@ -18,10 +18,9 @@ Where a symmetry makes cells equal, or equal but for the sign, one cell of each 
 all: the equations are the same, and what a cell hears is found among the classes.
 """
 
-from itertools import permutations
 from typing import Generic
 
-from cpg_ros.networks.equations import equations_of, values_of
+from cpg_ros.networks.equations import equations_of, multilinear, values_of
 from cpg_ros.networks.network_definition import AnyDefinition
 import numpy as np
 
@@ -115,14 +114,10 @@ class Field(Generic[AnyDefinition]):
 
         """
         find = self._equations.second if len(sets) == 2 else self._equations.third
-        heard = [self._arguments(*one) for one in sets]
         out = np.zeros(sets[0][0].shape, dtype=complex)
-        found = find(self._arguments(*at), self._p)
-        for (v, *places), value in found.items():
-            into = out[..., v * self.size:(v + 1) * self.size]
-            for order in set(permutations(places)):
-                into += value * np.prod([one[k] for one, k in zip(heard, order, strict=True)],
-                                        axis=0)
+        for v, rate in multilinear(find(self._arguments(*at), self._p),
+                                   [self._arguments(*one) for one in sets]).items():
+            out[..., v * self.size:(v + 1) * self.size] = rate
         return out
 
     def by_parameter(self, now: np.ndarray, past: np.ndarray | None = None) -> np.ndarray:

@@ -15,13 +15,16 @@
 """Legs that reach to the side, as those of insects: which they are, and how they stand at first.
 
 The first of a leg's last three joints, the coxa, turns it about an upright axis; the other two,
-femur and tibia, about level axes that are parallel.
+femur and tibia, about level axes that are parallel and do not lie across the body: those swing a
+leg forward by themselves.
 """
 
 import math
 
 import numpy as np
 
+#: Part of the femur's axis across the body from which on it swings the leg forward.
+ACROSS = 0.9
 #: How far the femur is raised above level in a first stand, and the tibia lowered below it, rad.
 RAISED, LOWERED = 0.4, 1.3
 
@@ -37,7 +40,7 @@ def sprawls(axes: np.ndarray) -> bool:
         return False
     coxa, femur, tibia = axes[-3:]
     return bool(abs(coxa[2]) > 0.99 and max(abs(femur[2]), abs(tibia[2])) < 0.01
-                and abs(femur @ tibia) > 0.99)
+                and abs(femur @ tibia) > 0.99 and abs(femur[1]) < ACROSS)
 
 
 def first_stand(places: np.ndarray, axes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -108,7 +108,7 @@ def feet_at_zero(name: str, robot: Robot) -> dict[str, np.ndarray]:
         last = chain_of(body, leg)[1][-1]
         points = [data.geom_xpos[geom] + _ends(model, geom) @ data.geom_xmat[geom].reshape(3, 3).T
                   for geom in range(model.ngeom) if model.geom_contype[geom]
-                  and model.geom_bodyid[geom] == model.jnt_bodyid[last]]
+                  and model.body_weldid[model.geom_bodyid[geom]] == model.jnt_bodyid[last]]
         if not points:
             raise SimulationError(f'model: leg {leg} has no shape that could touch the floor')
         balls = [point for point in points if len(point) == 1]

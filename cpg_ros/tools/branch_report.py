@@ -53,12 +53,12 @@ class StabilityLoss:
 
     def text(self, along: str) -> str:
         """Return it as a line."""
-        said = self.form.verdict
+        verdict = self.form.verdict
         if self.form.soft is not None:
-            said += (f': {BEYOND[self.point.kind]} attracts beside it, and grows from it'
-                     if self.form.soft else ': nothing beside it attracts, the gait jumps')
+            verdict += (f': {BEYOND[self.point.kind]} attracts beside it, and grows from it'
+                        if self.form.soft else ': nothing beside it attracts, the gait jumps')
         return (f'{self.gait} loses stability at {along} {self.point.value:.6g} '
-                f'({self.point.kind}), {said}')
+                f'({self.point.kind}), {verdict}')
 
     def as_dict(self) -> dict[str, object]:
         """Return it as plain types."""

@@ -77,6 +77,13 @@ def test_a_frame_that_is_turned_turns_the_axes_with_it(tmp_path):
     assert swinging['thigh'][0] > 0.0 and swinging['hip'] == (0.0,)
 
 
+def test_a_hip_that_yaws_before_pitching_joints_holds_still(tmp_path):
+    """Upright, then two level axes across the body: no leg that reaches to the side."""
+    robot = made(tmp_path, quadruped_urdf(roll='0 0 1'))
+    swinging = {joint.name[3:-6]: joint.weights for joint in robot.legs['lf']}
+    assert swinging['thigh'][0] != 0.0 and swinging['hip'] == (0.0,)
+
+
 def test_a_biped_is_made(tmp_path):
     joints = []
     for side in ('left', 'right'):

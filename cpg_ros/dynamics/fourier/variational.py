@@ -78,6 +78,7 @@ class Variational:
             The factor, and the disturbance at the unknowns, shape (n components,).
 
         """
+        # Of a pair the real part, which is enough for a guess.
         values = mode(self._orbit, part, multiplier)(self._times / self._orbit.period)
         return multiplier, (values * self._wave(multiplier, -1.0)).ravel()
 
