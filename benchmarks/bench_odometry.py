@@ -15,7 +15,8 @@
 """Leg odometry over 100 m: drift in percent of the way, and whether its covariance is true.
 
 Robots walk at changing speeds and turning rates, half of them on a height field, some pushed, with
-noisy sensors that are 4 ms late and an IMU whose heading drifts by half a degree a minute. NEES is
+noisy sensors that are 4 ms late and an IMU whose heading drifts by half a degree a minute. Speeds,
+ground and pushes are for a Go2's size; ``--size`` is the length of other legs over that. NEES is
 the squared error of x and y over its covariance, 2 on average where that is true; both come for a
 robot as it is, and for one whose scale was measured along a tape first. ``--robot`` and
 ``--model`` take another robot, as ``tune`` wrote it.
@@ -29,10 +30,11 @@ import time
 
 from common import emit, log, ROOT
 from cpg_ros.feedback.estimate import SensorData
+from cpg_ros.feedback.froude_scaling import leg_length, scaled_gains
 from cpg_ros.feedback.gains import Gains
 from cpg_ros.feedback.odometry import Odometry
 from cpg_ros.motion.plan import plan
-from cpg_ros.networks.registry import PRESETS
+from cpg_ros.networks.registry import NETWORKS
 from cpg_ros.robots.robot_file import read_robot
 from cpg_ros.simulation.closed_loop import ClosedLoop
 from cpg_ros.simulation.efference_measurement import measure_efference
@@ -54,32 +56,42 @@ NOISE = {'delay': 0.004, 'force_bias': 0.05, 'force_noise': 0.05, 'orientation_b
          'accelerometer_bias': 0.05}
 
 
-def scenarios(rng: np.random.Generator, runs: int) -> list[Scenario]:
+def scenarios(rng: np.random.Generator, runs: int, size: float) -> list[Scenario]:
     """Draw commands, ground and pushes."""
-    times = np.arange(CHANGE, LONGEST, CHANGE)
+    pace = math.sqrt(size)
+    times = np.arange(CHANGE, LONGEST / pace, CHANGE)
     return [Scenario(
-        phase=rng.uniform(), speed=rng.uniform(*SPEEDS),
-        commands=tuple((t, rng.uniform(*SPEEDS), rng.uniform(-LEFT, LEFT),
+        phase=rng.uniform(), speed=pace * rng.uniform(*SPEEDS),
+        commands=tuple((t, pace * rng.uniform(*SPEEDS), pace * rng.uniform(-LEFT, LEFT),
                         rng.uniform(-TURN, TURN)) for t in times),
-        terrain=Terrain('height_field', 0.06, int(rng.integers(1000))) if k % 2 else None,
-        pushes=(impulse(10.0, *rng.uniform(-PUSHED, PUSHED, 2)),) if k % 3 == 0 else ())
+        terrain=(Terrain('height_field', 0.06 * size, int(rng.integers(1000))) if k % 2
+                 else None),
+        pushes=((impulse(10.0, *(size**3 * pace * rng.uniform(-PUSHED, PUSHED, 2))),)
+                if k % 3 == 0 else ()))
         for k in range(runs)]
 
 
-def tape(loop: ClosedLoop, expected: object, seed: int) -> float:
+def tape(loop: ClosedLoop, expected: object, seed: int, size: float) -> float:
     """Return true way over estimated way, as a user measures it: straight on beside a tape."""
-    ran = loop.run([Scenario(speed=speed) for speed in np.linspace(*SPEEDS, 3)], TAPE, Gains(),
-                   expected, SensorNoise(**NOISE, seed=seed))
+    speeds = math.sqrt(size) * np.linspace(*SPEEDS, 3)
+    ran = loop.run([Scenario(speed=speed) for speed in speeds], TAPE, gains_of(loop), expected,
+                   SensorNoise(**NOISE, seed=seed))
     walked = loop.timestep * ran.estimated[:, :, 0].sum(axis=1)
     ways = np.linalg.norm(ran.place[:, -1] - ran.place[:, 0], axis=1)
     return float(np.mean(ways / walked))
 
 
-def measure(loop: ClosedLoop, expected: object, runs: int, seed: int, scale: float
+def gains_of(loop: ClosedLoop) -> Gains:
+    """Return what a robot of that size is walked with."""
+    return scaled_gains(leg_length(loop.geometry))
+
+
+def measure(loop: ClosedLoop, expected: object, chosen: argparse.Namespace, scale: float
             ) -> dict[str, object]:
     """Return drift in percent and NEES at the end of the way, of runs that did not fall."""
-    ran = loop.run(scenarios(np.random.default_rng(seed), runs), LONGEST, Gains(), expected,
-                   SensorNoise(**NOISE, seed=seed))
+    runs, seed, size = chosen.runs, chosen.seed, chosen.size
+    ran = loop.run(scenarios(np.random.default_rng(seed), runs, size), LONGEST / math.sqrt(size),
+                   gains_of(loop), expected, SensorNoise(**NOISE, seed=seed))
     found: dict[str, object] = {'runs': runs, 'fell': int(runs - ran.upright.sum())}
     for name, how in (('as_it_is', ()), ('measured', (scale, MEASURED))):
         drifts, errors = [], []
@@ -114,26 +126,26 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument('--robot', type=Path, default=ROOT / 'config' / 'unitree_go2.yaml')
     parser.add_argument('--model', default='go2')
+    parser.add_argument('--size', type=float, default=1.0, help="length of the legs over a Go2's")
     parser.add_argument('--gaits', nargs='+', default=['trot', 'walk'])
     parser.add_argument('--runs', type=int, default=8)
     parser.add_argument('--seed', type=int, default=secrets.randbelow(2**31))
     chosen = parser.parse_args()
     robot, loops = read_robot(chosen.robot), {}
     for gait in chosen.gaits:
-        preset = PRESETS['delayed'][gait]
+        preset = NETWORKS[robot.networks[0]].presets()[gait]
         made = plan(robot, gait, preset, preset.network, robot.motion(gait, gait).frequency)
         loop = ClosedLoop(chosen.model, made)
-        loops[gait] = loop, measure_efference(loop, SPEEDS)
-    scales = {gait: tape(*loops[gait], chosen.seed + 1) for gait in loops}
+        loops[gait] = loop, measure_efference(loop, math.sqrt(chosen.size) * np.array(SPEEDS))
+    scales = {gait: tape(*loops[gait], chosen.seed + 1, chosen.size) for gait in loops}
     log(f'by the tape: {scales}')
     found = {}
     for gait in loops:
         began = time.perf_counter()
-        found[gait] = measure(*loops[gait], chosen.runs, chosen.seed,
-                              float(np.mean(list(scales.values()))))
+        found[gait] = measure(*loops[gait], chosen, float(np.mean(list(scales.values()))))
         log(f'{gait}: {found[gait]} ({time.perf_counter() - began:.0f} s)')
-    emit(benchmark='odometry', model=chosen.model, seed=chosen.seed, way_m=WAY, scales=scales,
-         scale_error=MEASURED, **found)
+    emit(benchmark='odometry', model=chosen.model, size=chosen.size, seed=chosen.seed, way_m=WAY,
+         scales=scales, scale_error=MEASURED, **found)
 
 
 if __name__ == '__main__':

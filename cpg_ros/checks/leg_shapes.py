@@ -14,7 +14,7 @@
 
 """The part ``geometry`` of a first robot file, from the robot's description."""
 
-from cpg_ros.robots.body_keys import body_geometry, BodyGeometry, LegChain
+from cpg_ros.robots.body_keys import body_geometry, BodyGeometry, LegChain, LEGS
 from cpg_ros.robots.description import RobotDescription
 from cpg_ros.robots.robot import Robot
 import numpy as np
@@ -45,8 +45,7 @@ def usable(robot: Robot, found: BodyGeometry, what: str) -> tuple[BodyGeometry |
     """
     if not found.legs or found.mass <= 0.0:
         return None, (f'feedback: the {what} gives no mass' if found.legs else
-                      'feedback: no leg is a hip about x, if any, then two joints about y')
+                      f'feedback: no leg is {LEGS}')
     others = [leg for leg in robot.legs if leg not in found.legs]
     return found, 'feedback can move all feet' if not others else (
-        f'feedback moves no foot of {", ".join(others)}: a leg must be a hip about x, if any, '
-        'then two joints about y')
+        f'feedback moves no foot of {", ".join(others)}: a leg must be {LEGS}')

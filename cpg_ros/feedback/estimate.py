@@ -17,7 +17,14 @@
 import math
 from typing import NamedTuple
 
-from cpg_ros.feedback.kinematics import foot_of, Geometry, GRAVITY, slopes_of, vertical
+from cpg_ros.feedback.kinematics import (
+    foot_of,
+    from_leg,
+    Geometry,
+    GRAVITY,
+    slopes_of,
+    vertical,
+)
 from cpg_ros.integration.jit import entry, jit
 import numpy as np
 
@@ -82,9 +89,8 @@ def velocity_by_leg(leg, joints, rates, slopes, turning, up, radius, out):
     slopes_of(leg, joints[0], joints[1], joints[2], slopes)
     hip, pitching = leg[0] * joints[0], leg[1] * rates[1] + leg[2] * rates[2]
     # Angular velocity of the shank.
-    a = turning[0] + leg[0] * rates[0]
-    b = turning[1] + pitching * math.cos(hip)
-    c = turning[2] + pitching * math.sin(hip)
+    a, b, c = from_leg(leg, leg[0] * rates[0], pitching * math.cos(hip), pitching * math.sin(hip))
+    a, b, c = turning[0] + a, turning[1] + b, turning[2] + c
     moving_x, moving_y, moving_z = turning[1] * z - turning[2] * y, turning[2] * x - turning[
         0] * z, turning[0] * y - turning[1] * x
     for joint in range(3):

@@ -12,9 +12,11 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Legs of a hip that abducts and two joints that pitch: forward, Jacobian, inverse, compiled.
+"""Legs of a hip and two joints that pitch: forward, Jacobian, inverse, compiled.
 
-Frames are the base's: x forward, y left, z up. A leg of two joints has no way sideways.
+Frames are the base's: x forward, y left, z up. A hip turns about x, or about z where legs reach
+to the sides; either is the first axis of the leg's own frame, whose second is the other joints'
+and whose third points away from the foot. A leg of two joints has no way sideways.
 """
 
 from dataclasses import dataclass
@@ -36,7 +38,7 @@ class LegArrays(NamedTuple):
     """A geometry as compiled code takes it.
 
     Attributes:
-        rows: of Geometry, shape (legs, 14).
+        rows: of Geometry, shape (legs, 23).
         columns: of Geometry, shape (legs, 3).
         radius: of the feet, m.
         weight: of the robot, N.
@@ -56,10 +58,11 @@ class Geometry:
     Attributes:
         columns: index of each leg's hip, thigh and calf among the joints, shape (legs, 3); of a
             leg without a hip joint the first is any, and its turn 0.
-        turns: 1 or -1 by the sense of each joint about x, y and y, shape (legs, 3); 0 of legs
-            whose geometry is not known.
+        turns: 1 or -1 by the sense of each joint about x, y and y of the leg's frame, shape
+            (legs, 3); 0 of legs whose geometry is not known.
         hips: a point on the axis of each hip, m, shape (legs, 3).
-        thighs: from there to the thigh joint, m, shape (legs, 3).
+        frames: axes of each leg's frame, as columns, shape (legs, 3, 3).
+        thighs: from hip to thigh joint in that frame, m, shape (legs, 3).
         uppers: from thigh to calf joint in their plane as z + i x, m, complex, shape (legs,).
         lowers: from calf joint to the middle of the foot, the same.
         bends: 1 or -1, the side to which each knee is bent, shape (legs,).
@@ -71,6 +74,7 @@ class Geometry:
     columns: np.ndarray
     turns: np.ndarray
     hips: np.ndarray
+    frames: np.ndarray
     thighs: np.ndarray
     uppers: np.ndarray
     lowers: np.ndarray
@@ -80,9 +84,10 @@ class Geometry:
 
     @cached_property
     def rows(self) -> np.ndarray:
-        """A row for each leg as the kernels take it, shape (legs, 14)."""
+        """A row for each leg as the kernels take it, shape (legs, 23)."""
         return np.column_stack([self.turns, self.hips, self.thighs, self.uppers.real,
-                                self.uppers.imag, self.lowers.real, self.lowers.imag, self.bends])
+                                self.uppers.imag, self.lowers.real, self.lowers.imag, self.bends,
+                                self.frames.reshape(-1, 9)])
 
     @cached_property
     def arrays(self) -> LegArrays:
@@ -93,6 +98,14 @@ class Geometry:
 def bend_of(upper: complex, lower: complex, second: float) -> float:
     """Return to which side the second of two links is bent at an angle, rad: 1 or -1."""
     return 1.0 if np.sin(second + np.angle(lower / upper)) >= 0.0 else -1.0
+
+
+def _axes(yaw: float | None) -> np.ndarray:
+    """Return the axes of a leg's frame: the base's, or those of one whose hip turns about z."""
+    if yaw is None:
+        return np.eye(3)
+    c, s = math.cos(yaw), math.sin(yaw)
+    return np.array([[0.0, -s, -c], [0.0, c, -s], [1.0, 0.0, 0.0]])
 
 
 def geometry_of(robot: Robot, body: BodyGeometry | None = None) -> Geometry:
@@ -114,19 +127,36 @@ def geometry_of(robot: Robot, body: BodyGeometry | None = None) -> Geometry:
     columns, turns = np.zeros((count, 3), dtype=np.int64), np.zeros((count, 3))
     hips, thighs, bends = np.zeros((count, 3)), np.zeros((count, 3)), np.ones(count)
     uppers, lowers = np.full((2, count), -0.1 + 0.0j)
+    frames = np.tile(np.eye(3), (count, 1, 1))
     for k, name in enumerate(robot.legs):
         if name not in body.legs:
             continue
         leg = body.legs[name]
         own = [joints[joint] for joint in leg.joints]
         columns[k], turns[k, -len(own):] = own if len(own) == 3 else [own[0], *own], leg.turns
-        hips[k], thighs[k] = leg.hip, leg.thigh
+        hips[k], frames[k] = leg.hip, _axes(leg.yaw)
+        thighs[k], calf, foot = (np.array(link) @ frames[k]
+                                 for link in (leg.thigh, leg.calf, leg.foot))
         # What the links themselves are off sideways belongs to the leg's plane.
-        thighs[k, 1] += leg.calf[1] + leg.foot[1]
-        uppers[k], lowers[k] = (complex(link[2], link[0]) for link in (leg.calf, leg.foot))
+        thighs[k, 1] += calf[1] + foot[1]
+        uppers[k], lowers[k] = (complex(link[2], link[0]) for link in (calf, foot))
         bends[k] = bend_of(uppers[k], lowers[k], turns[k, 2] * offsets[own[-1]])
-    return Geometry(columns, turns, hips, thighs, uppers, lowers, bends, body.foot_radius,
+    return Geometry(columns, turns, hips, frames, thighs, uppers, lowers, bends, body.foot_radius,
                     GRAVITY * body.mass)
+
+
+@jit
+def from_leg(leg, x, y, z):
+    """Return a vector of a leg's frame in that of the base."""
+    return (leg[14] * x + leg[15] * y + leg[16] * z, leg[17] * x + leg[18] * y + leg[19] * z,
+            leg[20] * x + leg[21] * y + leg[22] * z)
+
+
+@jit
+def to_leg(leg, x, y, z):
+    """Return a vector of the base's frame in that of a leg."""
+    return (leg[14] * x + leg[17] * y + leg[20] * z, leg[15] * x + leg[18] * y + leg[21] * z,
+            leg[16] * x + leg[19] * y + leg[22] * z)
 
 
 @jit
@@ -136,8 +166,9 @@ def foot_of(leg, hip, thigh, calf):
     ct, st, cc, sc = math.cos(thigh), math.sin(thigh), math.cos(calf), math.sin(calf)
     y, z = leg[7], leg[8] + leg[9] * ct - leg[10] * st + leg[11] * cc - leg[12] * sc
     ch, sh = math.cos(hip), math.sin(hip)
-    return (leg[3] + leg[6] + leg[9] * st + leg[10] * ct + leg[11] * sc + leg[12] * cc,
-            leg[4] + y * ch - z * sh, leg[5] + y * sh + z * ch)
+    x, y, z = from_leg(leg, leg[6] + leg[9] * st + leg[10] * ct + leg[11] * sc + leg[12] * cc,
+                       y * ch - z * sh, y * sh + z * ch)
+    return leg[3] + x, leg[4] + y, leg[5] + z
 
 
 @jit
@@ -149,14 +180,13 @@ def slopes_of(leg, hip, thigh, calf, out):
     whole_z, whole_x = leg[9] * ct - leg[10] * st + lower_z, leg[9] * st + leg[10] * ct + lower_x
     y, z = leg[7], leg[8] + whole_z
     ch, sh = math.cos(hip), math.sin(hip)
-    out[0, 0] = 0.0
-    out[1, 0] = leg[0] * (-y * sh - z * ch)
-    out[2, 0] = leg[0] * (y * ch - z * sh)
+    out[0, 0], out[1, 0], out[2, 0] = from_leg(leg, 0.0, leg[0] * (-y * sh - z * ch),
+                                               leg[0] * (y * ch - z * sh))
     # A positive turn about y takes z + i x on by i times itself.
-    out[0, 1], out[1, 1], out[2, 1] = (leg[1] * whole_z, leg[1] * sh * whole_x,
-                                       -leg[1] * ch * whole_x)
-    out[0, 2], out[1, 2], out[2, 2] = (leg[2] * lower_z, leg[2] * sh * lower_x,
-                                       -leg[2] * ch * lower_x)
+    out[0, 1], out[1, 1], out[2, 1] = from_leg(leg, leg[1] * whole_z, leg[1] * sh * whole_x,
+                                               -leg[1] * ch * whole_x)
+    out[0, 2], out[1, 2], out[2, 2] = from_leg(leg, leg[2] * lower_z, leg[2] * sh * lower_x,
+                                               -leg[2] * ch * lower_x)
 
 
 @jit
@@ -180,7 +210,7 @@ def wrapped(angle):
 @jit
 def joints_of(leg, x, y, z):
     """Return hip, thigh and calf, rad, with a leg's foot there; see inverse."""
-    x, y, z = x - leg[3], y - leg[4], z - leg[5]
+    x, y, z = to_leg(leg, x - leg[3], y - leg[4], z - leg[5])
     side, hip = leg[7], 0.0
     if leg[0] != 0.0:
         down = -math.sqrt(max(y * y + z * z - side * side, 1e-6))

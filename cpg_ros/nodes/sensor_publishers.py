@@ -15,6 +15,7 @@
 """The measurements that a simulated robot publishes every period."""
 
 from collections import deque
+from collections.abc import Sequence
 
 from cpg_ros.nodes.joint_publishers import joint_state, labelled
 from cpg_ros.nodes.message_block import each, MessageBlock, places, Template
@@ -25,6 +26,9 @@ from cpg_ros.simulation.robot_model import legs
 import numpy as np
 from rclpy.node import Node
 from sensor_msgs.msg import Imu
+
+#: Time between two transforms, ns.
+PERIOD = 20_000_000
 
 
 class Measurements:
@@ -57,12 +61,14 @@ class Measurements:
             joints = [np.concatenate(pair) for pair in zip(joints, places(sizes)[7:],
                                                            strict=True)]
         frames = 'odom', frame
-        messages = [('joint_states', joint_state(names, *joints)),
-                    odometry('odom', frames, base, quaternion, twist),
-                    ('foot_contacts', labelled(tuple(feet), forces))]
+        self._block = MessageBlock(node, sizes, [
+            ('joint_states', joint_state(names, *joints)),
+            odometry('odom', frames, base, quaternion, twist),
+            ('foot_contacts', labelled(tuple(feet), forces))])
+        self._transform, self._transformed = None, -PERIOD
         if has_transforms():
-            messages.append(transform(frames, base, quaternion))
-        self._block = MessageBlock(node, sizes, messages)
+            self._transform = MessageBlock(node, sizes[4:6], [transform(frames,
+                                                                        *places(sizes[4:6]))])
         imu = Imu()
         imu.header.frame_id = frame
         self._imu = MessageBlock(node, [10], [('imu', Template(imu, [imu.header.stamp], numbers=[
@@ -83,8 +89,14 @@ class Measurements:
         found = (body.position, body.velocity, body.torque, feet, body.base, body.quaternion,
                  body.twist, *(body.held if self._holds else ()))
         if not self._delay:
-            self._block.publish(stamp, found)
+            self._send(stamp, found)
             return
         self._late.append((stamp, [part.copy() for part in found]))
         while self._late and self._late[0][0] <= stamp - self._delay:
-            self._block.publish(*self._late.popleft())
+            self._send(*self._late.popleft())
+
+    def _send(self, stamp: int, found: Sequence[np.ndarray]) -> None:
+        self._block.publish(stamp, found)
+        if self._transform is not None and not 0 <= stamp - self._transformed < PERIOD:
+            self._transform.publish(stamp, found[4:6])
+            self._transformed = stamp

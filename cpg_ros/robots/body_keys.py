@@ -23,11 +23,15 @@ from dataclasses import asdict, dataclass, field
 from typing import Any, NamedTuple
 
 from cpg_ros.files.yaml_reader import shown, YamlReader
+from cpg_ros.robots.sprawled_stand import sprawls
 from cpg_ros.short_repr import ShortRepr
 import numpy as np
 
 #: Bins of the stride in an efference table, and most speeds that it has.
 BINS, SPEEDS = 64, 8
+#: The legs that feedback can displace.
+LEGS = ('a hip about x, if any, then two joints about y; or, of a leg that reaches to the side, a '
+        'hip about z, then two about one level axis')
 #: Its signals: velocities in m/s, rates in rad/s, angles in rad, of the base in its own frame.
 SIGNALS = ('forward', 'left', 'roll_rate', 'pitch_rate', 'roll', 'pitch')
 
@@ -38,11 +42,14 @@ class LegGeometry:
 
     Attributes:
         joints: names of hip, thigh and calf, or of the last two.
-        turns: 1 or -1 by the sense of each about x, y and y, or y and y.
+        turns: 1 or -1 by the sense of each about x, y and y, or y and y; about z and twice the
+            level axis to the left of its yaw where it has one.
         hip: the hip joint, from the base; of a leg without one that of the thigh.
         thigh: the thigh joint, from the hip.
         calf: the calf joint, from the thigh joint.
         foot: the middle of the foot, from the calf joint.
+        yaw: of a leg whose hip turns about z, the way in which it reaches from there: 0 forward,
+            positive to the left, rad.
 
     """
 
@@ -52,6 +59,7 @@ class LegGeometry:
     thigh: tuple[float, ...]
     calf: tuple[float, ...]
     foot: tuple[float, ...]
+    yaw: float | None = None
 
 
 @dataclass(frozen=True, repr=False)
@@ -107,7 +115,7 @@ class LegChain(NamedTuple):
 def body_geometry(mass: float, chains: Mapping[str, LegChain]) -> BodyGeometry:
     """Return the geometry of a body.
 
-    Legs are left out that are not a hip about x, if any, then two joints about y.
+    Legs are left out that are not LEGS.
 
     Args:
         mass: of the robot, kg.
@@ -121,14 +129,23 @@ def body_geometry(mass: float, chains: Mapping[str, LegChain]) -> BodyGeometry:
 
 def _leg_geometry(joints: Sequence[str], axes: np.ndarray, anchors: np.ndarray, foot: np.ndarray
                   ) -> LegGeometry | None:
-    wanted = np.eye(3)[[0, 1, 1][-len(joints):]]
-    if len(joints) not in (2, 3) or np.abs(np.abs(axes) - wanted).max() > 0.01:
+    if len(joints) not in (2, 3):
         return None
+    wanted, yaw = np.eye(3)[[0, 1, 1][-len(joints):]], None
+    if sprawls(axes):
+        # The plane in which thigh and calf move the foot goes to the foot's side of the hip.
+        out = np.array([axes[1, 1], -axes[1, 0], 0.0])
+        out *= 1.0 if out @ (foot - anchors[0]) >= 0.0 else -1.0
+        yaw = round(float(np.arctan2(out[1], out[0])), 6)
+        wanted = np.array([[0.0, 0.0, 1.0], *[[-np.sin(yaw), np.cos(yaw), 0.0]] * 2])
     turns = np.sign((axes * wanted).sum(axis=1))
+    if np.abs(axes - turns[:, None] * wanted).max() > 0.01:
+        return None
     hip, thigh, calf = anchors[[0, 0, 1] if len(joints) == 2 else [0, 1, 2]]
-    links = (np.round(one, 6) + 0.0 for one in (hip, thigh - hip, calf - thigh, foot - calf))
-    return LegGeometry(tuple(joints), tuple(turns.tolist()), *(
-        tuple(one.tolist()) for one in links))
+    links = [tuple((np.round(one, 6) + 0.0).tolist())
+             for one in (hip, thigh - hip, calf - thigh, foot - calf)]
+    return LegGeometry(tuple(joints), tuple(turns.tolist()), links[0], links[1], links[2],
+                       links[3], yaw)
 
 
 def read_geometry(reader: YamlReader, tree: Any,
@@ -147,7 +164,7 @@ def read_geometry(reader: YamlReader, tree: Any,
 
 def _leg(reader: YamlReader, tree: Any, where: str, known: set[str]) -> LegGeometry:
     places = ('hip', 'thigh', 'calf', 'foot')
-    tree = reader.keys(tree, where, {'joints', 'turns', *places})
+    tree = reader.keys(tree, where, {'joints', 'turns', *places}, {'yaw'})
     joints = tuple(reader.text(name, f'{where}.joints[{k}]') for k, name
                    in enumerate(reader.items(tree['joints'], f'{where}.joints')))
     if len(joints) not in (2, 3) or len(set(joints)) < len(joints):
@@ -160,11 +177,16 @@ def _leg(reader: YamlReader, tree: Any, where: str, known: set[str]) -> LegGeome
     for k, turn in enumerate(turns):
         if turn not in (1.0, -1.0):
             raise reader.fail(f'{where}.turns[{k}]', f'{turn:g} must be 1 or -1')
-    found = [reader.numbers(tree[key], f'{where}.{key}', 3) for key in places]
-    for key, (x, _, z) in zip(places[2:], found[2:], strict=True):
-        if x == z == 0.0:
+    hip, thigh, calf, foot = (reader.numbers(tree[key], f'{where}.{key}', 3) for key in places)
+    yaw = reader.number(tree['yaw'], f'{where}.yaw') if 'yaw' in tree else None
+    if yaw is not None and len(joints) == 2:
+        raise reader.fail(f'{where}.yaw', 'is of a leg of three joints, the first about z')
+    # Level and upward, of what is in the plane of the leg.
+    level = np.array([1.0, 0.0]) if yaw is None else np.array([np.cos(yaw), np.sin(yaw)])
+    for key, link in (('calf', calf), ('foot', foot)):
+        if np.hypot(level @ link[:2], link[2]) < 1e-9:
             raise reader.fail(f'{where}.{key}', 'has no length in the plane of the leg')
-    return LegGeometry(joints, turns, *found)
+    return LegGeometry(joints, turns, hip, thigh, calf, foot, yaw)
 
 
 def read_efference(reader: YamlReader, tree: Any, where: str) -> EfferenceTable:
@@ -201,7 +223,8 @@ def _row(reader: YamlReader, value: Any, where: str) -> tuple[float, ...]:
 def geometry_tree(geometry: BodyGeometry) -> dict[str, Any]:
     """Return what ``read_geometry`` reads back."""
     return {'mass': geometry.mass, 'foot_radius': geometry.foot_radius,
-            'legs': {leg: {key: list(value) for key, value in asdict(one).items()}
+            'legs': {leg: {key: list(value) if isinstance(value, tuple) else value
+                           for key, value in asdict(one).items() if value is not None}
                      for leg, one in geometry.legs.items()}}
 
 

@@ -60,7 +60,7 @@ def calibrated(robot: Robot, model: str, gaits: Sequence[str],
                kd: float | None = None) -> Robot:
     """Return a robot with the geometry of a model, and with efference copies measured on it.
 
-    Where feedback can displace none of its legs, as none of a hexapod's, it stays as it is.
+    A robot of whose legs feedback can displace none stays as it is.
 
     Args:
         robot: whose first network is used.

@@ -245,7 +245,7 @@ def demonstrate(chosen: Namespace) -> int:
     name = own_robot.name_of(chosen)
     if chosen.course and (chosen.hexapod or chosen.humanoid or name or chosen.tour is not None):
         raise InputError('argument --course: not with ' + (
-            '--hexapod, which has no feedback' if chosen.hexapod else
+            '--hexapod, which walks without feedback' if chosen.hexapod else
             '--humanoid, which walks on even ground' if chosen.humanoid else
             'a robot of your own' if name else '--tour'))
     chosen.out = chosen.out or Path(f'{name}_robot' if name else 'out')

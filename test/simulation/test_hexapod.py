@@ -22,6 +22,7 @@ import re
 
 from cpg_ros.checks.description_match import checked
 from cpg_ros.checks.robot_template import robot_from
+from cpg_ros.feedback.froude_scaling import robot_gains
 from cpg_ros.motion.pattern import Pattern
 from cpg_ros.motion.plan import plan
 from cpg_ros.networks.registry import find_network
@@ -34,8 +35,10 @@ import pytest
 mujoco = pytest.importorskip('mujoco')
 
 from cpg_ros.simulation.body import Body  # noqa: E402
+from cpg_ros.simulation.closed_loop import ClosedLoop  # noqa: E402
 from cpg_ros.simulation.model_indices import Anatomy  # noqa: E402
 from cpg_ros.simulation.robot_model import find_model, legs  # noqa: E402
+from cpg_ros.simulation.scenario import Scenario  # noqa: E402
 
 ROOT = Path(__file__).parents[2]
 HEXAPOD, DT = load_robot('hexapod'), 0.002
@@ -164,3 +167,14 @@ def test_legs_that_reach_to_the_side_stand_swing_and_lift(tmp_path, source, caps
     for joint in robot.joints:
         if 'coxa' not in joint.name:
             assert joint.offset == pytest.approx(sign * own[joint.name], abs=2e-3)
+
+
+@pytest.mark.parametrize('gait', ['tripod', 'ripple'])
+def test_its_velocity_is_estimated_by_legs_that_reach_to_the_side(gait):
+    """And with all laws on it keeps walking."""
+    loop = ClosedLoop('hexapod', program(gait))
+    ran = loop.run([Scenario(speed=speed) for speed in (0.1, 0.2)], 8.0, robot_gains(HEXAPOD))
+    late = round(2.0 / DT)
+    true, found = (one[:, late:, 0].mean(axis=1) for one in (ran.velocity, ran.estimated))
+    assert ran.upright.all() and (true > 0.06).all()
+    assert found == pytest.approx(true, rel=0.1)

@@ -15,13 +15,14 @@
 """The transform on /tf held against the odometry that it comes with."""
 
 from nav_msgs.msg import Odometry
+import numpy as np
 import pytest
 from tf2_msgs.msg import TFMessage
 
 
 def check_transforms(messages: list[TFMessage], odometry: list[Odometry],
                      frames: tuple[str, str]) -> None:
-    """Show that transforms between two frames have the odometry's poses, stamp by stamp.
+    """Show that 50 transforms a second have the odometry's poses, stamp by stamp.
 
     Args:
         messages: of /tf, on which others may publish, too.
@@ -32,7 +33,9 @@ def check_transforms(messages: list[TFMessage], odometry: list[Odometry],
     found = {stamp(one): one.transform for message in messages for one in message.transforms
              if (one.header.frame_id, one.child_frame_id) == frames}
     both = [(found[stamp(one)], one.pose.pose) for one in odometry if stamp(one) in found]
-    assert len(both) > 0.8 * len(odometry) > 0
+    assert len(both) > 0.8 * len(found) > 0
+    times = np.array([sec + 1e-9 * nanosec for sec, nanosec in sorted(found)])
+    assert np.median(np.diff(times)) == pytest.approx(0.02, abs=1e-6)
     for transform, pose in both:
         for at, place in ((transform.translation, pose.position),
                           (transform.rotation, pose.orientation)):
