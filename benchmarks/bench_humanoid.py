@@ -20,6 +20,8 @@ inertial unit and of the foot forces, 4 ms of delay. Every run has a seed of its
 in the walk and 0.5 m/s in the run, survived if the robot is upright 6 s later. Ablations get the
 same pushes. 'even clock' has phases that grow evenly, as those of a sine, in place of the network:
 it says what the network's dynamics add to the balance. 'ten times' walks, runs, walks and stands.
+Grounds are crossed at 0.3 m/s for 21 s: tiles of random heights, ramps that begin after half a
+metre, another friction or a load on the base that the feedback does not know of.
 """
 
 import argparse
@@ -35,6 +37,7 @@ from cpg_ros.feedback.biped.gains import BipedGains
 from cpg_ros.robots.robot_file import load_robot
 from cpg_ros.simulation.biped_run import BipedRun
 from cpg_ros.simulation.scenario import impulse, SensorNoise
+from cpg_ros.simulation.terrain import Terrain
 import numpy as np
 
 NOISE = SensorNoise(delay=0.004, gyroscope_noise=0.02, accelerometer_noise=0.1, force_noise=0.05)
@@ -48,6 +51,12 @@ GOINGS = {'0': ('walk', 0.0, 0.0, 0.0, 61.0), '0.3': ('walk', 0.3, 0.0, 0.0, 61.
           'jump': ('two_legged_jump', 0.0, 0.0, 0.0, 31.0)}
 IMPULSES = {'walk': (20.0, 30.0, 40.0), 'run': (15.0, 20.0, 25.0)}
 SPEEDS = {'walk': 0.3, 'run': 0.5}
+#: Kind and size of the terrain, friction, load in kg; then s and runs of each.
+GROUNDS = {'tiles 3 cm': ('boxes', 0.03, 0.6, 0.0), 'tiles 4 cm': ('boxes', 0.04, 0.6, 0.0),
+           'slope +4 degrees': ('ramp', 4.0, 0.6, 0.0),
+           'slope -4 degrees': ('ramp', -4.0, 0.6, 0.0), 'friction 0.5': ('', 0.0, 0.5, 0.0),
+           'load +5 kg': ('', 0.0, 0.6, 5.0), 'load -3 kg': ('', 0.0, 0.6, -3.0)}
+CROSSING, CROSSINGS = 21.0, 4
 #: Changes of the gains that take a law away.
 ABLATIONS = {'without placement': {'place_x': 0.0, 'place_y': 0.0},
              'without speed-up': {'speed_up': 0.0},
@@ -101,12 +110,17 @@ class Job(NamedTuple):
 
 
 @cache
-def runner(robot: str, model: str) -> BipedRun:
-    return BipedRun(model, load_robot(robot), NOISE)
+def runner(robot: str, model: str, ground: str = '', number: int = 0) -> BipedRun:
+    kind, size, friction, load = GROUNDS.get(ground, ('', 0.0, 0.6, 0.0))
+    made = BipedRun(model, load_robot(robot), NOISE, friction,
+                    terrain=Terrain(kind, size, number) if kind else None)
+    made.body.load(load)
+    return made
 
 
 def measure(job: Job) -> tuple[Job, dict[str, float]]:
-    run = runner(job.robot, job.model)
+    run = (runner(job.robot, job.model, job.name, job.number) if job.name in GROUNDS else
+           runner(job.robot, job.model))
     robot = run.robot
     assert robot.biped is not None
     gains = BipedGains.of({**robot.biped.gains, **ABLATIONS.get(job.ablation, {})}, job.gait)
@@ -164,6 +178,8 @@ def main() -> None:
             for name, (gait, *wish, seconds) in GOINGS.items() for k in range(chosen.seeds)]
     jobs += [Job(*robot, seed + k, 'ten times', 'walk', (0.3, 0.0, 0.0), 10.0 * ROUND)
              for k in range(2)]
+    jobs += [Job(*robot, seed + k, name, 'walk', (0.3, 0.0, 0.0), CROSSING, number=k)
+             for name in GROUNDS for k in range(CROSSINGS)]
     for gait, strengths in IMPULSES.items():
         for strength in strengths:
             jobs += pushed(robot, seed, gait, strength)
@@ -176,6 +192,8 @@ def main() -> None:
         found = list(pool.map(measure, jobs, chunksize=4))
     goings = {name: summary([one for job, one in found if job.name == name], tuple(wish))
               for name, (_, *wish, _) in GOINGS.items()}
+    crossed = {name: summary([one for job, one in found if job.name == name], (0.3, 0.0, 0.0))
+               for name in GROUNDS}
     ten = [one['fell'] for job, one in found if job.name == 'ten times']
     survived = {label: {f'{strength:g}': sum(math.isinf(one['fell']) for job, one in found if (
         job.name, job.gait, job.ablation, job.impulse) == ('push', gait, ablation, strength))
@@ -187,7 +205,7 @@ def main() -> None:
               and all(goings[name]['error'] <= TARGETS['speed_error'] * abs(GOINGS[name][1])
                       for name in ('0.3', '0.5', 'backward', 'run 0.5', 'run 1.0'))
               and whole['20'] >= TARGETS['survived_20'] and whole['30'] >= TARGETS['survived_30'])
-    emit(benchmark='humanoid', robot=chosen.robot, goings=goings,
+    emit(benchmark='humanoid', robot=chosen.robot, goings=goings, grounds=crossed,
          walk_run_walk_stand_ten_times={'runs': len(ten), 'falls': sum(map(math.isfinite, ten))},
          pushes_of=DIRECTIONS * PHASES, survived=survived, targets=TARGETS, passed=passed)
 

@@ -26,7 +26,7 @@ from cpg_ros.short_repr import ShortRepr
 from cpg_ros.simulation.body import Body
 from cpg_ros.simulation.proprioception import fill_sensor_data, NoisySenses
 from cpg_ros.simulation.scenario import PUSH, SensorNoise
-from cpg_ros.simulation.terrain import set_friction
+from cpg_ros.simulation.terrain import add_ground, lay, set_friction, Terrain
 import numpy as np
 
 #: A robot has fallen whose centre of mass is lower than this share of its height.
@@ -65,7 +65,8 @@ class BipedRun:
     """One simulated biped whose servos follow its feedback at every step of the physics."""
 
     def __init__(self, model: str, robot: Robot, noise: SensorNoise | None = None,
-                 friction: float = 0.6, timestep: float = 0.002) -> None:
+                 friction: float = 0.6, timestep: float = 0.002,
+                 terrain: Terrain | None = None) -> None:
         """Load the model.
 
         Args:
@@ -74,9 +75,12 @@ class BipedRun:
             noise: of the sensors; none if not given.
             friction: between feet and ground.
             timestep: of physics and feedback, s.
+            terrain: flat and level ground if not given.
 
         """
-        self.body = Body(model, robot, timestep=timestep)
+        self.body = Body(model, robot, timestep=timestep, add=add_ground if terrain else None)
+        if terrain is not None:
+            lay(self.body.model, terrain)
         self.robot, self.noise, self.dt = robot, noise or SensorNoise(), timestep
         set_friction(self.body.model, friction)
         biped = robot.biped
