@@ -16,7 +16,7 @@
 
 Robots walk at changing speeds and turning rates, half of them on a height field, some pushed, with
 noisy sensors that are 4 ms late and an IMU whose heading drifts by half a degree a minute. Speeds,
-ground and pushes are for a Go2's size; ``--size`` is the length of other legs over that. NEES is
+ground, pushes and gains are a Go2's; ``--size`` scales them to legs of other lengths. NEES is
 the squared error of x and y over its covariance, 2 on average where that is true; both come for a
 robot as it is, and for one whose scale was measured along a tape first. ``--robot`` and
 ``--model`` take another robot, as ``tune`` wrote it.
@@ -30,8 +30,7 @@ import time
 
 from common import emit, log, ROOT
 from cpg_ros.feedback.estimate import SensorData
-from cpg_ros.feedback.froude_scaling import leg_length, scaled_gains
-from cpg_ros.feedback.gains import Gains
+from cpg_ros.feedback.froude_scaling import LENGTH, scaled_gains
 from cpg_ros.feedback.odometry import Odometry
 from cpg_ros.motion.plan import plan
 from cpg_ros.networks.registry import NETWORKS
@@ -74,16 +73,11 @@ def scenarios(rng: np.random.Generator, runs: int, size: float) -> list[Scenario
 def tape(loop: ClosedLoop, expected: object, seed: int, size: float) -> float:
     """Return true way over estimated way, as a user measures it: straight on beside a tape."""
     speeds = math.sqrt(size) * np.linspace(*SPEEDS, 3)
-    ran = loop.run([Scenario(speed=speed) for speed in speeds], TAPE, gains_of(loop), expected,
-                   SensorNoise(**NOISE, seed=seed))
+    ran = loop.run([Scenario(speed=speed) for speed in speeds], TAPE,
+                   scaled_gains(size * LENGTH), expected, SensorNoise(**NOISE, seed=seed))
     walked = loop.timestep * ran.estimated[:, :, 0].sum(axis=1)
     ways = np.linalg.norm(ran.place[:, -1] - ran.place[:, 0], axis=1)
     return float(np.mean(ways / walked))
-
-
-def gains_of(loop: ClosedLoop) -> Gains:
-    """Return what a robot of that size is walked with."""
-    return scaled_gains(leg_length(loop.geometry))
 
 
 def measure(loop: ClosedLoop, expected: object, chosen: argparse.Namespace, scale: float
@@ -91,7 +85,7 @@ def measure(loop: ClosedLoop, expected: object, chosen: argparse.Namespace, scal
     """Return drift in percent and NEES at the end of the way, of runs that did not fall."""
     runs, seed, size = chosen.runs, chosen.seed, chosen.size
     ran = loop.run(scenarios(np.random.default_rng(seed), runs, size), LONGEST / math.sqrt(size),
-                   gains_of(loop), expected, SensorNoise(**NOISE, seed=seed))
+                   scaled_gains(size * LENGTH), expected, SensorNoise(**NOISE, seed=seed))
     found: dict[str, object] = {'runs': runs, 'fell': int(runs - ran.upright.sum())}
     for name, how in (('as_it_is', ()), ('measured', (scale, MEASURED))):
         drifts, errors = [], []

@@ -23,6 +23,8 @@ import numpy as np
 
 #: Numbers of a position, an orientation w x y z, a twist, and the covariances of pose and twist.
 POSE, ORIENTATION, TWIST, COVARIANCE = 3, 4, 6, 36
+#: Time between two estimates of the pose that are published, and between two transforms, s.
+PERIOD = 0.02
 
 
 def has_transforms() -> bool:

@@ -21,15 +21,13 @@ from cpg_ros.nodes.odometry_messages import (
     has_transforms,
     odometry,
     ORIENTATION,
+    PERIOD,
     POSE,
     transform,
     TWIST,
 )
 import numpy as np
 from rclpy.node import Node
-
-#: Time between two messages, s.
-PERIOD = 0.02
 
 
 class OdometryPublisher:

@@ -19,16 +19,13 @@ from collections.abc import Sequence
 
 from cpg_ros.nodes.joint_publishers import joint_state, labelled
 from cpg_ros.nodes.message_block import each, MessageBlock, places, Template
-from cpg_ros.nodes.odometry_messages import has_transforms, odometry, transform
+from cpg_ros.nodes.odometry_messages import has_transforms, odometry, PERIOD, transform
 from cpg_ros.simulation.body import Body
 from cpg_ros.simulation.inertial_unit import InertialUnit
 from cpg_ros.simulation.robot_model import legs
 import numpy as np
 from rclpy.node import Node
 from sensor_msgs.msg import Imu
-
-#: Time between two transforms, ns.
-PERIOD = 20_000_000
 
 
 class Measurements:
@@ -65,7 +62,8 @@ class Measurements:
             ('joint_states', joint_state(names, *joints)),
             odometry('odom', frames, base, quaternion, twist),
             ('foot_contacts', labelled(tuple(feet), forces))])
-        self._transform, self._transformed = None, -PERIOD
+        self._transform, self._period = None, round(1e9 * PERIOD)
+        self._transformed = -self._period
         if has_transforms():
             self._transform = MessageBlock(node, sizes[4:6], [transform(frames,
                                                                         *places(sizes[4:6]))])
@@ -97,6 +95,7 @@ class Measurements:
 
     def _send(self, stamp: int, found: Sequence[np.ndarray]) -> None:
         self._block.publish(stamp, found)
-        if self._transform is not None and not 0 <= stamp - self._transformed < PERIOD:
+        age = stamp - self._transformed
+        if self._transform is not None and not 0 <= age < self._period:
             self._transform.publish(stamp, found[4:6])
             self._transformed = stamp

@@ -23,7 +23,7 @@ from dataclasses import asdict, dataclass, field
 from typing import Any, NamedTuple
 
 from cpg_ros.files.yaml_reader import shown, YamlReader
-from cpg_ros.robots.sprawled_stand import sprawls
+from cpg_ros.robots.sprawled_stand import outward, sprawls
 from cpg_ros.short_repr import ShortRepr
 import numpy as np
 
@@ -42,8 +42,9 @@ class LegGeometry:
 
     Attributes:
         joints: names of hip, thigh and calf, or of the last two.
-        turns: 1 or -1 by the sense of each about x, y and y, or y and y; about z and twice the
-            level axis to the left of its yaw where it has one.
+        turns: 1 or -1 by the sense of each about x, y and y, or y and y; of a leg with a yaw,
+            about z for the hip and, for the others, about the level axis that is 90 degrees to
+            the left of it.
         hip: the hip joint, from the base; of a leg without one that of the thigh.
         thigh: the thigh joint, from the hip.
         calf: the calf joint, from the thigh joint.
@@ -133,19 +134,19 @@ def _leg_geometry(joints: Sequence[str], axes: np.ndarray, anchors: np.ndarray, 
         return None
     wanted, yaw = np.eye(3)[[0, 1, 1][-len(joints):]], None
     if sprawls(axes):
-        # The plane in which thigh and calf move the foot goes to the foot's side of the hip.
-        out = np.array([axes[1, 1], -axes[1, 0], 0.0])
-        out *= 1.0 if out @ (foot - anchors[0]) >= 0.0 else -1.0
+        out = outward(axes[1], foot - anchors[0])
         yaw = round(float(np.arctan2(out[1], out[0])), 6)
         wanted = np.array([[0.0, 0.0, 1.0], *[[-np.sin(yaw), np.cos(yaw), 0.0]] * 2])
     turns = np.sign((axes * wanted).sum(axis=1))
     if np.abs(axes - turns[:, None] * wanted).max() > 0.01:
         return None
     hip, thigh, calf = anchors[[0, 0, 1] if len(joints) == 2 else [0, 1, 2]]
-    links = [tuple((np.round(one, 6) + 0.0).tolist())
-             for one in (hip, thigh - hip, calf - thigh, foot - calf)]
-    return LegGeometry(tuple(joints), tuple(turns.tolist()), links[0], links[1], links[2],
-                       links[3], yaw)
+
+    def rounded(place: np.ndarray) -> tuple[float, ...]:
+        return tuple((np.round(place, 6) + 0.0).tolist())
+
+    return LegGeometry(tuple(joints), tuple(turns.tolist()), rounded(hip), rounded(thigh - hip),
+                       rounded(calf - thigh), rounded(foot - calf), yaw)
 
 
 def read_geometry(reader: YamlReader, tree: Any,

@@ -43,6 +43,18 @@ def sprawls(axes: np.ndarray) -> bool:
                 and abs(femur @ tibia) > 0.99 and abs(femur[1]) < ACROSS)
 
 
+def outward(axis: np.ndarray, reach: np.ndarray) -> np.ndarray:
+    """Return the level direction in which a leg reaches, in the plane that its femur moves.
+
+    Args:
+        axis: of the femur, shape (3,).
+        reach: from coxa to foot, m; its first two numbers count.
+
+    """
+    out = np.array([-axis[1], axis[0]]) / math.hypot(axis[0], axis[1])
+    return out if out @ reach[:2] >= 0.0 else -out
+
+
 def first_stand(places: np.ndarray, axes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return a stand with the foot out to the side and below, and what the joints do there.
 
@@ -55,9 +67,7 @@ def first_stand(places: np.ndarray, axes: np.ndarray) -> tuple[np.ndarray, np.nd
         angles of the coxa take the foot forward, and of femur and tibia upward.
 
     """
-    reach = places[3, :2] - places[0, :2]
-    out = np.array([-axes[1, 1], axes[1, 0]]) / math.hypot(*axes[1, :2])
-    out = out if out @ reach >= 0.0 else -out
+    out = outward(axes[1], places[3] - places[0])
     # As complex numbers out + i up; turns of femur and tibia by what they do to out.
     upper, lower = np.diff(places[1:, :2] @ out + 1j * places[1:, 2])
     turns = np.sign(np.cross(axes[1:], [*out, 0.0])[:, 2])

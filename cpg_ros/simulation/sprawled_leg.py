@@ -22,6 +22,7 @@ import math
 
 from cpg_ros.feedback.kinematics import bend_of
 from cpg_ros.robots.robot import Joint
+from cpg_ros.robots.sprawled_stand import outward
 from cpg_ros.simulation.body import Body
 from cpg_ros.simulation.leg_geometry import at_zero, chain_of, two_link_angles, wrapped
 from cpg_ros.simulation.model_indices import Anatomy
@@ -53,10 +54,7 @@ class SprawledLeg:
         ids = ids[-3:]
         foot = parts.places(data)[legs(body.robot).index(leg)]
         corners = np.stack([*data.xanchor[ids], foot]) - data.xanchor[ids[0]]
-        # The plane's level direction, away from the body.
-        axis = data.xaxis[ids[1]]
-        out = np.array([-axis[1], axis[0]]) / math.hypot(axis[0], axis[1])
-        out = out if corners[3, :2] @ out >= 0.0 else -out
+        out = outward(data.xaxis[ids[1]], corners[3])
         beside = np.abs(corners[:, :2] @ np.array([-out[1], out[0]])).max()
         if beside > BESIDE * np.linalg.norm(np.diff(corners, axis=0), axis=1).sum():
             raise SimulationError(f'leg {leg}: its foot is {100.0 * beside:.1f} cm beside the '
