@@ -17,16 +17,19 @@
 Six networks, of which the delayed one has delays up to 5, and three of one's own (own_networks).
 Simulation is of the whole network, held in the gait's class by a symmetry lock; what it does in
 the end is compared with the gait's shifts. A gait that it settles on must be among the ones of
-coexisting_orbits, with its period, and attract in its class. The seed is a new one each time,
-unless it is given.
+coexisting_orbits, with its period, and attract in its class. Where it is neutral in its class, a
+few of the starts end beside it, within what counts as the gait: these are counted by themselves.
+So are cycles that are the gait's no more if a simulation goes on: they settled slowly.
+The seed is a new one each time, unless it is given.
 """
 
 import argparse
+from collections.abc import Iterator
 import time
 
 from common import emit, log
 from cpg_ros.dynamics.coexisting_orbits import coexisting_orbits
-from cpg_ros.dynamics.floquet import leading_within
+from cpg_ros.dynamics.floquet import ATTRACTS, leading_within
 from cpg_ros.dynamics.orbit import NoOrbit
 from cpg_ros.dynamics.periodic import added_symmetry, check_values
 from cpg_ros.integration.simulate import simulate, Trajectory
@@ -47,8 +50,12 @@ SAME = 0.01
 RICHER = 0.03
 #: A simulation has so many of the cycles that it settles in, or what returns may be a torus.
 CYCLES = 12
+#: What has no orbit is simulated so many times as long again.
+LONGER = 8
 #: Below this range of the first variable it rests; gain of the lock, 1/model time.
 MOVES, HOLD = 0.05, 1.0
+#: So near to 1 a multiplier within the class is neutral.
+NEUTRAL = 1e-6
 #: By what share its size may change over three cycles, or it still dies away.
 STEADY = 2e-3
 TARGETS = {'missed': 0, 'other_orbits': 0}
@@ -141,28 +148,47 @@ def period_of(network: Network, symmetry: Symmetry, run: Trajectory) -> float | 
     return cycle.period
 
 
-def settles_on(name: str, network: Network, rng: np.random.Generator) -> dict[str, list[float]]:
-    """Gaits in which the network settles, and the periods from each start that does."""
-    _, states, span = NETWORKS[name]
+def settled(network: Network, gait: str, starts: np.ndarray, span: float) -> list[float]:
+    """Periods from each start that settles in the gait in so much model time."""
+    symmetry = network.symmetry(gait)
+    run = simulate(network, starts, span, network.step, lock=(HOLD, symmetry), every=5,
+                   progress=False)
+    return [period for x, slopes in zip(run.x, run.slopes, strict=True)
+            if (period := period_of(network, symmetry, Trajectory(run.t, x, slopes)))]
+
+
+def starts_of(name: str, network: Network, rng: np.random.Generator
+              ) -> Iterator[tuple[str, np.ndarray]]:
+    """Yield the gaits that the network's weights allow, and random states in their classes."""
+    states = NETWORKS[name][1]
     low, high = np.repeat(np.array(states * (network.variables // len(states))).T, network.cells,
                           axis=1)
-    found = {}
     for gait in network.gaits():
-        symmetry = network.symmetry(gait)
+        basis = network.symmetry(gait).basis
         try:
             check_values(network, gait)
         except NoOrbit:
             # Its weights lack the symmetry: the lock would make the gait.
             continue
-        starts = rng.uniform(low, high, (STARTS, network.components))
-        starts = starts @ symmetry.basis.T @ symmetry.basis
-        run = simulate(network, starts, span, network.step, lock=(HOLD, symmetry), every=5,
-                       progress=False)
-        periods = [period for x, slopes in zip(run.x, run.slopes, strict=True)
-                   if (period := period_of(network, symmetry, Trajectory(run.t, x, slopes)))]
-        if periods:
-            found[gait] = periods
-    return found
+        yield gait, rng.uniform(low, high, (STARTS, network.components)) @ basis.T @ basis
+
+
+def judged(network: Network, gait: str, periods: list[float]) -> tuple[str, float, bool]:
+    """What is wrong with the solver's answer, '' if nothing; for which period; is it neutral."""
+    try:
+        orbits = coexisting_orbits(network, gait, everything=False).orbits
+    except NoOrbit as error:
+        return str(error)[:60], periods[0], False
+    growth = [leading_within(one) for one in orbits]
+    attracting = [one.period for one, largest in zip(orbits, growth, strict=True)
+                  if largest < 1.0 + NEUTRAL]
+    neutral = any(ATTRACTS <= largest < 1.0 + NEUTRAL for largest in growth)
+    lost = [period for period in periods
+            if not any(abs(one / period - 1.0) < 1e-2 for one in attracting)]
+    if not lost:
+        return '', periods[0], neutral
+    known = any(abs(one.period / lost[0] - 1.0) < 1e-2 for one in orbits)
+    return 'not stable' if known else f'period {orbits[0].period:.4f}', lost[0], neutral
 
 
 def main() -> None:
@@ -176,24 +202,23 @@ def main() -> None:
     seed, rng = chosen.seed, np.random.default_rng(chosen.seed)
     sets = [(name, NETWORKS[name][0](rng)) for name in chosen.networks
             for _ in range(chosen.sets)]
-    missed, seen, spent = [], 0, 0.0
+    missed, seen, neutral, slow, spent = [], 0, 0, 0, 0.0
     for count, (name, network) in enumerate(sets):
-        for gait, periods in settles_on(name, network, rng).items():
-            seen += 1
+        span = NETWORKS[name][2]
+        for gait, starts in starts_of(name, network, rng):
+            if not (periods := settled(network, gait, starts, span)):
+                continue
             began = time.process_time()
-            try:
-                orbits = coexisting_orbits(network, gait, everything=False).orbits
-            except NoOrbit as error:
-                orbits, reason = (), str(error)[:60]
-            else:
-                attracting = [one.period for one in orbits if leading_within(one) < 1.0]
-                lost = [period for period in periods if not any(
-                    abs(one / period - 1.0) < 1e-2 for one in attracting)]
-                period = lost[0] if lost else periods[0]
-                reason = ('' if not lost else f'period {orbits[0].period:.4f}' if not any(
-                    abs(one.period / period - 1.0) < 1e-2 for one in orbits) else 'not stable')
-            period = periods[0] if not orbits else period
+            reason, period, between = judged(network, gait, periods)
             spent += time.process_time() - began
+            if reason:
+                # It may still be on its way to something else.
+                if not (periods := settled(network, gait, starts, LONGER * span)):
+                    slow += 1
+                    continue
+                reason, period, between = judged(network, gait, periods)
+            seen += 1
+            neutral += between
             if reason:
                 missed.append({'network': network.name, 'gait': gait, 'period': period,
                                'params': network.as_dict(), 'reason': reason})
@@ -201,6 +226,7 @@ def main() -> None:
         if count % 10 == 9:
             log(f'{count + 1} sets, {seen} gaits')
     emit(benchmark='missed_gaits', seed=seed, networks=chosen.networks, sets=len(sets), gaits=seen,
+         neutral=neutral, slow=slow,
          missed=sum(not one['reason'].startswith('period') for one in missed),
          other_orbits=sum(one['reason'].startswith('period') for one in missed),
          solve_cpu_s_mean=spent / max(seen, 1), misses=missed, targets=TARGETS,

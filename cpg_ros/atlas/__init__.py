@@ -20,4 +20,5 @@ Imports ``fleet``, ``dynamics`` and what is below; knows nothing of ROS.
 __all__ = ['bautin_folds', 'chart', 'codimension_two', 'fold_curves', 'fold_cusps',
            'grid_refinement', 'hopf_condition', 'hopf_curve_ends', 'hopf_curves',
            'hopf_degeneracies', 'hopf_starts', 'infinite_periods', 'map_page', 'map_picture',
-           'orbit_curves', 'orbit_plane', 'resonances', 'row_job', 'stored']
+           'orbit_curves', 'orbit_plane', 'resonances', 'row_job', 'stability_losses',
+           'stored']

@@ -27,6 +27,7 @@ from cpg_ros.atlas.chart import Chart
 from cpg_ros.atlas.codimension_two import CodimensionTwo
 from cpg_ros.atlas.hopf_condition import HopfCondition
 from cpg_ros.atlas.hopf_starts import hopf_starts, HopfStart, lines_across
+from cpg_ros.atlas.stability_losses import StabilityLoss
 from cpg_ros.short_repr import ShortRepr
 import numpy as np
 
@@ -47,6 +48,8 @@ class Boundary(ShortRepr):
         gaits: whose: several, where classes with the same eigenvalues share it.
         points: values on both axes, and of a Hopf point omega, shape (n, 2 or 3).
         codimension_two: points on it where a second condition holds.
+        losses: whether the gait is lost softly or hard at places on it where a multiplier of
+            stable orbits crosses the unit circle, other than by a fold.
 
     """
 
@@ -54,9 +57,13 @@ class Boundary(ShortRepr):
     gaits: tuple[str, ...]
     points: np.ndarray
     codimension_two: tuple[CodimensionTwo, ...] = ()
+    losses: tuple[StabilityLoss, ...] = ()
 
     def __str__(self) -> str:
-        return f'{self.kind} of {" and ".join(self.gaits)}'
+        met = [name for name, soft in (('soft', True), ('hard', False))
+               if any(loss.soft is soft for loss in self.losses)]
+        return (f'{self.kind} of {" and ".join(self.gaits)}'
+                + (f' ({" and ".join(met)})' if met else ''))
 
 
 def _inside(share: np.ndarray) -> bool:

@@ -30,6 +30,7 @@ from cpg_ros.atlas.hopf_curves import Boundary
 from cpg_ros.atlas.orbit_plane import OrbitPlane, spectrum
 from cpg_ros.atlas.resonances import resonances
 from cpg_ros.atlas.row_job import NONE, solve_from_wave
+from cpg_ros.atlas.stability_losses import stability_losses
 from cpg_ros.dynamics.bifurcation import REAL
 from cpg_ros.dynamics.floquet import ATTRACTS
 from cpg_ros.dynamics.orbit import NoOrbit
@@ -118,23 +119,24 @@ def _through(chart: Chart, gait: str, edge: Edge) -> Iterator[Boundary]:
         ways, special = [], []
         for way in (-1.0, 1.0):
             plane.last = at_share
-            ways.append(_followed(g, share, way))
+            ways.append([(new, plane.last) for new in _followed(g, share, way)])
             if kind == 'torus':
                 plane.last = at_share
-                special.append([*resonances(plane, part, rank, [share, *ways[-1]])][::int(way)])
-        shares = np.array([*ways[0][::-1], share, *ways[1]])
-        yield Boundary(kind, (gait,), chart.low + shares * chart.size,
-                       tuple(chain(*special)))
+                along = [share, *(new for new, _ in ways[-1])]
+                special.append([*resonances(plane, part, rank, along)][::int(way)])
+        curve = [*ways[0][::-1], (share, at_share), *ways[1]]
+        yield Boundary(kind, (gait,), chart.low + np.array([new for new, _ in curve]) * chart.size,
+                       tuple(chain(*special)),
+                       tuple(stability_losses(plane, part, rank, curve)))
         plane.last = start
 
 
-def _followed(g: Distance, start: np.ndarray, way: float) -> list[np.ndarray]:
-    """Return points of g = 0 from one on, until the plane ends or the orbit is lost."""
-    found: list[np.ndarray] = []
-    here, step = start, STEP
+def _followed(g: Distance, start: np.ndarray, way: float) -> Iterator[np.ndarray]:
+    """Yield points of g = 0 from one on, until the plane ends or the orbit is lost."""
+    here, step, count = start, STEP, 0
     normal = slopes(g, here, DIFFERENCE)
     tangent = way * np.array([-normal[1], normal[0]]) / np.linalg.norm(normal)
-    while len(found) < MOST and step > SHORTEST:
+    while count < MOST and step > SHORTEST:
         try:
             new, across = _onto(g, here + step * tangent, normal)
         except (NoOrbit, np.linalg.LinAlgError):
@@ -148,11 +150,10 @@ def _followed(g: Distance, start: np.ndarray, way: float) -> list[np.ndarray]:
             step *= 0.5
             continue
         here, tangent, normal = new, ahead, across
-        found.append(here)
-        step = min(1.5 * step, STEP)
-        if len(found) > 5 and np.linalg.norm(here - start) < 0.5 * STEP:
+        yield here
+        count, step = count + 1, min(1.5 * step, STEP)
+        if count > 5 and np.linalg.norm(here - start) < 0.5 * STEP:
             break
-    return found
 
 
 def _onto(g: Distance, share: np.ndarray, normal: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

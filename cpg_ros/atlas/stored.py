@@ -26,6 +26,7 @@ from cpg_ros.atlas.codimension_two import CodimensionTwo
 from cpg_ros.atlas.grid_refinement import NUMBERS, Sheet
 from cpg_ros.atlas.hopf_curves import Boundary
 from cpg_ros.atlas.row_job import AtlasRow
+from cpg_ros.atlas.stability_losses import StabilityLoss
 from cpg_ros.errors import InputError
 from cpg_ros.files.atomic_write import replacing, stored_json, write_atomically
 from cpg_ros.fleet.results_table import library
@@ -77,17 +78,19 @@ class AtlasFolder:
     def curves(self) -> list[Boundary] | None:
         """Return the boundaries, if they are done."""
         found = stored_json(self.folder / 'boundaries.json')
-        if found is None or any('codimension_two' not in one for one in found):
+        if found is None or any('losses' not in one for one in found):
             return None  # Those of an earlier version are followed anew.
         return [Boundary(one['kind'], tuple(one['gaits']), np.array(one['points']),
-                         tuple(map(CodimensionTwo.of, one['codimension_two'])))
+                         tuple(map(CodimensionTwo.of, one['codimension_two'])),
+                         tuple(map(StabilityLoss.of, one['losses'])))
                 for one in found]
 
     def put_curves(self, curves: list[Boundary]) -> None:
         """Store the boundaries."""
         write_atomically(self.folder / 'boundaries.json', json.dumps([
             {'kind': curve.kind, 'gaits': curve.gaits, 'points': curve.points.tolist(),
-             'codimension_two': [point.as_dict() for point in curve.codimension_two]}
+             'codimension_two': [point.as_dict() for point in curve.codimension_two],
+             'losses': [loss.as_dict() for loss in curve.losses]}
             for curve in curves]))
 
     def write(self, sheets: dict[str, Sheet]) -> Path:

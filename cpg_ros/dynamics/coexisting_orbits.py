@@ -25,7 +25,7 @@ from dataclasses import dataclass
 
 from cpg_ros.dynamics.branch_orbits import branch_orbits
 from cpg_ros.dynamics.equilibrium import NoEquilibrium
-from cpg_ros.dynamics.floquet import leading_within
+from cpg_ros.dynamics.floquet import ATTRACTS, leading_within
 from cpg_ros.dynamics.hopf_point import first_hopf
 from cpg_ros.dynamics.orbit import NoOrbit, Orbit, solve_from_path, solve_orbit
 from cpg_ros.dynamics.periodic import check_values, richer
@@ -95,8 +95,8 @@ def coexisting_orbits(network: Network, gait: str, near: Orbit | None = None, *,
         near: a known orbit of the gait, from which to start and to whose period the one that
             comes first is nearest.
         starts: simulate from states in the gait's class.
-        everything: simulate from more states and for longer, follow the branches of the class's
-            Hopf points and deflate Newton's method about each orbit.
+        everything: simulate from more states and always for longer, follow the branches of the
+            class's Hopf points and deflate Newton's method about each orbit.
 
     Raises:
         InputError: an unknown gait, or parameters that are not finite or a delay not positive.
@@ -145,12 +145,12 @@ class _Search:
     @property
     def attracting(self) -> bool:
         """Whether an orbit is known that attracts within its class."""
-        return any(growth < 1.0 for growth in self._growth)
+        return any(growth < ATTRACTS for growth in self._growth)
 
     def result(self, near: Orbit | None) -> CoexistingOrbits:
         known = near or (self.orbits[0] if self.orbits else None)
         order = sorted(range(len(self.orbits)), key=lambda k: (
-            self._growth[k] >= 1.0,
+            self._growth[k] >= ATTRACTS,
             0.0 if known is None else abs(np.log(self.orbits[k].period / known.period))))
         return CoexistingOrbits(self.gait, tuple(self.orbits[k] for k in order), self.starts,
                                 self.hopf_points, self.deflated)
@@ -163,10 +163,14 @@ class _Search:
         self._growth.append(leading_within(orbit))
         return True
 
-    def simulate(self, random: int, thorough: bool) -> None:
-        """Let the network settle in the gait's class from many states, for longer if thorough."""
+    def simulate(self, random: int, longer: bool) -> None:
+        """Let the network settle in the gait's class from many states.
+
+        Those that take long are waited for as long as nothing is known that attracts, or if asked.
+        """
         try:
-            for path, period in find_orbit(self.network, self.gait, random, thorough):
+            for path, period in find_orbit(self.network, self.gait, random,
+                                           lambda: longer or not self.attracting):
                 if len(self.orbits) < MOST and not any(
                         _near(path, period, one) for one in self.orbits):
                     self.add(solve_from_path(self.network, self.symmetry, path, period))

@@ -32,10 +32,10 @@ bifurcations of limit cycles in DDEs, 2023).
 
 from dataclasses import dataclass
 
-from cpg_ros.dynamics.bifurcation import Bifurcation
+from cpg_ros.dynamics.bifurcation import REAL
 from cpg_ros.dynamics.critical_disturbances import Linearised
 from cpg_ros.dynamics.floquet import multipliers
-from cpg_ros.dynamics.periodic import NoOrbit
+from cpg_ros.dynamics.orbit import NoOrbit, Orbit
 from cpg_ros.networks.field import States
 from cpg_ros.short_repr import ShortRepr
 import numpy as np
@@ -44,6 +44,8 @@ import numpy as np
 CRITICAL, RESONANT = 1e-3, 0.02
 #: A coefficient must not change by more than this share when the mesh is halved.
 SAME = 0.01
+#: What a multiplier is larger than that grows where another one crosses the circle.
+GROWS = 1.001
 #: A quadratic term of this share of what its parts are is none.
 NOTHING = 1e-6
 
@@ -76,12 +78,22 @@ class OrbitNormalForm(ShortRepr):
         return f'{self.verdict}, c = {self.cubic:.6g}'
 
 
-def orbit_normal_form(point: Bifurcation) -> OrbitNormalForm:
-    """Return the normal form of a torus, a period doubling or a branch point."""
-    if why := _undecided(point):
+def orbit_normal_form(orbit: Orbit, multiplier: complex, part: int) -> OrbitNormalForm:
+    """Return the normal form at an orbit of which a multiplier crosses the unit circle.
+
+    Args:
+        orbit: of the critical parameters.
+        multiplier: that crosses: complex at a torus, where it is either of the pair, near -1 at a
+            period doubling, near 1 at a branch point.
+        part: number of the subspace it belongs to: 0 the gait's class, then those transverse.
+
+    """
+    pair = abs(multiplier.imag) > REAL
+    if why := _undecided(orbit, multiplier, pair):
         return OrbitNormalForm(complex('nan'), why)
     try:
-        found = [_cubic(point, halvings) for halvings in (0, 1)]
+        found = [_cubic(Linearised(orbit, halvings), multiplier, part, pair)
+                 for halvings in (0, 1)]
     except (NoOrbit, np.linalg.LinAlgError, RuntimeError) as error:
         return OrbitNormalForm(complex('nan'), str(error))
     if abs(found[1].real - found[0].real) > SAME * abs(found[1].real):
@@ -89,14 +101,20 @@ def orbit_normal_form(point: Bifurcation) -> OrbitNormalForm:
     return OrbitNormalForm(found[1])
 
 
-def _undecided(point: Bifurcation) -> str:
+def loses_stability(orbit: Orbit) -> bool:
+    """Whether nothing else grows where a multiplier of an orbit crosses the unit circle."""
+    known = multipliers(orbit)
+    return bool((np.abs([*known.within, *known.transverse]) < GROWS).all())
+
+
+def _undecided(orbit: Orbit, multiplier: complex, pair: bool) -> str:
     """Say what makes a normal form with one disturbance the wrong one, '' if nothing does."""
-    known, pair = multipliers(point.point.orbit), point.kind == 'torus'
+    known = multipliers(orbit)
     there = np.concatenate([known.within, known.transverse])
     if (np.abs(np.abs(there) - 1.0) < CRITICAL).sum() > 1 + pair:
         return 'other multipliers are on the unit circle, too'
     for power in (1, 2, 3, 4):
-        if pair and abs(point.multiplier**power - 1.0) < RESONANT:
+        if pair and abs(multiplier**power - 1.0) < RESONANT:
             return f'the resonance 1:{power} is near'
     return ''
 
@@ -105,11 +123,10 @@ def _conj(y: States) -> States:
     return y[0].conj(), None if y[1] is None else y[1].conj()
 
 
-def _cubic(point: Bifurcation, halvings: int) -> complex:
-    """Return c on the orbit's mesh or a finer one."""
-    linear = Linearised(point.point.orbit, halvings)
-    equation, pair = linear.equation, point.kind == 'torus'
-    turn, guess = equation.critical(point.part, point.multiplier)
+def _cubic(linear: Linearised, multiplier: complex, part: int, pair: bool) -> complex:
+    """Return c on the mesh of a linearised network."""
+    equation = linear.equation
+    turn, guess = equation.critical(part, multiplier)
     turn = complex(turn / abs(turn)) if pair else complex(round(turn.real))
     if not pair and abs(turn) != 1.0:
         raise NoOrbit('two disturbances that symmetry makes alike are critical')
@@ -129,7 +146,7 @@ def _cubic(point: Bifurcation, halvings: int) -> complex:
                                                                       else (along,))]).T
     own = None if alike else linear.shares(turn, linear.moved(v))[0]
 
-    def part(rates: np.ndarray) -> complex:
+    def share(rates: np.ndarray) -> complex:
         """Return the part along v."""
         if own is None:
             return complex(np.linalg.solve(weights, linear.shares(1.0, rates))[1])
@@ -137,7 +154,7 @@ def _cubic(point: Bifurcation, halvings: int) -> complex:
 
     other = _conj(v) if pair else v
     first = linear.second(v, other)
-    if alike and abs(part(first)) > NOTHING * np.abs(first).max():
+    if alike and abs(share(first)) > NOTHING * np.abs(first).max():
         raise NoOrbit('a branch crosses this one (transcritical)')
     a = complex(np.linalg.solve(weights, linear.shares(1.0, first))[0])
     mixed = linear.solve(first - a * linear.moved(along), 1.0)
@@ -151,7 +168,7 @@ def _cubic(point: Bifurcation, halvings: int) -> complex:
         terms = [0.5 * linear.second(v, mixed), cubic / 6.0]
     slope = equation.derivative(v, turn)
     terms += [-a * linear.moved(slope), -a * linear.second(v, linear.late(along))]
-    parts = [part(term) for term in terms]
+    parts = [share(term) for term in terms]
     if abs(sum(parts).real) <= NOTHING * max(map(abs, parts)):
         raise NoOrbit('its cubic term is 0')
     return complex(sum(parts))

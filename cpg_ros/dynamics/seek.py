@@ -30,8 +30,8 @@ SETTLING, HOLD = 30, 1.0
 #: from so many states in the gait's class at random about it, this far in the mean.
 SIZES, RANDOM, SCATTER = (0.5, 0.1, 2.0), 12, 0.3
 #: After how many steps it is looked whether a start has settled, twice as many each time, the
-#: last of them in a thorough search only; how many are taken at once where there is no delay.
-LOOKED, THOROUGH, COARSER = (3125, 6250, 12_500, 25_000), (50_000, 100_000), 2.0
+#: last of them only where that is asked for; how many are taken at once where there is no delay.
+LOOKED, LONGER, COARSER = (3125, 6250, 12_500, 25_000), (50_000, 100_000), 2.0
 #: Rates below which a network rests, 1/model time, and what its cycles differ by at most, over
 #: their size, where they repeat: neither changes any more.
 RESTING, REPEATING = 1e-9, 1e-3
@@ -136,28 +136,30 @@ def starts(network: Network, symmetry: Symmetry, random: int = RANDOM) -> np.nda
     return np.repeat(equilibrium(network), network.cells) + np.concatenate([waves, inside])
 
 
-def find_orbit(network: Network, gait: str, random: int = RANDOM, thorough: bool = False
-               ) -> Iterator[tuple[Path, float]]:
+def find_orbit(network: Network, gait: str, random: int = RANDOM,
+               longer: Callable[[], bool] = lambda: True) -> Iterator[tuple[Path, float]]:
     """Yield what the network settles on in the gait's class, where it has the gait's symmetry.
 
     Args:
         network: parameters.
         gait: one of its gaits.
         random: number of states at random, besides the waves.
-        thorough: wait longer, as slow relaxation oscillations need it.
+        longer: whether to wait longer for starts that have not settled, as slow relaxation
+            oscillations need it.
 
     Yields:
         States over cycles, and the period in model time.
 
     """
     symmetry = network.symmetry(gait)
-    looked = LOOKED + THOROUGH * thorough
     step = network.step * (1.0 if network.delay_parameter else COARSER)
     # As many at a time as advance together.
     for some in np.array_split(starts(network, symmetry, random), (len(SIZES) + random) // LANES):
         histories: list[History] = list(some)
         before = 0
-        for steps in looked:
+        for steps in LOOKED + LONGER:
+            if not histories or (before == LOOKED[-1] and not longer()):
+                break
             batch = simulate(network, histories, (steps - before) * step, step,
                              lock=(HOLD, symmetry), progress=False)
             histories = []
@@ -165,13 +167,12 @@ def find_orbit(network: Network, gait: str, random: int = RANDOM, thorough: bool
                 run = Trajectory(batch.t, x, slopes)
                 first = steps * 3 // 4 - before
                 found = _cycle(run, first)
-                if steps < looked[-1] and not _ends(run, first) and (
-                        found is None or found.drift > REPEATING):
+                settled = _ends(run, first) or (found is not None and found.drift <= REPEATING)
+                if not settled:
                     histories.append(_Past(run))
-                elif found is not None and _fits(found.path, symmetry):
+                if ((settled or steps >= LOOKED[-1]) and found is not None
+                        and _fits(found.path, symmetry)):
                     yield found.path, found.period
-            if not histories:
-                break
             before = steps
 
 

@@ -59,5 +59,35 @@ def crossings(function: Callable[[float], float], grid: np.ndarray,
     signs[signs == 0.0] = 1.0
     # Not a number where there is no value, whose product differs from -1.
     crossed = np.flatnonzero(signs[:-1] * signs[1:] == -1.0)
-    return [float(scipy.optimize.brentq(function, *places[k:k + 2], xtol=EXACT, rtol=EXACT))
-            for k in crossed]
+    return [root for k in crossed for root in _roots(function, *places[k:k + 2])]
+
+
+def _roots(function: Callable[[float], float], low: float, high: float) -> list[float]:
+    """Find where a function changes sign between two places; on both sides of a gap in it."""
+    gap: list[float] = []
+
+    def whole(x: float) -> float:
+        value = function(x)
+        if np.isnan(value):
+            gap.append(x)
+            # Any number ends the search: what it finds is not used.
+            return 0.0
+        return value
+
+    root = float(scipy.optimize.brentq(whole, low, high, xtol=EXACT, rtol=EXACT))
+    if not gap:
+        return [root]
+    edges = [(end, _last(function, end, gap[0])) for end in (low, high)]
+    return [root for end, edge in edges if function(end) * function(edge) < 0.0
+            for root in _roots(function, *sorted((end, edge)))]
+
+
+def _last(function: Callable[[float], float], inside: float, outside: float) -> float:
+    """Return the last place with a value, on the way to one without."""
+    while abs(outside - inside) > EXACT * max(1.0, abs(inside)):
+        middle = 0.5 * (inside + outside)
+        if np.isnan(function(middle)):
+            outside = middle
+        else:
+            inside = middle
+    return inside

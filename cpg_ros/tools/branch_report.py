@@ -21,16 +21,13 @@ from cpg_ros.dynamics.continuation import Branch, continue_from_hopf, continue_o
 from cpg_ros.dynamics.floquet import ATTRACTS, Multipliers, multipliers
 from cpg_ros.dynamics.hopf_point import HopfPoint
 from cpg_ros.dynamics.orbit import NoOrbit, Orbit
-from cpg_ros.dynamics.orbit_normal_form import orbit_normal_form, OrbitNormalForm
+from cpg_ros.dynamics.orbit_normal_form import loses_stability, orbit_normal_form, OrbitNormalForm
 from cpg_ros.files.progress_bar import progress_bar
 from cpg_ros.tools.analysis_report import Analysis
-import numpy as np
 
 #: Points of a branch at most, how far apart in arclength, how many times the first period the
 #: last may be (beyond, near a homoclinic orbit, branches wind), and how many branches are drawn.
 POINTS, LONGEST, SLOWEST, BRANCHES = 80, 0.3, 5.0, 12
-#: What a multiplier is larger than that grows where another one crosses the circle.
-GROWS = 1.001
 #: By what crosses the circle: what is there beyond.
 BEYOND = {'torus': 'a torus', 'period doubling': 'a gait of two strides',
           'branch point': 'a gait of less symmetry'}
@@ -102,15 +99,14 @@ def judged_branches(analysis: Analysis) -> list[JudgedBranch]:
                 done += 1
                 bar(done)
             one.crossings = bifurcations(one.branch, spectra)
-            one.losses = [StabilityLoss(one.gait, point, orbit_normal_form(point))
-                          for point in one.crossings if _last(point)]
+    lost = [(one, point) for one in found for point in one.crossings
+            if loses_stability(point.point.orbit)]
+    with progress_bar('normal forms where gaits lose stability', len(lost)) as bar:
+        for done, (one, point) in enumerate(lost, 1):
+            one.losses.append(StabilityLoss(one.gait, point, orbit_normal_form(
+                point.point.orbit, point.multiplier, point.part)))
+            bar(done)
     return found
-
-
-def _last(point: Bifurcation) -> bool:
-    """Whether nothing else grows where a multiplier crosses the circle."""
-    known = multipliers(point.point.orbit)
-    return bool((np.abs([*known.within, *known.transverse]) < GROWS).all())
 
 
 def _branches(analysis: Analysis) -> list[tuple[str, Branch]]:

@@ -266,6 +266,13 @@ def test_crossings_come_in_pairs_between_points_of_the_grid():
     assert crossings(lambda x: np.nan if x < 0.0 else x - 0.5, grid) == pytest.approx([0.5])
 
 
+@pytest.mark.parametrize(('zero', 'found'), [(0.52, [0.52]), (0.61, [0.61]), (0.57, [])])
+def test_a_crossing_beside_a_gap_between_points_of_the_grid_is_found(zero, found):
+    """The gap lies where the method looks first: in the middle."""
+    assert crossings(lambda x: np.nan if 0.53 < x < 0.6 else x - zero,
+                     np.array([0.0, 0.5, 0.63, 1.0])) == pytest.approx(found)
+
+
 def test_refusals(monkeypatch):
     monkeypatch.setattr(hopf_search, 'GRID', 5)
     along = ParameterLine.parse('gamma=delta', Quadruped)

@@ -28,10 +28,15 @@ from cpg_ros.integration.simulate import simulate
 from cpg_ros.networks.biped import Biped
 from cpg_ros.networks.parameter_line import ParameterLine
 from cpg_ros.networks.registry import NETWORKS, PRESETS
+from late_two_rhythms import LateTwoRhythms
 import numpy as np
 import pytest
 from scipy.spatial import cKDTree
-from two_rhythms import LateTwoRhythms, TwoRhythms
+from two_rhythms import TwoRhythms
+
+
+def normal_form_at(point):
+    return orbit_normal_form(point.point.orbit, point.multiplier, point.part)
 
 
 def hop(network):
@@ -53,7 +58,7 @@ def test_a_torus_has_the_closed_form(kind, alpha):
                             ParameterLine.parse('growth', kind), begins - 0.2, begins + 0.2)
     (point,) = (one for one in bifurcations(branch) if one.kind == 'torus')
     assert point.value == pytest.approx(begins, abs=1e-6)
-    found = orbit_normal_form(point)
+    found = normal_form_at(point)
     # The two of the pair do not come in an order: z may turn either way.
     wanted = network.cubic()
     assert found.cubic.real == pytest.approx(wanted.real, rel=1e-5)
@@ -112,7 +117,7 @@ def beside_a_branch(branch, point, leaving, cycles):
     ('biped', 'walk', 'w_a', 0.27693, False)])
 def test_a_branch_leaves_as_the_normal_form_has_it(network, preset, line, near, soft):
     branch, point = point_of(network, preset, line, near)
-    found = orbit_normal_form(point)
+    found = normal_form_at(point)
     assert found.soft == soft and abs(found.cubic.imag) < 1e-6 * abs(found.cubic)
     leaving = switch_branch(point, branch.along, *sorted((near - 0.1, near + 0.1)), most=4)
     assert beside_a_branch(branch, point, leaving, 1) == pytest.approx(found.cubic.real, rel=0.04)
@@ -127,7 +132,7 @@ def test_the_walk_leaves_the_hop_as_the_normal_form_has_it():
                     lambda theta: last(0.5 * theta * last.period), 0.5 * last.period)
     branch = continue_orbit(hop, line, value - 0.05, value + 0.05)
     (point,) = (one for one in bifurcations(branch) if one.kind == 'period doubling')
-    found = orbit_normal_form(point)
+    found = normal_form_at(point)
     leaving = switch_branch(point, line, -1.0, 0.4, most=4)
     assert beside_a_branch(branch, point, leaving, 2) == pytest.approx(found.cubic.real, rel=0.04)
 
@@ -135,7 +140,7 @@ def test_the_walk_leaves_the_hop_as_the_normal_form_has_it():
 def test_where_a_torus_is_hard_disturbances_grow_beyond_its_size_only():
     """Of the biped's run, where it is stable: sqrt(-lambda / c) divides what comes back."""
     branch, point = point_of('biped', 'run', 'w_a', -0.53281)
-    cubic = orbit_normal_form(point).cubic.real
+    cubic = normal_form_at(point).cubic.real
     assert point.kind == 'torus' and cubic > 0.0
     for gap in (0.0008, -0.0008):
         orbit = branch.at(point.value + gap)[0]

@@ -23,7 +23,7 @@ On the hop ``|w|^2 = 1 + kappa |z|^2``, and z of both legs alike obeys ``z' = (g
 
 from dataclasses import dataclass
 
-from cpg_ros.networks.network import Preset, Range
+from cpg_ros.networks.network import Preset
 import numpy as np
 from two_sided import OTHER, TwoSided, WIDE
 
@@ -89,19 +89,3 @@ class TwoRhythms(TwoSided):
         own = ((self.alpha + 1j * self.beta + self.e * self.kappa)
                / (1.0 + self.h * self.delay * np.exp(-1j * pace * self.delay)))
         return 4.0 * (own - 1j * pace * self.gamma / self.omega)
-
-
-@dataclass(frozen=True)
-class LateTwoRhythms(TwoRhythms):
-    """It is heard a delay ago."""
-
-    tau: float = 0.4
-
-    name = 'late_two_rhythms'
-    delay_parameter = 'tau'
-    longest_delay = 2.0
-    ranges = {**TwoRhythms.ranges, 'tau': Range(0.01, 2.0, 'delay [model time]')}
-
-    @staticmethod
-    def heard(cell):
-        return cell.past(OTHER)

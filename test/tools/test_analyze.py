@@ -21,7 +21,9 @@ import subprocess
 import sys
 
 from cpg_ros.dynamics.orbit import solve_orbit
+from cpg_ros.integration.simulate import simulate
 from cpg_ros.networks.biped import Biped
+from cpg_ros.networks.delayed import Delayed
 from cpg_ros.networks.preset_files import read_presets, write_presets
 from cpg_ros.networks.quadruped import Quadruped
 from cpg_ros.networks.registry import PRESETS
@@ -61,7 +63,7 @@ def test_example_1_as_json(capsys):
         assert point['unstable_transverse_roots'] > 0
     gaits = said['gaits']
     assert set(gaits) == {'pronk', 'pace', 'bound', 'trot', 'jump', 'walk'}
-    assert {gait for gait in gaits if gaits[gait]['exists']} == {'trot', 'walk'}
+    assert {gait for gait in gaits if gaits[gait]['exists']} == {'trot', 'walk', 'jump'}
     assert gaits['trot']['period'] == pytest.approx(1.27827056, abs=1e-8)
     assert gaits['trot']['amplitude'] == pytest.approx(0.981144, abs=1e-6)
     assert gaits['walk']['period'] == pytest.approx(1.09048163, abs=1e-8)
@@ -81,14 +83,14 @@ def test_example_1_as_text(capsys):
     said = capsys.readouterr().out
     for words in ('delayed: a -4.5, b 1, c 6.5, d -2, tau 0.4', 'Hopf points up to a delay of 0.8',
                   '0.2852', '7.4772', '1.278271', 'supercritical',
-                  'trot, walk: stable with the symmetry lock only'):
+                  'trot, jump, walk: stable with the symmetry lock only'):
         assert words in said
     assert max(map(len, said.splitlines())) <= 160
 
 
 @pytest.mark.parametrize(('changes', 'name', 'gait'), [
-    (('tau=0.28',), 'tau', 'trot'), (('tau=0.28', 'd=2'), 'tau', 'pace'),
-    (('a=-3', 'b=0.1', 'c=4', 'd=1', 'tau=0.3'), 'tau', None), (('c=1',), 'c', None)])
+    (('b=0.5', 'c=4.4', 'd=-0.3'), 'tau', 'trot'), (('b=0.5', 'c=4.4', 'd=0.3'), 'tau', 'pace'),
+    (('c=4.5', 'd=0'), 'tau', None), (('c=1',), 'c', None)])
 def test_a_set_without_gait_is_told_its_nearest_threshold(capsys, changes, name, gait):
     said = as_json(capsys, '--set', *changes)
     assert not any(one['exists'] for one in said['gaits'].values())
@@ -108,6 +110,21 @@ def test_a_set_without_gait_is_told_its_nearest_threshold(capsys, changes, name,
         below, above = (as_json(capsys, '--set', *rest, f'c={factor * threshold}',
                                 '--longest-delay', '100') for factor in (0.99, 1.01))
         assert not below['hopf'] and above['hopf']
+
+
+def test_a_gait_far_from_every_hopf_point_is_found(capsys):
+    # Below the first critical delay, .2852: a jump that rests between its steps, and that was
+    # missed where simulations ended before they had settled.
+    said = as_json(capsys, '--set', 'tau=0.28')
+    assert {gait for gait, one in said['gaits'].items() if one['exists']} == {'jump'}
+    network = Delayed(-4.5, 1.0, 6.5, -2.0, 0.28)
+    symmetry = network.symmetry('jump')
+    start = np.random.default_rng(5).uniform(-1.0, 1.0, 8) @ symmetry.basis.T @ symmetry.basis
+    run = simulate(network, start, 400.0, 0.0025, lock=(1.0, symmetry), progress=False)
+    v = run.x[:, 0]
+    rises = run.t[np.flatnonzero((v[:-1] < 0.0) & (v[1:] >= 0.0))][-5:]
+    assert said['gaits']['jump']['period'] == pytest.approx(np.diff(rises).mean(), rel=1e-3)
+    assert said['gaits']['jump']['stable_with_default_gain']
 
 
 def test_gaits_that_are_born_unstable_are_found_and_judged(capsys):

@@ -167,8 +167,7 @@ def solve(network: Network, gait: str, near: MeshOrbit | None = None) -> MeshOrb
     if stated is not None:
         return stated
     if near is None:
-        known = network.presets().get(gait)
-        near = _sought(network, gait) if known is None else from_preset(known)
+        near = _of_preset(network, gait) or _sought(network, gait)
     if near.network == network and near.symmetry == symmetry:
         return near
     if near.symmetry == symmetry:
@@ -195,6 +194,15 @@ def solve(network: Network, gait: str, near: MeshOrbit | None = None) -> MeshOrb
         raise NoOrbit(f'no {gait} at these parameters: on the way to them from its preset it ends '
                       f'at {changed}')
     raise NoOrbit(f'no {gait} at these parameters')
+
+
+def _of_preset(network: Network, gait: str) -> MeshOrbit | None:
+    """Return the orbit of the gait's preset, if it has one."""
+    known = network.presets().get(gait)
+    try:
+        return None if known is None else from_preset(known)
+    except NoOrbit:
+        return None
 
 
 def _states(orbit: MeshOrbit, symmetry: Symmetry) -> np.ndarray:
