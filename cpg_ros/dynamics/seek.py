@@ -27,7 +27,8 @@ import numpy as np
 #: Periods the network gets to find its gait, held by a lock of this gain (1/model time).
 SETTLING, HOLD = 30, 1.0
 #: Where no start is known, gaits are sought from waves about the equilibrium of these sizes, and
-#: from so many states in the gait's class at random about it, this far in the mean.
+#: from so many states in the gait's class at random about it, this far in the mean. Variables that
+#: are beyond 1 at the equilibrium are taken over what they are there.
 SIZES, RANDOM, SCATTER = (0.5, 0.1, 2.0), 12, 0.3
 #: After how many steps it is looked whether a start has settled, twice as many each time, the
 #: last of them only where that is asked for; how many are taken at once where there is no delay.
@@ -133,7 +134,9 @@ def starts(network: Network, symmetry: Symmetry, random: int = RANDOM) -> np.nda
     # On the class, of any length there: fewer numbers, each as large.
     inside = scattered[:, :len(symmetry.basis)] @ symmetry.basis
     inside *= np.sqrt(network.components / len(symmetry.basis))
-    return np.repeat(equilibrium(network), network.cells) + np.concatenate([waves, inside])
+    rest = np.repeat(equilibrium(network), network.cells)
+    # A variable in mV swings by more than 1.
+    return rest + np.maximum(1.0, np.abs(rest)) * np.concatenate([waves, inside])
 
 
 def find_orbit(network: Network, gait: str, random: int = RANDOM,

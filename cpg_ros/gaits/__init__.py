@@ -18,6 +18,7 @@ Imports ``networks`` and ``files``; knows nothing of ROS.
 """
 
 __all__ = [
+           'foot_contacts',
            'insect_legs',
            'leg_motion',
            'leg_names',

@@ -23,9 +23,10 @@ of an elbow corresponds to that of a knee. Insects' legs are compared by their f
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
+from cpg_ros.gaits.foot_contacts import FootContacts
 from cpg_ros.gaits.insect_legs import foot_phases
 from cpg_ros.gaits.leg_names import role_of
 from cpg_ros.gaits.recognition import recognise
@@ -276,3 +277,20 @@ def match_gait_by_cells(c: np.ndarray, network: type[Network]) -> GaitMatch:
                         for size in (found.distance, found.distance + found.margin))
     return GaitMatch(found.name, found.nearest, distance, second - distance, (found.nearest,),
                      1.0 / (1.0 + _odds(distance, second, network.cells)), ())
+
+
+def match_gait_by_contacts(match: GaitMatch, contacts: FootContacts) -> GaitMatch:
+    """Tell walk from run by the feet's contacts, where the legs move alike in both.
+
+    Args:
+        match: by the legs' phases.
+        contacts: of the feet.
+
+    """
+    gait = contacts.gait
+    if set(match.alike) != {'walk', 'run'} or gait is None:
+        return match
+    # The other one was a rival with even odds.
+    return replace(match, gait=match.gait and gait, nearest=gait, alike=(gait,),
+                   sure=1.0 / (1.0 / match.sure - 1.0),
+                   notes=(f'{gait}, by the loads on the feet: {contacts}',))

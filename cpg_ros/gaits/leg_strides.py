@@ -18,8 +18,9 @@ A leg's hip (or what corresponds to it) is foremost about when the foot is set d
 its hindmost angle the leg is retracted, mostly in stance, and from there on protracted, mostly in
 swing (Alexander 2003, Principles of Animal Locomotion). Which of the two strokes is which, the
 joint below tells: it is bent more in protraction. Where that does not decide, neither does this.
-Contacts are not looked at: a trotting Go1 retracts its legs in 74 % of the stride, by its thighs,
-and loads its feet in 58 %.
+A trotting Go1 retracts its legs in 74 % of the stride, by its thighs, and loads its feet in 58 %:
+where loads on the feet were recorded, too, strides go from touchdown to touchdown, through stance
+and swing.
 """
 
 from collections.abc import Mapping, Sequence
@@ -56,11 +57,13 @@ class LegStrides(ShortRepr):
         leg: its name.
         joint: whose extremes are taken.
         begins: s, when its strides begin: the joint is foremost or, where nothing tells the sense,
-            at its largest angle; shape (n,).
+            at its largest angle, or the foot touches down; shape (n,).
         periods: s, shape (n,).
-        retractions: s, from foremost to hindmost, shape (n,); nan if nothing tells the sense.
+        retractions: s, from foremost to hindmost, or in stance, shape (n,); nan if nothing tells
+            the sense.
         range: of the joint in the mean cycle, rad.
         why: why retraction and protraction cannot be told apart, or ''.
+        by_contacts: whether the strides are those of the foot's contacts, not of the joint.
 
     """
 
@@ -71,13 +74,15 @@ class LegStrides(ShortRepr):
     retractions: np.ndarray
     range: float  # noqa: A003
     why: str = ''
+    by_contacts: bool = False
 
     def _summary(self) -> str:
-        return f'{self.leg}: {len(self.begins)} strides by {self.joint}'
+        by = 'loads' if self.by_contacts else self.joint
+        return f'{self.leg}: {len(self.begins)} strides by {by}'
 
     @property
     def protractions(self) -> np.ndarray:
-        """Durations of the forward strokes, s, shape (n,)."""
+        """Durations of the forward strokes, or in swing, s, shape (n,)."""
         return self.periods - self.retractions
 
     @property
@@ -101,17 +106,24 @@ def leg_strides(recording: RecordingLike, legs: Mapping[str, Sequence[str]], str
     phases = stride.warp(times)
     coefficients = np.fft.rfft(stride.mean, axis=1).T[:HARMONICS + 1] / stride.mean.shape[1]
     c = dict(zip(stride.joints, coefficients.T, strict=True))
+    contacts = stride.contacts
+    if contacts is not None and not set(stride.phases) <= set(contacts.legs):
+        contacts = None
     found = []
     for leg in stride.phases:
         names = [name for name in legs[leg] if name in c]
         joint, sense, why = _leading(names, c)
         x = sense * recording.positions[inside, recording.joints.index(joint)]
+        span = float(np.ptp(evaluate_coefficients(c[joint][:, None], np.arange(POINTS) / POINTS)))
+        if contacts is not None:
+            begins, periods, stances = contacts.strides(leg).T
+            found.append(LegStrides(leg, joint, begins, periods, stances, span, '', True))
+            continue
         fore = _extremes(times, phases, x, sense * c[joint], 1.0)
         hind = None if why else _extremes(times, phases, x, sense * c[joint], -1.0)
         rows = _strides(fore, hind)
-        span = evaluate_coefficients(c[joint][:, None], np.arange(POINTS) / POINTS)
         begins, periods, back = rows.T
-        found.append(LegStrides(leg, joint, begins, periods, back, float(np.ptp(span)), why))
+        found.append(LegStrides(leg, joint, begins, periods, back, span, why))
     return found
 
 

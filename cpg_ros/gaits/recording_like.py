@@ -37,3 +37,19 @@ class RecordingLike(Protocol):
     @property
     def source(self) -> str:
         """What to call it."""
+
+
+class FootLoadsLike(Protocol):
+    """What is needed of loads on the feet; see FootLoads."""
+
+    @property
+    def legs(self) -> tuple[str, ...]:
+        """Names."""
+
+    @property
+    def times(self) -> np.ndarray:
+        """Rising, s, shape (n,)."""
+
+    @property
+    def loads(self) -> np.ndarray:
+        """In any unit, shape (n, legs)."""

@@ -22,12 +22,14 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from cpg_ros.errors import InputError
+from cpg_ros.gaits.foot_contacts import foot_contacts, FootContacts
 from cpg_ros.gaits.leg_motion import check_travel
 from cpg_ros.gaits.leg_names import Legs
 from cpg_ros.gaits.leg_phases import (
     leg_phases,
     match_gait,
     match_gait_by_cells,
+    match_gait_by_contacts,
 )
 from cpg_ros.gaits.phase_average import average_cycles
 from cpg_ros.gaits.phase_estimation import (
@@ -48,7 +50,7 @@ from cpg_ros.gaits.quality_checks import (
     QualityIssue,
     SURE,
 )
-from cpg_ros.gaits.recording_like import RecordingLike
+from cpg_ros.gaits.recording_like import FootLoadsLike, RecordingLike
 from cpg_ros.gaits.steady_stretch import (
     best_stretch,
     CYCLES,
@@ -109,6 +111,7 @@ class Stride(ShortRepr):
         issues: what speaks against them, one line each.
         notes: one line each.
         warp: stride phase of the recording's times within the stretch.
+        contacts: which feet were on the ground in the stretch, if the recording has loads.
 
     """
 
@@ -134,6 +137,7 @@ class Stride(ShortRepr):
     issues: tuple[str, ...]
     notes: tuple[str, ...]
     warp: PhaseEstimate
+    contacts: FootContacts | None = None
 
     @property
     def verdict(self) -> str:
@@ -150,7 +154,8 @@ class Stride(ShortRepr):
 
 def find_stride(recording: RecordingLike, legs: Legs | Mapping[str, Sequence[str]],
                 network: type[Network] | Network, cells: Mapping[str, int] | None = None,
-                gains: Mapping[str, complex] | None = None) -> Stride:
+                gains: Mapping[str, complex] | None = None,
+                loads: FootLoadsLike | None = None) -> Stride:
     """Find the steady gait of a recording.
 
     Args:
@@ -162,6 +167,8 @@ def find_stride(recording: RecordingLike, legs: Legs | Mapping[str, Sequence[str
         gains: joint -> w_x + i w_y, rad, the first two weights of its readout. With these gaits
             that move the legs alike (walk and run of the biped) are distinguished, if every cell
             has a joint.
+        loads: on the feet, at the recording's times or others; they tell walk from run where
+            legs move alike in both.
 
     Raises:
         NoSteadyGait: there is none, or none of a leg's joints has angles.
@@ -221,6 +228,10 @@ def find_stride(recording: RecordingLike, legs: Legs | Mapping[str, Sequence[str
         by_cells = _cell_signals(c, cells, gains, kind)
         if by_cells is not None:
             gait = match_gait_by_cells(by_cells, kind)
+    contacts = None if loads is None else foot_contacts(
+        loads, float(warp.knots[0]), float(warp.knots[-1]), 1.0 / warp.frequency)
+    if contacts is not None:
+        gait = match_gait_by_contacts(gait, contacts)
     if len(gait.alike) > 1:
         # The odds of the gait have this already.
         issues.append(QualityIssue(f'{" or ".join(gait.alike)}: cannot tell, the legs move in the '
@@ -233,7 +244,7 @@ def find_stride(recording: RecordingLike, legs: Legs | Mapping[str, Sequence[str
                   gait.sure * float(np.prod([one.left for one in issues])),
                   tuple(one.message for one in issues if one.message),
                   (*notes, *by_legs, *limping(chosen, c), *gait.notes),
-                  replace(warp, phases=warp.phases - found.zero))
+                  replace(warp, phases=warp.phases - found.zero), contacts)
 
 
 def _regions(times: np.ndarray, x: np.ndarray, source: str) -> tuple[RoughPhase, list[str]]:

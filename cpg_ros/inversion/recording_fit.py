@@ -173,7 +173,7 @@ def stride_of(recording: Recording, legs: Mapping[str, Sequence[str]], kind: typ
     gains = None if robot is None else {
         joint.name: complex(*joint.weights[:2]) for joint in robot.joints}
     return cells, find_stride(recording.select(tuple(cells)), legs, kind,
-                              None if robot is None else cells, gains)
+                              None if robot is None else cells, gains, recording.loads)
 
 
 def _none_of(kind: type[Network], stride: Stride) -> str:

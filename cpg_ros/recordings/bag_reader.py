@@ -19,13 +19,15 @@ The library `rosbags` reads the storage; positions come from the messages' bytes
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from cpg_ros.files.plain_text import printable
 from cpg_ros.files.progress_bar import progress_bar
-from cpg_ros.recordings.bag_storage import files_of_bag, opened, STORAGES
+from cpg_ros.recordings.bag_storage import Bag, files_of_bag, opened, STORAGES
 from cpg_ros.recordings.joint_streams import BATCH, recorded, Stream
-from cpg_ros.recordings.recording import Recording
+from cpg_ros.recordings.load_stream import LoadStream, NAME, TYPE
+from cpg_ros.recordings.recording import Recording, RecordingError
 from cpg_ros.recordings.recording_format import JOINTS, Option, RecordingFormat
 from cpg_ros.recordings.servo import Servo
 
@@ -35,7 +37,8 @@ def read_bag(path: str | Path, topics: Sequence[str] = (), joints: Sequence[str]
              ) -> Recording:
     """Read the joint states of a bag.
 
-    See `recorded` for joints that are on several topics, and for stamps.
+    See `recorded` for joints that are on several topics, and for stamps. Loads on the feet are
+    read if one topic of the bag has them (see `LoadStream`).
 
     A recorder that died leaves mcap files without an end and no metadata.yaml. The complete part
     of such files is read, and a note reports it. A truncated sqlite3 file is an error.
@@ -58,12 +61,18 @@ def read_bag(path: str | Path, topics: Sequence[str] = (), joints: Sequence[str]
     with opened(path) as bag:
         streams = {topic: Stream(topic, joints, servo, source)
                    for topic in bag.choose(topics)}
+        loads = _load_stream(bag)
         expected = bag.expected()
         total = max(1, sum(expected[topic] for topic in streams))
         with progress_bar(f'reading {path.name}', total, enabled=progress) as bar:
-            messages = bag.messages(list(streams))
+            messages = bag.messages([*streams, *([loads.topic] if loads else [])])
             for done, (topic, received, message) in enumerate(messages, 1):
+                if loads and topic == loads.topic:
+                    loads.add(received, message)
+                    continue
                 streams[topic].add(received, message)
+                if loads:
+                    loads.pass_joint_state(received, message)
                 if not done % BATCH:
                     bar(done)
         for stream in streams.values():
@@ -72,7 +81,23 @@ def read_bag(path: str | Path, topics: Sequence[str] = (), joints: Sequence[str]
             f"{topic}: {stream.count} messages, where the bag's metadata counts {expected[topic]}"
             for topic, stream in streams.items() if stream.count != expected[topic]), *(
             f'{topic}: no messages' for topic, stream in streams.items() if not stream.count)]
-    return recorded(list(streams.values()), joints, source, notes, some)
+    recording = recorded(list(streams.values()), joints, source, notes, some)
+    return recording if loads is None else _with_loads(recording, loads)
+
+
+def _load_stream(bag: Bag) -> LoadStream | None:
+    """Return a stream for the topic with foot loads, None unless exactly one has them."""
+    found = {one.topic for one in bag.connections
+             if one.topic.rsplit('/')[-1] == NAME and one.msgtype == TYPE}
+    return LoadStream(found.pop()) if len(found) == 1 else None
+
+
+def _with_loads(recording: Recording, stream: LoadStream) -> Recording:
+    try:
+        return replace(recording, loads=stream.loads(recording.start))
+    except RecordingError as error:
+        # What is asked for is the joints.
+        return replace(recording, notes=(*recording.notes, f'{error}: left out'))
 
 
 BAG = RecordingFormat(

@@ -21,6 +21,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
 from cpg_ros.errors import CpgError
+from cpg_ros.recordings.foot_loads import FootLoads
 from cpg_ros.recordings.stray_samples import (
     counted,
     FARTHEST,
@@ -57,6 +58,7 @@ class Recording(ShortRepr):
         source: what to call it in messages, such as 'walk_bag, /joint_states'.
         start: stamp at times = 0, s.
         notes: what was repaired or left out, one line each.
+        loads: on the feet, where they were recorded, too.
 
     Raises:
         RecordingError: fewer than two samples, times that do not rise from 0, or shapes that
@@ -70,6 +72,7 @@ class Recording(ShortRepr):
     source: str
     start: float = 0.0
     notes: tuple[str, ...] = ()
+    loads: FootLoads | None = None
 
     def _summary(self) -> str:
         return (f'{self.source}: {len(self.joints)} joints, {len(self.times)} samples '

@@ -14,13 +14,16 @@
 
 """All orbits of a gait: what simulations settle on is found, and judged with the others."""
 
+from pathlib import Path
+import re
+
 from cpg_ros.dynamics.coexisting_orbits import coexisting_orbits
 from cpg_ros.dynamics.floquet import leading_within, multipliers
 from cpg_ros.dynamics.orbit import NoOrbit
 from cpg_ros.integration.simulate import simulate, Trajectory
 from cpg_ros.networks.biped import Biped
 from cpg_ros.networks.delayed import Delayed
-from cpg_ros.networks.registry import PRESETS
+from cpg_ros.networks.registry import find_network, PRESETS
 from cpg_ros.search.settled_cycle import last_cycle
 from depth import in_depth
 import numpy as np
@@ -147,3 +150,20 @@ def test_slow_relaxation_oscillations_are_found_when_all_orbits_are_asked_for():
     found = coexisting_orbits(network, 'jump').orbits
     assert found[0].period == pytest.approx(periods[0], abs=1e-3)
     assert leading_within(found[0]) < 1.0
+
+
+def test_a_cycle_of_three_spikes_is_found_where_variables_are_in_millivolts(tmp_path):
+    """Hodgkin-Huxley cells that excite each other: intervals of 49.5, 49.8 and 60.4 ms."""
+    page = Path(__file__).parents[2] / 'docs' / 'tutorials' / 'own_network.md'
+    text = re.search(r':name: half_centre\.py\n\n(.*?)```', page.read_text(), re.DOTALL)[1]
+    (path := tmp_path / 'spiking.py').write_text(text.replace("'half_centre'", "'spiking'"))
+    network = find_network(str(path))(10.092, 0.49404, 0.0)
+    symmetry = network.symmetry('hop')
+    start = np.array([-50.0, -50.0, *[0.3] * 8])
+    run = simulate(network, start, 2000.0, network.step, lock=(1.0, symmetry), progress=False)
+    v = run.x[:, 0]
+    spikes = run.t[np.flatnonzero((v[:-1] < -20.0) & (v[1:] >= -20.0))][-7:]
+    found = coexisting_orbits(network, 'hop', everything=False)
+    assert found.orbits[0].period == pytest.approx(spikes[3] - spikes[0], abs=0.05)
+    assert spikes[6] - spikes[3] == pytest.approx(spikes[3] - spikes[0], abs=0.05)
+    assert leading_within(found.orbits[0]) < 1.0

@@ -20,6 +20,7 @@ from cpg_ros.dynamics.mesh import collocation
 from cpg_ros.dynamics.mesh.kinks import aligned, places_of
 from cpg_ros.dynamics.mesh.newton import (
     coefficients_of,
+    FEW,
     FEWEST,
     finer,
     first_mesh,
@@ -37,6 +38,8 @@ from cpg_ros.networks.symmetry import Symmetry
 import numpy as np
 from numpy.polynomial import polynomial
 
+#: How many times as many intervals a first mesh has where fewer lead nowhere: as several spikes.
+MORE = 4
 #: Times that ends of intervals are put on kinks anew.
 ALIGNED = 8
 #: Below this range the orbit has fallen to an equilibrium.
@@ -62,8 +65,12 @@ def collocate(network: Network, symmetry: Symmetry, path: Callable[[np.ndarray],
     def guess(places: np.ndarray) -> np.ndarray:
         return path(places / symmetry.order)[:, reduced.kept]
 
-    return _refined(reduced, sampled(guess, first_mesh(reduced, guess), period / symmetry.order),
-                    [one / symmetry.order for one in known])
+    for intervals in (FEW,) if known else (FEW, MORE * FEW):
+        start = sampled(guess, first_mesh(reduced, guess, intervals), period / symmetry.order)
+        found = _refined(reduced, start, [one / symmetry.order for one in known])
+        if found is not None:
+            return found
+    return None
 
 
 def predicted(network: Network, near: MeshOrbit) -> MeshOrbit | None:

@@ -37,7 +37,9 @@ from numpy.polynomial import polynomial
 
 #: A mesh is fine enough when its polynomials end with terms of this share of the whole.
 RESOLVED = 1e-11
-FEWEST, MOST_INTERVALS = 12, 300
+FEWEST, MOST_INTERVALS = 12, 800
+#: Intervals of a first mesh, and places for each of them at which it is seen how the guess bends.
+FEW, LOOKED = 30, 17
 #: Newton stops at steps this small, against the size of the states and the period: what is left
 #: is of the order of their square.
 TOLERANCE = 1e-8
@@ -201,11 +203,12 @@ def remeshed(reduced: Reduced, now: Solution, fewest: int = FEWEST) -> np.ndarra
     return collocation.spread(now.mesh, ends**(1.0 / collocation.S) / h, max(fewest, int(wanted)))
 
 
-def first_mesh(reduced: Reduced, path: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
+def first_mesh(reduced: Reduced, path: Callable[[np.ndarray], np.ndarray],
+               intervals: int = FEW) -> np.ndarray:
     """Return a mesh of few intervals for a path over the places 0 to 1, by how it bends."""
-    coarse = np.linspace(0.0, 1.0, 513)
-    bend = np.abs(np.diff(reduced.rates(path(coarse)), axis=0)).max(axis=1)
-    return collocation.spread(coarse, np.sqrt(bend + 1e-3 * bend.max() + 1e-12), 30)
+    places = np.linspace(0.0, 1.0, LOOKED * intervals + 1)
+    bend = np.abs(np.diff(reduced.rates(path(places)), axis=0)).max(axis=1)
+    return collocation.spread(places, np.sqrt(bend + 1e-3 * bend.max() + 1e-12), intervals)
 
 
 def derivatives(reduced: Reduced, now: Solution) -> tuple[np.ndarray, np.ndarray]:

@@ -1,0 +1,121 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Stance and swing from the loads on the feet, and what they say of walk and run.
+
+A stride is from touchdown to touchdown; duty is the share of it in stance. In a walk a foot is on
+the ground at any time, in a run there is flight (Alexander 2003, Principles of Animal Locomotion).
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import pairwise
+
+from cpg_ros.gaits.recording_like import FootLoadsLike
+from cpg_ros.short_repr import ShortRepr
+import numpy as np
+
+#: A foot is on the ground where its load is more than this share of the way from its least to its
+#: largest load. If the least is more than this share of the largest, it is never lifted.
+LOADED, ALWAYS = 0.15, 0.5
+#: What counts as least and largest, percentiles.
+LEAST, LARGEST = 5.0, 95.0
+#: Contacts and lifts shorter than this share of a stride are those of a foot that bounces.
+BOUNCE = 0.08
+#: Fewest samples of a stride that tell stance from swing.
+FEWEST = 12
+#: Flight, as a share of the time, up to which legs walk, and from which on they run: a foot that
+#: is about to be lifted bears little.
+WALK, RUN = 0.1, 0.15
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class FootContacts(ShortRepr):
+    """Which feet are on the ground.
+
+    Attributes:
+        legs: their names.
+        times: s, rising, shape (n,).
+        down: whether each foot bears a load, bool, shape (n, legs).
+
+    """
+
+    legs: tuple[str, ...]
+    times: np.ndarray
+    down: np.ndarray
+
+    def __str__(self) -> str:
+        duty = ', '.join(f'{leg} {share:.0%}' for leg, share in self.duty.items())
+        return f'{duty} of the time in stance, {self.flight:.0%} in flight'
+
+    def _summary(self) -> str:
+        return str(self)
+
+    @property
+    def duty(self) -> dict[str, float]:
+        """Share of the time in stance, for each leg."""
+        return dict(zip(self.legs, self.down.mean(axis=0).tolist(), strict=True))
+
+    @property
+    def flight(self) -> float:
+        """Share of the time without a foot on the ground."""
+        return float(1.0 - self.down.any(axis=1).mean())
+
+    @property
+    def gait(self) -> str | None:
+        """Walk or run, None where the flight is between theirs."""
+        return 'walk' if self.flight <= WALK else 'run' if self.flight >= RUN else None
+
+    def strides(self, leg: str) -> np.ndarray:
+        """Return touchdown, duration and stance of a leg's strides, s, shape (k, 3)."""
+        down = self.down[:, self.legs.index(leg)]
+        touched = self.times[1:][down[1:] & ~down[:-1]]
+        lifted = self.times[1:][~down[1:] & down[:-1]]
+        ends = touched[1:]
+        stance = lifted[np.searchsorted(lifted, touched[:-1])] if len(ends) else ends
+        return np.column_stack([touched[:-1], ends - touched[:-1], stance - touched[:-1]])
+
+
+def foot_contacts(loads: FootLoadsLike, begin: float, end: float, period: float
+                  ) -> FootContacts | None:
+    """Find which feet are on the ground between two times; None for too few samples.
+
+    Args:
+        loads: on the feet.
+        begin: s.
+        end: s.
+        period: of a stride, s.
+
+    """
+    inside = (loads.times >= begin) & (loads.times <= end)
+    times, rows = loads.times[inside], loads.loads[inside]
+    if len(times) < FEWEST * (end - begin) / period or not np.isfinite(rows).all():
+        return None
+    least, largest = np.percentile(rows, [LEAST, LARGEST], axis=0)
+    level = np.where(least > ALWAYS * largest, -np.inf, least + LOADED * (largest - least))
+    down = rows > level
+    # A foot that bounces touches down once.
+    for state in (False, True):
+        for column in down.T:
+            for first, last in _short(column == state, times, BOUNCE * period):
+                column[first:last] = not state
+    return FootContacts(tuple(loads.legs), times, down)
+
+
+def _short(there: np.ndarray, times: np.ndarray, shortest: float) -> Iterator[tuple[int, int]]:
+    """Yield from where to where something is there for a short time, within the rest."""
+    edges = np.flatnonzero(np.diff(there)) + 1
+    for first, last in pairwise(edges.tolist()):
+        if there[first] and times[last] - times[first] < shortest:
+            yield first, last
