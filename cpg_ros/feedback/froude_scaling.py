@@ -16,8 +16,8 @@
 
 Legged bodies of one shape move alike at one Froude number v^2/(g l) (Alexander and Jayes 1983):
 as gravity is the same, lengths go with the length l of the legs, and times with sqrt(l/g). Forces
-are shares of the weight in all laws, so mass does not matter. What a gain is a multiple of follows
-from its unit.
+are shares of the weight in all laws of a quadruped, so mass does not matter there; a biped's gains
+go with it. What a gain is a multiple of follows from its unit.
 """
 
 from functools import cache
@@ -31,8 +31,9 @@ import numpy as np
 
 #: Of the Go2's outstretched legs, from the thigh joints to the feet, m.
 LENGTH = 0.426
-#: Powers of the legs' length and of sqrt(l/g) that each unit is.
-POWERS = {'m': (1, 0), 's': (0, 1), 'rad': (0, 0), '1': (0, 0), '': (0, 0)}
+#: Powers of the legs' length, of sqrt(l/g) and of the mass that each unit is.
+POWERS = {'m': (1, 0, 0), 's': (0, 1, 0), 's^2': (0, 2, 0), 'Hz': (0, -1, 0), 'kg': (0, 0, 1),
+          'N': (1, -2, 1), 'rad': (0, 0, 0), '1': (0, 0, 0), '': (0, 0, 0)}
 #: Scaled gains have so many digits.
 DIGITS = 3
 
@@ -48,26 +49,27 @@ def leg_length(geometry: Geometry) -> float:
 
 
 @cache
-def _powers(unit: str) -> tuple[int, int]:
+def _powers(unit: str) -> tuple[int, ...]:
     over, *under = unit.split('/')
-    found = np.zeros(2, dtype=int)
+    found = np.zeros(3, dtype=int)
     for part in over.split(' '):
         found += POWERS[part]
     for part in under:
         found -= POWERS[part]
-    return int(found[0]), int(found[1])
+    return tuple(found.tolist())
 
 
-def scale_of(unit: str, length: float) -> float:
+def scale_of(unit: str, length: float, mass: float = 1.0) -> float:
     """Return how much 1 of a dimensionless gain is in its unit, as sqrt(g l) for 'm/s'.
 
     Args:
         unit: of the gain.
         length: of the legs, m.
+        mass: of the robot, kg.
 
     """
-    lengths, times = _powers(unit)
-    return length**lengths * math.sqrt(length / GRAVITY)**times
+    lengths, times, masses = _powers(unit)
+    return float(length**lengths * math.sqrt(length / GRAVITY)**times * mass**masses)
 
 
 def scaled_gains(length: float) -> Gains:

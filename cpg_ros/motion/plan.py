@@ -114,8 +114,8 @@ class GaitPlan(ShortRepr):
     @property
     def speeds(self) -> tuple[float, float]:
         """Slowest and fastest forward speed that steering allows, m/s."""
-        if self.balanced:
-            return SPEEDS[self.gait]
+        if self.balanced and self.robot.biped is not None:
+            return self.robot.biped.speeds(self.gait)
         speed = self._steering.speed
         return speed[0], speed[-1]
 

@@ -89,7 +89,7 @@ def specs(robot: Robot) -> dict[str, Spec]:
     """
     if robot.biped is None:
         return {**TOPICS, **of_gains(robot_gains(robot))}
-    own = BipedGains.of(robot.biped.gains)
+    own = BipedGains.of_body(robot.biped)
     return {**TOPICS, **{name: replace(spec, default=getattr(own, name.removeprefix(PREFIX)))
                          for name, spec in BIPED_GAINS.items()}}
 

@@ -201,7 +201,7 @@ class Planner:
         gait = self.presets[preset].gait
         frequency = self.robot.motion(preset, gait).frequency
         if frequency is None and self.robot.biped is not None and gait in SPEEDS:
-            frequency = BipedGains.of(self.robot.biped.gains, gait).frequency
+            frequency = BipedGains.of_body(self.robot.biped, gait).frequency
         return frequency
 
     def _values(self, network: Network) -> dict[str, float]:

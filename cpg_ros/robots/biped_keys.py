@@ -20,6 +20,7 @@ forward, y left, z up), so that no link needs a frame of its own.
 
 from collections.abc import Collection, Mapping
 from dataclasses import asdict, dataclass, field
+import math
 from typing import Any
 
 from cpg_ros.files.yaml_reader import YamlReader
@@ -29,7 +30,7 @@ import numpy as np
 
 BASE = 'base'
 NUMBERS = ('mass', 'kp', 'kd', 'effort', 'armature')
-#: Gaits in which feedback keeps a biped up, and the speeds forward that were tried, m/s.
+#: Gaits in which feedback keeps a biped up, and the speeds forward that were tried on the G1, m/s.
 SPEEDS = {'walk': (-0.3, 0.6), 'run': (0.0, 1.0), 'two_legged_hop': (-0.05, 0.05),
           'two_legged_jump': (-0.05, 0.05)}
 
@@ -79,6 +80,8 @@ class BipedBody(ShortRepr):
         soles: middle of each leg's sole, m, by leg.
         sole_size: length and width of a sole, m.
         gains: of the feedback where they are not the usual ones, by name.
+        scale: height of the centre of mass and mass of the robot over those of the G1, for which
+            the usual gains were found: they are scaled by them, as their units say (Froude).
 
     """
 
@@ -88,6 +91,13 @@ class BipedBody(ShortRepr):
     soles: dict[str, tuple[float, ...]]
     sole_size: tuple[float, ...]
     gains: dict[str, float] = field(default_factory=dict)
+    scale: tuple[float, float] = (1.0, 1.0)
+
+    def speeds(self, gait: str) -> tuple[float, float]:
+        """Return the slowest and the fastest speed forward of a gait with feedback, m/s."""
+        slowest, fastest = SPEEDS[gait]
+        factor = math.sqrt(self.scale[0])
+        return factor * slowest, factor * fastest
 
     @property
     def total(self) -> float:
@@ -102,7 +112,8 @@ class BipedBody(ShortRepr):
 
 def read_biped(reader: YamlReader, tree: Any, legs: Mapping[str, Collection[str]]) -> BipedBody:
     """Take the part ``biped``; legs are those of the file with the names of their joints."""
-    tree = reader.keys(tree, 'biped', {'base', 'links', 'soles', 'sole_size'}, {'gains'})
+    tree = reader.keys(tree, 'biped', {'base', 'links', 'soles', 'sole_size'},
+                       {'gains', 'scale'})
     base = reader.keys(tree['base'], 'biped.base', {'mass', 'center'})
     driven = {name for names in legs.values() for name in names}
     links: dict[str, BipedLink] = {}
@@ -116,11 +127,14 @@ def read_biped(reader: YamlReader, tree: Any, legs: Mapping[str, Collection[str]
         _positive(reader, value, f'biped.sole_size[{k}]')
     gains = tree.get('gains', {})
     gains = reader.keys(gains, 'biped.gains', set(), set(gains))
+    length, mass = (_positive(reader, value, f'biped.scale[{k}]') for k, value in enumerate(
+        reader.numbers(tree.get('scale', [1.0, 1.0]), 'biped.scale', 2)))
     return BipedBody(
         _positive(reader, base['mass'], 'biped.base.mass'),
         reader.numbers(base['center'], 'biped.base.center', 3), links,
         {leg: reader.numbers(soles[leg], f'biped.soles.{leg}', 3) for leg in legs}, size,
-        {name: reader.number(value, f'biped.gains.{name}') for name, value in gains.items()})
+        {name: reader.number(value, f'biped.gains.{name}') for name, value in gains.items()},
+        (length, mass))
 
 
 def _positive(reader: YamlReader, value: Any, where: str) -> float:
@@ -168,4 +182,5 @@ def biped_tree(biped: BipedBody) -> dict[str, Any]:
     tree = {'base': {'mass': biped.mass, 'center': list(biped.center)}, 'links': links,
             'soles': {leg: list(place) for leg, place in biped.soles.items()},
             'sole_size': list(biped.sole_size)}
-    return tree | ({'gains': dict(biped.gains)} if biped.gains else {})
+    return (tree | ({'scale': list(biped.scale)} if biped.scale != (1.0, 1.0) else {})
+            | ({'gains': dict(biped.gains)} if biped.gains else {}))

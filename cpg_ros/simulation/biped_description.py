@@ -12,23 +12,26 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A biped's links, soles and servos, read off its MuJoCo model."""
+"""A biped's links, soles and servos, read off its model, MJCF or URDF."""
 
 from dataclasses import replace
+import math
 from typing import Any
 
 from cpg_ros.errors import InputError
 from cpg_ros.feedback.biped.links import blank_pose, kinematics, links_of
 from cpg_ros.feedback.kinematics import GRAVITY
-from cpg_ros.files.regular_file import one_line, opened
 from cpg_ros.robots.biped_keys import BASE, BipedBody, BipedLink
 from cpg_ros.robots.robot import Robot
-from cpg_ros.simulation.robot_model import engine, find_model, SimulationError
+from cpg_ros.simulation.robot_model import engine, load
 import numpy as np
 
-#: Servos: stiffness and damping by the torque that they can, 1/rad and s/rad; the damping of
-#: joints next to a sole is less, as their links are light.
-STIFF, DAMPED, LIGHT = 1.0, 0.05, 0.4
+#: Servos: stiffness and damping by the torque that they can, 1/rad and s/rad, both by STIFFEST
+#: N m/rad at most for a robot of the G1's size; the damping of joints next to a sole is less, as
+#: their links are light.
+STIFF, STIFFEST, DAMPED, LIGHT = 1.0, 100.0, 0.05, 0.4
+#: Height of the G1's centre of mass in a walk, m, and its mass, kg.
+HEIGHT, MASS = 0.6657, 33.34
 #: Torque by the robot's weight where the model has no limit, m.
 LEVER = 0.3
 #: How much higher than a sole's lowest point it may be to belong to it, m.
@@ -43,7 +46,7 @@ def read_biped(name: str, robot: Robot) -> BipedBody:
     Joints that are no leg's are held where all are at 0, or at the nearest angle they have.
 
     Args:
-        name: as ``find_model`` takes it, an MJCF file.
+        name: as ``robot_model.load`` takes it.
         robot: its legs.
 
     Raises:
@@ -51,25 +54,17 @@ def read_biped(name: str, robot: Robot) -> BipedBody:
         InputError: a leg has no sole.
 
     """
-    mujoco, path = engine(), find_model(name)
-    try:
-        with opened(path, SimulationError, 'model'):
-            model = mujoco.MjModel.from_xml_path(str(path))
-    except ValueError as error:
-        raise SimulationError(one_line(f'model {path}: {error}')) from error
+    mujoco, model = engine(), load(name, robot)
     data = mujoco.MjData(model)
     data.qpos[:] = 0.0
     hinges = [k for k in range(model.njnt) if model.jnt_type[k] == mujoco.mjtJoint.mjJNT_HINGE]
-    free = [k for k in range(model.njnt) if model.jnt_type[k] == mujoco.mjtJoint.mjJNT_FREE]
-    if not free:
-        raise SimulationError(f'model {path}: no body has a free joint, so the robot cannot move')
-    data.qpos[model.jnt_qposadr[free[0]] + 3] = 1.0
+    (free,) = np.flatnonzero(model.jnt_type == mujoco.mjtJoint.mjJNT_FREE)
+    data.qpos[model.jnt_qposadr[free] + 3] = 1.0
     mujoco.mj_kinematics(model, data)
 
     mover = _movers(model, hinges)
     weight = float(model.body_mass.sum()) * GRAVITY
     driven = [joint.name for joint in robot.joints]
-    light = {joint.name for leg in robot.legs for joint in _outwards(model, robot, leg)[-2:]}
     links: dict[str, BipedLink] = {}
     mass, center = 0.0, np.zeros(3)
     for k in (-1, *hinges):
@@ -87,9 +82,7 @@ def read_biped(name: str, robot: Robot) -> BipedBody:
         angle = None if joint in driven else float(np.clip(0.0, *_range(model, k)))
         links[joint] = BipedLink(
             parent, _rounded(data.xaxis[k]), _rounded(anchor), heavy, _rounded(middle),
-            min(round(STIFF * effort, 3), 100.0),
-            round(DAMPED * min(effort, 100.0) * (LIGHT if joint in light else 1.0), 3), effort,
-            float(model.dof_armature[model.jnt_dofadr[k]]), angle)
+            1.0, 0.0, effort, float(model.dof_armature[model.jnt_dofadr[k]]), angle)
     soles, sizes = {}, []
     for leg in robot.legs:
         last = model.joint(_outwards(model, robot, leg)[-1].name).id
@@ -98,20 +91,29 @@ def read_biped(name: str, robot: Robot) -> BipedBody:
         soles[leg] = _rounded(middle)
         sizes.append(size)
     body = BipedBody(mass, _rounded(center), links, soles, _rounded(np.min(sizes, axis=0)))
-    return replace(body, gains=_fitting(replace(robot, biped=body), list(links)))
+    return _fitted(body, replace(robot, biped=body))
 
 
-def _fitting(robot: Robot, order: list[str]) -> dict[str, float]:
-    """Return the gains that follow from the stand: height, and width of the steps, m."""
+def _fitted(body: BipedBody, robot: Robot) -> BipedBody:
+    """Add what follows from the stand: height and width of the steps, size, and servos for it."""
     links, stand = links_of(robot), {joint.name: joint.offset for joint in robot.joints}
     stand |= robot.held
     pose, count = blank_pose(links), len(links.masses) - 1
-    angles, center = np.array([stand[name] for name in order]), np.zeros(6)
+    angles, center = np.array([stand[name] for name in body.links]), np.zeros(6)
     kinematics(links, np.zeros(3), angles, (np.zeros(3), np.zeros(count)), pose, center,
                np.zeros((2, 6)), np.zeros(count))
     wide = abs(float(pose.soles[0, 1] - pose.soles[1, 1]))
-    return {'height': round(float(center[2] - pose.soles[:, 2].mean()) - CROUCH, 4),
-            'step_width': round(wide, 4)}
+    height = float(center[2] - pose.soles[:, 2].mean()) - CROUCH
+    length, mass = round(height / HEIGHT, 3), round(body.total / MASS, 3)
+    stiffest = STIFFEST * length * mass
+    light = {joint for leg in links.chains for joint in np.array(list(body.links))[leg[-2:] - 1]}
+    servos = {}
+    for name, link in body.links.items():
+        damped = DAMPED * math.sqrt(length) * (LIGHT if name in light else 1.0)
+        servos[name] = replace(link, kp=round(min(STIFF * link.effort, stiffest), 3),
+                               kd=round(damped * min(link.effort, stiffest), 3))
+    return replace(body, links=servos, scale=(length, mass),
+                   gains={'height': round(height, 4), 'step_width': round(wide, 4)})
 
 
 def soled(robot: Robot) -> bool:
@@ -158,6 +160,11 @@ def _sole(model: Any, data: Any, bodies: list[int], leg: str) -> tuple[np.ndarra
             corners, round_ = np.array([[0.0, 0.0, size[1]], [0.0, 0.0, -size[1]]]), size[0]
         elif kind == mujoco.mjtGeom.mjGEOM_SPHERE:
             corners, round_ = np.zeros((1, 3)), size[0]
+        elif kind == mujoco.mjtGeom.mjGEOM_MESH:
+            # Its box is along axes of its inertia, and would reach below it.
+            mesh = model.geom_dataid[geom]
+            first = model.mesh_vertadr[mesh]
+            corners = model.mesh_vert[first:first + model.mesh_vertnum[mesh]]
         else:
             signs = np.array(np.meshgrid(*[[-1.0, 1.0]] * 3)).reshape(3, -1).T
             corners = model.geom_aabb[geom, :3] + signs * model.geom_aabb[geom, 3:]

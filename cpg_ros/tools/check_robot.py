@@ -126,8 +126,8 @@ def _made(chosen: Namespace, known: RobotDescription) -> Robot:
     except SimulationError as error:
         geometry, feet = None, f'feedback: {error}'
     biped = None
-    if chosen.mjcf is not None and soled(robot):
-        biped, feet = read_biped(chosen.mjcf, robot), 'feedback: of a biped with soles'
+    if soled(robot):
+        biped, feet = read_biped(model, robot), 'feedback: of a biped with soles'
     robot, notes = replace(robot, geometry=geometry, biped=biped), f'{notes}\n{feet}'
     if chosen.velocity is not None:
         notes += f'\nvelocity limits: {chosen.velocity:g} rad/s, as given with --velocity'

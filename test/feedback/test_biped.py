@@ -21,7 +21,7 @@ import sys
 from cpg_ros.errors import InputError
 from cpg_ros.feedback.biped import clock, flight, placement, stance, swing
 from cpg_ros.feedback.biped.feedback import gait_plan, KINDS
-from cpg_ros.feedback.biped.gains import BipedGains
+from cpg_ros.feedback.biped.gains import BipedGains, GAINS
 from cpg_ros.feedback.biped.links import add_torques, blank_pose, kinematics, links_of, rotation
 from cpg_ros.networks.biped import Biped
 from cpg_ros.robots.biped_keys import SPEEDS
@@ -272,6 +272,24 @@ def test_gains_are_checked():
         BipedGains.of({'lft': 0.05})
     with pytest.raises(InputError, match=r'biped\.gains\.duty: 0\.4 is not from 0\.501'):
         BipedGains.of({'duty': 0.4})
+
+
+@pytest.mark.parametrize('gait', KINDS)
+@pytest.mark.parametrize(('length', 'mass'), [(1.5, 2.3), (0.8, 0.7)])
+def test_gains_go_with_size_and_mass_by_their_units(gait, length, mass):
+    """Froude: gravity stays, so times go with the square root of lengths; forces with weight."""
+    powers = {'m': (1.0, 0), 's': (0.5, 0), 'Hz': (-0.5, 0), '1/s': (-0.5, 0), '1/m': (-1.0, 0),
+              'm/s^2': (0.0, 0), 'N/m': (-1.0, 1), 'N s/m': (-0.5, 1), 'N m': (1.0, 1),
+              'N m/rad': (1.0, 1), 'N m s/rad': (1.5, 1), 'kg': (0.0, 1), 'rad': (0.0, 0),
+              '': (0.0, 0)}
+    usual, found = BipedGains.of({}, gait), BipedGains.of({'lift': 0.05}, gait, (length, mass))
+    for name, gain in GAINS.items():
+        if name == 'lift' and gait == 'walk':
+            assert found.lift == 0.05
+            continue
+        lengths, masses = powers[gain.unit]
+        expected = getattr(usual, name) * length**lengths * mass**masses
+        assert getattr(found, name) == pytest.approx(min(max(expected, gain.low), gain.high)), name
 
 
 def test_a_robot_without_soles_is_refused():

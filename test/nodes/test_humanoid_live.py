@@ -15,7 +15,11 @@
 """A humanoid over the graph: generator and robot_sim make it stand, walk, run and fall."""
 
 import importlib.util
+import json
+import os
 import re
+import signal
+import subprocess
 
 from geometry_msgs.msg import Twist, Wrench
 from graph import EXECUTABLE, free_domain, Process, until, Watcher
@@ -114,3 +118,26 @@ def test_it_walks_by_cmd_vel_survives_a_push_falls_and_is_reset(stage):
     assert stage.watcher.diagnostics[-1].message == 'running'
     # What is held is measured, too.
     assert 'waist_joint' in stage.watcher.names
+
+
+def test_its_walk_and_its_run_come_back_from_bags(stage, tmp_path):
+    stage.pass_time(1.0)
+    for gait, speed, rate in (('walk', 0.3, 1.65), ('run', 0.5, 2.2)):
+        assert stage.watcher.set(gait=gait)[0].successful
+        stage.drive(speed)
+        stage.pass_time(3.0)
+        environment = {**os.environ, 'ROS_DOMAIN_ID': str(stage.generator.domain),
+                       'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST'}
+        recorder = subprocess.Popen(
+            [EXECUTABLE.with_name('cpg'), 'record', tmp_path / gait, 'joint_states',
+             'foot_contacts'], env=environment, stderr=subprocess.PIPE, text=True)
+        stage.pass_time(8.0)
+        recorder.send_signal(signal.SIGINT)
+        assert recorder.wait(20.0) == 0, recorder.stderr.read()
+        said = json.loads(subprocess.run(
+            [EXECUTABLE.with_name('inversion'), '--bag', tmp_path / gait, '--robot', 'humanoid',
+             '--json'], env=environment, stdout=subprocess.PIPE, text=True, check=True).stdout)
+        assert (said['network'], said['gait'], said['recognised']) == ('biped', gait, gait)
+        assert said['confidence'] > 0.95
+        assert said['frequency'] == pytest.approx(rate, abs=0.02)
+        assert any('by the loads on the feet' in note for note in said['notes'])

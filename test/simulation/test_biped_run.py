@@ -175,9 +175,19 @@ def test_the_velocity_is_estimated_without_bias():
 def test_the_robot_file_is_what_the_model_says():
     robot = load_robot('humanoid')
     read = read_biped('humanoid', robot)
-    # The shipped one walks with the usual gains, and its arms swing, which no model says.
+    # The shipped one walks with the G1's gains, servos among them, and its arms swing.
     links = {name: replace(link, cell=0, swing=0.0) for name, link in robot.biped.links.items()}
-    assert replace(read, gains={}) == replace(robot.biped, links=links)
+    made = {name: replace(link, kp=links[name].kp, kd=links[name].kd)
+            for name, link in read.links.items()}
+    assert replace(read, links=made, gains={}, scale=(1.0, 1.0)) == replace(
+        robot.biped, links=links)
+    assert read.scale == (pytest.approx(1.05, abs=0.01), pytest.approx(0.978, abs=0.001))
+
+
+def test_the_usual_gains_are_those_of_a_robot_of_the_g1s_size():
+    read = read_biped('unitree_g1', runner('unitree_g1').robot)
+    assert read.scale == (1.0, 1.0)
+    assert all(link.kp == min(link.effort, 100.0) for link in read.links.values())
 
 
 @pytest.mark.parametrize('joints', [6, 5])
@@ -192,6 +202,64 @@ def test_a_robot_file_made_from_a_model_alone_walks(tmp_path, joints):
     robot = load_robot(made)
     assert {len(leg) for leg in robot.legs.values()} == {joints}
     found = BipedRun(str(model), robot, NOISE).run(12.0, ((1.0, 0.3, 0.0, 0.0),), seed=12)
+    assert math.isinf(found.fell)
+    assert found.speed[0] == pytest.approx(0.3, abs=0.03)
+
+
+def as_urdf(model):
+    """The humanoid's bodies, joints and shapes as a URDF: its axes are parallel, with all at 0."""
+    names = {body: f'link{body}' for body in range(1, model.nbody)}
+    parts = []
+    for body, name in names.items():
+        mass, center = model.body_mass[body], model.body_ipos[body]
+        turn = np.zeros(9)
+        mujoco.mju_quat2Mat(turn, model.body_iquat[body])
+        axes = turn.reshape(3, 3)
+        i = axes @ np.diag(model.body_inertia[body]) @ axes.T
+        shapes = []
+        for geom in np.flatnonzero(model.geom_bodyid == body):
+            size, kind = model.geom_size[geom], mujoco.mjtGeom(model.geom_type[geom])
+            shape = {mujoco.mjtGeom.mjGEOM_BOX: f'<box size="{2 * size[0]} {2 * size[1]} '
+                                                f'{2 * size[2]}"/>',
+                     mujoco.mjtGeom.mjGEOM_SPHERE: f'<sphere radius="{size[0]}"/>',
+                     mujoco.mjtGeom.mjGEOM_CAPSULE: f'<cylinder radius="{size[0]}" length="'
+                                                    f'{2 * size[1]}"/>'}[kind]
+            w, x, y, z = model.geom_quat[geom]
+            rpy = (math.atan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y)),
+                   math.asin(np.clip(2 * (w * y - z * x), -1, 1)),
+                   math.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z)))
+            shapes.append(f'<collision><origin xyz="{" ".join(map(str, model.geom_pos[geom]))}" '
+                          f'rpy="{" ".join(map(str, rpy))}"/><geometry>{shape}</geometry>'
+                          '</collision>')
+        parts.append(
+            f'<link name="{name}"><inertial><origin xyz="{" ".join(map(str, center))}"/>'
+            f'<mass value="{mass}"/><inertia ixx="{i[0, 0]}" iyy="{i[1, 1]}" izz="{i[2, 2]}" '
+            f'ixy="{i[0, 1]}" ixz="{i[0, 2]}" iyz="{i[1, 2]}"/></inertial>{"".join(shapes)}'
+            '</link>')
+        joint = model.body_jntadr[body]
+        if (parent := model.body_parentid[body]) == 0:
+            continue
+        assert model.body_jntnum[body] == 1 and not model.jnt_pos[joint].any()
+        low, high = model.jnt_range[joint]
+        parts.append(
+            f'<joint name="{model.joint(joint).name}" type="revolute"><parent link="'
+            f'{names[parent]}"/><child link="{name}"/><origin xyz="'
+            f'{" ".join(map(str, model.body_pos[body]))}"/><axis xyz="'
+            f'{" ".join(map(str, model.jnt_axis[joint]))}"/><limit lower="{low}" upper="{high}" '
+            f'effort="{model.jnt_actfrcrange[joint][1]}" velocity="20"/></joint>')
+    return f'<robot name="made">{"".join(parts)}</robot>'
+
+
+def test_a_robot_file_made_from_a_urdf_alone_walks(tmp_path):
+    urdf, made = tmp_path / 'mine.urdf', tmp_path / 'mine.yaml'
+    urdf.write_text(as_urdf(mujoco.MjModel.from_xml_path(str(find_model('humanoid')))))
+    assert check_robot.main(['--urdf', str(urdf), '--make', str(made)]) == 0
+    robot = load_robot(made)
+    shipped = load_robot('humanoid').biped
+    assert robot.biped.total == pytest.approx(shipped.total)
+    for leg, place in shipped.soles.items():
+        assert robot.biped.soles[leg] == pytest.approx(place, abs=1e-6)
+    found = BipedRun(str(urdf), robot, NOISE).run(12.0, ((1.0, 0.3, 0.0, 0.0),), seed=12)
     assert math.isinf(found.fell)
     assert found.speed[0] == pytest.approx(0.3, abs=0.03)
 

@@ -24,7 +24,6 @@ from cpg_ros.motion.pattern import Pattern
 from cpg_ros.motion.plan import GaitPlan
 from cpg_ros.motion.strides import Drive
 from cpg_ros.motion.track import Track
-from cpg_ros.robots.biped_keys import SPEEDS
 import numpy as np
 
 #: A base that leans more than this, rad, or a centre of mass lower than this share of its height
@@ -137,7 +136,7 @@ class BalancedPattern(Pattern):
             return
         if self.enabled:
             forward, left, turn = self.wish
-            slowest, fastest = SPEEDS[balance.program.gait]
+            slowest, fastest = balance.program.speeds
             balance.walk(min(max(forward, slowest), fastest), min(max(left, -ASIDE), ASIDE),
                          min(max(turn, -TURN), TURN))
         else:

@@ -56,7 +56,7 @@ def gait_plan(robot: Robot, gait: str) -> GaitPlan:
                          + ', '.join(KINDS))
     preset = presets[gait]
     return plan(robot, gait, preset, preset.network,
-                BipedGains.of(robot.biped.gains, gait).frequency)
+                BipedGains.of_body(robot.biped, gait).frequency)
 
 
 class BipedFeedback:
@@ -100,7 +100,7 @@ class BipedFeedback:
         biped = robot.biped
         if biped is None or len(robot.legs) != 2:
             raise InputError(f"robot '{robot.name}' has no two legs with soles")
-        self._gains = {gait: BipedGains.of(biped.gains, gait) for gait in KINDS}
+        self._gains = {gait: BipedGains.of_body(biped, gait) for gait in KINDS}
         walk = gait_plan(robot, WALK_GAIT)
         program = program or walk
         if program.gait not in KINDS:

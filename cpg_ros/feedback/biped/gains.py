@@ -26,7 +26,9 @@ from cpg_ros.feedback.biped import (
     swing,
     velocity,
 )
+from cpg_ros.feedback.froude_scaling import scale_of
 from cpg_ros.feedback.law import Gain, named_tuple
+from cpg_ros.robots.biped_keys import BipedBody
 
 GAINS: Mapping[str, Gain] = {name: gain for law in (
                                  clock, flight, placement, stance, swing, velocity)
@@ -59,8 +61,25 @@ class BipedGains(_Fields):  # type: ignore[misc]
     __slots__ = ()
 
     @classmethod
-    def of(cls, changes: Mapping[str, float], gait: str = 'walk') -> 'BipedGains':
+    def of_body(cls, body: BipedBody, gait: str = 'walk') -> 'BipedGains':
+        """Return the gains of a gait that a robot file has, or the usual ones for its size.
+
+        Raises:
+            InputError: as of `of`.
+
+        """
+        return cls.of(body.gains, gait, body.scale)
+
+    @classmethod
+    def of(cls, changes: Mapping[str, float], gait: str = 'walk',
+           scale: tuple[float, float] = (1.0, 1.0)) -> 'BipedGains':
         """Return the usual gains of a gait with changes, which spare those that only it has.
+
+        Args:
+            changes: gains by name, in their units.
+            gait: one of those that have laws.
+            scale: length and mass of the robot over those of the G1, by which the usual gains are
+                scaled and held to their limits (see froude_scaling).
 
         Raises:
             InputError: no gain has this name, or it is not within its limits.
@@ -73,5 +92,15 @@ class BipedGains(_Fields):  # type: ignore[misc]
             if not gain.low <= value <= gain.high:
                 raise InputError(f'biped.gains.{name}: {value:g} is not from {gain.low:g} to '
                                  f'{gain.high:g} {gain.unit}'.rstrip())
-        return cls(**{name: float(value)
-                      for name, value in {**changes, **OF_GAIT.get(gait, {})}.items()})
+        of_gait = OF_GAIT.get(gait, {})
+        usual = {**{name: gain.default for name, gain in GAINS.items()}, **of_gait}
+        own = {name: value for name, value in changes.items() if name not in of_gait}
+        return cls(**{name: float(own[name] if name in own else _scaled(GAINS[name], value, scale))
+                      for name, value in usual.items()})
+
+
+def _scaled(gain: Gain, value: float, scale: tuple[float, float]) -> float:
+    if scale == (1.0, 1.0):
+        return value
+    ratio = scale_of(gain.unit, *scale) / scale_of(gain.unit, 1.0)
+    return min(max(value * ratio, gain.low), gain.high)
