@@ -32,6 +32,7 @@ from cpg_ros.networks.registry import NETWORKS
 from cpg_ros.robots.feedback_keys import OwnFeedback
 from cpg_ros.robots.robot import Robot
 from cpg_ros.robots.robot_file import LIMITS, load_robot, write_robot
+from cpg_ros.simulation.biped_tuning import tune_biped
 from cpg_ros.simulation.feedback_benefit import judge_feedback, judged_gaits
 from cpg_ros.simulation.feedback_tuning import tune_feedback
 from cpg_ros.simulation.gait_design import AIMS
@@ -67,7 +68,8 @@ def _parser() -> Parser:
                         'has); the file keeps its other gaits')
     parser.add_argument('--feedback', action='store_true', help="tune the feedback's gains "
                         'instead, for the gaits of the file or those of --gaits together: over '
-                        'pushes, rough ground, speed and cost')
+                        'pushes, rough ground, speed and cost; of a biped with soles, those of '
+                        'its walk, over pushes, tiles, speed and tilt')
     parser.add_argument('--evaluations', type=int, metavar='N', help='designs to try for each '
                         f'gait (default: {DESIGNS}), or sets of gains (default: {GAINS})')
     parser.add_argument('--seed', type=int, default=0, metavar='N',
@@ -125,7 +127,24 @@ def _refuse_options(chosen: argparse.Namespace) -> None:
     refuse_repeated('argument --gaits', chosen.gaits or [])
 
 
+def _tune_biped(chosen: argparse.Namespace, robot: Robot) -> int:
+    if others := [gait for gait in chosen.gaits or [] if gait != 'walk']:
+        raise InputError("argument --gaits: of a biped's feedback the walk is tuned, not "
+                         f'{" and ".join(others)}')
+    if chosen.kp is not None or chosen.kd is not None:
+        raise InputError("arguments --kp and --kd: a biped's servos are those of its robot file, "
+                         'biped.links')
+    _refuse_out(chosen)
+    with (executor_for(2, chosen, 'walks', partial(note, 'tune')) as executor,
+          progress_bar("tuning the biped's walk", chosen.evaluations) as bar):
+        robot, found = tune_biped(robot, chosen.model, chosen.evaluations, chosen.seed,
+                                  executor=executor, update=bar)
+    return _written(chosen, robot, found.better, str(found))
+
+
 def _tune_feedback(chosen: argparse.Namespace, robot: Robot) -> int:
+    if robot.biped is not None:
+        return _tune_biped(chosen, robot)
     known = judged_gaits(robot)
     if lacking := [gait for gait in chosen.gaits or [] if gait not in known]:
         raise InputError(f"argument --gaits: robot file '{robot.name}' has no efference copy of "
@@ -140,13 +159,17 @@ def _tune_feedback(chosen: argparse.Namespace, robot: Robot) -> int:
           progress_bar('tuning the feedback', chosen.evaluations) as bar):
         robot, found = tune_feedback(robot, chosen.model, gaits, chosen.evaluations, chosen.seed,
                                      executor=executor, kp=chosen.kp, kd=chosen.kd, update=bar)
-    assert robot.feedback is not None
-    lines = ['better gains were found' if found.better else
-             'nothing better was found: the gains stay', _verdict(robot)]
+    return _written(chosen, robot, found.better, _verdict(robot))
+
+
+def _written(chosen: argparse.Namespace, robot: Robot, better: bool, verdict: str) -> int:
+    """Write a robot with tuned feedback; return the exit code."""
+    lines = ['better gains were found' if better else
+             'nothing better was found: the gains stay', verdict]
     write_robot(chosen.out, robot, '\n'.join([f'Feedback made by: ros2 run cpg_ros '
                                               f'{chosen.command}', *lines]))
     say('\n'.join([*lines, f'written: {chosen.out}']))
-    return 0 if found.better else 1
+    return 0 if better else 1
 
 
 def _verdict(robot: Robot) -> str:
