@@ -27,7 +27,7 @@ from cpg_ros.atlas.chart import Chart
 from cpg_ros.atlas.codimension_two import CodimensionTwo
 from cpg_ros.atlas.hopf_condition import HopfCondition
 from cpg_ros.atlas.hopf_starts import hopf_starts, HopfStart, lines_across
-from cpg_ros.atlas.stability_losses import StabilityLoss
+from cpg_ros.atlas.stability_losses import LossOnCurve
 from cpg_ros.short_repr import ShortRepr
 import numpy as np
 
@@ -57,7 +57,7 @@ class Boundary(ShortRepr):
     gaits: tuple[str, ...]
     points: np.ndarray
     codimension_two: tuple[CodimensionTwo, ...] = ()
-    losses: tuple[StabilityLoss, ...] = ()
+    losses: tuple[LossOnCurve, ...] = ()
 
     def __str__(self) -> str:
         met = [name for name, soft in (('soft', True), ('hard', False))

@@ -28,7 +28,7 @@ PLACES = 5
 
 
 @dataclass(frozen=True)
-class StabilityLoss:
+class LossOnCurve:
     """What the normal form says at a place on a curve.
 
     Attributes:
@@ -43,10 +43,10 @@ class StabilityLoss:
     why: str = ''
 
     @staticmethod
-    def of(stored: dict[str, Any]) -> 'StabilityLoss':
+    def of(stored: dict[str, Any]) -> 'LossOnCurve':
         """Return it from what as_dict has made."""
         one, other = stored['values']
-        return StabilityLoss((one, other), stored['soft'], stored['why'])
+        return LossOnCurve((one, other), stored['soft'], stored['why'])
 
     def as_dict(self) -> dict[str, Any]:
         """Return it as plain types."""
@@ -54,7 +54,7 @@ class StabilityLoss:
 
 
 def stability_losses(plane: OrbitPlane, part: int, rank: int,
-                     curve: Sequence[tuple[np.ndarray, Orbit]]) -> Iterator[StabilityLoss]:
+                     curve: Sequence[tuple[np.ndarray, Orbit]]) -> Iterator[LossOnCurve]:
     """Yield the verdicts at places spread evenly over the points of a curve.
 
     Places where other multipliers are outside the unit circle are left out: there the gait is not
@@ -77,4 +77,4 @@ def stability_losses(plane: OrbitPlane, part: int, rank: int,
         if loses_stability(orbit):
             multiplier = complex(spectrum(orbit)[part][rank])
             form = orbit_normal_form(orbit, multiplier, part)
-            yield StabilityLoss(plane.chart.values_at(share), form.soft, form.why)
+            yield LossOnCurve(plane.chart.values_at(share), form.soft, form.why)

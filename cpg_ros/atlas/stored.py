@@ -26,7 +26,7 @@ from cpg_ros.atlas.codimension_two import CodimensionTwo
 from cpg_ros.atlas.grid_refinement import NUMBERS, Sheet
 from cpg_ros.atlas.hopf_curves import Boundary
 from cpg_ros.atlas.row_job import AtlasRow
-from cpg_ros.atlas.stability_losses import StabilityLoss
+from cpg_ros.atlas.stability_losses import LossOnCurve
 from cpg_ros.errors import InputError
 from cpg_ros.files.atomic_write import replacing, stored_json, write_atomically
 from cpg_ros.fleet.results_table import library
@@ -82,7 +82,7 @@ class AtlasFolder:
             return None  # Those of an earlier version are followed anew.
         return [Boundary(one['kind'], tuple(one['gaits']), np.array(one['points']),
                          tuple(map(CodimensionTwo.of, one['codimension_two'])),
-                         tuple(map(StabilityLoss.of, one['losses'])))
+                         tuple(map(LossOnCurve.of, one['losses'])))
                 for one in found]
 
     def put_curves(self, curves: list[Boundary]) -> None:

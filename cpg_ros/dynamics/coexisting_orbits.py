@@ -166,7 +166,7 @@ class _Search:
     def simulate(self, random: int, longer: bool) -> None:
         """Let the network settle in the gait's class from many states.
 
-        Those that take long are waited for as long as nothing is known that attracts, or if asked.
+        Those that take long are waited for while nothing that attracts is known, or with longer.
         """
         try:
             for path, period in find_orbit(self.network, self.gait, random,

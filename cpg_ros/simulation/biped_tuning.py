@@ -31,11 +31,11 @@ from cpg_ros.feedback.kinematics import GRAVITY
 from cpg_ros.robots.biped_keys import BipedBody
 from cpg_ros.robots.robot import Robot
 from cpg_ros.simulation.biped_run import BipedOutcome, BipedRun
+from cpg_ros.simulation.feedback_tuning import more_than_chance
 from cpg_ros.simulation.scenario import impulse, SensorNoise
 from cpg_ros.simulation.terrain import Terrain
 from cpg_ros.simulation.tuning import cma_es
 import numpy as np
-from scipy.stats import binomtest
 
 #: What is searched for.
 SEARCHED = ('frequency', 'step_width', 'place_x', 'place_y', 'place_offset', 'speed_up',
@@ -77,6 +77,11 @@ class Walk:
     push: tuple[float, float, float] | None = None
     tiles: float = 0.0
 
+    @property
+    def ground(self) -> Terrain | None:
+        """Return tiles of its own, None if it is flat."""
+        return Terrain('boxes', self.tiles, self.seed) if self.tiles else None
+
 
 @dataclass(frozen=True)
 class WalkJob:
@@ -116,9 +121,7 @@ class TunedBiped:
     @property
     def better(self) -> bool:
         """Whether more runs are survived than chance would have it (p < 0.05, sign test)."""
-        changed = self.won + self.lost
-        return changed > 0 and bool(
-            binomtest(self.won, changed, alternative='greater').pvalue < 0.05)
+        return more_than_chance(self.won, self.lost)
 
     def __str__(self) -> str:
         return (f'fresh pushes survived: {self.before} of {self.pushes} before, {self.after} '
@@ -128,16 +131,12 @@ class TunedBiped:
 
 def walked(job: WalkJob) -> list[list[BipedOutcome]]:
     """Return the outcomes of each candidate's walks."""
-    grounds: dict[tuple[float, int], BipedRun] = {}
-    for walk in job.walks:
-        tiles = (walk.tiles, walk.seed if walk.tiles else 0)
-        if tiles not in grounds:
-            grounds[tiles] = BipedRun(job.model, job.robot, NOISE, terrain=Terrain(
-                'boxes', *tiles) if walk.tiles else None)
+    runs = {ground: BipedRun(job.model, job.robot, NOISE, terrain=ground)
+            for ground in {walk.ground for walk in job.walks}}
     found = []
     for gains in job.candidates:
         robot = with_gains(job.robot, gains)
-        found.append([grounds[walk.tiles, walk.seed if walk.tiles else 0].run(
+        found.append([runs[walk.ground].run(
             END, ((WALKS_OFF, walk.speed, 0.0, 0.0),), (walk.push,) if walk.push else (),
             BipedFeedback(robot), walk.seed) for walk in job.walks])
     return found

@@ -109,6 +109,12 @@ def prices(job: PriceJob) -> list[float]:
     return (found / len(job.gaits)).tolist()
 
 
+def more_than_chance(won: int, lost: int) -> bool:
+    """Whether of runs that end in two ways more are won than lost (p < 0.05, sign test)."""
+    changed = won + lost
+    return changed > 0 and bool(binomtest(won, changed, alternative='greater').pvalue < 0.05)
+
+
 @dataclass(frozen=True)
 class TunedFeedback:
     """What pushes on fresh seeds make of gains: survivors of all gaits, of so many.
@@ -138,9 +144,7 @@ class TunedFeedback:
         chance would have it (p < 0.05, one-sided sign test) must be survived after.
         """
         won = self.after - self.before + self.lost
-        changed = won + self.lost
-        return not self.fell and changed > 0 and bool(
-            binomtest(won, changed, alternative='greater').pvalue < 0.05)
+        return not self.fell and more_than_chance(won, self.lost)
 
     def __str__(self) -> str:
         spans = []

@@ -199,8 +199,11 @@ def solve(network: Network, gait: str, near: MeshOrbit | None = None) -> MeshOrb
 def _of_preset(network: Network, gait: str) -> MeshOrbit | None:
     """Return the orbit of the gait's preset, if it has one."""
     known = network.presets().get(gait)
+    # One without a start is sought, as the gait of the network itself is.
+    if known is None or (known.start is None and known.network == network):
+        return None
     try:
-        return None if known is None else from_preset(known)
+        return from_preset(known)
     except NoOrbit:
         return None
 
