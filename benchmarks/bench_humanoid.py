@@ -20,6 +20,7 @@ inertial unit and of the foot forces, 4 ms of delay. Every run has a seed of its
 in the walk and 0.5 m/s in the run, survived if the robot is upright 6 s later. Ablations get the
 same pushes. 'even clock' has phases that grow evenly, as those of a sine, in place of the network:
 it says what the network's dynamics add to the balance. 'ten times' walks, runs, walks and stands.
+'ends' are of runs at 1 m/s: in a walk, in a stand and in a jump, at any time of the stride.
 Grounds are crossed at 0.3 m/s for 21 s: tiles of random heights, ramps that begin after half a
 metre, another friction or a load on the base that the feedback does not know of.
 """
@@ -57,6 +58,10 @@ GROUNDS = {'tiles 3 cm': ('boxes', 0.03, 0.6, 0.0), 'tiles 4 cm': ('boxes', 0.04
            'slope -4 degrees': ('ramp', -4.0, 0.6, 0.0), 'friction 0.5': ('', 0.0, 0.5, 0.0),
            'load +5 kg': ('', 0.0, 0.6, 5.0), 'load -3 kg': ('', 0.0, 0.6, -3.0)}
 CROSSING, CROSSINGS = 21.0, 4
+#: What a run at 1 m/s changes to after 8 s, and a bit more in each of the runs, s.
+ENDS = {'end in a walk': ('walk', 0.4), 'end in a stand': ('run', math.nan),
+        'end in a jump': ('two_legged_jump', 0.0)}
+RUNNING, LATER = 8.0, 0.07
 #: Changes of the gains that take a law away.
 ABLATIONS = {'without placement': {'place_x': 0.0, 'place_y': 0.0},
              'without speed-up': {'speed_up': 0.0},
@@ -139,6 +144,10 @@ def measure(job: Job) -> tuple[Job, dict[str, float]]:
         gaits = tuple((begin + when, gait) for begin in begins for when, gait in CHANGES)
         commands = tuple(one for begin in begins for one in (
             (begin + 1.0, *job.wish), (begin + 12.0, math.nan, 0.0, 0.0)))
+    if job.name in ENDS:
+        gait, speed = ENDS[job.name]
+        when = RUNNING + LATER * job.number
+        gaits, commands = ((when, gait),), (*commands, (when, speed, 0.0, 0.0))
     found = run.run(job.duration, commands, pushes, feedback, job.seed, gaits)
     late = found.path[:, 0] > 5.0
     yaw = np.unwrap(found.path[:, 4])
@@ -180,6 +189,8 @@ def main() -> None:
              for k in range(2)]
     jobs += [Job(*robot, seed + k, name, 'walk', (0.3, 0.0, 0.0), CROSSING, number=k)
              for name in GROUNDS for k in range(CROSSINGS)]
+    jobs += [Job(*robot, seed + k, name, 'run', (1.0, 0.0, 0.0), RUNNING + 7.0, number=k)
+             for name in ENDS for k in range(4 * chosen.seeds)]
     for gait, strengths in IMPULSES.items():
         for strength in strengths:
             jobs += pushed(robot, seed, gait, strength)
@@ -195,6 +206,8 @@ def main() -> None:
     crossed = {name: summary([one for job, one in found if job.name == name], (0.3, 0.0, 0.0))
                for name in GROUNDS}
     ten = [one['fell'] for job, one in found if job.name == 'ten times']
+    ended = {name: [math.isfinite(one['fell']) for job, one in found if job.name == name]
+             for name in ENDS}
     survived = {label: {f'{strength:g}': sum(math.isinf(one['fell']) for job, one in found if (
         job.name, job.gait, job.ablation, job.impulse) == ('push', gait, ablation, strength))
         for strength in IMPULSES[gait][:2 if ablation else None]}
@@ -202,11 +215,13 @@ def main() -> None:
                                       *((one, 'walk', one) for one in ablations))}
     whole = survived['walk']
     passed = (not any(one['falls'] for one in goings.values()) and all(map(math.isinf, ten))
+              and not any(map(any, ended.values()))
               and all(goings[name]['error'] <= TARGETS['speed_error'] * abs(GOINGS[name][1])
                       for name in ('0.3', '0.5', 'backward', 'run 0.5', 'run 1.0'))
               and whole['20'] >= TARGETS['survived_20'] and whole['30'] >= TARGETS['survived_30'])
     emit(benchmark='humanoid', robot=chosen.robot, goings=goings, grounds=crossed,
          walk_run_walk_stand_ten_times={'runs': len(ten), 'falls': sum(map(math.isfinite, ten))},
+         run_ends={name: {'runs': len(own), 'falls': sum(own)} for name, own in ended.items()},
          pushes_of=DIRECTIONS * PHASES, survived=survived, targets=TARGETS, passed=passed)
 
 

@@ -80,6 +80,7 @@ class BipedBody(ShortRepr):
         soles: middle of each leg's sole, m, by leg.
         sole_size: length and width of a sole, m.
         gains: of the feedback where they are not the usual ones, by name.
+        gait_gains: the same in one gait alone, by gait and name.
         scale: height of the centre of mass and mass of the robot over those of the G1, for which
             the usual gains were found: they are scaled by them, as their units say (Froude).
 
@@ -92,6 +93,7 @@ class BipedBody(ShortRepr):
     sole_size: tuple[float, ...]
     gains: dict[str, float] = field(default_factory=dict)
     scale: tuple[float, float] = (1.0, 1.0)
+    gait_gains: dict[str, dict[str, float]] = field(default_factory=dict)
 
     def speeds(self, gait: str) -> tuple[float, float]:
         """Return the slowest and the fastest speed forward of a gait with feedback, m/s."""
@@ -126,15 +128,23 @@ def read_biped(reader: YamlReader, tree: Any, legs: Mapping[str, Collection[str]
     for k, value in enumerate(size):
         _positive(reader, value, f'biped.sole_size[{k}]')
     gains = tree.get('gains', {})
-    gains = reader.keys(gains, 'biped.gains', set(), set(gains))
+    gains = reader.keys(gains, 'biped.gains', set(),
+                        set(gains) if isinstance(gains, Mapping) else set())
     length, mass = (_positive(reader, value, f'biped.scale[{k}]') for k, value in enumerate(
         reader.numbers(tree.get('scale', [1.0, 1.0]), 'biped.scale', 2)))
     return BipedBody(
         _positive(reader, base['mass'], 'biped.base.mass'),
         reader.numbers(base['center'], 'biped.base.center', 3), links,
         {leg: reader.numbers(soles[leg], f'biped.soles.{leg}', 3) for leg in legs}, size,
-        {name: reader.number(value, f'biped.gains.{name}') for name, value in gains.items()},
-        (length, mass))
+        {name: reader.number(value, f'biped.gains.{name}') for name, value in gains.items()
+         if name not in SPEEDS},
+        (length, mass), {gait: _gait_gains(reader, gains[gait], f'biped.gains.{gait}')
+                         for gait in gains if gait in SPEEDS})
+
+
+def _gait_gains(reader: YamlReader, tree: Any, where: str) -> dict[str, float]:
+    tree = reader.keys(tree, where, set(), set(tree) if isinstance(tree, Mapping) else set())
+    return {name: reader.number(value, f'{where}.{name}') for name, value in tree.items()}
 
 
 def _positive(reader: YamlReader, value: Any, where: str) -> float:
@@ -182,5 +192,6 @@ def biped_tree(biped: BipedBody) -> dict[str, Any]:
     tree = {'base': {'mass': biped.mass, 'center': list(biped.center)}, 'links': links,
             'soles': {leg: list(place) for leg, place in biped.soles.items()},
             'sole_size': list(biped.sole_size)}
+    gains = biped.gains | biped.gait_gains
     return (tree | ({'scale': list(biped.scale)} if biped.scale != (1.0, 1.0) else {})
-            | ({'gains': dict(biped.gains)} if biped.gains else {}))
+            | ({'gains': gains} if gains else {}))

@@ -17,6 +17,9 @@
 import copy
 from pathlib import Path
 
+from cpg_ros.errors import InputError
+from cpg_ros.feedback.biped.feedback import gait_plan
+from cpg_ros.feedback.biped.gains import BipedGains
 from cpg_ros.robots.robot_file import load_robot, read_robot, RobotError, write_robot
 import pytest
 import yaml
@@ -51,6 +54,27 @@ def test_what_is_written_is_read_back(tmp_path):
     assert mass == pytest.approx(32.6)
 
 
+def test_a_gait_has_gains_of_its_own(tmp_path):
+    path = tmp_path / 'robot.yaml'
+    path.write_text(yaml.safe_dump(changed(
+        'biped.gains', {'lift': 0.09, 'duty': 0.55, 'run': {'duty': 0.4, 'frequency': 2.4}}),
+        sort_keys=False))
+    robot = read_robot(path)
+    write_robot(tmp_path / 'again.yaml', robot)
+    assert read_robot(tmp_path / 'again.yaml').biped == robot.biped
+    walk, run, hop = (BipedGains.of_body(robot.biped, gait)
+                      for gait in ('walk', 'run', 'two_legged_hop'))
+    assert (walk.lift, walk.duty, run.duty, run.frequency) == (0.09, 0.55, 0.4, 2.4)
+    # A lift stands among the gains that runs and hops have by themselves.
+    usual = load_robot('humanoid').biped
+    assert hop == BipedGains.of_body(usual, 'two_legged_hop')
+    assert gait_plan(robot, 'run').frequency == 2.4
+    path.write_text(yaml.safe_dump(changed('biped.gains', {'run': {'dutty': 0.4}}),
+                                   sort_keys=False))
+    with pytest.raises(InputError, match=r"biped\.gains\.run: 'dutty' is not one of"):
+        BipedGains.of_body(read_robot(path).biped)
+
+
 @pytest.mark.parametrize(('place', 'value', 'message'), [
     (f'{KNEE}.mass', -1.0, f'{KNEE}.mass: -1 must be at least 0'),
     (f'{KNEE}.kp', 0.0, f'{KNEE}.kp: 0 must be positive'),
@@ -68,6 +92,10 @@ def test_what_is_written_is_read_back(tmp_path):
     ('biped.sole_size', [0.2], 'biped.sole_size: takes 2 numbers, not 1'),
     ('biped.base.mass', 0.0, 'biped.base.mass: 0 must be positive'),
     ('biped.gains', {'lift': 'high'}, "biped.gains.lift: must be a number, not 'high'"),
+    ('biped.gains', {'run': {'lift': 'high'}}, "biped.gains.run.lift: must be a number, not "
+     "'high'"),
+    ('biped.gains', {'run': [0.1]}, 'biped.gains.run: must be a mapping'),
+    ('biped.gains', 0.1, 'biped.gains: must be a mapping'),
     ('biped.links', [1], 'biped.links: must be a mapping')])
 def test_what_is_wrong_is_named(tmp_path, place, value, message):
     path = tmp_path / 'robot.yaml'

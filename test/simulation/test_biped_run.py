@@ -116,6 +116,24 @@ def test_it_changes_between_walk_run_hop_and_stand():
     assert np.ptp(x[running]) == pytest.approx(0.9, abs=0.1)
 
 
+@pytest.mark.parametrize('name', ['humanoid', 'unitree_g1'])
+@pytest.mark.parametrize(('wish', 'gait'), [
+    (STOP, 'run'), ((1.0, 0.0, 0.0), 'walk'), ((0.0, 0.0, 0.0), 'two_legged_jump')])
+def test_a_fast_run_slows_down_before_it_becomes_a_walk(name, wish, gait):
+    # Turned into a walk at 1 m/s, it fell 14 times of 16.
+    run = runner(name)
+    feedback = BipedFeedback(run.robot, program=gait_plan(run.robot, 'run'))
+    found = run.run(14.0, ((1.0, 1.0, 0.0, 0.0), (8.3, *wish)), feedback=feedback, seed=21,
+                    gaits=((8.3, gait),))
+    assert math.isinf(found.fell) and found.tilt < 0.3
+    time, x = found.path[:, 0], found.path[:, 1]
+    ran, after = (time > 7.0) & (time < 8.0), (time > 13.0) & (time < 14.0)
+    assert np.ptp(x[ran]) == pytest.approx(1.0, abs=0.05)
+    # A walk goes no faster than it can, whatever is wished of it.
+    assert np.ptp(x[after]) == pytest.approx(0.6 if gait == 'walk' else 0.0, abs=0.08)
+    assert not feedback.changing
+
+
 def test_arms_swing_by_the_cells_and_take_yaw_from_the_walk():
     run, found = runner(), {}
     robot = run.robot

@@ -136,9 +136,7 @@ class BalancedPattern(Pattern):
             return
         if self.enabled:
             forward, left, turn = self.wish
-            slowest, fastest = balance.program.speeds
-            balance.walk(min(max(forward, slowest), fastest), min(max(left, -ASIDE), ASIDE),
-                         min(max(turn, -TURN), TURN))
+            balance.walk(forward, min(max(left, -ASIDE), ASIDE), min(max(turn, -TURN), TURN))
         else:
             balance.stand()
         wanted = balance.advance(sensors, dt)

@@ -15,6 +15,7 @@
 """A biped that stands, walks, runs and hops by a network's clock: sensors in, positions out."""
 
 from collections.abc import Callable
+import math
 
 from cpg_ros.errors import InputError
 from cpg_ros.feedback.biped.arms import Arms
@@ -35,6 +36,8 @@ import numpy as np
 SHIFTING, FIRST_STEP = 0.8, 1.0
 #: At most this fast, m/s, and with this error of the capture point, m, a walk ends on two feet.
 STILL, CAUGHT = 0.15, 0.05
+#: A run slows down to this multiple of the fastest walk before it becomes one.
+SLOWED = 1.2
 #: How the legs go in the gaits that there are laws for.
 KINDS = {'walk': WALKS, 'run': RUNS, 'two_legged_hop': HOPS, 'two_legged_jump': HOPS}
 WALK_GAIT = 'walk'
@@ -63,7 +66,8 @@ class BipedFeedback:
     """Balance of one biped with soles; a tick allocates nothing but what the network's clock does.
 
     Walk and run change into one another in the middle of a stance, where the body rises no more
-    and falls no more. Whatever else changes does so on two feet.
+    and falls no more, a run once it is slow enough for a walk. Whatever else changes does so on
+    two feet. Speeds forward are held to those of the gait in force and of the gait wanted.
 
     Attributes:
         robot: whose feedback it is.
@@ -75,6 +79,8 @@ class BipedFeedback:
         rows: place of each joint of ``robot.order`` in that order, shape (joints,).
         track: the network in force, whose orbit is the clock.
         arms: where the joints that are no leg's are to be driven.
+        command: speeds forward and to the left, m/s, and rate of turning, rad/s, that the gait in
+            force is to have.
         faults: how often the network left its orbit and was put back.
         torques: wanted of the joints in ``robot.order``, N m, shape (joints,).
         positions: the same as targets of servos, rad.
@@ -124,7 +130,7 @@ class BipedFeedback:
         self._places = np.array([chained.index(row) for row in self.rows])
         self._kp = np.array([biped.links[name].kp for name in robot.order])
         self.torques, self.positions = np.zeros((2, len(robot.order)))
-        self._command, self._walks, self._rest = np.zeros(3), False, np.zeros(3)
+        self._asked, self._walks, self.command = np.zeros(3), False, np.zeros(3)
         self._time = 0.0
         self._ready = False
         self._before = np.zeros(2)
@@ -153,12 +159,12 @@ class BipedFeedback:
 
     def walk(self, forward: float, left: float = 0.0, turn: float = 0.0) -> None:
         """Go with this velocity, m/s, and rate of turning, rad/s, from now on."""
-        self._command[:] = forward, left, turn
+        self._asked[:] = forward, left, turn
         self._walks = True
 
     def stand(self) -> None:
         """Stop, and stand on both legs as soon as the body is slow enough."""
-        self._command[:] = 0.0
+        self._asked[:] = 0.0
         self._walks = False
 
     def set_gains(self, gait: str, gains: BipedGains) -> None:
@@ -195,8 +201,8 @@ class BipedFeedback:
             self._ready = True
         self._choose(dt)
         step = dt, min(self._time / SHIFTING, 1.0), self.kind
-        command = self._rest if self._stops else self._command
-        arguments = (self.links, self.gains, memory, sensors, command, self.mode, step)
+        self._limit()
+        arguments = (self.links, self.gains, memory, sensors, self.command, self.mode, step)
         if self._tick is None or self._bound is not self.gains:
             self._tick, self._bound = bound(tick, *arguments), self.gains
         self._tick(*arguments)
@@ -211,6 +217,15 @@ class BipedFeedback:
         np.divide(self.torques, self._kp, out=self.positions)
         self.positions += sensors.joint_positions[0, self.rows]
         return self.positions
+
+    def _limit(self) -> None:
+        """Fill what is wished of the gait in force, which may be on its way to another."""
+        if self._stops:
+            self.command[:] = 0.0
+            return
+        (slow, fast), (slowest, fastest) = self.program.speeds, self._goal.program.speeds
+        self.command[:] = self._asked
+        self.command[0] = min(max(self._asked[0], slow, slowest), fast, fastest)
 
     def _set_frequency(self, program: GaitPlan) -> None:
         known = self._gains[program.gait]
@@ -265,6 +280,10 @@ class BipedFeedback:
         if self._stops:
             wanted = self._walk if self.kind == RUNS else self.track
         if wanted is self.track or KINDS[wanted.program.gait] == HOPS:
+            return
+        velocity, heading = memory.center[1], memory.heading[0]
+        forward = velocity[0] * math.cos(heading) + velocity[1] * math.sin(heading)
+        if self.kind == RUNS and forward > SLOWED * wanted.program.speeds[1]:
             return
         for leg in range(2):
             if memory.swinging[leg] and self._before[leg] < half <= memory.phases[leg]:

@@ -52,6 +52,8 @@ OF_GAIT: Mapping[str, Mapping[str, float]] = {
         'sole_kd': 0.33, 'stance_damping': 0.3, 'speed_integral': 0.793, 'place_offset': 0.0082,
         'reaction': 0.0689, 'reaction_yaw': 0.639},
     'two_legged_hop': _HOP, 'two_legged_jump': _HOP}
+#: Least gains of a gait that leaves the ground, where they are not those of a walk.
+SHORTEST: Mapping[str, float] = {'duty': 0.2}
 _Fields: Any = named_tuple('BipedGains', GAINS, (gain.default for gain in GAINS.values()))
 
 
@@ -68,7 +70,9 @@ class BipedGains(_Fields):  # type: ignore[misc]
             InputError: as of `of`.
 
         """
-        return cls.of(body.gains, gait, body.scale)
+        for known, changes in body.gait_gains.items():
+            _check(changes, f'biped.gains.{known}', SHORTEST if known in OF_GAIT else None)
+        return cls.of(body.gains, gait, body.scale)._replace(**body.gait_gains.get(gait, {}))
 
     @classmethod
     def of(cls, changes: Mapping[str, float], gait: str = 'walk',
@@ -85,18 +89,24 @@ class BipedGains(_Fields):  # type: ignore[misc]
             InputError: no gain has this name, or it is not within its limits.
 
         """
-        for name, value in changes.items():
-            if name not in GAINS:
-                raise InputError(f"biped.gains: '{name}' is not one of {', '.join(GAINS)}")
-            gain = GAINS[name]
-            if not gain.low <= value <= gain.high:
-                raise InputError(f'biped.gains.{name}: {value:g} is not from {gain.low:g} to '
-                                 f'{gain.high:g} {gain.unit}'.rstrip())
+        _check(changes, 'biped.gains')
         of_gait = OF_GAIT.get(gait, {})
         usual = {**{name: gain.default for name, gain in GAINS.items()}, **of_gait}
         own = {name: value for name, value in changes.items() if name not in of_gait}
         return cls(**{name: float(own[name] if name in own else _scaled(GAINS[name], value, scale))
                       for name, value in usual.items()})
+
+
+def _check(changes: Mapping[str, float], where: str,
+           lowest: Mapping[str, float] | None = None) -> None:
+    for name, value in changes.items():
+        if name not in GAINS:
+            raise InputError(f"{where}: '{name}' is not one of {', '.join(GAINS)}")
+        gain = GAINS[name]
+        low = (lowest or {}).get(name, gain.low)
+        if not low <= value <= gain.high:
+            raise InputError(f'{where}.{name}: {value:g} is not from {low:g} to '
+                             f'{gain.high:g} {gain.unit}'.rstrip())
 
 
 def _scaled(gain: Gain, value: float, scale: tuple[float, float]) -> float:
