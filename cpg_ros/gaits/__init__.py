@@ -27,6 +27,7 @@ __all__ = [
            'mean_cycle',
            'period',
            'phase_average',
+           'phase_change',
            'phase_estimation',
            'phase_scatter',
            'quality_checks',

@@ -97,6 +97,14 @@ def _guessed(name: str, leg: str, found: RecordingFit) -> Joint:
                  float(angles.max()) + room, max(FASTER * fastest, 1.0))
 
 
+def running_parameters(found: RecordingFit) -> dict[str, Any]:
+    """Return what a running generator is set to, by parameter: all but the readout."""
+    network = found.fit.network
+    return {'gait': found.fit.gait, 'frequency': float(found.stride.frequency),
+            **{f'{network.name}.{name}': float(value)
+               for name, value in network.as_dict().items()}}
+
+
 def parameter_tree(found: RecordingFit, robot: Path) -> dict[str, Any]:
     """Return the generator's parameters as ``--params-file`` takes them, for any node name."""
     fit = found.fit

@@ -27,7 +27,7 @@ import traceback
 from cpg_ros.errors import CpgError
 from cpg_ros.files.atomic_write import write_atomically
 from cpg_ros.files.plain_text import finite
-from cpg_ros.inversion.parameter_files import write_fitted
+from cpg_ros.inversion.parameter_files import running_parameters, write_fitted
 from cpg_ros.inversion.recording_fit import fit_recording, RecordingFit
 from cpg_ros.networks.registry import is_path
 from cpg_ros.nodes import node_base
@@ -203,11 +203,10 @@ class Inversion(StartedNode):
         """Set the parameters of the target, if there is one; return success and what to add."""
         if not target:
             return True, ''
-        network, services = found.fit.network, ServiceClients(self)
-        values = {'gait': found.fit.gait, 'frequency': found.stride.frequency,
-                  **{f'{network.name}.{key}': value for key, value in network.as_dict().items()}}
+        services = ServiceClients(self)
         try:
-            asyncio.run(NodeClient(services, target).set_parameters(values, PATIENCE))
+            asyncio.run(NodeClient(services, target).set_parameters(running_parameters(found),
+                                                                    PATIENCE))
         except (CallError, NameValidationException) as error:
             return False, f'; not applied to {target}: {" ".join(str(error).split())}'
         finally:

@@ -100,6 +100,23 @@ class Recording(ShortRepr):
         columns = [self.joints.index(name) for name in names]
         return replace(self, joints=tuple(names), positions=self.positions[:, columns])
 
+    def between(self, begin: float, end: float) -> 'Recording':
+        """Return what was recorded from one time to another, s; its times begin at 0 again.
+
+        Raises:
+            RecordingError: fewer than two samples are there.
+
+        """
+        within = (self.times >= begin) & (self.times <= end)
+        times = self.times[within]
+        first = float(times[0]) if times.size else 0.0
+        loads = self.loads
+        if loads is not None:
+            held = (loads.times >= begin) & (loads.times <= end)
+            loads = replace(loads, times=loads.times[held] - first, loads=loads.loads[held])
+        return replace(self, times=times - first, positions=self.positions[within],
+                       start=self.start + first, loads=loads)
+
 
 def require(names: Sequence[str], there: Sequence[str], source: str) -> None:
     """Check that joints are there, and that none is named twice.

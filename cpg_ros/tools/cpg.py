@@ -128,6 +128,11 @@ def parser() -> Parser:
     play.add_argument('topics', nargs='*', metavar='TOPIC', help='topics to play (default: all)')
     play.add_argument('--rate', type=rate, default=1.0, metavar='R',
                       help='playback speed relative to the recording (default: %(default)g)')
+    schedule = add(actions, 'play-schedule', 'set the generator at the times of a schedule, which '
+                   'inversion --schedule writes')
+    schedule.add_argument('schedule', type=Path, metavar='FILE', help='YAML file')
+    schedule.add_argument('--rate', type=rate, default=1.0, metavar='R',
+                          help='speed relative to the schedule (default: %(default)g)')
     add(actions, 'completion', 'print the bash completion script of cpg')
     return made
 
@@ -182,6 +187,9 @@ async def _call(chosen: Namespace, other: 'NodeClient') -> str:
                                    data=chosen.action == 'enable')
     if chosen.action in ('reset', 'call'):
         return await other.command(Trigger, chosen.service, ANSWER)
+    if chosen.action == 'play-schedule':
+        from cpg_ros.tools.schedule_playing import play_schedule
+        return await play_schedule(chosen.schedule, other, chosen.rate)
     if chosen.action == 'gait':
         await other.set_parameters({'gait': chosen.gait}, ANSWER)
     elif chosen.what == 'set':
@@ -229,8 +237,8 @@ def _played(chosen: Namespace, node: 'Node') -> str:
 
 
 _DOERS = {'param': _called, 'gait': _called, 'enable': _called, 'disable': _called,
-          'reset': _called, 'call': _called, 'topic': _listened, 'record': _recorded,
-          'play': _played}
+          'reset': _called, 'call': _called, 'play-schedule': _called, 'topic': _listened,
+          'record': _recorded, 'play': _played}
 
 
 @contextmanager

@@ -33,6 +33,7 @@ from cpg_ros.files.progress_bar import progress_bar
 from cpg_ros.files.yaml_reader import shown
 from cpg_ros.fleet.options import add_options, KEPT, working
 from cpg_ros.gaits.leg_names import BIPED, QUADRUPED
+from cpg_ros.inversion.gait_schedule import write_schedule
 from cpg_ros.inversion.model_choice import (
     as_rows,
     compare_networks,
@@ -42,6 +43,7 @@ from cpg_ros.inversion.model_choice import (
 from cpg_ros.inversion.paper_fit import paper_fits, PaperFit, refuse_others
 from cpg_ros.inversion.parameter_files import write_fitted
 from cpg_ros.inversion.recording_fit import fit_recording, network_of, preset_of, RecordingFit
+from cpg_ros.inversion.stretch_fits import fit_stretches, stretch_rows
 from cpg_ros.inversion.stride_report import as_csv
 from cpg_ros.networks.registry import SHIPPED
 from cpg_ros.recordings.formats import FORMATS, read_recording
@@ -66,6 +68,7 @@ examples:
   inversion --bag walk_bag --robot go1.yaml --out fitted.yaml --report report.html
   inversion --csv walk.csv --unit deg --free c tau --json
   ros2 run cpg_ros generator --ros-args --params-file fitted.yaml
+  inversion --bag walk_and_trot --robot go1.yaml --schedule gaits.yaml
   inversion --bags recordings/ --out results/ --jobs 2
 
 Without a recording, inversion runs as the node cpg_inversion, which listens to joint states and
@@ -106,6 +109,10 @@ def _parser() -> Parser:
     parser.add_argument('--out', type=Path, metavar='FILE', help='parameter file to write, such '
                         'as fitted.yaml; the robot file is written beside it; with --bags, a '
                         'folder')
+    parser.add_argument('--schedule', type=Path, metavar='FILE', help='cut a recording that '
+                        'changes its gait into its steady stretches, fit each, and write what '
+                        'cpg play-schedule repeats, such as gaits.yaml; the robot file is written '
+                        'beside it')
     parser.add_argument('--report', type=Path, metavar='FILE', help='report to write: .html, or '
                         '.csv for a table of all strides')
     parser.add_argument('--json', action='store_true', help='print JSON instead of text')
@@ -143,18 +150,25 @@ def _refuse_for_many(chosen: Namespace) -> None:
         raise InputError('argument --bags: --out FOLDER is needed for the results')
     if chosen.out.exists() and not chosen.out.is_dir():
         raise InputError(f'argument --out: {chosen.out} is not a folder')
-    for option in ('report', 'json', 'paper'):
+    for option in ('report', 'json', 'paper', 'schedule'):
         if getattr(chosen, option):
             raise InputError(f'argument --{option}: not with --bags')
 
 
 def _refuse_files(chosen: Namespace) -> None:
-    for option in ('out', 'report'):
+    for option in ('out', 'report', 'schedule'):
         path = getattr(chosen, option)
         if path is not None and not path.absolute().parent.is_dir():
             raise InputError(f'argument --{option}: there is no folder {path.parent}')
-    if chosen.out is not None and chosen.out.suffix not in ('.yaml', '.yml'):
-        raise InputError(f'argument --out: {shown(str(chosen.out))} does not end in .yaml')
+    for option in ('out', 'schedule'):
+        path = getattr(chosen, option)
+        if path is not None and path.suffix not in ('.yaml', '.yml'):
+            raise InputError(f'argument --{option}: {shown(str(path))} does not end in .yaml')
+    if chosen.schedule is not None:
+        for option in ('out', 'report', 'gait', 'preset', 'free', 'start', 'paper'):
+            if getattr(chosen, option):
+                raise InputError(f'argument --{option}: not with --schedule, which fits every '
+                                 'stretch by itself')
     if chosen.report is not None and chosen.report.suffix not in ('.html', '.csv'):
         raise InputError(f'argument --report: {shown(str(chosen.report))} does not end in .html '
                          'or .csv')
@@ -190,6 +204,8 @@ def _invert(chosen: Namespace) -> int:
     if chosen.bags is not None:
         return _invert_many(chosen, robot, starts)
     recording = _recording(chosen, robot)
+    if chosen.schedule is not None:
+        return _scheduled(chosen, recording, robot)
     network, compared = _explained(chosen, recording, robot)
     with progress_bar('fitting', 100) as bar:
         found = fit_recording(recording, robot, network, chosen.gait or '',
@@ -212,6 +228,25 @@ def _invert(chosen: Namespace) -> int:
                   ] if compared else []
         text = '\n'.join([*judged, as_text(found), *as_table(fits)])
         say(f'{text}\nwritten: {", ".join(map(str, written))}' if written else text)
+    return 0
+
+
+def _scheduled(chosen: Namespace, recording: Recording, robot: Robot | None) -> int:
+    """Fit every stretch, and write the changes between them."""
+    with progress_bar('fitting', 100) as bar:
+        found = fit_stretches(recording, robot, chosen.network or '', order=chosen.order,
+                              done=lambda share: bar(round(100.0 * share)))
+    written = write_schedule(chosen.schedule, found, robot)
+    if chosen.json:
+        say(as_json([{'begin': one.begin, 'end': one.end, 'gait': one.gait,
+                      'frequency': one.stride.frequency, 'confidence': one.confidence,
+                      'rms_share': one.fit.fit.mean_rms_share if one.fit else None,
+                      'why': one.why or None} for one in found]))
+        return 0
+    say('\n'.join([*table(stretch_rows(found), '>><>>>>'), *(
+        f'warning: {one.begin:.2f} to {one.end:.2f} s: {line}' for one in found
+        for line in ((one.why,) if one.fit is None else one.fit.warnings)),
+        f'written: {", ".join(map(str, written))}']))
     return 0
 
 

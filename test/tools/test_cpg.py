@@ -95,6 +95,33 @@ def test_parameters_and_topics_of_a_running_generator(unhurried):
         1, "cpg: /cpg_generator has no parameter 'nothing'")
 
 
+def test_a_schedule_is_played(unhurried, tmp_path):
+    process, watcher = unhurried
+    path = tmp_path / 'gaits.yaml'
+    robot, = watcher.get('robot')
+
+    def plays(network, *entries):
+        path.write_text(yaml.safe_dump({'network': network, 'robot': robot, 'schedule': [
+            {'at': at, 'parameters': parameters} for at, parameters in entries]},
+            sort_keys=False))
+        return ask(process.domain, 'play-schedule', str(path), '--rate', '10')
+
+    code, played, why = plays('delayed', (0.0, {'gait': 'walk', 'frequency': 1.5}),
+                              (10.0, {'gait': 'trot', 'frequency': 2, 'delayed.tau': 0.45}))
+    assert (code, why) == (0, '')
+    assert [line.split() for line in played.splitlines()[:2]] == [
+        ['0.00', 's', 'gait', 'walk,', 'frequency', '1.5'],
+        ['10.00', 's', 'gait', 'trot,', 'frequency', '2,', 'delayed.tau', '0.45']]
+    assert watcher.get('gait', 'frequency', 'delayed.tau') == ['trot', 2.0, 0.45]
+    # All of an entry or none: a walk there is not.
+    code, played, why = plays('delayed', (0.0, {'gait': 'walk', 'delayed.tau': 0.2}))
+    assert (code, played) == (1, '') and "below the walk's critical delay" in why
+    assert watcher.get('gait', 'delayed.tau') == ['trot', 0.45]
+    code, played, why = plays('quadruped', (0.0, {'gait': 'walk'}))
+    assert code == 2 and 'is for the network quadruped, and /cpg_generator runs delayed' in why
+    assert f'start it with: generator --ros-args -p network:=quadruped -p robot:={robot}' in why
+
+
 def test_a_shell_completes_actions_gaits_parameters_and_topics(unhurried):
     domain = unhurried[0].domain
     assert {'run', 'gait', 'param', 'record'} <= completed(domain, 'cpg ')
