@@ -149,7 +149,7 @@ def jobs(quick: bool) -> list[Job]:
             + [Job(gait, 'switches', closed) for gait in GAITS[::3 if quick else 1]
                for closed in ways]
             + [Job('trot', 'noisy', True), Job('trot', 'wander', True),
-               Job('trot', 'wander', False)]
+               Job('trot', 'wander', False), Job('walk', 'wander', True)]
             + [Job('trot', 'networks', closed, network) for network in OTHERS for closed in ways]
             + [Job(gait, 'pushes', closed) for gait in ('pace', 'bound') for closed in ways]
             + [Job(gait, figure, closed) for gait in ('trot', 'walk')
@@ -198,7 +198,8 @@ def verdicts(found: dict[str, dict[str, dict[str, Any]]]) -> dict[str, bool]:
     met['trot with noise and delay'] = trot['noisy']['half_survive_N_s'] >= 34.0
     for network, one in trot['networks'].items():
         met[network] = one['half_survive_N_s'] >= ENOUGH
-    met['wander'] = trot['wander']['falls'] == 0
+    for gait in ('trot', 'walk'):
+        met[f'{gait} wander'] = found[gait]['closed']['wander']['falls'] == 0
     met['switches'] = not any(sum(one['closed']['switches'].values()) for one in found.values()
                               if 'switches' in one['closed'])
     for gait in ('pace', 'bound'):
