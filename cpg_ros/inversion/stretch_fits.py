@@ -19,7 +19,7 @@ each is followed with its own phase until the motion is no longer alike, which i
 frequency changes. Where only the legs' phases change, a stretch is cut in two.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 from cpg_ros.errors import CpgError, InputError
@@ -94,9 +94,8 @@ def cut(recording: Recording, robot: Robot | None = None, network: str = ''
 
     """
     legs, _ = leg_joints(recording, robot)
-    name = network or (robot.networks[0] if robot is not None else network_of(legs))
     try:
-        kind = with_legs_of(find_network(name), legs)
+        kind = with_legs_of(find_network(_network(recording, robot, network)), legs)
     except NetworkError as error:
         raise InputError(f'network {error}') from error
     found: list[tuple[float, float, Stride]] = []
@@ -129,6 +128,12 @@ def cut(recording: Recording, robot: Robot | None = None, network: str = ''
     return sorted(found, key=lambda one: one[0])
 
 
+def _network(recording: Recording, robot: Robot | None, network: str) -> str:
+    if network or robot is None:
+        return network or network_of(leg_joints(recording, robot)[0])
+    return robot.networks[0]
+
+
 def _longer(*parts: tuple[float, float]) -> list[tuple[float, float]]:
     return [(begin, end) for begin, end in parts if end - begin >= SHORTEST]
 
@@ -149,25 +154,20 @@ def fit_stretches(recording: Recording, robot: Robot | None = None, network: str
         CpgError: as of cut.
 
     """
-    return list(_fitted(recording, robot, network, order, done))
-
-
-def _fitted(recording: Recording, robot: Robot | None, network: str, order: int,
-            done: Callable[[float], None]) -> Iterator[StretchFit]:
+    name, found = _network(recording, robot, network), []
     stretches = cut(recording, robot, network)
-    name = network or (robot.networks[0] if robot is not None else
-                       network_of(leg_joints(recording, robot)[0]))
     for k, (begin, end, stride) in enumerate(stretches):
-        part = recording.between(begin, end)
-        part = replace(part, source=f'{recording.source}, {begin:.2f} to {end:.2f} s')
+        part = replace(recording.between(begin, end),
+                       source=f'{recording.source}, {begin:.2f} to {end:.2f} s')
 
         def so_far(share: float, before: int = k) -> None:
             done((before + share) / len(stretches))
         try:
             fit = fit_recording(part, robot, name, order=order, done=so_far)
-            yield StretchFit(begin, end, fit.stride, fit)
+            found.append(StretchFit(begin, end, fit.stride, fit))
         except CpgError as error:
-            yield StretchFit(begin, end, stride, None, str(error))
+            found.append(StretchFit(begin, end, stride, None, str(error)))
+    return found
 
 
 def stretch_rows(found: Sequence[StretchFit]) -> list[tuple[str, ...]]:
