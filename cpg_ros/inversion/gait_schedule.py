@@ -24,12 +24,18 @@ from typing import Any
 from cpg_ros.errors import CpgError, InputError
 from cpg_ros.files.atomic_write import write_atomically
 from cpg_ros.files.yaml_reader import shown, YamlReader
-from cpg_ros.inversion.parameter_files import fitted_robot, robot_file_of, running_parameters
+from cpg_ros.inversion.parameter_files import (
+    check_plan,
+    fitted_robot,
+    parameter_tree,
+    robot_file_of,
+    running_parameters,
+)
 from cpg_ros.inversion.recording_fit import RecordingFit
 from cpg_ros.inversion.stretch_fits import StretchFit
 from cpg_ros.networks.registry import reference
 from cpg_ros.robots.robot import JointMotion, Motion, Robot
-from cpg_ros.robots.robot_file import read_robot, write_robot
+from cpg_ros.robots.robot_file import write_robot
 import yaml
 
 #: Frequencies this near to one another, as a share, are one entry's.
@@ -57,7 +63,7 @@ class GaitSchedule:
     Attributes:
         network: that the generator has to run, as its parameter names it.
         robot: path of the robot file with the gaits' readouts, or a shipped robot's name.
-        entries: at rising times, the first at 0.
+        entries: at rising times.
 
     """
 
@@ -125,21 +131,25 @@ def robot_of(stretches: Sequence[StretchFit], robot: Robot | None) -> Robot:
 def write_schedule(path: Path, stretches: Sequence[StretchFit], robot: Robot | None) -> list[Path]:
     """Write the schedule of a recording, and beside it the robot file that it names.
 
+    Files that the generator would reject are not kept.
+
     Raises:
-        InputError: as of schedule_of and robot_of.
+        InputError: as of schedule_of and robot_of, or the robot cannot move in one of the gaits.
         OSError: a file cannot be written.
 
     """
     beside = robot_file_of(path)
     schedule, moved = schedule_of(stretches, str(beside.resolve())), robot_of(stretches, robot)
-    source = next(one.fit.recording.source for one in stretches if one.fit is not None)
-    summary = f'gaits of {source.rpartition(", ")[0]}'
+    fits = [one.fit for one in stretches if one.fit is not None]
+    summary = f'gaits of {fits[0].recording.source.rpartition(", ")[0]}'
     tree = {'network': schedule.network, 'robot': schedule.robot, 'schedule': [
         {'at': one.at, 'parameters': one.parameters} for one in schedule.entries]}
     with TemporaryDirectory(prefix='.', dir=path.absolute().parent) as folder:
         joints = Path(folder, beside.name)
         write_robot(joints, moved, summary)
-        read_robot(joints)
+        for fit in fits:
+            check_plan(parameter_tree(fit, joints), joints,
+                       f'{fit.recording.source}: robot {moved.name}')
         write_atomically(path, f'# {summary}; play it with: cpg play-schedule {path.name}\n'
                          + yaml.safe_dump(tree, sort_keys=False))
         joints.replace(beside)

@@ -14,6 +14,7 @@
 
 """A fit as files that the generator loads: its parameters, and a robot file."""
 
+from collections.abc import Mapping
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -115,13 +116,26 @@ def parameter_tree(found: RecordingFit, robot: Path) -> dict[str, Any]:
                            for name, value in fit.network.as_dict().items()}}}}
 
 
-def _planned(parameters: Path, robot: Path) -> None:
-    """Plan the gait as the generator does, from the files written; raises PlanError."""
-    tree = yaml.safe_load(parameters.read_text())['/**']['ros__parameters']
+def check_plan(tree: Mapping[str, Any], robot: Path, who: str) -> None:
+    """Plan the gait as the generator does, from what was written for it.
+
+    Args:
+        tree: as of parameter_tree.
+        robot: the robot file.
+        who: whose plan it is, in the error.
+
+    Raises:
+        InputError: the generator would refuse it.
+
+    """
+    tree = tree['/**']['ros__parameters']
     kind = find_network(tree['network'])
     network = kind(**tree[kind.name])
-    plan(read_robot(robot), tree['gait'], kind.presets()[tree['gait']], network,
-         tree['frequency'], tree['amplitude'])
+    try:
+        plan(read_robot(robot), tree['gait'], kind.presets()[tree['gait']], network,
+             tree['frequency'], tree['amplitude'])
+    except PlanError as error:
+        raise InputError(f'{who} cannot do this: {error}') from error
 
 
 def write_fitted(path: str | Path, found: RecordingFit, robot: Robot | None = None,
@@ -158,11 +172,8 @@ def write_fitted(path: str | Path, found: RecordingFit, robot: Robot | None = No
         parameters, joints = Path(folder, path.name), Path(folder, beside.name)
         write_robot(joints, moved, summary)
         write_atomically(parameters, comment + yaml.safe_dump(tree, sort_keys=False))
-        try:
-            _planned(parameters, joints)
-        except PlanError as error:
-            raise InputError(f'{found.recording.source}: robot {moved.name} cannot do this: '
-                             f'{error}') from error
+        check_plan(yaml.safe_load(parameters.read_text()), joints,
+                   f'{found.recording.source}: robot {moved.name}')
         joints.replace(beside)
         parameters.replace(path)
     return [path, beside]

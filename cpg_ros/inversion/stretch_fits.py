@@ -41,8 +41,6 @@ from cpg_ros.short_repr import ShortRepr
 
 #: Shorter remains are not searched: three strides of the fastest that is looked for, s.
 SHORTEST = 0.24
-#: Most stretches of a recording.
-MOST = 1000
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -51,7 +49,7 @@ class StretchFit(ShortRepr):
 
     Attributes:
         begin, end: s from the recording's start.
-        stride: what was found there, its times from the start of the stretch.
+        stride: what was found there, on a clock of its own.
         fit: the network's gait fitted to it; None if that failed.
         why: why there is no fit.
 
@@ -101,7 +99,7 @@ def cut(recording: Recording, robot: Robot | None = None, network: str = ''
     found: list[tuple[float, float, Stride]] = []
     remains = [(0.0, float(recording.times[-1]))]
     why: NoSteadyGait | None = None
-    while remains and len(found) < MOST:
+    while remains:
         begin, end = remains.pop()
         try:
             part = recording.between(begin, end)

@@ -18,7 +18,7 @@ A link is what one joint moves. Places are those with all joints at 0, in the fr
 forward, y left, z up), so that no link needs a frame of its own.
 """
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Set
 from dataclasses import asdict, dataclass, field
 import math
 from typing import Any
@@ -119,17 +119,14 @@ def read_biped(reader: YamlReader, tree: Any, legs: Mapping[str, Collection[str]
     base = reader.keys(tree['base'], 'biped.base', {'mass', 'center'})
     driven = {name for names in legs.values() for name in names}
     links: dict[str, BipedLink] = {}
-    listed = reader.keys(tree['links'], 'biped.links', driven, set(tree['links'])
-                         if isinstance(tree['links'], Mapping) else set())
+    listed = _any_keys(reader, tree['links'], 'biped.links', driven)
     for name in listed:
         links[name] = _link(reader, listed[name], f'biped.links.{name}', links, name in driven)
     soles = reader.keys(tree['soles'], 'biped.soles', set(legs))
     size = reader.numbers(tree['sole_size'], 'biped.sole_size', 2)
     for k, value in enumerate(size):
         _positive(reader, value, f'biped.sole_size[{k}]')
-    gains = tree.get('gains', {})
-    gains = reader.keys(gains, 'biped.gains', set(),
-                        set(gains) if isinstance(gains, Mapping) else set())
+    gains = _any_keys(reader, tree.get('gains', {}), 'biped.gains')
     length, mass = (_positive(reader, value, f'biped.scale[{k}]') for k, value in enumerate(
         reader.numbers(tree.get('scale', [1.0, 1.0]), 'biped.scale', 2)))
     return BipedBody(
@@ -143,8 +140,13 @@ def read_biped(reader: YamlReader, tree: Any, legs: Mapping[str, Collection[str]
 
 
 def _gait_gains(reader: YamlReader, tree: Any, where: str) -> dict[str, float]:
-    tree = reader.keys(tree, where, set(), set(tree) if isinstance(tree, Mapping) else set())
-    return {name: reader.number(value, f'{where}.{name}') for name, value in tree.items()}
+    return {name: reader.number(value, f'{where}.{name}')
+            for name, value in _any_keys(reader, tree, where).items()}
+
+
+def _any_keys(reader: YamlReader, tree: Any, where: str, required: Set[str] = frozenset()
+              ) -> Mapping[str, Any]:
+    return reader.keys(tree, where, required, set(tree) if isinstance(tree, Mapping) else set())
 
 
 def _positive(reader: YamlReader, value: Any, where: str) -> float:

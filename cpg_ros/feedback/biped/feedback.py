@@ -281,10 +281,11 @@ class BipedFeedback:
             wanted = self._walk if self.kind == RUNS else self.track
         if wanted is self.track or KINDS[wanted.program.gait] == HOPS:
             return
-        velocity, heading = memory.center[1], memory.heading[0]
-        forward = velocity[0] * math.cos(heading) + velocity[1] * math.sin(heading)
-        if self.kind == RUNS and forward > SLOWED * wanted.program.speeds[1]:
-            return
+        if self.kind == RUNS:
+            velocity, heading = memory.center[1], memory.heading[0]
+            forward = velocity[0] * math.cos(heading) + velocity[1] * math.sin(heading)
+            if forward > SLOWED * wanted.program.speeds[1]:
+                return
         for leg in range(2):
             if memory.swinging[leg] and self._before[leg] < half <= memory.phases[leg]:
                 # There its flexor peaks, in any gait; swings begin from the other sole in a walk.

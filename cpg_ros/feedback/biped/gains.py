@@ -71,7 +71,7 @@ class BipedGains(_Fields):  # type: ignore[misc]
 
         """
         for known, changes in body.gait_gains.items():
-            _check(changes, f'biped.gains.{known}', SHORTEST if known in OF_GAIT else None)
+            _check(changes, f'biped.gains.{known}', SHORTEST if known in OF_GAIT else {})
         return cls.of(body.gains, gait, body.scale)._replace(**body.gait_gains.get(gait, {}))
 
     @classmethod
@@ -89,7 +89,7 @@ class BipedGains(_Fields):  # type: ignore[misc]
             InputError: no gain has this name, or it is not within its limits.
 
         """
-        _check(changes, 'biped.gains')
+        _check(changes, 'biped.gains', {})
         of_gait = OF_GAIT.get(gait, {})
         usual = {**{name: gain.default for name, gain in GAINS.items()}, **of_gait}
         own = {name: value for name, value in changes.items() if name not in of_gait}
@@ -97,13 +97,12 @@ class BipedGains(_Fields):  # type: ignore[misc]
                       for name, value in usual.items()})
 
 
-def _check(changes: Mapping[str, float], where: str,
-           lowest: Mapping[str, float] | None = None) -> None:
+def _check(changes: Mapping[str, float], where: str, lowest: Mapping[str, float]) -> None:
     for name, value in changes.items():
         if name not in GAINS:
             raise InputError(f"{where}: '{name}' is not one of {', '.join(GAINS)}")
         gain = GAINS[name]
-        low = (lowest or {}).get(name, gain.low)
+        low = lowest.get(name, gain.low)
         if not low <= value <= gain.high:
             raise InputError(f'{where}.{name}: {value:g} is not from {low:g} to '
                              f'{gain.high:g} {gain.unit}'.rstrip())
