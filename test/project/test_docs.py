@@ -70,6 +70,14 @@ def test_the_readme_is_short():
     assert len((ROOT / 'README.md').read_text().splitlines()) <= 150
 
 
+def test_the_reference_has_the_keys_of_robot_files(monkeypatch):
+    monkeypatch.syspath_prepend(ROOT / 'docs' / 'extensions')
+    (block,) = re.findall(r'```{robotfile}\n(.*?)```',
+                          (ROOT / 'docs/reference/robot_file.md').read_text(), re.DOTALL)
+    described = [line.split(': ')[0] for line in block.splitlines() if line]
+    assert sorted(described) == sorted(importlib.import_module('robot_keys').asked_for())
+
+
 @pytest.mark.parametrize(('file', 'pattern'), [
     ('setup.py', r"version='([\d.]+)'"), ('package.xml', r'<version>([\d.]+)<'),
     ('CITATION.cff', r'\nversion: ([\d.]+)\n')])
