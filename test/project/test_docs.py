@@ -72,7 +72,7 @@ def test_the_readme_is_short():
 
 def test_the_reference_has_the_keys_of_robot_files(monkeypatch):
     monkeypatch.syspath_prepend(ROOT / 'docs' / 'extensions')
-    (block,) = re.findall(r'```{robotfile}\n(.*?)```',
+    (block,) = re.findall(r'```{robotfile} keys\n(.*?)```',
                           (ROOT / 'docs/reference/robot_file.md').read_text(), re.DOTALL)
     described = [line.split(': ')[0] for line in block.splitlines() if line]
     assert sorted(described) == sorted(importlib.import_module('robot_keys').asked_for())
