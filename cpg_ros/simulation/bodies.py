@@ -22,7 +22,7 @@ import copy
 import os
 from typing import Any
 
-from cpg_ros.simulation.body import Body
+from cpg_ros.simulation.body import add_payload, Body
 from cpg_ros.simulation.model_indices import Anatomy
 from cpg_ros.simulation.robot_model import engine
 from cpg_ros.simulation.scenario import Scenario
@@ -50,7 +50,7 @@ class Bodies:
                               else os.cpu_count() or 1)
         self._data = [mujoco.MjData(body.model) for _ in range(threads)]
         self._pool = rollout.Rollout(nthread=threads)
-        self._models: dict[tuple[float, float, Terrain | None, float], Any] = {}
+        self._models: dict[tuple[float, float, float, Terrain | None, float], Any] = {}
         self._spec = int(mujoco.mjtState.mjSTATE_CTRL | mujoco.mjtState.mjSTATE_XFRC_APPLIED)
         full = mujoco.mjtState.mjSTATE_FULLPHYSICS
         body.reset()
@@ -79,7 +79,7 @@ class Bodies:
 
     def model(self, scenario: Scenario, kp_scale: float = 1.0) -> Any:
         """Return the model of a body that meets a scenario, its servos' kp scaled."""
-        key = (scenario.friction, scenario.mass, scenario.terrain, kp_scale)
+        key = (scenario.friction, scenario.mass, scenario.payload, scenario.terrain, kp_scale)
         if key not in self._models:
             mujoco, model = engine(), copy.copy(self.body.model)
             set_friction(model, scenario.friction)
@@ -88,6 +88,9 @@ class Bodies:
             if scenario.mass != 1.0:
                 model.body_mass[:] *= scenario.mass
                 model.body_inertia[:] *= scenario.mass
+            if scenario.payload:
+                add_payload(model, self.parts.base, scenario.payload)
+            if scenario.mass != 1.0 or scenario.payload:
                 mujoco.mj_setConst(model, mujoco.MjData(model))
             if scenario.terrain is not None:
                 lay(model, scenario.terrain)

@@ -32,6 +32,13 @@ def yaw(quaternion: np.ndarray) -> float:
     return math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
 
 
+def add_payload(model: Any, base: int, mass: float) -> None:
+    """Put a mass in kg on the base of a model, where its own is; ``mj_setConst`` is to follow."""
+    own = float(model.body_mass[base])
+    model.body_mass[base] = own + mass
+    model.body_inertia[base] *= (own + mass) / own
+
+
 class Body:
     """One robot on a floor; joints in ``robot.order``, legs in the order of its network.
 
@@ -138,11 +145,9 @@ class Body:
 
     def load(self, mass: float) -> None:
         """Put a mass in kg on the base, where its own is."""
-        model, own = self.model, float(self.model.body_mass[self._base])
         if mass:
-            model.body_mass[self._base] += mass
-            model.body_inertia[self._base] *= (own + mass) / own
-            engine().mj_setConst(model, self.data)
+            add_payload(self.model, self._base, mass)
+            engine().mj_setConst(self.model, self.data)
             self.reset()
 
     def push(self, force: np.ndarray, duration: float) -> None:

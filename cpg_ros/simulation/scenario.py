@@ -38,6 +38,7 @@ class Scenario:
         speed: wanted, forward, m/s; ignored where the gait cannot be steered.
         commands: later wishes, each (s, m/s forward, m/s to the left, rad/s of turning).
         switches: later gaits, each (s, name).
+        payload: on the base, where its own mass is, kg; less than 0 for a lighter base.
 
     """
 
@@ -49,6 +50,7 @@ class Scenario:
     speed: float = 0.4
     commands: tuple[tuple[float, float, float, float], ...] = ()
     switches: tuple[tuple[float, str], ...] = ()
+    payload: float = 0.0
 
     def forces(self, steps: int, timestep: float) -> np.ndarray:
         """Return the forces of the pushes in each step of some s, N, shape (steps, 2)."""

