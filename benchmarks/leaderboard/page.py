@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Draw what bench_leaderboard.py has printed, and print its table in Markdown.
+"""Print the table of bench_leaderboard.py in Markdown, and draw it if it has all rows.
 
 python leaderboard/page.py leaderboard.json --out ../docs > table.md
 """
@@ -27,7 +27,7 @@ import matplotlib
 
 matplotlib.use('Agg')
 import matplotlib.pyplot as plt  # noqa: E402
-from rules import WISHES  # noqa: E402
+from rules import ROWS, WISHES  # noqa: E402
 
 #: Of the picture on a dark ground, NAME_dark.png.
 DARK = Path(__file__).resolve().parents[2] / 'docs' / 'static' / 'dark.matplotlibrc'
@@ -45,9 +45,12 @@ def table(found: Found) -> str:
     def row(label: str, value: Callable[[dict[str, Any]], Any]) -> None:
         lines.append([label, *(str(value(one)) for one in found.values())])
 
+    first = next(iter(found.values()))
+
     def figures(rows: str, label: str, *keys: str, factor: float = 100.0, unit: str = '%') -> None:
-        row(f'{label} [{unit}]', lambda one: ', '.join(
-            _number(one[rows].get(key), factor) for key in keys))
+        if rows in first:
+            row(f'{label} [{unit}]', lambda one: ', '.join(
+                _number(one[rows].get(key), factor) for key in keys))
 
     row('velocity of the base', lambda one: one['what']['velocity'])
     row('servos, kp, kd', lambda one: f'{one["what"]["kp"]:g}, {one["what"]["kd"]:g}')
@@ -56,20 +59,22 @@ def table(found: Found) -> str:
         asked = ', '.join(key.split()[1] for key in keys)
         unit = 'rad/s' if way == 'turn' else 'm/s'
         figures('tracking', f'{way}, asked {asked}', *keys, factor=1.0, unit=unit)
-    row('cost of transport at 0.4 m/s', lambda one: f'{one["tracking"]["cost of transport"]:.2f}')
+    if 'tracking' in first:
+        row('cost of transport at 0.4 m/s',
+            lambda one: f'{one["tracking"]["cost of transport"]:.2f}')
     figures('pushes', 'pushes that half survive', 'half, N s', factor=1.0, unit='N s')
     figures('pushes', 'pushes of 30, 40, 50, 60, 70 N s survived',
             *(f'{size} N s' for size in (30, 40, 50, 60, 70)))
     figures('delays', 'of 30 N s, all that is measured late by 10, 20, 30, 40, 60 ms',
             *(f'{late} ms' for late in (10, 20, 30, 40, 60)))
     for kind, label in (('height_field', 'rough ground'), ('boxes', 'blocks'), ('waves', 'waves')):
-        keys = [key for key in next(iter(found.values()))['rough'] if key.startswith(kind)]
+        keys = [key for key in first.get('rough', ()) if key.startswith(kind)]
         sizes = ', '.join(key.split()[1] for key in keys)
         figures('rough', f'{label} of {sizes} cm crossed', *keys)
     for rows, label, unit in (('stairs', 'stairs of', 'cm'), ('slopes', 'up', 'degrees'),
                               ('slopes', 'down', 'degrees'), ('floors', 'friction', ''),
                               ('floors', 'payload', 'kg')):
-        keys = [key for key in next(iter(found.values()))[rows]
+        keys = [key for key in first.get(rows, ())
                 if key != 'of' and (rows == 'stairs' or key.startswith(label))]
         sizes = ', '.join(key.removeprefix(label).split()[0] for key in keys)
         ends = {'stairs': 'crossed', 'slopes': 'climbed' if label == 'up' else 'descended',
@@ -127,9 +132,10 @@ def main() -> None:
     entrants = json.loads(chosen.file.read_text())['entrants']
     found = dict(sorted(((name, one) for name, one in entrants.items() if 'skipped' not in one),
                         key=lambda item: item[1]['what']['robot'], reverse=True))
-    picture(found, chosen.out / f'{chosen.name}.png')
-    with plt.rc_context(fname=DARK):
-        picture(found, chosen.out / f'{chosen.name}_dark.png')
+    if all(set(ROWS) <= set(one) for one in found.values()):
+        picture(found, chosen.out / f'{chosen.name}.png')
+        with plt.rc_context(fname=DARK):
+            picture(found, chosen.out / f'{chosen.name}_dark.png')
     print(table(found))
 
 

@@ -25,6 +25,8 @@ LAW = Law(
         'slope_share': Gain(0.7, 7.0, '',
                             'share of the way to the vertical through the body by which feet '
                             'are moved'),
+        'slope_share_up': Gain(0.35, 7.0, '',
+                               'the same uphill, where feet that are far ahead shorten strides'),
         'slope_height': Gain(0.3, 3.0, 'm', 'height of the body above its feet'),
         'slope_filter': Gain(0.5, 5.0, 's',
                              'time constant of the filter on the angles of the ground'),
@@ -40,7 +42,13 @@ def update_ground(ground, angle, gains, dt):
 
 
 @jit
-def shift(ground, gains):
+def shift_ahead(ground, gains):
+    """Return how far to move all feet forward, m, on ground at an angle in rad, > 0 downhill."""
+    return shift(ground, gains.slope_share if ground > 0.0 else gains.slope_share_up, gains)
+
+
+@jit
+def shift(ground, share, gains):
     """Return how far to move all feet uphill, m, on ground at an angle in rad."""
-    far = gains.slope_share * gains.slope_height * math.tan(ground)
+    far = share * gains.slope_height * math.tan(ground)
     return min(max(far, -gains.slope_most), gains.slope_most)

@@ -156,8 +156,8 @@ def tick(legs, tables, gains, memory, sensors, planned, step, out):
         roll, pitch = off.roll - ground[0], off.pitch - ground[1]
         uphill_x = uphill_y = 0.0
         if gains.slope:
-            uphill_x = turns * slope.shift(ground[1], gains)
-            uphill_y = -turns * slope.shift(ground[0], gains)
+            uphill_x = turns * slope.shift_ahead(ground[1], gains)
+            uphill_y = -turns * slope.shift(ground[0], gains.slope_share, gains)
         step_x = placement.step(off.vx, off.wy, gains.step, gains.step_pitch_rate, gains)
         step_y = placement.step(off.vy, off.wx, gains.step_left, gains.step_roll_rate, gains)
         memory.sidestep_correction[run] = sidestep.correct_speed(

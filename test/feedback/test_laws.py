@@ -157,9 +157,16 @@ def test_feet_stand_under_the_body_on_a_slope():
     for _ in range(2000):
         ground = slope.update_ground(ground, -0.2, GAINS, DT)
     assert ground == pytest.approx(-0.2, abs=1e-3)
-    assert slope.shift(ground, GAINS) == pytest.approx(
-        -GAINS.slope_share * GAINS.slope_height * math.tan(0.2), abs=1e-3)
-    assert slope.shift(1.5, GAINS) == GAINS.slope_most
+    assert slope.shift(ground, 0.7, GAINS) == pytest.approx(
+        -0.7 * GAINS.slope_height * math.tan(0.2), abs=1e-3)
+    assert slope.shift(1.5, 0.7, GAINS) == GAINS.slope_most
+
+
+def test_feet_are_moved_less_uphill_than_downhill():
+    up, down = slope.shift_ahead(-0.2, GAINS), slope.shift_ahead(0.2, GAINS)
+    assert up < 0.0 < down
+    assert up / down == pytest.approx(-GAINS.slope_share_up / GAINS.slope_share)
+    assert slope.shift_ahead(0.0, GAINS) == 0.0
 
 
 def test_heading_turns_back_by_the_shorter_way():

@@ -71,3 +71,11 @@ def test_steps_have_edges_and_lead_up_and_down(walk):
         heights.append(round(3.0 - distance, 6))
     up = [0.12 * k for k in range(STEPS + 1)]
     assert heights == pytest.approx([*up, *up[-2::-1]])
+
+
+def test_the_trot_goes_up_twenty_degrees():
+    """3 m from eight phases; with the feet as far ahead as downhill, most of them do not."""
+    trot = ClosedLoop('go2', program('trot'))
+    ran = trot.run([Scenario(friction, terrain=Terrain('ramp', 20.0), phase=k / 4)
+                    for friction in (0.8, 1.0) for k in range(4)], 15.0, Gains(), goal=3.0)
+    assert np.isfinite(ran.arrived).sum() >= 7
