@@ -39,8 +39,8 @@ Found = dict[str, dict[str, Any]]
 def table(found: Found) -> str:
     """Return the figures of all entrants, a column each."""
     heads = {name: one['what'] for name, one in found.items()}
-    lines = [['', *(f'{what["robot"]}: {name.removeprefix(what["robot"] + " ")}'
-                    for name, what in heads.items())], ['---'] * (1 + len(found))]
+    lines = [['', *(f'{what["robot"]}: {_label(name)}' for name, what in heads.items())],
+             ['---'] * (1 + len(found))]
 
     def row(label: str, value: Callable[[dict[str, Any]], Any]) -> None:
         lines.append([label, *(str(value(one)) for one in found.values())])
@@ -83,6 +83,12 @@ def table(found: Found) -> str:
     return '\n'.join('| ' + ' | '.join(line) + ' |' for line in lines)
 
 
+def _label(name: str) -> str:
+    """Return how an entrant is called, without its robot."""
+    _, _, gait = name.partition(' ')
+    return f'cpg_ros, {gait}' if gait else name
+
+
 def _number(value: Any, factor: float) -> str:
     """Return a figure in few digits; a dash for what was not measured."""
     if value is None:
@@ -102,9 +108,10 @@ def picture(found: Found, path: Path) -> None:
               ('stairs', ' cm', 'height of steps [cm]', 'crossed [%]'),
               ('slopes', 'up ', 'slope up [degrees]', 'climbed [%]'))
     for name, one in found.items():
-        looks = {'color': COLORS.get(name) or next(others), 'label': name,
+        robot = one['what']['robot']
+        looks = {'color': COLORS.get(name) or next(others), 'label': f'{robot}: {_label(name)}',
                  'marker': 'o', 'ms': 3.0, 'lw': 2.0 if name in COLORS else 1.2,
-                 'ls': '--' if one['what']['robot'] == 'go1' else '-'}
+                 'ls': '--' if robot == 'go1' else '-'}
         for axis, (row, key, across, up) in zip(axes.flat, panels, strict=False):
             shares = {float(label.replace(key, '').split()[0]): 100.0 * share
                       for label, share in one[row].items() if key in label and 'half' not in label}
