@@ -18,10 +18,11 @@ A stride is from touchdown to touchdown; duty is the share of it in stance. In a
 the ground at any time, in a run there is flight (Alexander 2003, Principles of Animal Locomotion).
 """
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
+from cpg_ros.gaits.leg_names import legs_of, LegsError
 from cpg_ros.gaits.recording_like import FootLoadsLike
 from cpg_ros.short_repr import ShortRepr
 import numpy as np
@@ -87,19 +88,25 @@ class FootContacts(ShortRepr):
         return np.column_stack([touched[:-1], ends - touched[:-1], stance - touched[:-1]])
 
 
-def foot_contacts(loads: FootLoadsLike, begin: float, end: float, period: float
-                  ) -> FootContacts | None:
-    """Find which feet are on the ground between two times; None for too few samples.
+def foot_contacts(loads: FootLoadsLike, legs: Collection[str], begin: float, end: float,
+                  period: float) -> FootContacts | None:
+    """Find which feet are on the ground between two times.
+
+    None for too few samples, or if it does not follow from their names whose feet they are.
 
     Args:
-        loads: on the feet.
+        loads: on the feet, which are called as the legs or as joints of them, such as FR_force.
+        legs: names.
         begin: s.
         end: s.
         period: of a stride, s.
 
     """
+    named = _legs_named(loads.legs, legs)
     inside = (loads.times >= begin) & (loads.times <= end)
     times, rows = loads.times[inside], loads.loads[inside]
+    if named is None:
+        return None
     if len(times) < FEWEST * (end - begin) / period or not np.isfinite(rows).all():
         return None
     least, largest = np.percentile(rows, [LEAST, LARGEST], axis=0)
@@ -110,7 +117,20 @@ def foot_contacts(loads: FootLoadsLike, begin: float, end: float, period: float
         for column in down.T:
             for first, last in _short(column == state, times, BOUNCE * period):
                 column[first:last] = not state
-    return FootContacts(tuple(loads.legs), times, down)
+    return FootContacts(named, times, down)
+
+
+def _legs_named(names: Sequence[str], legs: Collection[str]) -> tuple[str, ...] | None:
+    """Return the leg of each foot by its name; None if there is not one foot for each leg."""
+    if set(legs) <= set(names):
+        return tuple(names)
+    try:
+        found = legs_of(names)
+    except LegsError:
+        return None
+    if set(found) != set(legs) or any(len(found[leg]) != 1 for leg in legs) or found.unassigned:
+        return None
+    return tuple(next(leg for leg in legs if name in found[leg]) for name in names)
 
 
 def _short(there: np.ndarray, times: np.ndarray, shortest: float) -> Iterator[tuple[int, int]]:

@@ -229,7 +229,7 @@ def find_stride(recording: RecordingLike, legs: Legs | Mapping[str, Sequence[str
         if by_cells is not None:
             gait = match_gait_by_cells(by_cells, kind)
     contacts = None if loads is None else foot_contacts(
-        loads, float(warp.knots[0]), float(warp.knots[-1]), 1.0 / warp.frequency)
+        loads, own, float(warp.knots[0]), float(warp.knots[-1]), 1.0 / warp.frequency)
     if contacts is not None:
         gait = match_gait_by_contacts(gait, contacts)
     if len(gait.alike) > 1:

@@ -22,6 +22,7 @@ from typing import Any
 from cpg_ros.errors import InputError
 from cpg_ros.files.atomic_write import write_atomically
 from cpg_ros.inversion.recording_fit import RecordingFit
+from cpg_ros.motion.joint_readout import standing
 from cpg_ros.motion.plan import plan, PlanError
 from cpg_ros.networks.registry import find_network, reference
 from cpg_ros.robots.robot import Joint, Motion, Robot
@@ -98,12 +99,28 @@ def _guessed(name: str, leg: str, found: RecordingFit) -> Joint:
                  float(angles.max()) + room, max(FASTER * fastest, 1.0))
 
 
-def running_parameters(found: RecordingFit) -> dict[str, Any]:
-    """Return what a running generator is set to, by parameter: all but the readout."""
-    network = found.fit.network
-    return {'gait': found.fit.gait, 'frequency': float(found.stride.frequency),
-            **{f'{network.name}.{name}': float(value)
-               for name, value in network.as_dict().items()}}
+def running_parameters(found: RecordingFit, robot: Robot | None = None) -> dict[str, Any]:
+    """Return what a running generator is set to, by parameter.
+
+    Args:
+        found: the fit.
+        robot: whose joints the generator moves, and whose cells were fitted; without one, the
+            readouts are left out.
+
+    """
+    fit, network = found.fit, found.fit.network
+    wanted = {'gait': fit.gait, 'frequency': float(found.stride.frequency),
+              **{f'{network.name}.{name}': float(value)
+                 for name, value in network.as_dict().items()}}
+    if robot is None:
+        return wanted
+    motion = robot.motion(fit.gait, fit.gait)
+    # What was fitted is not retimed: the legs stand for as long as they do by themselves.
+    own = (standing(fit.orbit, robot.leg_cells, fit.harmonics)[1].mean() if motion.stance is None
+           else motion.stance[1])
+    return {**wanted, 'amplitude': 1.0, 'duty': 0.0 if motion.duty is None else float(own),
+            **{f'readout.{name}': [float(offset), *map(float, weights)]
+               for name, (offset, weights) in fit.readouts.items()}}
 
 
 def parameter_tree(found: RecordingFit, robot: Path) -> dict[str, Any]:

@@ -22,7 +22,7 @@ import math
 from pathlib import Path
 from typing import Any
 
-from cpg_ros.errors import CpgError
+from cpg_ros.errors import CpgError, InputError
 from cpg_ros.export.c_kernel import KERNELS
 from cpg_ros.feedback.biped.gains import BipedGains
 from cpg_ros.motion.plan import gait_of, GaitPlan, plan, PlanError
@@ -32,11 +32,14 @@ from cpg_ros.networks.registry import find_network, NETWORKS, with_legs_of
 from cpg_ros.nodes import real_time
 from cpg_ros.nodes.parameter_spec import as_doubles, one_of, PRESETS, Spec
 from cpg_ros.robots.biped_keys import SPEEDS
+from cpg_ros.robots.gait_readouts import gait_readouts, with_readouts
 from cpg_ros.robots.robot import Robot
 from cpg_ros.robots.robot_file import load_robot
 from rclpy.parameter import Parameter
 
 COMMANDS = ('none', 'joint_trajectory', 'forward_position')
+#: What the parameters of the joints' readouts begin with; the joint's name follows.
+READOUT = 'readout.'
 NETWORK = Spec('delayed', 'network of cells that generates the rhythm', read_only=True,
                constraints=one_of(NETWORKS, ', or the path of a Python file that defines one; '
                                   'append a number of legs, as in delayed6, for a variant; '
@@ -136,6 +139,7 @@ class GaitSettings:
     amplitude: float
     symmetry_gain: float
     duty: float
+    readouts: tuple[tuple[float, ...], ...]
 
 
 class Planner:
@@ -155,7 +159,8 @@ class Planner:
         self.network, self.presets, self.robot = network, presets, robot
         self.steered = steered
         self.names = ('gait', 'frequency', 'amplitude', 'symmetry_gain', 'duty',
-                      *(f'{network.name}.{key}' for key in network.parameters()))
+                      *(f'{network.name}.{key}' for key in network.parameters()),
+                      *(READOUT + joint.name for joint in robot.joints))
         self.program = functools.lru_cache(maxsize=32)(self._program)
 
     @property
@@ -173,7 +178,7 @@ class Planner:
                 gait_of(preset, preset.network)
 
     def specs(self, preset: str) -> dict[str, Spec]:
-        """Return ``frequency`` and the network's own, with a preset's values as defaults."""
+        """Return ``frequency``, the network's and the joints' own, a preset's as defaults."""
         network, values = self.network, self._values(self.presets[preset].network)
         frequency = self._frequency(preset)
         found = {'frequency': Spec(1.0 if frequency is None else frequency,
@@ -187,6 +192,10 @@ class Planner:
             found[f'{network.name}.{group}'] = Spec(
                 values[group], f'mean of {", ".join(members)}; setting it sets all of them',
                 allowed.low, allowed.high)
+        for name, readout in self._readouts(preset).items():
+            found[name] = Spec(readout, "offset of the joint in this gait, and 1, 2, 4 or 6 "
+                               "weights of its cell's signals [rad]; setting the gait loads "
+                               'those of the robot file')
         return found
 
     def given(self, gait: str, overrides: Mapping[str, Parameter]) -> list[Parameter]:
@@ -204,6 +213,12 @@ class Planner:
             frequency = BipedGains.of_body(self.robot.biped, gait).frequency
         return frequency
 
+    def _readouts(self, preset: str) -> dict[str, list[float]]:
+        """Readouts that the robot file has for this gait, by parameter."""
+        motion = self.robot.motion(preset, self.presets[preset].gait)
+        return {READOUT + name: list(readout)
+                for name, readout in gait_readouts(self.robot, motion).items()}
+
     def _values(self, network: Network) -> dict[str, float]:
         """Parameters and groups by their bare names."""
         values = network.as_dict()
@@ -219,7 +234,8 @@ class Planner:
         """
         for name in self.names:
             value = values[name]
-            if name != 'gait' and not (isinstance(value, float) and math.isfinite(value)):
+            if name != 'gait' and not name.startswith(READOUT) and not (
+                    isinstance(value, float) and math.isfinite(value)):
                 raise PlanError(f'{name} must be a finite number, not {value!r}')
         if values['gait'] not in self.presets:
             raise PlanError(f"gait '{values['gait']}' is not one of {', '.join(self.presets)}")
@@ -229,7 +245,9 @@ class Planner:
         network = self.network(*(values[f'{self.network.name}.{key}']
                                  for key in self.network.parameters()))
         return GaitSettings(values['gait'], network, values['frequency'], values['amplitude'],
-                            gain, values['duty'])
+                            gain, values['duty'], tuple(
+                                tuple(values[READOUT + joint.name])
+                                for joint in self.robot.joints))
 
     def plan(self, values: dict[str, Any]) -> GaitPlan:
         """Return the plan for all parameters, by name.
@@ -247,24 +265,31 @@ class Planner:
         return program
 
     def _program(self, settings: GaitSettings) -> GaitPlan:
-        return plan(self.robot, settings.gait, self.presets[settings.gait], settings.network,
-                    settings.frequency, settings.amplitude, settings.symmetry_gain,
-                    settings.duty)
+        preset = self.presets[settings.gait]
+        readouts = {joint.name: readout for joint, readout
+                    in zip(self.robot.joints, settings.readouts, strict=True)}
+        try:
+            robot = with_readouts(self.robot, settings.gait, preset.gait, readouts)
+        except InputError as error:
+            raise PlanError(str(error)) from error
+        return plan(robot, settings.gait, preset, settings.network, settings.frequency,
+                    settings.amplitude, settings.symmetry_gain, settings.duty)
 
     def complete(self, parameters: list[Parameter], current: dict[str, Any]) -> list[Parameter]:
         """Add to a batch the changes that follow from it.
 
-        The gait's preset, the frequency that the robot file has for it, its own duty, then what a
-        group sets, then the means of the groups; single parameters in the batch win over all of
-        them. An unknown gait adds nothing; it is rejected later.
+        The gait's preset, the frequency and readouts that the robot file has for it, its own
+        duty, then what a group sets, then the means of the groups; single parameters in the batch
+        win over all of them. An unknown gait adds nothing; it is rejected later.
         """
         prefix = f'{self.network.name}.'
         given = {p.name: p.value for p in parameters}
         gait = given.get('gait')
-        wanted: dict[str, float] = {}
+        wanted: dict[str, Any] = {}
         if isinstance(gait, str) and gait in self.presets:
             loaded = self.presets[gait].network.as_dict()
             wanted = {prefix + key: value for key, value in loaded.items()}
+            wanted |= self._readouts(gait)
             if (frequency := self._frequency(gait)) is not None:
                 wanted['frequency'] = frequency
             wanted['duty'] = 0.0
@@ -279,5 +304,4 @@ class Planner:
                     and all(isinstance(part, float) for part in parts)):
                 parameters = [p for p in parameters if p.name != prefix + group]
                 wanted[prefix + group] = math.fsum(parts) / len(parts)
-        return [Parameter(name, Parameter.Type.DOUBLE, value)
-                for name, value in wanted.items()] + parameters
+        return [Parameter(name, value=value) for name, value in wanted.items()] + parameters

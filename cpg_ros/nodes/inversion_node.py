@@ -77,7 +77,8 @@ SPECS = {
     'out': Spec('', 'parameter file to write; empty for none'),
     'report': Spec('', 'HTML report to write; empty for none'),
     'apply_to': Spec('', 'generator whose parameters are set after a fit, such as /cpg_generator; '
-                     'empty for none')}
+                     "the joints' readouts, too, where both have the same 'robot'; empty for "
+                     'none')}
 
 
 class Inversion(StartedNode):
@@ -205,17 +206,28 @@ class Inversion(StartedNode):
             return True, ''
         services = ServiceClients(self)
         try:
-            asyncio.run(NodeClient(services, target).set_parameters(running_parameters(found),
-                                                                    PATIENCE))
+            whole = asyncio.run(self._set(NodeClient(services, target), found))
         except (CallError, NameValidationException) as error:
             return False, f'; not applied to {target}: {" ".join(str(error).split())}'
         finally:
             services.forget(target)
-        # The readout is the robot file's, which a generator reads once.
+        if whole:
+            return True, f"; applied to {target}: gait, frequency, network and joints' readouts"
         written = self._value('out')
-        return True, (f'; applied to {target}: gait, frequency and network, not the readout; to '
-                      'move as recorded, ' + (f'start it with --params-file {written}' if written
-                      else "set 'out' and start it with the file written there"))
+        return True, (f'; applied to {target}: gait, frequency and network, not the readout, as '
+                      "'robot' here is not its robot; to move as recorded, "
+                      + (f'start it with --params-file {written}' if written
+                         else "set 'out' and start it with the file written there"))
+
+    async def _set(self, target: NodeClient, found: RecordingFit) -> bool:
+        """Set the parameters of a generator; return whether its robot can take the readouts."""
+        robot = self._robot
+        theirs, = await target.values(['robot'])
+        # The fit's cells are then those of its joints.
+        whole = (robot is not None and theirs == self._value('robot')
+                 and robot.harmonics == found.fit.harmonics)
+        await target.set_parameters(running_parameters(found, robot if whole else None), PATIENCE)
+        return whole
 
 
 def _summary(found: RecordingFit) -> str:

@@ -68,6 +68,7 @@ class StartedNode(Node):
         self._logger = QueuedLogger.of(self)
         self.parameter_service = StrictParameterService(self)
         self._doubles: set[str] = set()
+        self._lists: dict[str, list] = {}
         # Its clock cannot change under a thread at work.
         self.set_descriptor('use_sim_time', ParameterDescriptor(
             description='follow /clock; set at start', type=ParameterType.PARAMETER_BOOL,
@@ -92,8 +93,10 @@ class StartedNode(Node):
                 self._doubles.add(name)
                 if override is not None:
                     overrides[name], = as_doubles([override], {name})
-            elif isinstance(spec.default, list) and override is not None:
-                overrides[name] = as_list(override, spec.default)
+            elif isinstance(spec.default, list):
+                self._lists[name] = spec.default
+                if override is not None:
+                    overrides[name] = as_list(override, spec.default)
             try:
                 self.declare_parameter(name, spec.default, spec.descriptor())
             except InvalidParameterTypeException as error:
@@ -105,7 +108,8 @@ class StartedNode(Node):
 
     def _complete(self, parameters: list[Parameter]) -> list[Parameter]:
         """Return a batch of changes with the types and the further changes that it implies."""
-        return as_doubles(parameters, self._doubles)
+        return [as_list(one, self._lists[one.name]) if one.name in self._lists else one
+                for one in as_doubles(parameters, self._doubles)]
 
     def resolve_topic_name(self, topic: str, **options: Any) -> str:
         """Do as the base class does; errors as of create_publisher."""

@@ -16,12 +16,11 @@
 
 from collections.abc import Iterator, Sequence
 import csv
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from fnmatch import fnmatchcase
 import io
 from itertools import chain, islice
 from pathlib import Path
-import re
 
 from cpg_ros.files.plain_text import printable
 from cpg_ros.files.progress_bar import progress_bar
@@ -35,37 +34,26 @@ from cpg_ros.recordings.recording import (
     require,
 )
 from cpg_ros.recordings.recording_format import JOINTS, Option, RecordingFormat, UNIT
+from cpg_ros.recordings.table_columns import (
+    ANGLES,
+    Column,
+    load_columns,
+    LoadColumns,
+    number_in,
+    POSITION,
+    split,
+    TIME,
+    TIMES,
+    TRUTH,
+)
 from cpg_ros.recordings.table_text import decimal_commas, opened, preamble, units_of
 import numpy as np
 
-#: What a header may call its unit -> that in rad, or in s.
-ANGLES = {'rad': 1.0, 'radian': 1.0, 'radians': 1.0,
-          'deg': np.pi / 180.0, 'degree': np.pi / 180.0, 'degrees': np.pi / 180.0,
-          '°': np.pi / 180.0}
-TIMES = {'s': 1.0, 'sec': 1.0, 'secs': 1.0, 'second': 1.0, 'seconds': 1.0,
-         'ms': 1e-3, 'msec': 1e-3, 'us': 1e-6, 'ns': 1e-9, 'nsec': 1e-9}
-#: 'knee [deg]', 'Time(s)', and for times also 'time_ms'.
-BRACKETED = re.compile(r'^(.*?)\s*[\[(]\s*([^\[\]()]*?)\s*[\])]$')
-TIME = re.compile(r'^[_%#/\s]*(t|time|times|stamp|timestamp|time_?stamp)(?:[_ ]([a-z]+))?$', re.I)
-#: Among other columns, those so called are the joints': 'JointPosFR_hip', as PlotJuggler has it
-#: '/joint_states/lf_knee/position'.
-POSITION = re.compile(r'^joint_?pos(?:ition)?s?[_./ ]*(.+)$|^/.*/position/([^/]+)$'
-                      r'|^/.*/([^/]+)/position$', re.I)
 DELIMITERS = ',;\t'
 #: A time that is so far ahead of both neighbours (s) is a stamp gone wrong.
 ASTRAY = 3600.0
 #: Lines that are parsed together.
 LINES = 8192
-
-
-@dataclass(frozen=True)
-class _Column:
-    """Where a number is, what its header says, which joint it is of, and its unit's size."""
-
-    index: int
-    header: str
-    joint: str
-    scale: float
 
 
 def read_csv(path: str | Path, unit: str | None = None, time: str | None = None,
@@ -110,7 +98,8 @@ def read_csv(path: str | Path, unit: str | None = None, time: str | None = None,
             recording = merged(chunks(), printable(str(path)),
                                [column.joint for column in table.columns])
     notes = [*table.notes, *(['lines that end in a delimiter'] if table.ended else [])]
-    return replace(recording, notes=(*notes, *recording.notes))
+    return replace(recording, notes=(*notes, *recording.notes),
+                   loads=table.loads.taken(recording.start, recording.times[-1]))
 
 
 class _Table:
@@ -140,7 +129,7 @@ class _Table:
             raise RecordingError(f'{path}, line {self.line}: one column only, '
                                  f'{"".join(headers)!r}; a table has a time column and one per '
                                  'joint')
-        if all(_number(header) is not None for header in headers if header):
+        if all(number_in(header) is not None for header in headers if header):
             raise RecordingError(f'{path}, line {self.line}: no header; the first line has to '
                                  'name the columns')
         self.width, self.ended = len(headers), False
@@ -154,6 +143,10 @@ class _Table:
             self.notes.append('commas are taken for decimal points')
         self.lines = chain([first] if first else [], file)
         self.time = self._time(headers, time)
+        self.loads = LoadColumns(load_columns(headers))
+        if self.loads.columns:
+            self.notes.append('taken for loads on the feet: '
+                              + few([one.header for one in self.loads.columns]))
         self.columns = self._joints(headers, unit, joints)
         self.last = -np.inf
 
@@ -165,7 +158,7 @@ class _Table:
 
     def _units(self, headers: list[str], line: str) -> list[str]:
         """Return the headers with the units that the next line has, if it is one of units."""
-        if '\0' in line or not line.strip() or any(_split(header)[1] for header in headers):
+        if '\0' in line or not line.strip() or any(split(header)[1] for header in headers):
             return headers
         cells = self._cells(line, self.line + 1)
         units = units_of(cells[:self.width])
@@ -178,11 +171,11 @@ class _Table:
         if '\0' in line:
             raise RecordingError(f'{self.path}, line {number}: not a text file (a byte 0)')
 
-    def _time(self, headers: list[str], option: str | None) -> _Column:
+    def _time(self, headers: list[str], option: str | None) -> Column:
         """Find the time column."""
         found = []
         for k, header in enumerate(headers):
-            name, unit = _split(header)
+            name, unit = split(header)
             match = TIME.match(name)
             if match and match[2]:
                 unit = unit or match[2]
@@ -195,7 +188,7 @@ class _Table:
                    "no time column, such as 'time' or 'time [ms]'; the columns are "
                    + few(headers, 20)))
         k, header, unit = found[0]
-        return _Column(k, header, '', self._scale(header, unit, option, TIMES))
+        return Column(k, header, '', self._scale(header, unit, option, TIMES))
 
     def _scale(self, header: str, unit: str | None, option: str | None,
                units: dict[str, float]) -> float:
@@ -205,15 +198,16 @@ class _Table:
         return units[(unit or option or next(iter(units))).lower()]
 
     def _joints(self, headers: list[str], option: str | None, wanted: Sequence[str]
-                ) -> list[_Column]:
+                ) -> list[Column]:
         """Find the joints' columns."""
         columns, others = [], []
+        loads = {column.index for column in self.loads.columns}
         for k, header in enumerate(headers):
-            name, unit = _split(header)
-            if k == self.time.index or not name:
+            name, unit = split(header)
+            if k == self.time.index or k in loads or not name:
                 continue
             if unit is None or unit.lower() in ANGLES:
-                columns.append(_Column(k, header, name,
+                columns.append(Column(k, header, name,
                                        self._scale(header, unit, option, ANGLES)))
             else:
                 others.append(header)
@@ -256,6 +250,7 @@ class _Table:
             numbers = self._numbers(lines)
             seconds = numbers[:, self.time.index] * self.time.scale
             self._check(seconds, lines)
+            self.loads.add(seconds, numbers)
             yield (np.rint(seconds * 1e9).astype(np.int64), names,
                    numbers[:, places] * scales)
             self.line += len(lines)
@@ -269,7 +264,9 @@ class _Table:
                     return numbers
             except ValueError:
                 pass  # Cells without a number, or with a text: which, the slow way tells.
-        needed = {column.index: column.header for column in (self.time, *self.columns)}
+        loads = {column.index for column in self.loads.columns}
+        needed = {column.index: column.header
+                  for column in (self.time, *self.columns, *self.loads.columns)}
         rows = []
         for number, line in enumerate(lines, self.line + 1):
             if not line.strip():
@@ -284,7 +281,9 @@ class _Table:
                                      f'the header has {self.width}')
             row = np.full(self.width, np.nan)
             for k, header in needed.items():
-                value = _number(cells[k])
+                value = number_in(cells[k])
+                if value is None and k in loads:
+                    value = TRUTH.get(cells[k].strip().lower(), np.nan)
                 if value is None:
                     raise RecordingError(f'{self.path}, line {number}, column {header!r}: '
                                          f'{cells[k].strip()[:40]!r} is not a number')
@@ -313,23 +312,6 @@ class _Table:
                                  f'{value:.9g} s')
         if len(seconds):
             self.last = float(seconds[-1])
-
-
-def _split(header: str) -> tuple[str, str | None]:
-    """Return name and unit of a header."""
-    match = BRACKETED.match(header)
-    return (match[1], match[2]) if match else (header, None)
-
-
-def _number(cell: str) -> float | None:
-    """Return the number in a cell, nan where it is empty, None where it is something else."""
-    cell = cell.strip()
-    if not cell:
-        return float('nan')
-    try:
-        return float(cell)
-    except ValueError:
-        return None
 
 
 CSV = RecordingFormat(

@@ -17,5 +17,5 @@
 Imports ``networks`` and ``files``; knows nothing of ROS.
 """
 
-__all__ = ['biped_keys', 'body_keys', 'description', 'feedback_keys', 'mesh_files', 'mesh_paths',
-           'robot', 'robot_file', 'sprawled_stand', 'urdf']
+__all__ = ['biped_keys', 'body_keys', 'description', 'feedback_keys', 'gait_readouts',
+           'mesh_files', 'mesh_paths', 'robot', 'robot_file', 'sprawled_stand', 'urdf']

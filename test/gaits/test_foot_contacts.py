@@ -20,6 +20,7 @@ from cpg_ros.gaits.foot_contacts import foot_contacts
 from cpg_ros.gaits.leg_strides import leg_strides
 from cpg_ros.gaits.stride import find_stride
 from cpg_ros.networks.registry import NETWORKS
+from cpg_ros.recordings.csv_reader import read_csv
 import numpy as np
 import pytest
 
@@ -72,7 +73,33 @@ def test_between_walk_and_run_it_cannot_tell():
 def test_feet_that_are_never_lifted_stand_and_few_samples_tell_nothing():
     _, loads = recorded(0.6)
     loads.loads[:] = 250.0 + 30.0 * np.sin(loads.times)[:, None]
-    stood = foot_contacts(loads, 1.0, 9.0, PERIOD)
+    stood = foot_contacts(loads, LEGS, 1.0, 9.0, PERIOD)
     assert stood.duty == {'left': 1.0, 'right': 1.0} and stood.flight == 0.0
     seldom = SimpleNamespace(legs=loads.legs, times=loads.times[::10], loads=loads.loads[::10])
-    assert foot_contacts(seldom, 1.0, 9.0, PERIOD) is None
+    assert foot_contacts(seldom, LEGS, 1.0, 9.0, PERIOD) is None
+
+
+@pytest.mark.parametrize(('duty', 'gait'), [(0.62, 'walk'), (0.38, 'run')])
+def test_columns_of_a_table_tell_walk_from_run(tmp_path, duty, gait):
+    recording, loads = recorded(duty)
+    table = np.column_stack([recording.times, recording.positions, *(
+        np.interp(recording.times, loads.times, row) for row in loads.loads.T)])
+    path = tmp_path / 'walk.csv'
+    np.savetxt(path, table, delimiter=',', comments='',
+               header=','.join(['time', *recording.joints, 'grf_R [N]', 'grf_L [N]']))
+    # The first column is the right foot's, which touches down with the stride.
+    read = read_csv(path, progress=False)
+    found = find_stride(read, LEGS, NETWORKS['biped'], loads=read.loads)
+    assert found.gait == gait and set(found.contacts.legs) == {'left', 'right'}
+    rows = {one.leg: one for one in leg_strides(read, LEGS, found)}
+    for leg, phase in (('left', 0.5), ('right', 1.0)):
+        assert rows[leg].shares.mean() == pytest.approx(duty, abs=0.04)
+        touched = (rows[leg].begins / PERIOD - phase + 0.5) % 1.0 - 0.5
+        assert np.abs(touched).max() < 0.05
+
+
+def test_feet_of_other_legs_tell_nothing():
+    _, loads = recorded(0.6)
+    for names in (('left_force', 'torso_force'), ('left_force', 'left_contact'), ('one', 'two')):
+        other = SimpleNamespace(legs=names, times=loads.times, loads=loads.loads)
+        assert foot_contacts(other, LEGS, 1.0, 9.0, PERIOD) is None

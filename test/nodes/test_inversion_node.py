@@ -49,6 +49,29 @@ def angles_at(times, positions, names, joint, instants):
     return np.interp(instants, times, positions[:, names.index(joint)])
 
 
+def gaps_in_step(watcher, again, period):
+    """Return how far joints differ after one shift of time for all, shape (instants, joints).
+
+    Args:
+        watcher: names, and samples (times, positions).
+        again: the same of what moved later.
+        period: of the strides, s.
+
+    """
+    (names, (times, positions)), (others, (later, angles)) = watcher, again
+    instants = np.arange(0.0, times[-1] - times[0] - period - 0.11, 0.01)
+    spans = np.ptp(positions, axis=0)
+
+    def gaps(shift):
+        return np.stack([np.abs(
+            angles_at(times, positions, names, joint, times[0] + shift % period + instants)
+            - angles_at(later, angles, others, joint, later[0] + instants))
+            / spans[names.index(joint)] for joint in names
+            if spans[names.index(joint)] > 0.01], axis=1)
+    best = min(np.linspace(0.0, period, 171), key=lambda shift: gaps(shift).max())
+    return gaps(min(best + np.linspace(-0.005, 0.005, 201), key=lambda one: gaps(one).max()))
+
+
 @pytest.mark.parametrize(('network', 'gait', 'topics'), [
     ('delayed', 'walk', ('/joint_states',)),
     ('quadruped', 'pace', tuple(f'/{leg}/joint_states' for leg in ('lh', 'rh', 'lf', 'rf')))])
@@ -98,19 +121,9 @@ def test_a_gait_recorded_inverted_and_run_again_is_the_same(ending, tmp_path, ne
 
     # They were started at different instants: in step after one shift of time, for all joints
     # and the whole of the recording.
-    instants = np.arange(0.0, times[-1] - times[0] - 0.7, 0.01)
-    spans = np.ptp(positions, axis=0)
-
-    def gap(shift):
-        return max(np.abs(
-            angles_at(times, positions, names, joint, times[0] + shift % (1.0 / 1.7) + instants)
-            - angles_at(later, angles, again.names, joint, later[0] + instants)).max()
-            / spans[names.index(joint)] for joint in names if spans[names.index(joint)] > 0.01)
-    shifts = np.linspace(0.0, 1.0 / 1.7, 171)
-    best = min(shifts, key=gap)
-    best = min(best + np.linspace(-0.005, 0.005, 201), key=gap)
+    found = gaps_in_step((names, (times, positions)), (again.names, (later, angles)),
+                         1.0 / 1.7).max()
     # One per cent of range.
-    found = gap(best)
     assert found < 0.01
 
 
@@ -126,7 +139,7 @@ def test_live_fits_on_call_written_and_applied(ending, tmp_path):
     ending.append(follower)
     out, report = tmp_path / 'fitted.yaml', tmp_path / 'report.html'
     node = Process('-p', f'out:={out}', '-p', f'report:={report}', '-p', 'window:=6.0', '-p',
-                   'apply_to:=/second/other', '-p', 'robot:=quadruped', *simulated,
+                   'apply_to:=/second/other', *simulated,
                    domain=source.domain, executable=INVERSION)
     ending.append(node)
     node.wait_for('listening to /joint_states')
@@ -180,6 +193,51 @@ def test_live_fits_on_call_written_and_applied(ending, tmp_path):
     node.signal(signal.SIGINT)
     assert node.wait() == 0
     assert 'Traceback' not in node.log
+
+
+def test_a_running_generator_moves_as_what_was_fitted(ending):
+    # Its readouts are not those of the robot file, which the second generator has, too; nor is a
+    # walk of the file's duty what is fitted.
+    timing = ('-p', 'use_sim_time:=true', '-p', 'rate:=200.0')
+    source = Process('-p', 'gait:=walk', '-p', 'frequency:=1.7', '-p', 'duty:=0.6', *timing,
+                     *(word for leg in ('lh', 'rh') for word in (
+                         '-p', f'readout.{leg}_thigh_joint:=[0.6, -0.2, 0.06, 0.05, 0.0]',
+                         '-p', f'readout.{leg}_hip_joint:=[0.0, 0.1]')))
+    ending.append(source)
+    source.wait_for('publishing')
+    follower = Process('-p', 'gait:=pace', '-p', 'frequency:=1.0', '-p', 'amplitude:=0.5', *timing,
+                       '--ros-args', '-r', '__ns:=/second', domain=source.domain)
+    ending.append(follower)
+    node = Process('-p', 'apply_to:=/second/cpg_generator', '-p', 'robot:=quadruped', '-p',
+                   'window:=6.0', *timing[:2], domain=source.domain, executable=INVERSION)
+    ending.append(node)
+    node.wait_for('listening to /joint_states')
+    follower.wait_for('publishing')
+    watchers = Watcher(source.domain), Watcher(source.domain, '/second/cpg_generator')
+    ending.extend(watchers)
+    clock = SimulatedTime(watchers[0], listeners=3)
+    clock.run(100.0, 103.0)
+    clock.lead(103.0, 110.0, 0.005)
+    answer = watchers[0].call(Trigger, '/cpg_inversion/fit', Trigger.Request())
+    assert answer.success, answer.message
+    assert answer.message.endswith("gait, frequency, network and joints' readouts")
+    clock.lead(110.0, 112.0, 0.005)
+    began = [len(one.samples) for one in watchers]
+    clock.lead(112.0, 115.0, 0.005)
+    moved = [(one.names, [np.array(part) for part in zip(*one.samples[start:], strict=True)][:2])
+             for one, start in zip(watchers, began, strict=True)]
+    gaps = gaps_in_step(*moved, 1.0 / 1.7)
+    assert gaps.shape[1] == 10
+    # Root of the mean square of each joint, over its range.
+    assert np.sqrt(np.mean(gaps**2, axis=0)).max() < 0.05
+    # What cannot run changes nothing.
+    for wrong, words in (([0.0], 'offset and 1, 2, 4 or 6 weights'),
+                         ([0.0, 5.0], 'rh_thigh_joint'), ('none', 'DOUBLE_ARRAY')):
+        result = watchers[1].set_together(**{'readout.rh_thigh_joint': wrong})
+        assert not result.successful and words in result.reason
+    assert watchers[1].get('readout.rh_thigh_joint')[0][0] == pytest.approx(0.6, abs=0.05)
+    assert watchers[1].set_together(gait='trot').successful
+    assert list(watchers[1].get('readout.rh_thigh_joint')[0]) == [0.8, -0.25]
 
 
 @pytest.mark.parametrize(('arguments', 'words'), [

@@ -99,6 +99,19 @@ def test_columns_of_positions_are_the_joints_among_others(write):
     assert recording.notes == ("2 columns left out: 'FR_Force', 'BaseAx'",)
 
 
+def test_loads_on_feet_are_no_joints_and_are_kept(write):
+    path = write('time,LFHip,RFHip,LF_contact,RF_contact,LF_force_x,LH_force [N],torso_yaw\n'
+                 '3.0,0.1,0.2,True,0,9,40.5,1\n3.5,0.3,0.4,False,1,9,41.5,2\n'
+                 '4.0,0.3,0.4,,1,9,41.5,2\n4.5,0.3,0.4,true,1,9,2,2\n')
+    recording = read_csv(path)
+    assert recording.joints == ('LFHip', 'RFHip', 'LF_force_x', 'torso_yaw')
+    assert recording.loads.legs == ('LF_contact', 'RF_contact', 'LH_force')
+    # A line without one of them says nothing.
+    assert recording.loads.times.tolist() == [0.0, 0.5, 1.5]
+    assert recording.loads.loads.tolist() == [[1, 0, 40.5], [0, 1, 41.5], [1, 1, 2]]
+    assert "taken for loads on the feet: 'LF_contact', 'RF_contact'" in recording.notes[0]
+
+
 def test_columns_are_chosen_by_name_or_pattern(write):
     path = write(GO1)
     assert read_csv(path, joints=['FL_hip', 'FR_hip']).joints == ('FL_hip', 'FR_hip')
