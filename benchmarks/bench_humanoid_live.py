@@ -25,21 +25,17 @@ import math
 import time
 from typing import Any
 
-from common import emit, log, ROOT
-from geometry_msgs.msg import Twist, Wrench
-from nav_msgs.msg import Odometry
+from common import emit, log
 import numpy as np
-from processes import enter_workspace, GENERATOR, Process
-from rcl_interfaces.srv import SetParameters
+from processes import enter_workspace
 import rclpy
-from rclpy.parameter import Parameter
-from std_srvs.srv import Trigger
+from stage import Stage
 
-SIM = [str(ROOT / 'install/cpg_ros/lib/cpg_ros/robot_sim')]
-RATE = 500.0
 NOISE = {'friction': 0.6, 'imu_delay': 0.004, 'joint_delay': 0.004, 'gyroscope_noise': 0.02,
          'accelerometer_noise': 0.1, 'force_noise': 0.05}
 SPEEDS = (0.0, 0.3, 0.5)
+#: Height of the base at which it lies, m.
+LOW = 0.4
 DIRECTIONS, ROUNDS, EVERY = 8, 3, 7.0
 #: After a push of this duration, s, as robot_sim's; so long after a fall it walks again.
 PUSH, AGAIN = 0.1, 8.0
@@ -47,82 +43,11 @@ PUSH, AGAIN = 0.1, 8.0
 TOUR = (('walk', 0.3), ('run', 0.5), ('walk', 0.3), ('two_legged_hop', 0.0), ('run', 1.0),
         ('two_legged_jump', 0.0), ('walk', 0.5), ('walk', math.nan))
 TARGETS = {'speed_error': 0.1, 'survived_20': 22}
-#: Longer than any compilation, s.
-PATIENCE = 120.0
-
-
-class Stage:
-    """A simulated humanoid, its generator, and who drives it."""
-
-    def __init__(self, robot: str, seed: int) -> None:
-        self.body = Process(SIM, robot=robot, model=robot, real_time_factor=0.0, noise_seed=seed,
-                            **NOISE)
-        self.generator = Process(GENERATOR, robot=robot, network='biped', rate=RATE,
-                                 combined_topic="''", use_sim_time='true', cmd_vel='true',
-                                 cmd_vel_timeout=60.0)
-        self.node = rclpy.create_node('driver')
-        self._walk = self.node.create_publisher(Twist, 'cmd_vel', 10)
-        self._push = self.node.create_publisher(Wrench, 'robot_sim/push', 10)
-        self._reset = self.node.create_client(Trigger, 'robot_sim/reset')
-        self._set = self.node.create_client(SetParameters, 'cpg_generator/set_parameters')
-        self.rows: list[tuple[float, ...]] = []
-        self.node.create_subscription(Odometry, 'odom', self._odom, 2000)
-        end = time.monotonic() + PATIENCE
-        while not (self.rows and self._walk.get_subscription_count()):
-            rclpy.spin_once(self.node, timeout_sec=0.1)
-            if time.monotonic() > end:
-                raise RuntimeError(self.body.output + self.generator.output)
-
-    def _odom(self, message: Odometry) -> None:
-        stamp, pose, twist = message.header.stamp, message.pose.pose, message.twist.twist
-        turn = pose.orientation
-        up = 1.0 - 2.0 * (turn.x**2 + turn.y**2)
-        self.rows.append((stamp.sec + 1e-9 * stamp.nanosec, twist.linear.x, twist.linear.y,
-                          math.acos(min(max(up, -1.0), 1.0)), pose.position.z))
-
-    @property
-    def upright(self) -> bool:
-        return self.rows[-1][3] < 1.0 and self.rows[-1][4] > 0.4
-
-    def drive(self, speed: float) -> None:
-        """Walk at a speed, in place at 0; stand with NaN."""
-        message = Twist()
-        # Exactly 0 would be a stand.
-        message.linear.x = 0.0 if math.isnan(speed) else speed or 1e-4
-        self._walk.publish(message)
-
-    def push(self, forward: float, left: float) -> None:
-        message = Wrench()
-        message.force.x, message.force.y = forward, left
-        self._push.publish(message)
-
-    def switch(self, gait: str) -> None:
-        self._set.call_async(SetParameters.Request(
-            parameters=[Parameter('gait', value=gait).to_parameter_msg()]))
-
-    def stand_up(self) -> None:
-        self._reset.call_async(Trigger.Request())
-
-    def spend(self, seconds: float) -> np.ndarray:
-        """Let simulated time pass; return the rows of it."""
-        first = len(self.rows)
-        until = self.rows[-1][0] + seconds
-        while self.rows[-1][0] < until:
-            rclpy.spin_once(self.node, timeout_sec=0.1)
-        return np.array(self.rows[first:])
-
-    def cpu(self) -> np.ndarray:
-        return np.array([self.generator.cpu_s(), self.body.cpu_s()])
-
-    def end(self) -> None:
-        self.node.destroy_node()
-        self.generator.end()
-        self.body.end()
 
 
 def walked(robot: str, speed: float, seconds: float, seed: int) -> dict[str, float]:
     log(f'{speed:g} m/s, seed {seed}')
-    stage = Stage(robot, seed)
+    stage = Stage(robot, 'biped', LOW, noise_seed=seed, **NOISE)
     try:
         stage.spend(1.0)
         stage.drive(speed)
@@ -141,7 +66,7 @@ def walked(robot: str, speed: float, seconds: float, seed: int) -> dict[str, flo
 def pushed(robot: str, strength: float, seed: int) -> int:
     """Return how many pushes of an impulse in N s were survived."""
     log(f'pushes of {strength:g} N s')
-    stage, survived = Stage(robot, seed), 0
+    stage, survived = Stage(robot, 'biped', LOW, noise_seed=seed, **NOISE), 0
     try:
         stage.spend(1.0)
         stage.drive(0.3)
@@ -165,7 +90,7 @@ def pushed(robot: str, strength: float, seed: int) -> int:
 def toured(robot: str, seed: int) -> dict[str, Any]:
     """Go through the gaits; return the mean speeds in the last 4 s of each."""
     log('tour')
-    stage, found = Stage(robot, seed), []
+    stage, found = Stage(robot, 'biped', LOW, noise_seed=seed, **NOISE), []
     try:
         stage.spend(1.0)
         for gait, speed in TOUR:

@@ -46,7 +46,8 @@ GO2 = ROOT / 'config' / 'unitree_go2.yaml'
 ARMATURE, DAMPING = 0.01, 0.0
 
 
-def make(entrant: str, go1: Path | None, plain: bool) -> tuple[Any, dict[str, Any]]:
+def make(entrant: str, go1: Path | None, plain: bool, motors: bool
+         ) -> tuple[Any, dict[str, Any]]:
     """Return an entrant and what it is.
 
     Raises:
@@ -59,13 +60,16 @@ def make(entrant: str, go1: Path | None, plain: bool) -> tuple[Any, dict[str, An
         if file is None:
             raise Missing('--go1 names no robot file, which tune writes')
         one: Any = subject(file, gait, robot_gains(read_robot(file)), 0, False, model=robot)
-        body, velocity = one.loop.body, 'estimated'
+        bodies, velocity = one.loop, 'estimated'
         source = 'cpg_ros, no learning'
     else:
         entry = entries()[entrant]
         one = LearnedPolicy(entry)
-        robot, body, source = entry['robot'], one.body, entry['source']
+        robot, bodies, source = entry['robot'], one.bodies, entry['source']
         velocity = 'true' if 'velocity' in entry['observes'] else 'not observed'
+    body = bodies.body
+    if motors:
+        bodies.no_load = body.robot.column('velocity')[body.robot.places]
     if plain:
         joints = slice(6, None)
         body.model.dof_frictionloss[joints] = 0.0
@@ -80,7 +84,7 @@ def measure(entrant: str, row: str, chosen: argparse.Namespace) -> dict[str, Any
     """Return the figures of a row, or why there are none, in a process of its own."""
     began = time.perf_counter()
     try:
-        one, what = make(entrant, chosen.go1, chosen.plain)
+        one, what = make(entrant, chosen.go1, chosen.plain, chosen.motors)
     except Missing as error:
         return {'skipped': str(error)}
     found = ROWS[row](one, draws(chosen.seed, row), chosen.quick)
@@ -97,6 +101,8 @@ def main() -> int:
                         metavar='ROW', help=', '.join(ROWS))
     parser.add_argument('--go1', type=Path, metavar='FILE', help='of a Go1, from tune')
     parser.add_argument('--plain', action='store_true', help='joints without friction')
+    parser.add_argument('--motors', action='store_true', help='torque of motors falls with speed, '
+                        "to none at the robot file's limit")
     parser.add_argument('--quick', action='store_true', help='few runs: a look')
     parser.add_argument('--seed', type=int, default=None, help='a fresh one if not given')
     parser.add_argument('--processes', type=int, default=len(os.sched_getaffinity(0)))
@@ -115,7 +121,8 @@ def main() -> int:
     except CpgError as error:
         parser.error(str(error))
     emit(benchmark='leaderboard', seed=chosen.seed, quick=chosen.quick,
-         joints='without friction' if chosen.plain else 'as measured', entrants=found)
+         joints='without friction' if chosen.plain else 'as measured',
+         torque='falls with speed' if chosen.motors else 'limited', entrants=found)
     return 0
 
 

@@ -109,6 +109,7 @@ class LearnedPolicy:
     Attributes:
         noise: its delay is that of everything that the policy observes; the rest is not used.
         body: the robot, for its model.
+        bodies: any number of it.
 
     """
 
@@ -122,7 +123,7 @@ class LearnedPolicy:
         self._act, self._entry = network(entry), entry
         robot = load_robot('unitree_go2')  # the Go1's joints have the same names
         self.body = Body(entry['robot'], robot, entry['kp'], entry['kd'], TIMESTEP, add_ground)
-        self._bodies = Bodies(self.body, 1)
+        self.bodies = Bodies(self.body, 1)
         own = [f'{leg}_{joint}_joint' for leg in entry['legs'] for joint in JOINTS]
         #: Where the policy's joints are among the body's, and the other way round.
         self._ours = [robot.order.index(name) for name in own]
@@ -138,7 +139,7 @@ class LearnedPolicy:
         Where there is a goal ahead, a policy is steered back to the line by its turning, as by a
         driver: it does not keep its heading by itself, as the feedback does.
         """
-        bodies, model, parts = self._bodies, self.body.model, self._bodies.parts
+        bodies, model, parts = self.bodies, self.body.model, self.bodies.parts
         runs, every = len(scenarios), round(PERIOD / TIMESTEP)
         steps = math.ceil(duration / PERIOD) * every
         models = [bodies.model(one) for one in scenarios]

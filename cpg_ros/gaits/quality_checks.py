@@ -44,6 +44,8 @@ CHANGE = 0.1
 #: These parts of a stretch are compared, of so many strides at least, and of so many samples of
 #: each joint.
 PARTS, STRIDES, FEWEST = ('at its beginning', 'in its middle', 'at its end'), 1, 16
+#: Legs that move together, within this part of a cycle, and by less than this (rad) may stand.
+TOGETHER, SWAY = 0.06, 0.3
 #: A leg limps that moves by less than this share of what the others do.
 LIMPS = 0.6
 
@@ -113,6 +115,21 @@ def check_angles(joints: Sequence[str], mean: np.ndarray) -> list[QualityIssue]:
         return []
     return [QualityIssue(f'{joints[k]} swings by {swing[k]:.3g} rad, more than a turn: if the '
                          f'angles are in degrees, declare it (--unit deg)', 0.5)]
+
+
+def check_sway(phases: Mapping[str, float], mean: np.ndarray) -> list[QualityIssue]:
+    """Doubt a hop of all legs that a body which breathes or sways on its feet would look like.
+
+    Args:
+        phases: leg -> its phase, cycles.
+        mean: cycles of the joints, rad, shape (joints, m).
+
+    """
+    most = float(np.ptp(mean, axis=1).max())
+    if most >= SWAY or any(abs((one + 0.5) % 1.0 - 0.5) > TOGETHER for one in phases.values()):
+        return []
+    return [QualityIssue(f'all legs move together, and by no more than {most:.2g} rad: a body '
+                         'that stands and sways moves its joints so, too', 0.3)]
 
 
 def check_legs(vague: Sequence[str]) -> list[QualityIssue]:

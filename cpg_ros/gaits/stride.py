@@ -45,6 +45,7 @@ from cpg_ros.gaits.quality_checks import (
     check_change,
     check_legs,
     check_rhythm,
+    check_sway,
     limping,
     quality_notes,
     QualityIssue,
@@ -220,6 +221,7 @@ def find_stride(recording: RecordingLike, legs: Legs | Mapping[str, Sequence[str
     gait = match_gait(ahead, kind)
     issues = [*check_rhythm(warp.frequency, phases, x, found.coefficients),
               *check_angles(names, found.mean(theta)), *check_legs(vague),
+              *check_sway(ahead, found.mean(theta)),
               *check_change(phases, x, leading, names),
               *check_travel(chosen, c, kind.girdles, opposite)]
     if warp.cycles < SURE:

@@ -64,6 +64,20 @@ def test_on_the_spot(phases):
     assert found.confidence <= 0.5 and 'step, or hop, on the spot' in found.issues[0]
 
 
+@pytest.mark.parametrize(('size', 'doubted'), [(0.35, True), (1.2, False)])
+def test_a_body_that_sways_on_its_feet_may_not_hop(size, doubted):
+    # A dog that stands and pants was named a pronk, without a doubt.
+    together, rest = dict.fromkeys(PHASES, 0.0), 0.7
+    found = stride_of(lambda turn, leg: rest + size * (hip(turn, leg) - rest),
+                      lambda turn, leg: -1.4 + size * (knee(turn, leg) + 1.4), together)
+    assert found.nearest == 'pronk' and (found.confidence > 0.95) != doubted
+    assert any('stands and sways' in one for one in found.issues) == doubted
+    # Legs that alternate do not sway.
+    walks = stride_of(lambda turn, leg: rest + size * (hip(turn, leg) - rest),
+                      lambda turn, leg: -1.4 + size * (knee(turn, leg) + 1.4))
+    assert walks.gait == 'trot' and walks.confidence > 0.95
+
+
 def test_a_turn_on_the_spot():
     found = stride_of(lambda turn, leg: 0.7 + 0.3 * np.cos(turn) * (-1.0) ** (leg[0] == 'l'), knee)
     assert found.confidence <= 0.3 and 'it turns on the spot' in ' '.join(found.issues)
