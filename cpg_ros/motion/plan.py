@@ -130,8 +130,11 @@ class GaitPlan(ShortRepr):
         steering = self.motion.steering
         if steering is None:
             return 0.0
-        # Measured at the gait's own frequency.
-        return steering.speed[-1] * self.frequency / (self.motion.frequency or self.frequency)
+        # Measured at the gait's own frequency, beyond which only steering goes.
+        own = self.motion.frequency or self.frequency
+        speed = max(speed for speed, frequency in zip(steering.speed, steering.frequency,
+                                                      strict=True) if frequency <= own)
+        return speed * self.frequency / own
 
     def steer(self, speed: float, turn: float) -> tuple[np.ndarray, float]:
         """Return each leg's stride, shape (legs,), and the pace for a wanted motion.
@@ -148,8 +151,10 @@ class GaitPlan(ShortRepr):
             return np.ones(len(self.robot.legs)), 1.0
         left, right, frequency = self._steering.ask(speed, turn)
         strides = np.where(self.robot.left, left, right)
-        # The table is for the gait's own frequency; a wanted one scales it.
-        return strides, frequency / (self.motion.frequency or frequency)
+        # The table is for the gait's own frequency; a wanted one scales it, as far as joints go.
+        pace = frequency / (self.motion.frequency or frequency)
+        within = self.robot.column('velocity') / np.maximum(self.speed, 1e-9)
+        return strides, max(min(pace, float(within.min())), min(pace, 1.0))
 
     @property
     def _steering(self) -> SteeringTable:

@@ -28,7 +28,7 @@ from cpg_ros.short_repr import ShortRepr
 import numpy as np
 
 #: Bins of the stride in an efference table, and most speeds that it has.
-BINS, SPEEDS = 64, 8
+BINS, SPEEDS = 64, 10
 #: The legs that feedback can displace.
 LEGS = ('a hip about x, if any, then two joints about y; or, of a leg that reaches to the side, a '
         'hip about z, then two about one level axis')

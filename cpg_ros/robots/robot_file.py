@@ -48,6 +48,8 @@ from cpg_ros.robots.robot import (
 )
 import yaml
 
+#: How many times its own frequency a gait that is steered may step, at most.
+HASTE = 2.0
 #: Limits of a joint.
 LIMITS = ('lower', 'upper', 'velocity')
 #: No angle (rad) or speed (rad/s) of a joint is larger.
@@ -187,7 +189,8 @@ class _Reader(YamlReader):
                 raise self.fail(f'{where}.{key}', f'has {len(rows[key])} numbers, and speed has '
                                 f'{len(rows["speed"])}')
         allowed = {'stride': (-1.0, 1.0, '-1 to 1'), 'turn': (1e-3, 1e3, '0.001 to 1000 rad/s'),
-                   'frequency': (0.01, fastest, f"0.01 to the gait's {fastest:g} Hz")}
+                   'frequency': (0.01, HASTE * fastest,
+                                 f"0.01 to twice the gait's {fastest:g} Hz")}
         for key, (low, high, text) in allowed.items():
             for k, value in enumerate(rows[key]):
                 self.within(value, f'{where}.{key}[{k}]', low, high, text)

@@ -22,9 +22,13 @@ from cpg_ros.simulation.batch import Batch, targets
 from cpg_ros.simulation.scenario import Scenario
 import numpy as np
 
-#: Strides that are tried, and how much slower the legs move at a stride of 0.
+#: Strides that are tried, how much slower the legs move at a stride of 0, and how much faster at
+#: one of 1, as far as the joints' limits are away by this share.
 STRIDES = (-0.4, -0.2, 0.0, 0.2, 0.4, 0.6, 0.8, 1.0)
 SLOWER = 0.2
+FASTER, ROOM = (1.1, 1.2, 1.3, 1.4), 0.05
+#: How many rows are tried at most.
+ROWS = len(STRIDES) + len(FASTER)
 #: Difference of stride between the legs of both sides, when turning is measured.
 DIFFERENCE = 0.5
 #: Length of a run, s.
@@ -50,9 +54,12 @@ def measure(batch: Batch, program: GaitPlan,
 
     """
     left = program.robot.left
+    within = (1.0 - ROOM) * float((program.robot.column('velocity')
+                                   / np.maximum(program.speed, 1e-9)).min())
+    tried = [*((stride, 1.0 - SLOWER * (1.0 - abs(stride))) for stride in STRIDES),
+             *((1.0, pace) for pace in FASTER if pace <= within)]
     rows = []
-    for done, stride in enumerate(STRIDES):
-        pace = 1.0 - SLOWER * (1.0 - abs(stride))
+    for done, (stride, pace) in enumerate(tried):
         # Within strides of -1 to 1 on both sides.
         middle = min(stride, 1.0 - 0.5 * DIFFERENCE)
         commands = [np.full(left.size, stride),
@@ -74,7 +81,7 @@ def _rising(rows: list[tuple[float, float, float, float, bool]]) -> SteeringTabl
     """Keep the rows about the stride of 0 as far as speeds rise."""
     zero = STRIDES.index(0.0)
     first = last = zero
-    top = max(rows[-1][0], 0.0)
+    top = max(rows[len(STRIDES) - 1][0], 0.0)
     rise, turning = min(RISE, RISE_SHARE * top), min(TURN, TURN_SHARE * top)
     good = [upright and turn >= turning for *_, turn, upright in rows]
     while last + 1 < len(rows) and good[last + 1] and (

@@ -38,7 +38,7 @@ from cpg_ros.simulation.leg_geometry import centre_ahead
 from cpg_ros.simulation.nearest_design import NearestDesign, NoDesign
 from cpg_ros.simulation.robot_model import SimulationError
 from cpg_ros.simulation.scenario import Scenario
-from cpg_ros.simulation.steering_table import measure, STRIDES
+from cpg_ros.simulation.steering_table import measure, ROWS
 from cpg_ros.simulation.tuned_gait import Tuned
 import numpy as np
 
@@ -250,7 +250,7 @@ def search(trial: DesignTrial) -> Tuned | NoDesign:
 
 def _here(tuner: Tuner, trials: Sequence[DesignTrial]) -> Iterator[Tuned | NoDesign]:
     """One after the other in this process, on the threads of one tuner."""
-    each = trials[0].evaluations + len(STRIDES)
+    each = trials[0].evaluations + ROWS
     with progress_bar('tuning', each * len(trials)) as bar:
         for k, trial in enumerate(trials):
             yield trial.search(tuner, lambda done, k=k: bar(k * each + done))  # type: ignore[misc]

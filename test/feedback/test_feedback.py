@@ -319,7 +319,7 @@ def test_wishes_switches_and_dull_senses_reach_the_runs(loop, expected):
               Scenario(speed=0.3, commands=((1.5, 0.3, 0.0, 0.3),)),
               Scenario(speed=0.3, switches=((1.5, 'walk'),))]
     for noise in (None, SensorNoise(0.01, 0.1, 0.05, math.radians(0.5), 0.02)):
-        ran = loop.run(wishes, 5.0, GAINS, noise=noise)
+        ran = loop.run(wishes, 7.0, GAINS, noise=noise)
         assert ran.upright.all()
         late = slice(1500, None)
         assert 0.02 < ran.velocity[0, late, 1].mean() < 0.12

@@ -60,16 +60,13 @@ def test_stiff_servos_recover_from_pushes_that_soft_ones_do_not(loop, expected):
 
 
 def test_late_senses_do_not_keep_servos_stiff(loop, expected):
-    """20 ms of delay, degraded sensors, pushes of 20 N s from 16 directions.
-
-    Of 96 such pushes 94 are survived, of as many with soft servos 96.
-    """
+    """20 ms of delay, degraded sensors, 48 pushes of 20 N s; of 96 such pushes 93 are survived."""
     late = SensorNoise(0.02, 0.1, 0.05, math.radians(0.5), 0.02)
-    trials = [Scenario(phase=k / 16, pushes=(impulse(2.0, 20.0 * math.cos(k * math.pi / 8.0),
-                                                     20.0 * math.sin(k * math.pi / 8.0)),))
-              for k in range(16)]
+    trials = [Scenario(phase=k / 16, pushes=(impulse(2.0, 20.0 * math.cos(k * math.pi / 7.5),
+                                                     20.0 * math.sin(k * math.pi / 7.5)),))
+              for k in range(48)]
     ran = loop.run(trials, 6.0, GAINS, expected, late)
-    assert ran.upright.sum() >= 15 and (ran.kp_scale[ran.upright, -1] == 1.0).all()
+    assert ran.upright.sum() >= 43 and (ran.kp_scale[ran.upright, -1] == 1.0).all()
 
 
 def test_servos_that_take_positions_only_recover_from_pushes_that_soft_ones_do_not(loop, expected):

@@ -209,7 +209,7 @@ def test_motions_survive_writing(robot, tmp_path):
     ('trot.steering.speed', [0.1, 0.1, 0.2], r'speed\[1\]: 0.1 is not above 0.1'),
     ('trot.steering.stride', [0, 0.5, 1.5], r'stride\[2\]: 1.5 is not from -1 to 1'),
     ('trot.steering.turn', [0, 1, 1], r'turn\[0\]: 0 is not from 0.001'),
-    ('trot.steering.frequency', [1, 2, 3], r'frequency\[2\]: 3 is not from 0.01 to the g'),
+    ('trot.steering.frequency', [1, 2, 5], r'frequency\[2\]: 5 is not from 0.01 to twice the g'),
     ('trot.steering.speed', 0.3, 'speed: must be a list'),
     ('trot.steering.sideways', [0], 'unknown key'),
     ('pace.steering', dict(steered.STEERING), "gaits.pace.steering: needs the gait's 'frequency'"),
