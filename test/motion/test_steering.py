@@ -21,6 +21,7 @@ from cpg_ros.networks.registry import PRESETS
 from cpg_ros.robots.robot import SteeringTable
 from cpg_ros.robots.robot_file import read_robot, RobotError, write_robot
 from depth import examples
+import go2
 from hypothesis import given
 from hypothesis import strategies as st
 import numpy as np
@@ -226,3 +227,22 @@ def test_a_wrong_entry_is_named(tmp_path, place, value, why):
     with pytest.raises(RobotError, match=why) as caught:
         read_robot(path)
     assert str(path) in str(caught.value) and '\n' not in str(caught.value)
+
+
+def test_beyond_full_strides_legs_are_faster_as_far_as_joints_go():
+    slow, preset = go2.program('trot'), PRESETS['delayed']['trot']
+    fast = plan(go2.GO2, 'trot', preset, preset.network, 2.9)
+    table = slow.motion.steering
+    assert table.stride[-1] == 1.0 and table.frequency[-1] > slow.motion.frequency
+    strides, pace = slow.steer(slow.speeds[1], 0.0)
+    assert (strides == 1.0).all() and pace == pytest.approx(table.frequency[-1] / 2.005)
+    # Without steering it goes as fast as its own strides do.
+    own = table.frequency.index(slow.motion.frequency)
+    assert slow.own_speed == table.speed[own] < table.speed[-1]
+    assert fast.own_speed == pytest.approx(slow.own_speed * 2.9 / 2.005)
+    limits = fast.robot.column('velocity')
+    for one in (slow, fast):
+        for wish in np.linspace(*one.speeds, 9):
+            _, pace = one.steer(wish, 0.0)
+            assert (one.speed * pace <= limits * (1.0 + 1e-9)).all()
+    assert fast.steer(fast.speeds[1], 0.0)[1] < slow.steer(slow.speeds[1], 0.0)[1]
