@@ -25,12 +25,17 @@ import tempfile
 import traceback
 
 from common import emit, log
+from cpg_ros import read_recording
 from cpg_ros.errors import CpgError
 from cpg_ros.gaits.leg_names import legs_of
 from cpg_ros.gaits.stride import find_stride, Stride
+from cpg_ros.inversion.recording_fit import fit_recording
 from cpg_ros.networks.delayed import Delayed
 from cpg_ros.recordings.csv_reader import read_csv
+from cpg_ros.robots.robot_file import load_robot
 from hostile_recordings import SEED, spoiled, WAYS
+import numpy as np
+import yaml
 
 FILES, GOAL = 8 * len(WAYS), 0.9
 
@@ -59,11 +64,44 @@ def outcome(number: int, folder: Path, seed: int = SEED) -> tuple[str, Stride | 
     return ('warned' if warned else 'wrong'), found, line
 
 
+def of_dataset(folder: Path) -> dict[str, object]:
+    """Name the gaits of a set that record_dataset.py made, and compare with its truth."""
+    tally = dict.fromkeys(('right', 'doubted', 'wrong', 'none'), 0)
+    off, duties, wrong = [], [], []
+    for path in sorted(folder.glob('*/truth.yaml')):
+        truth = yaml.safe_load(path.read_text())
+        robot = load_robot(truth['robot'])
+        try:
+            recording = read_recording(path.with_name('bag'), progress=False)
+            fit = fit_recording(recording, robot, truth['network'])
+        except CpgError as error:
+            tally['none'] += 1
+            log(f'{path.parent.name}: {error}')
+            continue
+        right, sure = fit.stride.nearest == truth['gait'], fit.confidence >= 0.95
+        tally['right' if right else 'wrong' if sure else 'doubted'] += 1
+        if right:
+            off.append(abs(fit.stride.frequency / truth['frequency'] - 1.0))
+            if fit.stride.contacts is not None:
+                duties += [abs(fit.stride.contacts.duty[leg] - share)
+                           for leg, share in truth['duty'].items()]
+        elif sure:
+            wrong.append(path.parent.name)
+    return {**tally, 'sure_and_wrong': wrong, 'median_frequency_error': float(np.median(off)),
+            'median_duty_error': float(np.median(duties))}
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument('--dataset', type=Path, help='of record_dataset.py: only this')
     parser.add_argument('--files', type=int, default=FILES)
     parser.add_argument('--seed', type=int, default=SEED)
     given = parser.parse_args()
+    if given.dataset:
+        found = of_dataset(given.dataset)
+        emit(benchmark='recordings', dataset=given.dataset.name, **found,
+             target='none sure and wrong', passed=not found['sure_and_wrong'])
+        return
     tally = dict.fromkeys(('refused', 'right', 'warned', 'wrong', 'traceback'), 0)
     sure, bad = [], []
     with tempfile.TemporaryDirectory() as folder:

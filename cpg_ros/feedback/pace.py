@@ -16,7 +16,8 @@
 
 A gait at a higher frequency sways less and is faster than its efference copy says, which would
 pass for a push. The law therefore fatigues, and it weights the forward speed, which follows from
-the frequency itself, less than the sideways speed.
+the frequency itself, less than the sideways speed. It acts only in gaits whose steering was
+measured: others may find another motion at a higher frequency, and stay in it.
 """
 
 import math

@@ -225,7 +225,7 @@ def tick(legs, tables, gains, memory, sensors, planned, step, out):
             memory.clearance_share[run], stumbling if share == 1.0 else 0.0, gains, dt)
         scale, frequency = 1.0, max(strode / dt, 0.1)
         error = turns * pace.velocity_error(off.vx, off.vy, gains)
-        if gains.pace:
+        if gains.pace and tables.steered[slot]:
             scale += share * pace.frequency_change(error, memory.fatigue[run], gains)
         memory.fatigue[run] = pace.update_fatigue(memory.fatigue[run], scale - 1.0, gains, dt)
         memory.kp_scale[run], memory.stiff[run] = 1.0, False

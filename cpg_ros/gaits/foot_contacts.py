@@ -18,7 +18,7 @@ A stride is from touchdown to touchdown; duty is the share of it in stance. In a
 the ground at any time, in a run there is flight (Alexander 2003, Principles of Animal Locomotion).
 """
 
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -34,6 +34,9 @@ LOADED, ALWAYS = 0.15, 0.5
 LEAST, LARGEST = 5.0, 95.0
 #: Contacts and lifts shorter than this share of a stride are those of a foot that bounces.
 BOUNCE = 0.08
+#: Touchdowns of a leg are at one phase if there are so many, and the mean vector of their phases
+#: is so long.
+TOUCHDOWNS, AGREE = 3, 0.9
 #: Fewest samples of a stride that tell stance from swing.
 FEWEST = 12
 #: Flight, as a share of the time, up to which legs walk, and from which on they run: a foot that
@@ -77,6 +80,25 @@ class FootContacts(ShortRepr):
     def gait(self) -> str | None:
         """Walk or run, None where the flight is between theirs."""
         return 'walk' if self.flight <= WALK else 'run' if self.flight >= RUN else None
+
+    def leads(self, phase: Callable[[np.ndarray], np.ndarray], legs: Sequence[str]
+              ) -> dict[str, float] | None:
+        """Return by how much each leg touches down before the first, cycles.
+
+        Args:
+            phase: of the stride, cycles, at times, s.
+            legs: names, in the order of the network.
+
+        Returns:
+            None where a leg's touchdowns are too few, or are not at one phase.
+
+        """
+        means = {leg: np.exp(2j * np.pi * phase(self.strides(leg)[:, 0])) for leg in legs}
+        if any(one.size < TOUCHDOWNS or abs(one.mean()) < AGREE for one in means.values()):
+            return None
+        first = means[legs[0]].mean()
+        return {leg: float(np.angle(first / one.mean()) / (2.0 * np.pi) % 1.0)
+                for leg, one in means.items()}
 
     def strides(self, leg: str) -> np.ndarray:
         """Return touchdown, duration and stance of a leg's strides, s, shape (k, 3)."""

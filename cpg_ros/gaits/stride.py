@@ -218,6 +218,13 @@ def find_stride(recording: RecordingLike, legs: Legs | Mapping[str, Sequence[str
                           if cells is None or cells.get(name) == own[leg][0]) or listed
                for leg, listed in chosen.items()}
     ahead, by_legs, vague, opposite = leg_phases(leading, c)
+    contacts = None if loads is None else foot_contacts(
+        loads, own, float(warp.knots[0]), float(warp.knots[-1]), 1.0 / warp.frequency)
+    leads = None if contacts is None else contacts.leads(warp, tuple(own))
+    if leads is not None:
+        # Joints of legs that are built alike move alike, others need not.
+        ahead, vague = leads, ()
+        by_legs = (*by_legs, "the legs' phases are those of touchdown, by the loads on the feet")
     gait = match_gait(ahead, kind)
     issues = [*check_rhythm(warp.frequency, phases, x, found.coefficients),
               *check_angles(names, found.mean(theta)), *check_legs(vague),
@@ -230,8 +237,6 @@ def find_stride(recording: RecordingLike, legs: Legs | Mapping[str, Sequence[str
         by_cells = _cell_signals(c, cells, gains, kind)
         if by_cells is not None:
             gait = match_gait_by_cells(by_cells, kind)
-    contacts = None if loads is None else foot_contacts(
-        loads, own, float(warp.knots[0]), float(warp.knots[-1]), 1.0 / warp.frequency)
     if contacts is not None:
         gait = match_gait_by_contacts(gait, contacts)
     if len(gait.alike) > 1:

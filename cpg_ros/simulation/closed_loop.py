@@ -71,7 +71,8 @@ class ClosedLoop(Bodies):
 
     def run(self, scenarios: Sequence[Scenario], duration: float, gains: Gains | None = None,
             expected: EfferenceCopy | Mapping[str, EfferenceCopy] | None = None,
-            noise: SensorNoise | None = None, goal: float = math.inf) -> Outcome:
+            noise: SensorNoise | None = None, goal: float = math.inf,
+            keep_senses: bool = False) -> Outcome:
         """Let bodies walk from the stand.
 
         Args:
@@ -82,6 +83,7 @@ class ClosedLoop(Bodies):
                 expected.
             noise: of the sensors.
             goal: way forward at which a run ends, m.
+            keep_senses: whether the outcome has what is measured.
 
         """
         model, dt, parts = self.body.model, self.timestep, self.parts
@@ -108,6 +110,8 @@ class ClosedLoop(Bodies):
         earlier = state[:, base].copy()
         angle_at, rate_at = 1 + parts.angles[order], moving.start + parts.speeds[order]
         senses = SensorData.zeros(runs, legs, len(order))
+        kept = SensorData(*(np.zeros((steps, *one.shape)) for one in senses
+                                )) if keep_senses else None
         noisy = None if noise is None else NoisySenses(noise, runs, legs, dt)
         velocity, work = np.zeros((runs, 3)), np.zeros((steps, runs))
         fell, arrived = np.full((2, runs), np.inf)
@@ -126,6 +130,8 @@ class ClosedLoop(Bodies):
             fill_sensor_data(senses, state[:, 1 + parts.pose[3:]], state[:, base], earlier, dt,
                              velocity)
             noticed = senses if noisy is None else noisy(senses)
+            for rows, value in zip(kept or (), noticed, strict=kept is not None):
+                rows[k] = value
             if gains is not None:
                 angles = feedback.advance(noticed, pattern.planned, dt, 1.0, pattern.level, delay)
             else:
@@ -174,5 +180,6 @@ class ClosedLoop(Bodies):
         found = {key: rows.swapaxes(0, 1) for key, rows in record.items()}
         for key in ('phase', 'kp_scale', 'stiff'):
             found[key] = found[key][:, :, 0]
-        return Outcome(fell=fell, arrived=arrived,
+        return Outcome(fell=fell, arrived=arrived, senses=None if kept is None else SensorData(
+            *(rows.swapaxes(0, 1) for rows in kept)),
                        cost=done / (self.geometry.weight * np.maximum(way, 1e-3)), **found)

@@ -16,6 +16,7 @@
 
 from dataclasses import dataclass
 
+from cpg_ros.feedback.estimate import SensorData
 from cpg_ros.short_repr import ShortRepr
 from cpg_ros.simulation.terrain import Terrain
 import numpy as np
@@ -109,6 +110,8 @@ class Outcome(ShortRepr):
         kp_scale: factor of the servos' proportional gain, shape (runs, steps).
         stiff: 1 while the feedback makes servos stiff, by gains or targets, else 0, the same.
         cost: of transport after BEGINNING, shape (runs,).
+        senses: what was measured before each step, of arrays (runs, steps, ...), if it was kept;
+            after a run's end it means nothing.
 
     """
 
@@ -123,6 +126,7 @@ class Outcome(ShortRepr):
     kp_scale: np.ndarray
     stiff: np.ndarray
     cost: np.ndarray
+    senses: SensorData | None = None
 
     @property
     def upright(self) -> np.ndarray:

@@ -312,6 +312,15 @@ def test_ground_is_flat_at_the_start_and_as_high_as_it_says(kind):
     assert ground[rows // 2, round(columns * 1.5 / 9.5)] == 0.0
 
 
+def test_a_gait_that_sways_keeps_its_frequency(loop):
+    """Undisturbed, the pace ran at twice its frequency: its sway at one passed for a push."""
+    swaying = program('pace')
+    ran = ClosedLoop('go2', swaying).run([Scenario(phase=k / 3) for k in range(3)], 10.0, GAINS)
+    strides = np.diff(np.unwrap(2.0 * np.pi * ran.phase, axis=1)[:, [2500, -1]], axis=1)
+    assert ran.upright.all()
+    assert strides / (2.0 * np.pi * 2499 * 0.002) == pytest.approx(swaying.frequency, rel=0.02)
+
+
 def test_wishes_switches_and_dull_senses_reach_the_runs(loop, expected):
     """To the left while it walks, turning, and another gait; then once more with dull senses."""
     loop = ClosedLoop('go2', program('trot'), program('walk'))

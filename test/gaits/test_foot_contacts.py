@@ -63,6 +63,22 @@ def test_walk_and_run_are_told_apart_by_the_loads(duty, gait, bounce):
         assert strides.shares.mean() == pytest.approx(duty, abs=0.03)
 
 
+def test_legs_that_are_built_unlike_are_in_step_by_their_feet():
+    recording, loads = recorded(0.62)
+    shifted = recording.positions.copy()
+    # The right leg's joints do the same 0.2 of a stride before its foot does.
+    for column in (2, 3):
+        shifted[:, column] = np.interp(recording.times + 0.2 * PERIOD, recording.times,
+                                       recording.positions[:, column])
+    unlike = SimpleNamespace(**{**vars(recording), 'positions': shifted})
+    by_joints = find_stride(unlike, LEGS, NETWORKS['biped'])
+    assert by_joints.phases['right'] == pytest.approx(0.7, abs=0.03)
+    assert by_joints.gait != 'walk'
+    found = find_stride(unlike, LEGS, NETWORKS['biped'], loads=loads)
+    assert found.gait == 'walk' and found.phases['right'] == pytest.approx(0.5, abs=0.03)
+    assert any('those of touchdown' in note for note in found.notes)
+
+
 def test_between_walk_and_run_it_cannot_tell():
     recording, loads = recorded(0.44)
     found = find_stride(recording, LEGS, NETWORKS['biped'], loads=loads)
