@@ -131,7 +131,7 @@ def test_a_robot_file_with_more_speeds_than_fit_is_refused_with_its_key(tmp_path
                    rows={key: (*rows, rows[-1]) for key, rows in table.rows.items()})
     trot = replace(GO2.motions['trot'], efference=more)
     write_robot(tmp_path / 'robot.yaml', replace(GO2, motions={'trot': trot}))
-    with pytest.raises(RobotError, match=r'gaits\.trot\.efference\.speeds.*at most 8'):
+    with pytest.raises(RobotError, match=r'gaits\.trot\.efference\.speeds.*at most 10'):
         read_robot(tmp_path / 'robot.yaml')
 
 
