@@ -88,6 +88,7 @@ def of_dataset(folder: Path) -> dict[str, object]:
         elif sure:
             wrong.append(path.parent.name)
     return {**tally, 'sure_and_wrong': wrong, 'median_frequency_error': float(np.median(off)),
+            'most_frequency_error': float(np.max(off)),
             'median_duty_error': float(np.median(duties))}
 
 

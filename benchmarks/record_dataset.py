@@ -35,7 +35,7 @@ from cpg_ros.networks.registry import PRESETS
 from cpg_ros.recordings.bag_writer import BagWriter
 from cpg_ros.robots.robot_file import load_robot
 from cpg_ros.simulation.closed_loop import ClosedLoop
-from cpg_ros.simulation.scenario import impulse, Outcome, Scenario, SensorNoise
+from cpg_ros.simulation.scenario import impulse, Outcome, PUSH, Scenario, SensorNoise
 from cpg_ros.simulation.terrain import Terrain
 import numpy as np
 from rosbags.typesys import get_typestore, Stores
@@ -43,9 +43,10 @@ import yaml
 
 #: Robot file and its model.
 ROBOTS = {'unitree_go2': 'go2', 'hexapod': 'hexapod'}
-#: Pushes of these impulses, N s, between these times, s; height of rough ground, m.
-PUSHES, BETWEEN, ROUGH = (8.0, 20.0), (4.0, 1.0), 0.03
-SPEED, EVERY = 0.3, 5
+#: Pushes of these impulses, N s, so far apart and so long before the end, s; rough ground, m.
+PUSHES, APART, BEFORE, ROUGH = (8.0, 20.0), 4.0, 1.0, 0.03
+#: Of so many steps of the physics one is kept.
+EVERY = 5
 #: A foot that bears less than this share of the weight does not stand.
 LOADED = 0.02
 NOISE = {'force_bias': 0.05, 'force_noise': 0.03, 'orientation_bias': 0.005,
@@ -63,9 +64,10 @@ an animal. Licence: CC0 1.0, public domain.
 
 Topics: `joint_states` (rad, rad/s), `imu` (orientation, rad/s, m/s^2), `foot_contacts` (N, legs
 in the label). Each folder's `truth.yaml` has the robot, the network with all parameters, gait,
-frequency, phases of the legs, the joints' readouts (offset and weights, rad), wish (m/s), ground,
-friction, pushes (s, N s forward and to the left), when it fell if it did (s; the bag ends there),
-and the share of the time that each foot bore a load, duty.
+frequency, phases of the legs, the joints' readouts (offset and weights, rad) as they are planned,
+before any feedback; wish (m/s; null where the gait is not steered), ground, friction, pushes (s,
+N s forward and to the left), when it fell if it did (s; the bag ends there), and the share of the
+time that each foot bore a load, duty.
 
 Sensor noise: {noise}.
 
@@ -81,14 +83,14 @@ def gaits_of(name: str) -> Iterator[GaitPlan]:
         yield plan(robot, gait, preset, preset.network, motion.frequency or 1.0)
 
 
-def scenarios(rng: np.random.Generator, seconds: float) -> dict[str, Scenario]:
-    """Return what a gait meets, by name; times and directions are drawn."""
-    when = np.arange(BETWEEN[0], seconds - BETWEEN[1], BETWEEN[0])
+def scenarios(rng: np.random.Generator, seconds: float, speed: float) -> dict[str, Scenario]:
+    """Return what a gait at a speed meets, by name; directions and sizes are drawn."""
+    when = np.arange(APART, seconds - BEFORE, APART)
     pushes = []
     for one in when:
         size, way = rng.uniform(*PUSHES), rng.uniform(0.0, 2.0 * math.pi)
         pushes.append(impulse(float(one), size * math.cos(way), size * math.sin(way)))
-    own = {'speed': SPEED, 'friction': float(rng.uniform(0.6, 1.0))}
+    own = {'speed': speed, 'friction': float(rng.uniform(0.6, 1.0))}
     return {'flat': Scenario(**own), 'pushed': Scenario(**own, pushes=tuple(pushes)),
             'rough': Scenario(**own, terrain=Terrain('height_field', ROUGH,
                                                      int(rng.integers(1 << 30))))}
@@ -108,9 +110,10 @@ def truth(program: GaitPlan, scenario: Scenario, ran: Outcome, run: int, weight:
                                             for cell in robot.leg_cells), strict=True)),
             'readouts': {joint.name: [round(one, 6) for one in (offset, *row)] for joint, offset,
                          row in zip(robot.joints, offsets, weights, strict=True)},
-            'wish': scenario.speed, 'friction': round(scenario.friction, 3),
+            'wish': None if program.motion.steering is None else round(scenario.speed, 4),
+            'friction': round(scenario.friction, 3),
             'ground': None if scenario.terrain is None else asdict(scenario.terrain),
-            'pushes': [[when, *(round(0.1 * one, 3) for one in force)]
+            'pushes': [[when, *(round(PUSH * one, 3) for one in force)]
                        for when, *force in scenario.pushes],
             'fell': None if math.isinf(fell) else fell,
             'duty': dict(zip(robot.legs, np.round(duty, 3).tolist(), strict=True))}
@@ -159,7 +162,8 @@ def main() -> None:
         for program in gaits_of(name):
             log(f'{name}, {program.gait}')
             rng = np.random.default_rng([given.seed, len(rows)])
-            met = scenarios(rng, given.seconds)
+            # At full strides, so that frequency and readouts are those that are planned.
+            met = scenarios(rng, given.seconds, program.own_speed)
             loop = ClosedLoop(ROBOTS[name], program)
             copied = program.motion.efference is not None
             ran = loop.run(list(met.values()), given.seconds,

@@ -125,10 +125,10 @@ def foot_contacts(loads: FootLoadsLike, legs: Collection[str], begin: float, end
 
     """
     named = _legs_named(loads.legs, legs)
-    inside = (loads.times >= begin) & (loads.times <= end)
-    times, rows = loads.times[inside], loads.loads[inside]
     if named is None:
         return None
+    inside = (loads.times >= begin) & (loads.times <= end)
+    times, rows = loads.times[inside], loads.loads[inside]
     if len(times) < FEWEST * (end - begin) / period or not np.isfinite(rows).all():
         return None
     least, largest = np.percentile(rows, [LEAST, LARGEST], axis=0)

@@ -168,8 +168,8 @@ def find_stride(recording: RecordingLike, legs: Legs | Mapping[str, Sequence[str
         gains: joint -> w_x + i w_y, rad, the first two weights of its readout. With these gaits
             that move the legs alike (walk and run of the biped) are distinguished, if every cell
             has a joint.
-        loads: on the feet, at the recording's times or others; they tell walk from run where
-            legs move alike in both.
+        loads: on the feet, at the recording's times or others. The legs' phases are then those
+            of touchdown, and they tell walk from run where legs move alike in both.
 
     Raises:
         NoSteadyGait: there is none, or none of a leg's joints has angles.
@@ -225,10 +225,10 @@ def find_stride(recording: RecordingLike, legs: Legs | Mapping[str, Sequence[str
         # Joints of legs that are built alike move alike, others need not.
         ahead, vague = leads, ()
         by_legs = (*by_legs, "the legs' phases are those of touchdown, by the loads on the feet")
-    gait = match_gait(ahead, kind)
+    gait, mean = match_gait(ahead, kind), found.mean(theta)
     issues = [*check_rhythm(warp.frequency, phases, x, found.coefficients),
-              *check_angles(names, found.mean(theta)), *check_legs(vague),
-              *check_sway(ahead, found.mean(theta)),
+              *check_angles(names, mean), *check_legs(vague),
+              *check_sway(ahead, mean),
               *check_change(phases, x, leading, names),
               *check_travel(chosen, c, kind.girdles, opposite)]
     if warp.cycles < SURE:
@@ -245,7 +245,7 @@ def find_stride(recording: RecordingLike, legs: Legs | Mapping[str, Sequence[str
                                    'same phases; name the gait it is (--gait)', 1.0))
     return Stride(float(warp.knots[0]), float(warp.knots[-1]), warp.frequency,
                   warp.frequency_error, int(warp.cycles + 1e-6), tuple(names), theta,
-                  found.mean(theta), found.spread, found.error, found.counts, ahead,
+                  mean, found.spread, found.error, found.counts, ahead,
                   phase_scatter(phases, x, found, leading, names), gait.gait,
                   gait.nearest, gait.alike, gait.distance, gait.margin,
                   gait.sure * float(np.prod([one.left for one in issues])),

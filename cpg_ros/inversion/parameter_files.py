@@ -25,6 +25,7 @@ from cpg_ros.inversion.recording_fit import RecordingFit
 from cpg_ros.motion.joint_readout import standing
 from cpg_ros.motion.plan import plan, PlanError
 from cpg_ros.networks.registry import find_network, reference
+from cpg_ros.robots.gait_readouts import READOUT
 from cpg_ros.robots.robot import Joint, Motion, Robot
 from cpg_ros.robots.robot_file import read_robot, write_robot
 import numpy as np
@@ -119,7 +120,7 @@ def running_parameters(found: RecordingFit, robot: Robot | None = None) -> dict[
     own = (standing(fit.orbit, robot.leg_cells, fit.harmonics)[1].mean() if motion.stance is None
            else motion.stance[1])
     return {**wanted, 'amplitude': 1.0, 'duty': 0.0 if motion.duty is None else float(own),
-            **{f'readout.{name}': [float(offset), *map(float, weights)]
+            **{READOUT + name: [float(offset), *map(float, weights)]
                for name, (offset, weights) in fit.readouts.items()}}
 
 

@@ -124,7 +124,7 @@ class GaitPlan(ShortRepr):
         """Whether it is a gait of a biped whose feedback places the feet, and so steers it."""
         return self.robot.biped is not None and self.gait in SPEEDS
 
-    @property
+    @cached_property
     def own_speed(self) -> float:
         """Speed forward at full strides as far as it has been measured, m/s, or else 0."""
         steering = self.motion.steering
@@ -132,8 +132,9 @@ class GaitPlan(ShortRepr):
             return 0.0
         # Measured at the gait's own frequency, beyond which only steering goes.
         own = self.motion.frequency or self.frequency
-        speed = max(speed for speed, frequency in zip(steering.speed, steering.frequency,
-                                                      strict=True) if frequency <= own)
+        speed = max((speed for speed, frequency in zip(steering.speed, steering.frequency,
+                                                       strict=True) if frequency <= own),
+                    default=0.0)
         return speed * self.frequency / own
 
     def steer(self, speed: float, turn: float) -> tuple[np.ndarray, float]:
@@ -152,9 +153,12 @@ class GaitPlan(ShortRepr):
         left, right, frequency = self._steering.ask(speed, turn)
         strides = np.where(self.robot.left, left, right)
         # The table is for the gait's own frequency; a wanted one scales it, as far as joints go.
-        pace = frequency / (self.motion.frequency or frequency)
-        within = self.robot.column('velocity') / np.maximum(self.speed, 1e-9)
-        return strides, max(min(pace, float(within.min())), min(pace, 1.0))
+        return strides, min(frequency / (self.motion.frequency or frequency), self.most_pace)
+
+    @cached_property
+    def most_pace(self) -> float:
+        """Factor of the frequency at which the first joint moves as fast as its limit allows."""
+        return float((self.robot.column('velocity') / np.maximum(self.speed, 1e-9)).min())
 
     @property
     def _steering(self) -> SteeringTable:

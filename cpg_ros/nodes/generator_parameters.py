@@ -32,14 +32,12 @@ from cpg_ros.networks.registry import find_network, NETWORKS, with_legs_of
 from cpg_ros.nodes import real_time
 from cpg_ros.nodes.parameter_spec import as_doubles, one_of, PRESETS, Spec
 from cpg_ros.robots.biped_keys import SPEEDS
-from cpg_ros.robots.gait_readouts import gait_readouts, with_readouts
+from cpg_ros.robots.gait_readouts import gait_readouts, READOUT, with_readouts
 from cpg_ros.robots.robot import Robot
 from cpg_ros.robots.robot_file import load_robot
 from rclpy.parameter import Parameter
 
 COMMANDS = ('none', 'joint_trajectory', 'forward_position')
-#: What the parameters of the joints' readouts begin with; the joint's name follows.
-READOUT = 'readout.'
 NETWORK = Spec('delayed', 'network of cells that generates the rhythm', read_only=True,
                constraints=one_of(NETWORKS, ', or the path of a Python file that defines one; '
                                   'append a number of legs, as in delayed6, for a variant; '

@@ -25,7 +25,7 @@ class FootLoads(ShortRepr):
     """Loads on the feet over time.
 
     Attributes:
-        legs: their names.
+        legs: their names, or those of columns that name them, such as FR_force.
         times: s from the recording's start, rising, shape (n,).
         loads: in the robot's unit, such as N, or 1 for contact; shape (n, legs).
 

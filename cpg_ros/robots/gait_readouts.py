@@ -21,6 +21,9 @@ import math
 from cpg_ros.errors import InputError
 from cpg_ros.robots.robot import JointMotion, Motion, Robot, WEIGHTS
 
+#: What the generator's parameters of readouts begin with; the joint's name follows.
+READOUT = 'readout.'
+
 
 def gait_readouts(robot: Robot, motion: Motion) -> dict[str, tuple[float, ...]]:
     """Return offset and weights of every joint in one of the robot's motions, rad, by name."""
@@ -54,7 +57,7 @@ def with_readouts(robot: Robot, preset: str, gait: str,
     for name, (offset, *weights) in ((name, [*row] or [math.nan])
                                      for name, row in wanted.items()):
         if len(weights) not in WEIGHTS or not all(map(math.isfinite, (offset, *weights))):
-            raise InputError(f'readout.{name} must be an offset and 1, 2, 4 or 6 weights in rad, '
+            raise InputError(f'{READOUT}{name} must be an offset and 1, 2, 4 or 6 weights in rad, '
                              f'not {list(wanted[name])}')
         own = motion.joints.get(name)
         joints[name] = JointMotion(offset, tuple(weights), own.in_place if own else ())

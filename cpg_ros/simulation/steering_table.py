@@ -54,10 +54,9 @@ def measure(batch: Batch, program: GaitPlan,
 
     """
     left = program.robot.left
-    within = (1.0 - ROOM) * float((program.robot.column('velocity')
-                                   / np.maximum(program.speed, 1e-9)).min())
     tried = [*((stride, 1.0 - SLOWER * (1.0 - abs(stride))) for stride in STRIDES),
-             *((1.0, pace) for pace in FASTER if pace <= within)]
+             *((1.0, pace) for pace in FASTER
+               if pace <= (1.0 - ROOM) * program.most_pace)]
     rows = []
     for done, (stride, pace) in enumerate(tried):
         # Within strides of -1 to 1 on both sides.

@@ -14,6 +14,8 @@
 
 """Gaits with motions of their own, and steering: what a stride factor does to the joints."""
 
+from dataclasses import replace
+
 from cpg_ros.motion.pattern import Pattern
 from cpg_ros.motion.plan import plan, PlanError
 from cpg_ros.motion.strides import Drive
@@ -240,6 +242,9 @@ def test_beyond_full_strides_legs_are_faster_as_far_as_joints_go():
     own = table.frequency.index(slow.motion.frequency)
     assert slow.own_speed == table.speed[own] < table.speed[-1]
     assert fast.own_speed == pytest.approx(slow.own_speed * 2.9 / 2.005)
+    faster = replace(table, frequency=(2.6,) * len(table.frequency))
+    unknown = replace(slow, motion=replace(slow.motion, steering=faster))
+    assert unknown.own_speed == 0.0
     limits = fast.robot.column('velocity')
     for one in (slow, fast):
         for wish in np.linspace(*one.speeds, 9):
