@@ -159,7 +159,7 @@ def legs_of(joints: Sequence[str], whole: bool = False) -> Legs:
             found = dict(zip(BIPED, (found[leg] for leg in sorted(there)), strict=True))
             break
         # Two codes may be left and right of a biped by chance, three are a quadruped's.
-        if column == 0 and len(there) >= 2:
+        if column == 0 and len(there) >= 2 and not _directions(there, read, joints):
             raise LegsError(_missing(there, known, read, joints))
     else:
         if there:
@@ -206,6 +206,18 @@ def _refuse_two(joints: Sequence[str]) -> None:
             raise LegsError('joints of two robots are there, such as '
                             f"'{next(iter(own.values()))}' and '{next(iter(other.values()))}'; "
                             'name those of one (--joints)')
+
+
+def _directions(there: list[str], read: Mapping, joints: Sequence[str]) -> bool:
+    """Tell whether the front of right_hip_front is a direction, as beside right_knee.
+
+    It is where joints of no end have names that those of the only end do not have.
+    """
+    ended = [name for name in joints if read[name][0] in there]
+    plain = {role_of(name) for name in joints if read[name][1] and not read[name][0]
+             and not (OTHER | UPPER) & set(words_of(name))}
+    return (len({leg[1] for leg in there}) == 1 and all(read[name][1] for name in ended)
+            and bool(plain) and plain.isdisjoint(map(role_of, ended)))
 
 
 def _rest(found: Mapping[str, tuple[str, ...]], joints: Sequence[str]) -> tuple[str, ...]:

@@ -22,4 +22,4 @@ __all__ = ['bag_library', 'bag_reader', 'bag_storage', 'bag_writer', 'bvh_reader
            'joint_streams', 'live_buffer', 'load_stream', 'markers', 'mot_reader', 'npz_reader',
            'number_rows', 'pose_reader', 'recording', 'recording_format', 'rosbag2_library',
            'rosbags_library', 'segments', 'servo', 'stray_samples', 'table_columns', 'table_text',
-           'thinned', 'trc_reader', 'unfinished_mcap']
+           'thinned', 'trc_reader', 'unfinished_mcap', 'unpacked_size']

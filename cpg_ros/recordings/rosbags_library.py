@@ -12,13 +12,17 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""What is used of the library `rosbags`."""
+"""What is used of the library `rosbags`, which unpacks no more than recordings have."""
 
-from typing import Any
+import os
+from types import SimpleNamespace
+from typing import Any, BinaryIO
 
-from rosbags.rosbag2 import Reader, ReaderError
+from rosbags.rosbag2 import reader, Reader, ReaderError, storage_mcap
 from rosbags.serde import SerdeError
 from rosbags.typesys import get_typestore, Stores
+
+from cpg_ros.recordings.unpacked_size import UnpackedSize
 
 __all__ = ['STORE', 'Reader', 'ReaderError', 'SerdeError', 'deserialize']
 
@@ -34,3 +38,35 @@ def deserialize(message: bytes) -> Any:
 
     """
     return STORE.deserialize_cdr(message, 'sensor_msgs/msg/JointState')
+
+
+class _UnpackedFile(reader.zstd.ZstdFile):
+    """A storage file that was packed as a whole, while it is unpacked to the disk."""
+
+    def __init__(self, file: BinaryIO, mode: str) -> None:
+        super().__init__(file, mode)
+        self._unpacked = UnpackedSize(os.fstat(file.fileno()).st_size)
+
+    def read(self, size: int = -1) -> bytes:
+        """Read some bytes."""
+        data = super().read(size)
+        self._unpacked.add(len(data))
+        return data
+
+
+def _unpack(data: bytes, zstd: Any = reader.zstd) -> bytes:
+    """Unpack a message, or a chunk of messages, of one frame or more."""
+    unpacked, parts = UnpackedSize(len(data)), []
+    while data:
+        frame = zstd.ZstdDecompressor()
+        parts.append(frame.decompress(data, max_length=unpacked.most + 1))
+        unpacked.add(len(parts[-1]))
+        if not frame.eof:
+            raise zstd.ZstdError('what was packed by zstd is cut')
+        data = frame.unused_data
+    return b''.join(parts)
+
+
+# The library takes both from here, and sets no limit.
+reader.zstd = storage_mcap.zstd = SimpleNamespace(
+    **{**vars(reader.zstd), 'open': _UnpackedFile, 'decompress': _unpack})

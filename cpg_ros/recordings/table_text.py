@@ -25,6 +25,7 @@ import zlib
 
 from cpg_ros.files import regular_file
 from cpg_ros.recordings.recording import RecordingError
+from cpg_ros.recordings.unpacked_size import UnpackedSize
 
 #: Largest file, bytes, packed or not, and longest line, letters.
 LARGEST, LONGEST = 4_000_000_000, 1 << 17
@@ -66,19 +67,37 @@ class _Lines(io.TextIOWrapper):
         raise StopIteration
 
 
+class _Unpacked(gzip.GzipFile):
+    """What is packed in a file, of which no more than a recording has is read."""
+
+    def __init__(self, file: IO[bytes], path: Path) -> None:
+        super().__init__(fileobj=file)
+        self._path, self._read = path, UnpackedSize(path.stat().st_size)
+
+    def read1(self, size: int = -1) -> bytes:
+        """Read some bytes; text is read by this alone."""
+        data = super().read1(size)
+        try:
+            self._read.add(len(data))
+        except RecordingError as error:
+            raise RecordingError(f'{self._path}: {error}') from error
+        return data
+
+
 @contextmanager
 def opened(path: Path) -> Iterator[io.TextIOBase]:
     """Open a text, packed by gzip or not.
 
     Raises:
-        RecordingError: it is no regular file, cut or damaged, or no text; from within, too.
+        RecordingError: it is no regular file, cut or damaged, no text, or unpacks to more than
+            recordings have (see `UnpackedSize`); from within, too.
 
     """
     try:
         with regular_file.opened(path, RecordingError, largest=LARGEST) as file:
             packed = file.read(2) == GZIP
             file.seek(0)
-            unpacked = gzip.GzipFile(fileobj=file) if packed else file
+            unpacked = _Unpacked(file, path) if packed else file
             with _Lines(cast(IO[bytes], unpacked), encoding='utf-8-sig', newline='') as text:
                 text.path = path
                 yield text

@@ -122,6 +122,15 @@ def test_arms_of_a_humanoid_are_no_legs_but_shoulders_of_a_dog_are():
     assert dog['lf'] == ('left_fore_shoulder',)
 
 
+def test_the_front_of_a_hip_is_a_direction_where_other_joints_have_none():
+    human = legs_of(['right_hip_front', 'right_knee', 'left_hip_front', 'left_knee', 'left_elbow'])
+    assert dict(human.joints) == {'left': ('left_hip_front', 'left_knee'),
+                                  'right': ('right_hip_front', 'right_knee')}
+    for other in ('left_hip', 'left_elbow', 'left_hip_hind'):
+        with pytest.raises(LegsError, match='are there'):
+            legs_of(['right_hip_front', 'left_hip_front', other])
+
+
 @pytest.mark.parametrize(('joints', 'message'), [
     (['joint_1', 'joint_2'], 'cannot identify legs from the joint names joint_1, joint_2'),
     ([], 'cannot identify legs'),
