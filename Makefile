@@ -23,13 +23,15 @@ endif
 ENTER := set -e; source install/setup.bash; \
 	export AMENT_PREFIX_PATH=$(CURDIR)/install/cpg_ros:$(PREFIXES)
 
-# Live tests wait for most of their time: one for each core runs at once.
-LIVE ?= $(shell nproc)
+# Live tests wait for half of their time: three run at once on two cores.
+LIVE ?= $(shell echo $$((($$(nproc) * 3 + 1) / 2)))
 # Tests of a file that need no graph run in one process: what they share is made once. Live ones,
 # without groups, are dealt out one by one. What hangs ends.
 PYTEST = $(VENV)/bin/pytest test --timeout 600
 OFFLINE := -n auto --dist loadfile
 ONLINE := -n $(LIVE) --dist loadgroup
+# What make test-deep, make browser and make docs run.
+LEFT_OUT := deep or alone or browser or docs
 # A shared machine may stall for seconds: before a commit, a live test that fails runs once more, and
 # is listed. In depth, and without a graph, nothing does.
 AGAIN := --reruns 1 -r aR
@@ -55,10 +57,12 @@ shell: install/.built
 		echo 'generator, cpg, analyze, inversion ... are on the path (--help); exit leaves this shell'; \
 		bash --rcfile <(cat ~/.bashrc 2>/dev/null; echo "PATH=$$PATH"; cpg completion) -i || :
 
-# The tables of topics are read from running nodes, the bridge among them.
+# The tables of topics are read from running nodes, the bridge among them. What the pages let a
+# reader type is run, and what the papers printed is computed anew.
 docs: install/.built messages
 	@$(ENTER); $(VENV)/bin/sphinx-build -W --keep-going -q -b html docs docs/_build
 	@echo 'built: docs/_build/index.html'
+	@$(ENTER); $(PYTEST) $(ONLINE) $(AGAIN) -m 'docs and not deep' $(ARGS)
 
 figures: install/.built
 	@$(ENTER); $(VENV)/bin/python docs/figures.py $(ARGS)
@@ -71,15 +75,15 @@ COVER = --cov=$$(echo install/cpg_ros/lib/python3*/*-packages/cpg_ros) --cov-rep
 export COVERAGE_FILE := $(CURDIR)/.coverage
 
 coverage: install/.built
-	@$(ENTER); $(PYTEST) $(OFFLINE) -m 'not (live or deep or browser)' $(COVER) $(ARGS)
+	@$(ENTER); $(PYTEST) $(OFFLINE) -m 'not (live or $(LEFT_OUT))' $(COVER) $(ARGS)
 
 # What is run before every commit; with COVERAGE=yes it measures that, too, and takes a minute
 # longer. The kernels of all networks are compiled while linters run.
 test: install/.built messages
 	@$(ENTER); $(VENV)/bin/python -P -m cpg_ros.tools.precompile $(KERNELS) & \
 		$(VENV)/bin/ruff check . && $(VENV)/bin/mypy && $(VENV)/bin/lint-imports --no-logo && wait $$!
-	@$(ENTER); for part in '$(OFFLINE) -m "not (live or deep or browser)" $(if $(COVERAGE),$(COVER))' \
-		'$(ONLINE) $(AGAIN) -m "live and not (deep or alone or browser)"'; do \
+	@$(ENTER); for part in '$(OFFLINE) -m "not (live or $(LEFT_OUT))" $(if $(COVERAGE),$(COVER))' \
+		'$(ONLINE) $(AGAIN) -m "live and not ($(LEFT_OUT))"'; do \
 		eval $(PYTEST) $$part $(ARGS) || [ $$? = 5 ]; done  # 5: none selected
 
 # All tests, all examples of properties; and what measures the machine, by itself.

@@ -18,16 +18,17 @@ import os
 from types import SimpleNamespace
 from typing import Any, BinaryIO
 
-from rosbags.rosbag2 import reader, Reader, ReaderError, storage_mcap
+from cpg_ros.recordings.unpacked_size import UnpackedSize
+from rosbags.rosbag2 import Reader, reader, ReaderError, storage_mcap
 from rosbags.serde import SerdeError
 from rosbags.typesys import get_typestore, Stores
-
-from cpg_ros.recordings.unpacked_size import UnpackedSize
 
 __all__ = ['STORE', 'Reader', 'ReaderError', 'SerdeError', 'deserialize']
 
 #: The layout of a JointState is the same in all ROS 2 distributions.
 STORE = get_typestore(Stores.ROS2_JAZZY)
+#: What the library unpacks with, which sets no limit.
+ZSTD: Any = vars(reader)['zstd']
 
 
 def deserialize(message: bytes) -> Any:
@@ -40,7 +41,7 @@ def deserialize(message: bytes) -> Any:
     return STORE.deserialize_cdr(message, 'sensor_msgs/msg/JointState')
 
 
-class _UnpackedFile(reader.zstd.ZstdFile):
+class _UnpackedFile(ZSTD.ZstdFile):  # type: ignore[misc]
     """A storage file that was packed as a whole, while it is unpacked to the disk."""
 
     def __init__(self, file: BinaryIO, mode: str) -> None:
@@ -54,19 +55,19 @@ class _UnpackedFile(reader.zstd.ZstdFile):
         return data
 
 
-def _unpack(data: bytes, zstd: Any = reader.zstd) -> bytes:
+def _unpack(data: bytes) -> bytes:
     """Unpack a message, or a chunk of messages, of one frame or more."""
     unpacked, parts = UnpackedSize(len(data)), []
     while data:
-        frame = zstd.ZstdDecompressor()
+        frame = ZSTD.ZstdDecompressor()
         parts.append(frame.decompress(data, max_length=unpacked.most + 1))
         unpacked.add(len(parts[-1]))
         if not frame.eof:
-            raise zstd.ZstdError('what was packed by zstd is cut')
+            raise ZSTD.ZstdError('what was packed by zstd is cut')
         data = frame.unused_data
     return b''.join(parts)
 
 
-# The library takes both from here, and sets no limit.
-reader.zstd = storage_mcap.zstd = SimpleNamespace(
-    **{**vars(reader.zstd), 'open': _UnpackedFile, 'decompress': _unpack})
+for module in (reader, storage_mcap):
+    vars(module).update(zstd=SimpleNamespace(
+        **{**vars(ZSTD), 'open': _UnpackedFile, 'decompress': _unpack}))

@@ -11,6 +11,7 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
 # See the License for the specific language governing permissions and
 # limitations under the License.
+
 """How large what is unpacked may become: a small file may hold zeros without end."""
 
 from cpg_ros.recordings.recording import RecordingError

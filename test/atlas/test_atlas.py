@@ -32,7 +32,6 @@ from cpg_ros.networks.parameter_line import ParameterLine
 from cpg_ros.networks.registry import PRESETS
 from cpg_ros.networks.symmetry import GAITS
 from cpg_ros.tools import atlas
-from depth import in_depth
 import numpy as np
 import pytest
 from scipy.optimize import brentq
@@ -66,7 +65,8 @@ def test_curves_of_hopf_points_are_those_of_the_formula():
             assert min(gaps) < 1e-8
 
 
-@pytest.mark.parametrize('order', [-1, *in_depth(1)])
+@pytest.mark.deep
+@pytest.mark.parametrize('order', [-1, 1])
 def test_a_curve_across_the_plane_is_found_whichever_axis_comes_first(order):
     """A trot of Hopf oscillators is born at mu = -3/(alpha + 50), flat and steep by turns.
 

@@ -44,7 +44,7 @@ SETS, SPREAD = 4, 0.5
 #: Ticks of the twin in one.
 TICKS = 4
 SIMPSON = np.array([1.0, 4.0, 2.0, 4.0, 1.0]) / 12.0
-EACH = pytest.mark.parametrize('network', PRESETS)
+EACH = pytest.mark.parametrize('network', [*list(PRESETS)[::2], *in_depth(*list(PRESETS)[1::2])])
 RATES = pytest.mark.parametrize('rate', [500.0, *in_depth(100.0, 2000.0)])
 
 

@@ -265,6 +265,7 @@ def robot_tree():
         for leg, cell in (('left', 1), ('right', 2))}}
 
 
+@pytest.mark.deep
 def test_a_generator_runs_it_and_switches_its_gait(start, tmp_path):
     # In here: the generator loads this file, too, and knows nothing of tests.
     from graph import until

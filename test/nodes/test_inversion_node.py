@@ -21,6 +21,7 @@ import signal
 import subprocess
 import sys
 
+from depth import in_depth
 from graph import EXECUTABLE, PATIENCE, Process, SimulatedTime, until, Watcher
 import numpy as np
 import pytest
@@ -73,8 +74,8 @@ def gaps_in_step(watcher, again, period):
 
 
 @pytest.mark.parametrize(('network', 'gait', 'topics'), [
-    ('delayed', 'walk', ('/joint_states',)),
-    ('quadruped', 'pace', tuple(f'/{leg}/joint_states' for leg in ('lh', 'rh', 'lf', 'rf')))])
+    ('quadruped', 'pace', tuple(f'/{leg}/joint_states' for leg in ('lh', 'rh', 'lf', 'rf'))),
+    *in_depth(('delayed', 'walk', ('/joint_states',)))])
 def test_a_gait_recorded_inverted_and_run_again_is_the_same(ending, tmp_path, network, gait,
                                                             topics):
     # Generator, recorder process, inversion of the bag, a second generator with the result. In

@@ -60,7 +60,7 @@ def for_network(text, network):
     return re.sub('^network: .*$', f'network: {network}', text, flags=re.M)
 
 
-@pytest.fixture(params=['quadruped', 'biped'])
+@pytest.fixture(params=['biped', *in_depth('quadruped')])
 def live(request, generators):
     generator = generators(request.param)
     with generator.lent():
@@ -206,7 +206,7 @@ def test_the_zig_zag_assignment_drives_a_leg_by_two_cells(tmp_path, stepped):
             in refused('-p', 'network:=quadruped', '-p', f'robot:={path}'))
 
 
-@pytest.mark.parametrize('live', ['hopf', 'matsuoka', *in_depth('phase')], indirect=True)
+@pytest.mark.parametrize('live', ['hopf', *in_depth('matsuoka', 'phase')], indirect=True)
 def test_oscillators_switch_between_all_ordered_pairs(live):
     network, watcher = live
     robot = read_robot(CONFIG / 'quadruped.yaml')

@@ -22,6 +22,7 @@ from cpg_ros.motion.pattern import Pattern
 from cpg_ros.motion.plan import plan
 from cpg_ros.networks.registry import PRESETS
 from cpg_ros.robots.robot_file import load_robot
+from depth import in_depth
 from diagnostic_msgs.msg import DiagnosticStatus
 from graph import until
 import numpy as np
@@ -54,7 +55,7 @@ def heard(watcher, kind, topic, angles):
     return rows
 
 
-@pytest.mark.parametrize(('rate', 'seconds'), [(100, 0.5), (200, 0.2), (100, 1.5)])
+@pytest.mark.parametrize(('rate', 'seconds'), [(200, 0.2), *in_depth((100, 0.5), (100, 1.5))])
 def test_what_was_missed_is_not_run_through(start, rate, seconds):
     process, watcher = start('-p', f'rate:={rate}', '-p', 'frequency:=2', '-p', 'ramp:=0.2',
                              '-p', 'command:=forward_position')

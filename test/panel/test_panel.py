@@ -38,6 +38,9 @@ from panel_client import Client, PANEL, start_panel, steered_robot  # noqa: E402
 from rclpy.qos import qos_profile_sensor_data  # noqa: E402
 from std_msgs.msg import String  # noqa: E402
 
+#: Together on one worker, as they share a generator and a panel.
+pytestmark = pytest.mark.xdist_group('panel')
+
 
 @pytest.fixture(scope='module')
 def rig(tmp_path_factory):
@@ -196,8 +199,13 @@ def test_the_robot_stops_when_nobody_holds_on(rig, how):
     twists = rig[4]
     page = Client(rig[2]).ready()
     twists.clear()
-    page.steer(0.6, 1.0, -0.5)
-    until(lambda: twists and twists[-1][1:] == (0.5, -0.3), 'cmd_vel')
+
+    def steered():
+        page.steer(0.1, 1.0, -0.5)
+        return twists and twists[-1][1:] == (0.5, -0.3)
+
+    # It begins to publish when it is steered: who listens may be found a little later.
+    until(steered, 'cmd_vel')
     let_go = time.monotonic()
     if how == 'let_go':
         page.send(do='steer', speed=0, turn=0)

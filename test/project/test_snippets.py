@@ -24,7 +24,8 @@ from graph import EXECUTABLE, free_domain
 import pytest
 from snippets import blocks, MARK, PAGES, ROOT
 
-RUN = [page for page in PAGES
+RUN = [page if page == 'README.md' else pytest.param(page, marks=pytest.mark.docs)
+       for page in PAGES
        if any(block.language in ('python', 'console') for block in blocks(page))]
 
 

@@ -50,6 +50,32 @@ def test_angles_in_space_are_those_of_the_skeleton_from_wherever_it_is_seen(seed
     assert found.positions == pytest.approx(expected, abs=1e-5)
 
 
+def test_a_dogs_legs_are_at_zero_under_it_and_positive_forward():
+    parts = {'Shoulder': 0.6, 'UpLeg': 0.0}
+    below = {'Shoulder': ('Arm', 'ForeArm', 'Hand', 'HandSite'),
+             'UpLeg': ('Leg', 'Foot', 'FootSite')}
+    rng = np.random.default_rng(5)
+    places_of = {'Hips': np.zeros((50, 3)), 'Neck': np.tile([0.7, 0.0, 0.0], (50, 1))}
+    expected = {}
+    joints = {'Shoulder': ('fore_scapula', 'fore_shoulder', 'fore_elbow', 'fore_wrist'),
+              'UpLeg': ('hind_hip', 'hind_knee', 'hind_ankle')}
+    for side, aside in (('Left', 0.1), ('Right', -0.1)):
+        for top, ahead in parts.items():
+            place, turn = np.tile([ahead, aside, 0.0], (50, 1)), np.zeros(50)
+            places_of[side + top] = place
+            for name, joint in zip(below[top], joints[top], strict=True):
+                angle = rng.uniform(-0.6, 0.6, 50)
+                turn = turn + angle
+                place = place + 0.2 * np.stack([np.sin(turn), 0.0 * turn, -np.cos(turn)], axis=-1)
+                places_of[side + name] = place
+                expected[f'{side.lower()}_{joint}'] = angle
+    seen = np.stack(list(places_of.values()), axis=1) @ rotation(rng.normal(size=3), 1.0).T
+    found = joint_recording(markers(seen, places_of), 'dog_skeleton')
+    assert set(found.joints) == set(expected)
+    for joint, angles_found in zip(found.joints, found.positions.T, strict=True):
+        assert angles_found == pytest.approx(expected[joint], abs=1e-5), joint
+
+
 SIDE = """\
 segments:
   pelvis: [LPSI, LASI]

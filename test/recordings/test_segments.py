@@ -22,7 +22,7 @@ GOOD = 'segments: {a: [x, y], b: [[y, z], w]}\njoints: {knee: {between: [a, b]}}
 
 
 def test_shipped_files_are_read():
-    assert shipped() == ['human_plug_in_gait', 'mouse_side_view']
+    assert shipped() == ['dog_skeleton', 'human_plug_in_gait', 'mouse_side_view']
     for name in shipped():
         assert len(load_segments(name).joints) >= 6
     mouse = load_segments('mouse_side_view')
@@ -64,5 +64,5 @@ def test_what_is_wrong_is_said_with_its_place(tmp_path, text, words):
 
 
 def test_a_name_that_is_no_file():
-    with pytest.raises(RecordingError, match="no such file of segments; shipped are 'human_plug"):
+    with pytest.raises(RecordingError, match="shipped are 'dog_skeleton', 'human_plug_in"):
         load_segments('horse')

@@ -31,12 +31,19 @@ FIXED = {'current': 0.229, 'phi': 0.254}
 
 
 @pytest.fixture(scope='module')
-def executors(tmp_path_factory):
-    """One thread, two processes, and two workers of a dask cluster."""
+def executors():
+    """One thread, and two processes."""
+    with processes(2) as two, ThreadPoolExecutor(1) as one:
+        yield {'one thread': one, 'two processes': two}
+
+
+@pytest.fixture(scope='module')
+def far(tmp_path_factory):
+    """Two workers of a dask cluster."""
     pytest.importorskip('distributed')
-    with (dask_cluster(tmp_path_factory.mktemp('dask')) as dask, processes(2) as two,
-          cluster(dask.address) as far, ThreadPoolExecutor(1) as one):
-        yield {'one thread': one, 'two processes': two, 'dask': far}
+    with (dask_cluster(tmp_path_factory.mktemp('dask')) as dask,
+          cluster(dask.address) as executor):
+        yield executor
 
 
 def weights(executor):
@@ -55,11 +62,18 @@ def test_islands_find_the_same_on_any_executor(executors):
         assert weights(executor) == here, name
 
 
+@pytest.mark.deep
+@pytest.mark.no_cover
+def test_islands_find_the_same_on_a_cluster(far):
+    pytest.importorskip('pymoo')
+    assert weights(far) == weights(None)
+
+
 def test_a_single_population_is_what_it_was(executors):
     pytest.importorskip('pymoo')
     one, other = (optimise('biped', 'walk', population=6, generations=3, fixed=FIXED,
                            progress=False, executor=where)
-                  for where in (None, executors['dask']))
+                  for where in (None, executors['two processes']))
     assert [score.network for score in one.tried] == [score.network for score in other.tried]
 
 

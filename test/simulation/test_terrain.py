@@ -46,6 +46,7 @@ def test_a_field_of_half_a_millimetre_is_as_the_plane(walk):
     assert cost[1] == pytest.approx(cost[0], rel=0.08)
 
 
+@pytest.mark.deep
 def test_no_edge_of_a_low_field_trips_a_walk_that_turns_on_the_spot(walk):
     """On the plane none falls; with MuJoCo's own collision of convex shapes, half of them."""
     ran = walk.run([Scenario(speed=0.05, terrain=Terrain('height_field', 0.001, k), phase=k / 8,

@@ -71,7 +71,7 @@ class Client:
         self._open = ExitStack()
         self._socket = self._open.enter_context(connect(
             base.replace('http', 'ws', 1) + 'socket' + (f'?{query}' if query else ''),
-            max_size=None, compression=None, **options))
+            max_size=None, compression=None, close_timeout=1.0, **options))
         self.last, self.frames, self.said, self.frame = {}, 0, [], {}
         self.closed, self.stamp = '', None
         threading.Thread(target=self._read, daemon=True).start()

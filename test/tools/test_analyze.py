@@ -29,6 +29,7 @@ from cpg_ros.networks.quadruped import Quadruped
 from cpg_ros.networks.registry import PRESETS
 from cpg_ros.tools import optimize
 from cpg_ros.tools.analyze import main
+from depth import in_depth
 import numpy as np
 import pytest
 import yaml
@@ -89,8 +90,8 @@ def test_example_1_as_text(capsys):
 
 
 @pytest.mark.parametrize(('changes', 'name', 'gait'), [
-    (('b=0.5', 'c=4.4', 'd=-0.3'), 'tau', 'trot'), (('b=0.5', 'c=4.4', 'd=0.3'), 'tau', 'pace'),
-    (('c=4.5', 'd=0'), 'tau', None), (('c=1',), 'c', None)])
+    (('b=0.5', 'c=4.4', 'd=-0.3'), 'tau', 'trot'), (('c=1',), 'c', None),
+    *in_depth((('b=0.5', 'c=4.4', 'd=0.3'), 'tau', 'pace'), (('c=4.5', 'd=0'), 'tau', None))])
 def test_a_set_without_gait_is_told_its_nearest_threshold(capsys, changes, name, gait):
     said = as_json(capsys, '--set', *changes)
     assert not any(one['exists'] for one in said['gaits'].values())
@@ -308,7 +309,7 @@ def test_as_a_process():
 
 
 @pytest.mark.parametrize(('name', 'head'), [
-    ('a.png', b'\x89PNG'), ('a.pdf', b'%PDF'), ('a.svg', b'<?xml')])
+    ('a.png', b'\x89PNG'), *in_depth(('a.pdf', b'%PDF'), ('a.svg', b'<?xml'))])
 def test_pictures(capsys, tmp_path, name, head):
     # A short range of delays, so that few branches are followed.
     path = tmp_path / name

@@ -57,8 +57,17 @@ def test_a_gait_that_is_chosen_on_its_page_ends_the_tour(tmp_path):
         line = until(lambda: re.search(rb'in a browser: (http://\S+)', process.stdout.readline()),
                      'the address')
         page = Client(line[1].decode()).ready()
-        page.send(do='set', name='gait', value='pace')
-        until(lambda: page.last['gait']['gait'] == 'pace', 'the gait')
+        # Right after the tour's own switch, so that its next one is far away.
+        first = page.last['gait']['gait']
+        until(lambda: page.last['gait']['gait'] != first, 'another gait of the tour')
+
+        def chosen():
+            # What comes late on a busy machine is ignored.
+            page.send(do='set', name='gait', value='pace')
+            time.sleep(0.2)
+            return page.last['gait']['gait'] == 'pace'
+
+        until(chosen, 'the gait')
         until(lambda: 'base' in page.frame, 'the robot')
         end = page.frame['time'] + 5.0
         until(lambda: page.frame['time'] > end, 'more than a gait of the tour')
@@ -91,6 +100,7 @@ def test_it_can_be_driven_on_its_page(tmp_path):
         assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.deep
 def test_it_can_be_pushed_and_fitted_on_its_page(tmp_path):
     domain = free_domain()
     fitting = Process('-p', 'topics:=[joint_states]', domain=domain,
