@@ -58,7 +58,7 @@ shell: install/.built
 		bash --rcfile <(cat ~/.bashrc 2>/dev/null; echo "PATH=$$PATH"; cpg completion) -i || :
 
 # The tables of topics are read from running nodes, the bridge among them. What the pages let a
-# reader type is run, and what the papers printed is computed anew.
+# reader type is run.
 docs: install/.built messages
 	@$(ENTER); $(VENV)/bin/sphinx-build -W --keep-going -q -b html docs docs/_build
 	@echo 'built: docs/_build/index.html'

@@ -72,7 +72,6 @@ def outcome(capsys, name):
     return code, json.loads(capsys.readouterr().out)['rows']
 
 
-@pytest.mark.docs
 def test_all_papers_are_covered_and_nothing_fails(report):
     _, tree, _ = report
     rows = tree['rows']
@@ -92,7 +91,6 @@ def test_all_papers_are_covered_and_nothing_fails(report):
     assert wanted <= places
 
 
-@pytest.mark.docs
 def test_json_has_a_schema(report):
     _, tree, _ = report
     assert set(tree) == {'papers', 'summary', 'rows', 'errata'}
@@ -104,7 +102,6 @@ def test_json_has_a_schema(report):
         assert row['verdict'] == expected
 
 
-@pytest.mark.docs
 def test_errata_are_numbered_used_and_of_the_right_paper(report):
     _, tree, _ = report
     assert list(ERRATA) == list(range(1, len(ERRATA) + 1))
@@ -149,7 +146,6 @@ def test_theorem_a1_lets_one_variable_have_no_trot_and_two_have_it():
     assert buono_appendix.of_cells(every, 2).failing(k, every) == []
 
 
-@pytest.mark.docs
 def test_the_page_needs_no_other_file(report):
     _, tree, page = report
     assert not re.search(r'https?:|<script|<link|@import|url\(', page)
@@ -164,7 +160,6 @@ def test_the_page_needs_no_other_file(report):
         assert f'id="{target}"' in page
 
 
-@pytest.mark.docs
 def test_the_table_has_every_row_and_progress_goes_to_standard_error(report):
     process, tree, _ = report
     lines = process.stdout.splitlines()
@@ -176,7 +171,6 @@ def test_the_table_has_every_row_and_progress_goes_to_standard_error(report):
     assert all(line.startswith('reproducing [') for line in process.stderr.splitlines())
 
 
-@pytest.mark.docs
 def test_computed_frequencies_and_delays_solve_the_characteristic_equation(report):
     _, tree, _ = report
     for (place, gait), (a, b, c, d, j) in {
