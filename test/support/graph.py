@@ -49,8 +49,6 @@ HELD = 3.0
 #: A request that may be made twice, and has no answer for so long, is sent again, s.
 TWICE = GetParameters, ListParameters, SetParameters, SetParametersAtomically
 LOST = 10.0
-#: For a server to find a new client before a request that is made once, s.
-FOUND = 0.3
 #: Which of the processes that share the tests this one is, and how many there are.
 WORKER = int(os.environ.get('PYTEST_XDIST_WORKER', 'gw0')[2:])
 WORKERS = int(os.environ.get('PYTEST_XDIST_WORKER_COUNT', '1'))
@@ -197,13 +195,10 @@ class Watcher:
 
     def call(self, kind: type, name: str, request):
         """Call a service and return its response."""
-        known = name in self._clients
-        if not known:
+        if name not in self._clients:
             self._clients[name] = self.node.create_client(kind, name)
         client = self._clients[name]
         assert client.wait_for_service(PATIENCE), f'no service {name}'
-        if not known and kind not in TWICE:
-            time.sleep(FOUND)
         # A server drops its first answer if it does not know the client's reader within 0.1 s.
         futures, again = [], 0.0
 
