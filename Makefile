@@ -62,7 +62,7 @@ shell: install/.built
 docs: install/.built messages
 	@$(ENTER); $(VENV)/bin/sphinx-build -W --keep-going -q -b html docs docs/_build
 	@echo 'built: docs/_build/index.html'
-	@$(ENTER); $(PYTEST) $(ONLINE) $(AGAIN) -m 'docs and not deep' $(ARGS)
+	@$(ENTER); $(PYTEST) $(ONLINE) $(AGAIN) -m docs $(ARGS)
 
 figures: install/.built
 	@$(ENTER); $(VENV)/bin/python docs/figures.py $(ARGS)
@@ -77,8 +77,8 @@ export COVERAGE_FILE := $(CURDIR)/.coverage
 coverage: install/.built
 	@$(ENTER); $(PYTEST) $(OFFLINE) -m 'not (live or $(LEFT_OUT))' $(COVER) $(ARGS)
 
-# What is run before every commit; with COVERAGE=yes it measures that, too, and takes a minute
-# longer. The kernels of all networks are compiled while linters run.
+# What is run before every commit; with COVERAGE=yes it measures that, too, and takes three
+# minutes longer. The kernels of all networks are compiled while linters run.
 test: install/.built messages
 	@$(ENTER); $(VENV)/bin/python -P -m cpg_ros.tools.precompile $(KERNELS) & \
 		$(VENV)/bin/ruff check . && $(VENV)/bin/mypy && $(VENV)/bin/lint-imports --no-logo && wait $$!

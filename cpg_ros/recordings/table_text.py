@@ -18,6 +18,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 import gzip
 import io
+import os
 from pathlib import Path
 import re
 from typing import cast, IO
@@ -72,13 +73,13 @@ class _Unpacked(gzip.GzipFile):
 
     def __init__(self, file: IO[bytes], path: Path) -> None:
         super().__init__(fileobj=file)
-        self._path, self._read = path, UnpackedSize(path.stat().st_size)
+        self._path, self._unpacked = path, UnpackedSize(os.fstat(file.fileno()).st_size)
 
     def read1(self, size: int = -1) -> bytes:
         """Read some bytes; text is read by this alone."""
         data = super().read1(size)
         try:
-            self._read.add(len(data))
+            self._unpacked.add(len(data))
         except RecordingError as error:
             raise RecordingError(f'{self._path}: {error}') from error
         return data
