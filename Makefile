@@ -19,6 +19,9 @@ INSTALLED := $(VENV)/.installed-beside-$(ROS_DISTRO)
 SITE := --system-site-packages
 PREFIXES := $(AMENT_PREFIX_PATH)
 endif
+# Containers often forbid it, and every process that starts would compile all sources again.
+unexport PYTHONDONTWRITEBYTECODE
+
 # Where the build has put the package, for every command that uses it.
 ENTER := set -e; source install/setup.bash; \
 	export AMENT_PREFIX_PATH=$(CURDIR)/install/cpg_ros:$(PREFIXES)

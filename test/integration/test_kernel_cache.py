@@ -155,6 +155,7 @@ print(np.round((slope[0] + 2.0 * y - 0.1 * state[1]) / x / (1.0 - x ** 2 - y ** 
 """
 
 
+@pytest.mark.deep
 def test_an_edited_network_of_ones_own_is_compiled_again_and_nothing_else(tmp_path):
     (tmp_path / 'one.py').write_text(ONE)
     own, given = tmp_path / 'own.py', environment(NUMBA_CACHE_DIR=str(tmp_path / 'cache'),

@@ -41,7 +41,7 @@ ROBOT = Path(__file__).parents[2] / 'config' / 'unitree_go2.yaml'
 ENDED = re.compile(r'\(x (-?[\d.]+), y (-?[\d.]+)\).* heading (-?\d+) degrees, (\w+), ')
 
 
-def walk(*parameters, seconds=10.0, bag=None):
+def walk(*parameters, seconds=7.0, bag=None):
     """Let a generator with these ROS arguments walk the robot; return x (m), heading, posture."""
     domain, ending = free_domain(), []
     try:
@@ -72,7 +72,7 @@ def walk(*parameters, seconds=10.0, bag=None):
 def test_what_was_recorded_from_a_walk_walks(tmp_path, gait):
     bag, out = tmp_path / 'bag', tmp_path / 'fitted.yaml'
     first, heading, posture = walk('-p', 'robot:=unitree_go2', '-p', f'gait:={gait}', bag=bag)
-    assert posture == 'upright' and first > 2.0 and abs(heading) < 20.0
+    assert posture == 'upright' and first > 1.4 and abs(heading) < 20.0
 
     done = subprocess.run([str(EXECUTABLE.with_name('inversion')), '--bag', str(bag), '--robot',
                            str(ROBOT), '--kp', '60', '--kd', '2', '--out', str(out)],

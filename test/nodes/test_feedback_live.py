@@ -82,10 +82,11 @@ class Between(Watcher):
 @pytest.fixture
 def between():
     # In turns, so that a slow machine makes a slow robot.
-    body = Process('-p', 'lockstep:=true', executable=EXECUTABLE.with_name('robot_sim'))
+    body = Process('-p', 'real_time_factor:=0.0', '-p', 'rate:=250.0',
+                   executable=EXECUTABLE.with_name('robot_sim'))
     found = Between(body.domain)
     # On by default, as the robot is calibrated and the topic of its joints is its own.
-    generator = Process('-p', 'use_sim_time:=true', '-p', 'rate:=500.0', '-p',
+    generator = Process('-p', 'use_sim_time:=true', '-p', 'rate:=250.0', '-p',
                         "combined_topic:=''", '-p', 'robot:=unitree_go2', '-p',
                         'feedback.imu_topic:=relay/imu', '-p', 'feedback.stiffen_from:=0.4',
                         domain=body.domain)

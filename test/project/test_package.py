@@ -79,6 +79,7 @@ def test_config_launch_and_index_are_installed():
         assert yaml.safe_load((SHARE / 'config' / f'{name}.yaml').read_text())['network']
 
 
+@pytest.mark.deep
 def test_a_clean_copy_builds_with_colcon_and_runs(tmp_path):
     files = subprocess.run(['git', 'ls-files', '-co', '--exclude-standard'], cwd=SOURCE, text=True,
                            capture_output=True, check=True).stdout.split()

