@@ -17,7 +17,6 @@
 from itertools import permutations
 
 from cpg_ros.nodes.feedback_parameters import ENABLED, SWITCH
-from depth import in_depth
 from graph import EXECUTABLE, free_domain, Process, until, Watcher
 from launch_files import of_generator
 import pytest
@@ -74,7 +73,7 @@ NODES = {'/robot_sim': ('robot_sim', ("film:=''", "footfalls:=''")),
          '/unitree_bridge': ('unitree_bridge', ('dry_run:=true',))}
 
 
-@pytest.mark.parametrize('network', ['delayed', 'hopf', *in_depth('quadruped', 'biped', 'phase')])
+@pytest.mark.parametrize('network', ['delayed', 'quadruped', 'biped', 'phase', 'hopf'])
 def test_no_name_is_the_beginning_of_another_whatever_the_network(network):
     assert clashes(of_generator(network)) == [] and ENABLED in of_generator(network)
     assert clashes([*of_generator(network), 'feedback']) and SWITCH.default is True
