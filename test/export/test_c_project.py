@@ -136,9 +136,9 @@ def test_ten_switches_are_those_of_the_generator(tmp_path, robot, network, gaits
 @needs_gcc
 @pytest.mark.parametrize('robot, network, gaits, degrees', [
     ('quadruped', 'delayed', ('trot', 'walk'), 0.03),
-    ('unitree_go2', 'delayed', ('trot', 'walk'), 0.06),
     ('biped', 'biped', ('walk', 'run'), 0.06),
-    *in_depth(('quadruped', 'phase', ('walk', 'trot'), 0.06),
+    *in_depth(('unitree_go2', 'delayed', ('trot', 'walk'), 0.06),
+              ('quadruped', 'phase', ('walk', 'trot'), 0.06),
               ('goat', 'delayed', ('trot', 'walk'), 0.2),
               ('octopod', 'phase8', ('pace', 'pronk'), 0.06))])
 @pytest.mark.parametrize('rate', [50.0, 100.0])

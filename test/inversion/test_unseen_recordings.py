@@ -27,6 +27,7 @@ from cpg_ros.networks.registry import PRESETS
 from cpg_ros.recordings.recording import Recording
 from cpg_ros.robots.robot_file import read_robot
 from cpg_ros.tools.inversion import main
+from depth import in_depth
 import numpy as np
 import pytest
 from walks import bag_of, LEGS, table_of, walked
@@ -204,8 +205,8 @@ def test_a_cut_packed_table_ends_in_one_line(tmp_path, capsys):
     assert 'packed by gzip, and damaged' in said and said.count('\n') == 1
 
 
-@pytest.mark.parametrize(('frequency', 'rate'), [(1.5, 2.0), (1.5, 3.3), (1.5, 4.0),
-                                                 (30.0, 100.0)])
+@pytest.mark.parametrize(('frequency', 'rate'), [
+    (1.5, 3.3), (30.0, 100.0), *in_depth((1.5, 2.0), (1.5, 4.0))])
 def test_too_few_samples_a_stride_are_doubted(tmp_path, capsys, frequency, rate):
     path = table_of(tmp_path / 'walk.csv', *walked(frequency=frequency, rate=rate,
                                                    seconds=90.0 / frequency))

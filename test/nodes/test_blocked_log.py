@@ -149,6 +149,7 @@ def test_a_generator_moves_on_and_ends_at_the_stand(console):
                     or importlib.util.find_spec('mujoco') is None,
                     reason="'make messages' has not been run, or the extra [sim] is not installed")
 @pytest.mark.parametrize('number', [signal.SIGHUP, *in_depth(signal.SIGTERM)])
+@pytest.mark.parametrize('console', ['terminal', *in_depth(*KINDS[1:])], indirect=True)
 def test_a_bridge_sits_down(console, number):
     class Blocked(Walk):
         # It stands, which a shared machine can let it do.

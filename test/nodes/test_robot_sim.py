@@ -22,6 +22,7 @@ import re
 import signal
 
 from cpg_ros.robots.robot_file import read_robot
+from depth import in_depth
 from geometry_msgs.msg import Wrench
 from graph import EXECUTABLE, Process, until, Watcher
 from nav_msgs.msg import Odometry
@@ -104,7 +105,8 @@ def seconds(stamp):
     return stamp.sec + 1e-9 * stamp.nanosec
 
 
-@pytest.mark.parametrize('command', ['joint_states', 'joint_trajectory', 'forward_position'])
+@pytest.mark.parametrize('command', ['joint_states', 'forward_position',
+                                     *in_depth('joint_trajectory')])
 def test_it_walks_in_lockstep_whatever_it_is_commanded_by(graph, tmp_path, command):
     sim, watch, generator = graph
     steps = tmp_path / 'steps.png'
@@ -226,7 +228,8 @@ BAD = {
         ('forward_position_controller/commands', Float64MultiArray(data=[0.5] * 11 + [1e11]))]}
 
 
-@pytest.mark.parametrize('command', list(BAD))
+@pytest.mark.parametrize('command', ['joint_states', 'joint_trajectory',
+                                     *in_depth('forward_position')])
 def test_bad_commands_leave_it_standing_with_one_warning(graph, command):
     sim, watch, _ = graph
     process = sim(f'command:={command}').wait_for('simulating')

@@ -21,7 +21,8 @@ import pytest
 
 pytest.importorskip('websockets')
 
-from graph import free_domain, until  # noqa: E402, I100
+from depth import in_depth  # noqa: E402, I100
+from graph import free_domain, until  # noqa: E402
 from panel_client import Client, start_panel  # noqa: E402
 import rclpy  # noqa: E402
 from rclpy.executors import SingleThreadedExecutor  # noqa: E402
@@ -104,7 +105,7 @@ def peak(pid):
         return next(1024 * int(line.split()[1]) for line in status if line.startswith('VmHWM'))
 
 
-@pytest.mark.parametrize('kind', ['network', 'pipe', 'device', 'proc', 'gone'])
+@pytest.mark.parametrize('kind', ['network', 'pipe', *in_depth('device', 'proc', 'gone')])
 def test_a_robot_file_that_a_node_names_is_not_opened(shown, tmp_path, kind):
     marker, robot = tmp_path / 'marker', tmp_path / 'robot.yaml'
     if kind == 'network':
@@ -125,7 +126,7 @@ def test_a_robot_file_that_a_node_names_is_not_opened(shown, tmp_path, kind):
     assert peak(panel.pid) < 1e9
 
 
-@pytest.mark.parametrize('kind', ['pipe', 'device', 'proc', 'file', 'up', 'encoded'])
+@pytest.mark.parametrize('kind', ['pipe', 'up', 'encoded', *in_depth('device', 'proc', 'file')])
 def test_meshes_of_a_description_are_those_of_installed_packages(shown, tmp_path, kind):
     os.mkfifo(tmp_path / 'pipe.stl')
     (tmp_path / 'own.stl').write_text('solid s\nendsolid s')

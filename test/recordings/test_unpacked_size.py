@@ -24,6 +24,7 @@ from cpg_ros.recordings.bag_reader import read_bag
 from cpg_ros.recordings.csv_reader import read_csv
 from cpg_ros.recordings.mot_reader import read_mot
 from cpg_ros.recordings.recording import RecordingError
+from depth import in_depth
 import pytest
 
 KINDS = [('sqlite3', 'file'), ('sqlite3', 'message'), ('mcap', 'file'), ('mcap', 'message'),
@@ -56,13 +57,15 @@ def test_a_long_table_is_read(tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize(('storage', 'compression'), KINDS)
-def test_bags_that_unpack_to_too_much(tmp_path, storage, compression, monkeypatch):
+@pytest.mark.parametrize('limit', [20_000_000, *in_depth(unpacked_size.ALWAYS)])
+def test_bags_that_unpack_to_too_much(tmp_path, storage, compression, limit, monkeypatch):
+    monkeypatch.setattr(unpacked_size, 'ALWAYS', limit)
     temporary = tmp_path / 'temporary'
     temporary.mkdir()
     monkeypatch.setattr(tempfile, 'tempdir', str(temporary))
-    large = joint_state(START, JOINTS, [0.0] * len(JOINTS), (), [0.0] * 28_000_000)
+    large = joint_state(START, JOINTS, [0.0] * len(JOINTS), (), [0.0] * round(0.14 * limit))
     bag = write_bag(tmp_path / 'walk', [('/joint_states', START, large)], storage, compression)
-    assert storage_file(bag).stat().st_size < 1_000_000
+    assert storage_file(bag).stat().st_size < 0.01 * limit
     refusal(read_bag, bag)
     assert not list(temporary.iterdir())
 

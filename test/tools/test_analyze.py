@@ -90,8 +90,9 @@ def test_example_1_as_text(capsys):
 
 
 @pytest.mark.parametrize(('changes', 'name', 'gait'), [
-    (('b=0.5', 'c=4.4', 'd=-0.3'), 'tau', 'trot'), (('c=1',), 'c', None),
-    *in_depth((('b=0.5', 'c=4.4', 'd=0.3'), 'tau', 'pace'), (('c=4.5', 'd=0'), 'tau', None))])
+    (('b=0.5', 'c=4.4', 'd=-0.3'), 'tau', 'trot'),
+    *in_depth((('c=1',), 'c', None), (('b=0.5', 'c=4.4', 'd=0.3'), 'tau', 'pace'),
+              (('c=4.5', 'd=0'), 'tau', None))])
 def test_a_set_without_gait_is_told_its_nearest_threshold(capsys, changes, name, gait):
     said = as_json(capsys, '--set', *changes)
     assert not any(one['exists'] for one in said['gaits'].values())
