@@ -33,6 +33,7 @@ class GaitTables(NamedTuple):
         swinging: whether each leg is meant to, shape (SLOTS, POINTS, legs).
         progress: share of that swing, or else of its stance, that is over, the same.
         duty: share of the stride that each leg stands, shape (SLOTS, legs).
+        one_by_one: whether, for most of the stride, at most one leg swings, shape (SLOTS,).
         turns: 1 where left and right legs take turns, 0 where they hop, shape (SLOTS,).
         speeds: of the efference copies, m/s, shape (SLOTS, SPEEDS).
         expected: efference copies, shape (SLOTS, SPEEDS, BINS, SIGNALS).
@@ -47,6 +48,7 @@ class GaitTables(NamedTuple):
     swinging: np.ndarray
     progress: np.ndarray
     duty: np.ndarray
+    one_by_one: np.ndarray
     turns: np.ndarray
     speeds: np.ndarray
     expected: np.ndarray
@@ -59,9 +61,10 @@ class GaitTables(NamedTuple):
     def empty(cls, legs: int) -> 'GaitTables':
         """Nothing known of any gait."""
         return cls(np.zeros((SLOTS, POINTS, legs), dtype=bool), np.zeros((SLOTS, POINTS, legs)),
-                   np.ones((SLOTS, legs)), np.ones(SLOTS), np.zeros((SLOTS, SPEEDS)),
-                   np.zeros((SLOTS, SPEEDS, BINS, SIGNALS)), np.zeros(SLOTS, dtype=bool),
-                   np.zeros((SLOTS, ROWS)), np.ones((SLOTS, ROWS)), np.zeros(legs))
+                   np.ones((SLOTS, legs)), np.zeros(SLOTS, dtype=bool), np.ones(SLOTS),
+                   np.zeros((SLOTS, SPEEDS)), np.zeros((SLOTS, SPEEDS, BINS, SIGNALS)),
+                   np.zeros(SLOTS, dtype=bool), np.zeros((SLOTS, ROWS)),
+                   np.ones((SLOTS, ROWS)), np.zeros(legs))
 
     def fill(self, slot: int, timetable: Timetable, expected: EfferenceCopy, program: GaitPlan
              ) -> None:
@@ -73,6 +76,7 @@ class GaitTables(NamedTuple):
         """
         self.swinging[slot], self.progress[slot] = timetable.swinging, timetable.progress
         self.duty[slot] = 1.0 - timetable.swinging.mean(axis=0)
+        self.one_by_one[slot] = (timetable.swinging.sum(axis=1) <= 1).mean() > 0.5
         self.turns[slot] = not timetable.hops
         self.speeds[slot] = _filled(expected.speeds, SPEEDS, 'an efference copy')
         self.expected[slot] = _filled(expected.table, SPEEDS, 'an efference copy')

@@ -42,7 +42,11 @@ LAW = Law(
         'give': Gain(0.0, 1.0, '',
                      'share of the forward velocity error to which feet in stance yield'),
         'give_left': Gain(0.8, 8.0, '',
-                          'share of the sideways velocity error to which feet in stance yield')},
+                          'share of the sideways velocity error to which feet in stance yield'),
+        # A trot, whose feet in stance all yield at once, would sway for seconds.
+        'give_recovering': Gain(1.35, 5.0, '',
+                                'factor of give_left while the body recovers from a push, as '
+                                'stiffen has it, in gaits whose legs swing one by one')},
     memory={
         'placement_displacement': StateVariable('of each foot [m]', ('legs', 2))})
 
@@ -79,23 +83,33 @@ def in_stance(displacement, yielding, gains, dt):
 
 
 @jit
-def advance(displacement, swinging, step_x, step_y, vx, vy, gains, dt):
+def yielding(vx, vy, recovering, gains):
+    """Return the speeds forward and to the left to which feet in stance yield, m/s.
+
+    Args:
+        vx: forward velocity beyond what is expected, m/s.
+        vy: the same to the left.
+        recovering: whether the body recovers from a push in a gait whose legs swing one by one.
+        gains: of the law.
+
+    """
+    more = gains.give_recovering if recovering else 1.0
+    return gains.give * vx, more * gains.give_left * vy
+
+
+@jit
+def advance(displacement, swinging, wanted, yielded, gains, dt):
     """Advance a foot's displacement forward and to the left, m, shape (2,), in place.
 
     Args:
         displacement: of the foot.
         swinging: whether it is meant to be in the air.
-        step_x: how much further forward to put it down, m.
-        step_y: how much further to the left, m.
-        vx: forward velocity beyond what is expected, m/s.
-        vy: the same to the left.
+        wanted: how much further forward and to the left to put it down, m.
+        yielded: speeds to which it yields in stance, m/s, see yielding.
         gains: of the law.
         dt: s.
 
     """
-    if swinging:
-        displacement[0] = in_swing(displacement[0], step_x, gains, dt)
-        displacement[1] = in_swing(displacement[1], step_y, gains, dt)
-    else:
-        displacement[0] = in_stance(displacement[0], gains.give * vx, gains, dt)
-        displacement[1] = in_stance(displacement[1], gains.give_left * vy, gains, dt)
+    for k in range(2):
+        displacement[k] = (in_swing(displacement[k], wanted[k], gains, dt) if swinging else
+                           in_stance(displacement[k], yielded[k], gains, dt))

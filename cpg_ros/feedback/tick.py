@@ -158,8 +158,11 @@ def tick(legs, tables, gains, memory, sensors, planned, step, out):
         if gains.slope:
             uphill_x = turns * slope.shift_ahead(ground[1], gains)
             uphill_y = -turns * slope.shift(ground[0], gains.slope_share, gains)
-        step_x = placement.step(off.vx, off.wy, gains.step, gains.step_pitch_rate, gains)
-        step_y = placement.step(off.vy, off.wx, gains.step_left, gains.step_roll_rate, gains)
+        wide = (placement.step(off.vx, off.wy, gains.step, gains.step_pitch_rate, gains),
+                placement.step(off.vy, off.wx, gains.step_left, gains.step_roll_rate, gains))
+        yielded = placement.yielding(
+            off.vx, off.vy, gains.stiffen and memory.stiff_for[run] > 0.0
+            and tables.one_by_one[slot], gains)
         memory.sidestep_correction[run] = sidestep.correct_speed(
             memory.sidestep_correction[run], -off.vy, left, gains, share * dt)
         sideways = left + memory.sidestep_correction[run]
@@ -192,7 +195,7 @@ def tick(legs, tables, gains, memory, sensors, planned, step, out):
                                           off.pitch, off.wx, off.wy, gains)
             if gains.placement:
                 placed = memory.placement_displacement[run, leg]
-                placement.advance(placed, swinging, step_x, step_y, off.vx, off.vy, gains, dt)
+                placement.advance(placed, swinging, wide, yielded, gains, dt)
                 x, y = x + turns * placed[0], y + turns * placed[1]
             if gains.sidestep:
                 carried = memory.sidestep_displacement[run]

@@ -71,6 +71,14 @@ def test_feet_in_the_air_go_to_their_steps_and_those_on_the_ground_yield():
     assert -0.1 * 0.2 < stood < 0.0
 
 
+def test_feet_in_stance_yield_more_to_the_side_while_the_body_recovers():
+    calm, pushed = (placement.yielding(0.2, -0.3, recovering, GAINS)
+                    for recovering in (False, True))
+    assert calm == pytest.approx((GAINS.give * 0.2, -GAINS.give_left * 0.3))
+    assert pushed == pytest.approx((calm[0], GAINS.give_recovering * calm[1]))
+    assert GAINS.give_recovering > 1.0
+
+
 def test_a_sidestep_begins_as_far_on_one_side_as_it_ends_on_the_other():
     way = first = sidestep.landing(0.2, 0.4, GAINS)
     for _ in range(200):

@@ -105,6 +105,18 @@ def test_late_senses_leave_positions_alone(loop, expected):
 
 
 @pytest.mark.deep
+def test_a_walk_that_yields_while_it_recovers_survives_more_pushes_from_the_side():
+    walks = ClosedLoop('go2', program('walk'))
+    ways, phases = np.random.default_rng(10).uniform([[-0.26], [0.0]], [[0.26], [1.0]], (2, 96))
+    trials = [Scenario(phase=phase, pushes=(impulse(
+        1.6, 42.0 * math.sin(way), (1 - 2 * (k % 2)) * 42.0 * math.cos(way)),))
+        for k, (way, phase) in enumerate(zip(ways, phases, strict=True))]
+    ran, before = (walks.run(trials, 4.1, GAINS._replace(give_recovering=factor))
+                   for factor in (GAINS.give_recovering, 1.0))
+    assert ran.upright.sum() >= before.upright.sum() + 8
+
+
+@pytest.mark.deep
 def test_rough_ground_does_not_stiffen(loop, expected):
     trials = [Scenario(terrain=Terrain('height_field', 0.08, seed)) for seed in range(8)]
     ran = loop.run(trials, 8.0, gains=GAINS, expected=expected)
