@@ -109,7 +109,7 @@ browser: install/.built
 	@command -v chromium chromium-browser google-chrome >/dev/null || \
 		{ echo 'there is no Chromium: apt install chromium (on Ubuntu: snap install chromium)' >&2; exit 1; }
 	@$(VENV)/bin/python -m pip install --quiet --disable-pip-version-check -r requirements-browser.txt
-	@$(ENTER); $(PYTEST) -m browser $(ARGS)
+	@$(ENTER); $(PYTEST) $(AGAIN) -m browser $(ARGS)
 
 bench: install/.built
 	@$(ENTER); for file in benchmarks/bench_*.py; do $(VENV)/bin/python $$file; done

@@ -254,6 +254,9 @@ def fit_recording(recording: Recording, robot: Robot | None = None, network: str
     as_recorded = parameters.with_phases(stride.phases)
     if not other_gait(as_recorded, gait):
         parameters = as_recorded
+    if robot is None and any(len(own) > 1 for own in next(iter(kind.legs.values())).values()):
+        read += ("; each joint is taken to follow its leg's first cell, as no robot file says "
+                 'which, and parameters and intervals hold for that alone')
     fit, fallbacks = fit_with_fallbacks(stride, cells, parameters, gait, free, order, starts, done)
     fit = replace(fit, parameters={**_phases_as_estimates(fit, stride), **fit.parameters})
     found = RecordingFit(recording, read, legs, stride, fit,

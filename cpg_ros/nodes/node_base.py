@@ -232,7 +232,12 @@ def run(make: Callable[[], StartedNode], name: str, text: str, known: Mapping[st
     if code is not None:
         return code
 
-    def leave(*_: object) -> None:
+    signals: list[int] = []
+
+    def leave(number: int, _: object) -> None:
+        # What Python calls while it cleans up, such as a weak reference's callback, drops what is
+        # raised in it.
+        signals.append(number)
         raise SystemExit(0)
 
     ending = endings()
@@ -265,7 +270,6 @@ def run(make: Callable[[], StartedNode], name: str, text: str, known: Mapping[st
         return 1
     # An Event may not be set here: a signal that comes while it is being waited for, or while
     # another one sets it, would wait for ever for the lock that its own thread holds.
-    signals: list[int] = []
     for number in ending:
         signal.signal(number, lambda number, _: signals.append(number))
     executor = SingleThreadedExecutor()

@@ -146,13 +146,15 @@ def wait_for(operator: Operator, interruption: Interruption) -> None:
     """Wait until the robot stands in its simulation and the generator serves.
 
     Raises:
-        DemoError: a node ended, or took too long.
+        DemoError: a node ended, took too long, or is not the only one.
 
     """
     end = time.monotonic() + PATIENCE
     while not operator.ready:
         rclpy.spin_once(operator, timeout_sec=0.1)
         interruption.look()
+        # Two of them may keep each other from being ready.
+        operator.check_alone()
         if time.monotonic() > end:
             raise DemoError(f'the nodes were not ready after {PATIENCE:g} s')
 

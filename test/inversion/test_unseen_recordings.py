@@ -51,7 +51,9 @@ def trot_found(said, frequency=2.0):
 
 def test_three_cycles_are_written(tmp_path, capsys):
     path = table_of(tmp_path / 'walk.csv', *walked(seconds=1.5, noise=0.01))
-    assert trot_found(said_of(capsys, '--csv', path, '--out', tmp_path / 'fitted.yaml'))
+    said = said_of(capsys, '--csv', path, '--out', tmp_path / 'fitted.yaml')
+    assert trot_found(said)
+    assert "each joint is taken to follow its leg's first cell" in said['read']
     tree = yaml.safe_load((tmp_path / 'fitted.yaml').read_text())['/**']['ros__parameters']
     assert len(read_robot(tree['robot']).joints) == 8
 

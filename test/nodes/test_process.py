@@ -14,14 +14,17 @@
 
 """The node as a process: how it starts, ends, and lives beside others."""
 
+import os
 from pathlib import Path
 import signal
+import subprocess
+import sys
 import time
 
 from ament_index_python.packages import get_package_share_directory
 from depth import in_depth
 from diagnostic_msgs.msg import DiagnosticStatus
-from graph import off_grid, until, Watcher
+from graph import free_domain, off_grid, PATIENCE, until, Watcher
 import numpy as np
 import pytest
 from stepped import refused
@@ -84,6 +87,29 @@ def test_a_signal_while_it_imports_is_one_line(start, number):
     process.signal(number)
     assert process.wait() == 128 + number
     assert process.lines == ['generator: stopped']
+
+
+# What is raised in a callback of the interpreter's own is dropped, as it is here.
+DROPPED = """
+import contextlib, os, signal, sys
+from cpg_ros.nodes import generator
+
+class Starting(generator.Generator):
+    def __init__(self):
+        with contextlib.suppress(SystemExit):
+            os.kill(os.getpid(), signal.SIGTERM)
+        super().__init__()
+
+generator.Generator = Starting
+sys.exit(generator.main([]))
+"""
+
+
+def test_a_signal_whose_exception_is_dropped_while_it_starts_ends_it():
+    variables = {**os.environ, 'ROS_DOMAIN_ID': str(free_domain())}
+    done = subprocess.run([sys.executable, '-P', '-c', DROPPED], capture_output=True, text=True,
+                          timeout=PATIENCE, env=variables)
+    assert done.returncode == 0 and 'Traceback' not in done.stderr
 
 
 def test_a_volley_of_signals_ends_it(start):

@@ -37,6 +37,16 @@ def ask(watcher, *batches):
     client = watcher.node.create_client(SetParameters, f'{watcher.generator}/set_parameters',
                                         qos_profile=qos_profile_parameters)
     until(client.service_is_ready, 'the parameter services')
+    # The first answer to a client is lost if the server has not found its reader yet.
+    first = [client.call_async(SetParameters.Request())]
+
+    def answered():
+        if time.monotonic() > began + len(first):
+            first.append(client.call_async(SetParameters.Request()))
+        return any(one.done() for one in first)
+
+    began = time.monotonic()
+    until(answered, 'a first answer')
     return [client.call_async(SetParameters.Request(parameters=[
         Parameter(name, value=float(value)).to_parameter_msg() for name, value in batch]))
         for batch in batches]

@@ -126,7 +126,7 @@ def test_a_robot_file_keeps_its_cells_and_limits(tmp_path, capsys):
     out = tmp_path / 'fitted.yaml'
     assert main(['--bag', str(path), '--robot', str(file), '--out', str(out), '--json']) == 0
     said = json.loads(capsys.readouterr().out)
-    assert 'not recorded: lf_gripper' in said['read']
+    assert 'not recorded: lf_gripper' in said['read'] and 'first cell' not in said['read']
     fitted = read_robot(tmp_path / 'fitted_robot.yaml')
     for joint in fitted.joints:
         assert (joint.lower, joint.upper, joint.velocity) == (-3.0, 3.0, 40.0)
