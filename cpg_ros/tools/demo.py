@@ -153,7 +153,6 @@ def wait_for(operator: Operator, interruption: Interruption) -> None:
     while not operator.ready:
         rclpy.spin_once(operator, timeout_sec=0.1)
         interruption.look()
-        # Two of them may keep each other from being ready.
         operator.check_alone()
         if time.monotonic() > end:
             raise DemoError(f'the nodes were not ready after {PATIENCE:g} s')

@@ -23,7 +23,6 @@ import numpy as np
 import pytest
 from rcl_interfaces.srv import SetParameters
 from rclpy.parameter import Parameter
-from rclpy.qos import qos_profile_parameters
 from std_srvs.srv import SetBool
 import steered
 
@@ -33,20 +32,10 @@ FLOOD = np.linspace(1.0, 2.0, 200)
 
 def ask(watcher, *batches):
     """Ask for batches of (name, value), each a request; return the futures of the answers."""
-    # As rclpy's own clients do: there is room for many answers.
-    client = watcher.node.create_client(SetParameters, f'{watcher.generator}/set_parameters',
-                                        qos_profile=qos_profile_parameters)
-    until(client.service_is_ready, 'the parameter services')
-    # The first answer to a client is lost if the server has not found its reader yet.
-    first = [client.call_async(SetParameters.Request())]
-
-    def answered():
-        if time.monotonic() > began + len(first):
-            first.append(client.call_async(SetParameters.Request()))
-        return any(one.done() for one in first)
-
-    began = time.monotonic()
-    until(answered, 'a first answer')
+    name = f'{watcher.generator}/set_parameters'
+    # The first answer to a client may be lost, but for this one, which is asked for again.
+    watcher.call(SetParameters, name, SetParameters.Request())
+    client = watcher.client(SetParameters, name)
     return [client.call_async(SetParameters.Request(parameters=[
         Parameter(name, value=float(value)).to_parameter_msg() for name, value in batch]))
         for batch in batches]

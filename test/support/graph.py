@@ -36,7 +36,7 @@ from rcl_interfaces.srv import (
 import rclpy
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.parameter import Parameter
-from rclpy.qos import DurabilityPolicy, QoSProfile
+from rclpy.qos import DurabilityPolicy, qos_profile_parameters, QoSProfile
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray, String
@@ -193,12 +193,17 @@ class Watcher:
     def _health(self, message: DiagnosticArray) -> None:
         self.diagnostics += [s for s in message.status if s.name.startswith(self.generator + ':')]
 
+    def client(self, kind: type, name: str):
+        """Return the client of a service, which has room for many answers, once it is there."""
+        if name not in self._clients:
+            self._clients[name] = self.node.create_client(kind, name,
+                                                          qos_profile=qos_profile_parameters)
+        assert self._clients[name].wait_for_service(PATIENCE), f'no service {name}'
+        return self._clients[name]
+
     def call(self, kind: type, name: str, request):
         """Call a service and return its response."""
-        if name not in self._clients:
-            self._clients[name] = self.node.create_client(kind, name)
-        client = self._clients[name]
-        assert client.wait_for_service(PATIENCE), f'no service {name}'
+        client = self.client(kind, name)
         # A server drops its first answer if it does not know the client's reader within 0.1 s.
         futures, again = [], 0.0
 
