@@ -18,7 +18,7 @@ from contextlib import ExitStack
 
 from graph import EXECUTABLE, Process, until, Watcher
 from nav_msgs.msg import Odometry
-from panel_client import start_panel
+from panel_client import press, start_panel
 import pytest
 
 pytestmark = pytest.mark.browser
@@ -51,10 +51,7 @@ def test_a_humanoid_is_steered_pushed_and_put_on_its_feet(browser):
         until(lambda: page.evaluate('panel.steering.able'), 'a pad')
 
         def walked(distance):
-            # A page that stood still lets go, and takes no key that is down already.
-            if not page.evaluate('panel.steering.held'):
-                page.keyboard.up('ArrowUp')
-                page.keyboard.down('ArrowUp')
+            press(page)
             return places and places[-1][0] > distance
 
         until(lambda: walked(0.15), 'a step')

@@ -55,6 +55,13 @@ def steered_robot(*panel_args):
         yield generator, panel, address, watcher, twists
 
 
+def press(page, key='ArrowUp'):
+    """Hold a key of a page in a browser; again where the page stood still, which lets go of it."""
+    if not page.evaluate('panel.steering.held'):
+        page.keyboard.up(key)
+        page.keyboard.down(key)
+
+
 class Client:
     """An open page, which sends the newest stamp with each request.
 
