@@ -12,22 +12,26 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Markers out of C3D files, by the library ezc3d (Michaud & Begon 2021, Journal of Open Source
-Software 6(58), 2911).
+"""Markers and joint angles out of C3D files, by the library ezc3d (Michaud & Begon 2021, Journal
+of Open Source Software 6(58), 2911).
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from cpg_ros.errors import needed
 from cpg_ros.files import regular_file
+from cpg_ros.files.plain_text import printable
 from cpg_ros.recordings.frame_stamps import stamps_of_frames
+from cpg_ros.recordings.joint_patterns import matching
 from cpg_ros.recordings.markers import joint_recording, Markers
-from cpg_ros.recordings.recording import Recording, RecordingError
+from cpg_ros.recordings.recording import few, merged, Recording, RecordingError
 from cpg_ros.recordings.recording_format import JOINTS, RecordingFormat
 from cpg_ros.recordings.segments import SEGMENTS
 from cpg_ros.recordings.stray_samples import counted
+from cpg_ros.recordings.table_columns import ANGLES
 import numpy as np
 
 #: Largest file, and what its first block has, bytes.
@@ -36,23 +40,31 @@ LARGEST, BLOCK = 1_000_000_000, 512
 
 def read_c3d(path: str | Path, segments: str | Path | None = None, joints: Sequence[str] = (),
              progress: bool = True) -> Recording:
-    """Read the joint angles between the markers of a C3D file.
+    """Read the joint angles of a C3D file: those that are in it, or those between its markers.
+
+    A biomechanical model, such as Plug-in Gait, writes angles as points that the parameter
+    POINT:ANGLES lists. They are taken where no segments are given: of each its first component,
+    flexion in Plug-in Gait, without jumps by whole turns.
 
     Args:
         path: the file.
         segments: which markers span which segment; see `load_segments`.
-        joints: of these, in this order; all of them, if empty.
+        joints: of these, in this order, or patterns such as '*Knee*'; all of them, if empty.
         progress: not used.
 
     Raises:
-        RecordingError: see `c3d_markers` and `joint_recording`.
+        RecordingError: see `c3d_markers` and `joint_recording`; an unknown unit of angles, or no
+            angle of a joint.
 
     """
-    return joint_recording(c3d_markers(path), segments, joints)
+    markers, angles, unit = _contents(Path(path))
+    if segments is None and angles:
+        return _modelled(markers, angles, unit, joints)
+    return joint_recording(markers, segments, joints)
 
 
 def c3d_markers(path: str | Path) -> Markers:
-    """Read the markers of a C3D file; a point with a negative residual was not seen.
+    """Read the points of a C3D file; one with a negative residual was not seen.
 
     Names lose what stands before a colon, the subject.
 
@@ -61,7 +73,11 @@ def c3d_markers(path: str | Path) -> Markers:
         MissingLibraryError: ezc3d is not installed.
 
     """
-    path = Path(path)
+    return _contents(Path(path))[0]
+
+
+def _contents(path: Path) -> tuple[Markers, list[str], str]:
+    """Return the points, the names of those that are angles, and the unit of these, '' if none."""
     stated = _stated(path)
     needed('ezc3d')
     import ezc3d
@@ -70,9 +86,8 @@ def c3d_markers(path: str | Path) -> Markers:
         point = file['parameters']['POINT']
         rate, points = float(point['RATE']['value'][0]), np.asarray(file['data']['points'])
         residuals = np.asarray(file['data']['meta_points']['residuals'])[0]
-        labels = [label for name in sorted((one for one in point if one.startswith('LABELS')
-                                            ), key=lambda name: (len(name), name))
-                  for label in point[name]['value']]
+        labels, angles = (_names(point, key) for key in ('LABELS', 'ANGLES'))
+        units = [str(one) for one in point.get('ANGLE_UNITS', {'value': []})['value']]
     # The library does not list what damaged files make it raise.
     except Exception as error:
         why = ' '.join(str(error).split()).rstrip('.') or type(error).__name__
@@ -80,14 +95,49 @@ def c3d_markers(path: str | Path) -> Markers:
     count, frames = points.shape[1:]
     if not count or not frames:
         raise RecordingError(f'{path}: {counted(count, "point")} in {counted(frames, "frame")}')
-    names = tuple(label.rpartition(':')[2].strip() for label in labels[:count])
+    names = labels[:count]
     if len(names) != count:
         raise RecordingError(f'{path}: {len(names)} labels for {counted(count, "point")}')
     places = np.where(residuals < 0.0, np.nan, points[:3]).transpose(2, 1, 0)
     notes = ([f'{counted(frames, "frame")}, where the header states {stated}: it may be cut']
              if frames < stated else [])
-    return Markers(names, stamps_of_frames(np.arange(frames), rate, path), places, path,
-                   notes=tuple(notes))
+    found = Markers(tuple(names), stamps_of_frames(np.arange(frames), rate, path), places, path,
+                    notes=tuple(notes))
+    return found, [name for name in names if name in angles], ''.join(units[:1]).strip()
+
+
+def _names(point: Any, key: str) -> list[str]:
+    """Return a list of points; past 255 of them it goes on in LABELS2, and so on."""
+    keys = sorted((one for one in point if one.startswith(key)), key=lambda one: (len(one), one))
+    return [name.rpartition(':')[2].strip() for one in keys for name in point[one]['value']]
+
+
+def _modelled(points: Markers, angles: Sequence[str], unit: str, joints: Sequence[str]
+              ) -> Recording:
+    """Return the angles that a model wrote."""
+    source = points.source
+    scale = ANGLES.get(unit.lower() or 'deg')
+    if scale is None:
+        raise RecordingError(f'{source}: POINT:ANGLE_UNITS is {unit[:20]!r}, not deg or rad')
+    wanted = matching(joints, angles, str(source))
+    places = points.points[:, [points.names.index(name) for name in wanted]]
+    # Where a model had no value, some write zeros.
+    first = np.where((places == 0.0).all(axis=2), np.nan, scale * places[..., 0])
+    there = np.isfinite(first)
+    silent = [name for k, name in enumerate(wanted) if not there[:, k].any()]
+    if silent and (joints or len(silent) == len(wanted)):
+        raise RecordingError(f'{source}: no value of {few(silent)}')
+    for k in range(len(wanted)):
+        first[there[:, k], k] = np.unwrap(first[there[:, k], k])
+    kept = [k for k, name in enumerate(wanted) if name not in silent]
+    recording = merged([(points.stamps, [wanted[k] for k in kept], first[:, kept])],
+                       printable(str(source)))
+    notes = [*points.notes, 'of each angle the first component is taken, flexion in Plug-in Gait']
+    if not unit:
+        notes.append('no POINT:ANGLE_UNITS: angles are taken to be in degrees')
+    if silent:
+        notes.append(f'without a value, left out: {few(silent)}')
+    return replace(recording, notes=(*map(printable, notes), *recording.notes))
 
 
 def _stated(path: Path) -> int:
@@ -106,6 +156,6 @@ def _stated(path: Path) -> int:
 
 
 C3D = RecordingFormat(
-    name='c3d', contents='markers in a C3D file', help='markers in three dimensions',
+    name='c3d', contents='a C3D file', help='joint angles of a model, or markers',
     metavar='FILE', read=read_c3d, endings=('.c3d',), options=(JOINTS, SEGMENTS),
-    lacks={'unit': 'markers have no angles', 'time': 'C3D files have their rate'})
+    lacks={'unit': 'C3D files have their unit', 'time': 'C3D files have their rate'})

@@ -61,6 +61,62 @@ def test_a_cut_file_is_read_as_far_as_it_goes(path):
                            'cut',)
 
 
+def modelled(path, unit='deg'):
+    """Write angles as Plug-in Gait does, beside two markers; return the flexion of a knee, deg."""
+    file = ezc3d.c3d()
+    names = ['LASI', 'RASI', 'LKneeAngles', 'RKneeAngles', 'LHeadAngles', 'RHeadAngles']
+    flexion = 30.0 - 30.0 * np.cos(2.0 * np.pi * 1.1 * TIME)
+    head = (170.0 + 400.0 * TIME + 180.0) % 360.0 - 180.0
+    points = np.ones((4, len(names), len(TIME)))
+    points[0, 2:5] = flexion, flexion[::-1], head
+    if unit == 'rad':
+        points[0, 2:5] = np.radians(points[0, 2:5])
+    points[:3, 2, :3] = 0.0       # no value yet
+    points[:3, 5] = 0.0           # never one
+    file['parameters']['POINT']['RATE']['value'] = [200]
+    file['parameters']['POINT']['LABELS']['value'] = [f'Anna:{name}' for name in names]
+    file.add_parameter('POINT', 'ANGLES', [f'Anna:{name}' for name in names[2:]])
+    if unit:
+        file.add_parameter('POINT', 'ANGLE_UNITS', [unit])
+    file['data']['points'] = points
+    file.write(str(path))
+    return flexion, 170.0 + 400.0 * TIME
+
+
+def test_angles_of_a_model_are_joints(tmp_path):
+    path = tmp_path / 'model.c3d'
+    flexion, head = modelled(path)
+    found = read_c3d(path)
+    assert found.joints == ('LKneeAngles', 'RKneeAngles', 'LHeadAngles')
+    assert np.isnan(found.positions[:3, 0]).all()
+    assert found.positions[3:, 0] == pytest.approx(np.radians(flexion[3:]), abs=1e-5)
+    assert found.positions[:, 2] == pytest.approx(np.radians(head), abs=1e-5)
+    assert "without a value, left out: 'RHeadAngles'" in found.notes
+    assert 'first component' in ' '.join(found.notes)
+    assert read_c3d(path, joints=['*Knee*']).joints == ('LKneeAngles', 'RKneeAngles')
+    with pytest.raises(RecordingError, match=r"model\.c3d: no value of 'RHeadAngles'"):
+        read_c3d(path, joints=['RHeadAngles'])
+    with pytest.raises(RecordingError, match='no marker'):  # segments are of the markers
+        read_c3d(path, 'human_plug_in_gait')
+
+
+@pytest.mark.parametrize('unit', ['rad', ''])
+def test_the_unit_of_angles_is_that_of_the_file(tmp_path, unit):
+    path = tmp_path / 'model.c3d'
+    flexion, _ = modelled(path, unit)
+    found = read_c3d(path, joints=['LKneeAngles'])
+    # Instants at which no joint has a value are none of the recording.
+    assert found.positions[:, 0] == pytest.approx(np.radians(flexion[3:]), abs=1e-5)
+    assert ('angles are taken to be in degrees' in ' '.join(found.notes)) == (unit == '')
+
+
+def test_an_unknown_unit_is_named(tmp_path):
+    path = tmp_path / 'model.c3d'
+    modelled(path, 'gon')
+    with pytest.raises(RecordingError, match="ANGLE_UNITS is 'gon', not deg or rad"):
+        read_c3d(path)
+
+
 @pytest.mark.parametrize('data', [b'', b'C3D', b'\x02\x50' * 100, b'\x02P' + bytes(2000),
                                   b'\x00P' + bytes(2000), b'\xff' * 4000])
 def test_what_is_none_ends_in_one_line(tmp_path, data):
