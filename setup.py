@@ -112,5 +112,6 @@ setup(
         'tune = cpg_ros.tools.executables:tune',
         'calibrate = cpg_ros.tools.executables:calibrate',
         'atlas = cpg_ros.tools.executables:atlas',
+        'record_dataset = cpg_ros.tools.executables:record_dataset',
         'export = cpg_ros.tools.executables:export']},
 )

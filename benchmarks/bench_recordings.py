@@ -65,9 +65,9 @@ def outcome(number: int, folder: Path, seed: int = SEED) -> tuple[str, Stride | 
 
 
 def of_dataset(folder: Path) -> dict[str, object]:
-    """Name the gaits of a set that record_dataset.py made, and compare with its truth."""
+    """Name the gaits of a set that record_dataset made, and compare with its truth."""
     tally = dict.fromkeys(('right', 'doubted', 'wrong', 'none'), 0)
-    off, duties, wrong = [], [], []
+    off, duties, wrong, inside = [], [], [], []
     for path in sorted(folder.glob('*/truth.yaml')):
         truth = yaml.safe_load(path.read_text())
         robot = load_robot(truth['robot'])
@@ -81,6 +81,9 @@ def of_dataset(folder: Path) -> dict[str, object]:
         right, sure = fit.stride.nearest == truth['gait'], fit.confidence >= 0.95
         tally['right' if right else 'wrong' if sure else 'doubted'] += 1
         if right:
+            known = truth['parameters']
+            inside += [one.low <= known[name] <= one.high
+                       for name, one in fit.fit.parameters.items() if name in known]
             off.append(abs(fit.stride.frequency / truth['frequency'] - 1.0))
             if fit.stride.contacts is not None:
                 duties += [abs(fit.stride.contacts.duty[leg] - share)
@@ -89,12 +92,13 @@ def of_dataset(folder: Path) -> dict[str, object]:
             wrong.append(path.parent.name)
     return {**tally, 'sure_and_wrong': wrong, 'median_frequency_error': float(np.median(off)),
             'most_frequency_error': float(np.max(off)),
-            'median_duty_error': float(np.median(duties))}
+            'median_duty_error': float(np.median(duties)), 'intervals': len(inside),
+            'with_the_truth': sum(inside)}
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument('--dataset', type=Path, help='of record_dataset.py: only this')
+    parser.add_argument('--dataset', type=Path, help='of record_dataset: only this')
     parser.add_argument('--files', type=int, default=FILES)
     parser.add_argument('--seed', type=int, default=SEED)
     given = parser.parse_args()

@@ -257,6 +257,9 @@ def fit_recording(recording: Recording, robot: Robot | None = None, network: str
     if robot is None and any(len(own) > 1 for own in next(iter(kind.legs.values())).values()):
         read += ("; each joint is taken to follow its leg's first cell, as no robot file says "
                  'which, and parameters and intervals hold for that alone')
+    if stride.contacts is not None:
+        warnings.append('feet bore loads: what servos, the ground and feedback changed of the '
+                        "joints' motion counts as the network's, which intervals do not know")
     fit, fallbacks = fit_with_fallbacks(stride, cells, parameters, gait, free, order, starts, done)
     fit = replace(fit, parameters={**_phases_as_estimates(fit, stride), **fit.parameters})
     found = RecordingFit(recording, read, legs, stride, fit,

@@ -20,7 +20,13 @@ import shutil
 
 from cpg_ros.errors import CpgError
 from rosbags.interfaces import Connection
-from rosbags.rosbag2 import StoragePlugin, Writer, WriterError
+from rosbags.rosbag2 import (
+    CompressionFormat,
+    CompressionMode,
+    StoragePlugin,
+    Writer,
+    WriterError,
+)
 from rosbags.typesys import get_types_from_msg, get_typestore, Stores
 
 
@@ -39,8 +45,12 @@ class BagWriter:
 
     """
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, packed: bool = False) -> None:
         """Open the bag.
+
+        Args:
+            path: of the bag, a folder.
+            packed: whether MCAP's chunks are packed by zstd, which takes time.
 
         Raises:
             BagError: something is there already, or the folder cannot be written to.
@@ -56,6 +66,8 @@ class BagWriter:
             shutil.rmtree(self._beside, ignore_errors=True)
             self._writer = Writer(self._beside / path.name, version=9,
                                   storage_plugin=StoragePlugin.MCAP)
+            if packed:
+                self._writer.set_compression(CompressionMode.STORAGE, CompressionFormat.ZSTD)
             self._writer.open()
         except (OSError, WriterError) as error:
             raise BagError(f'{path}: {getattr(error, "strerror", None) or error}') from error

@@ -20,7 +20,7 @@ Imports ``feedback``, ``motion``, ``robots`` and what is below; knows nothing of
 __all__ = ['batch', 'biped_description', 'biped_run', 'biped_tuning', 'bodies', 'body', 'camera',
            'closed_loop', 'efference_measurement', 'feedback_benefit', 'feedback_tuning',
            'foot_path', 'footfall_diagram', 'gait_design', 'inertia', 'inertial_unit',
-           'leg_geometry', 'mesh_hull', 'mjcf_description', 'model_indices', 'nearest_design',
-           'pattern_batch', 'proprioception', 'robot_model', 'run_metrics', 'run_recorder',
-           'scenario', 'servo_gains', 'soft_start', 'sprawled_leg', 'steering_table', 'terrain',
-           'tuned_gait', 'tuning', 'urdf_model']
+           'labelled_walks', 'leg_geometry', 'mesh_hull', 'mjcf_description', 'model_indices',
+           'nearest_design', 'pattern_batch', 'proprioception', 'robot_model', 'run_metrics',
+           'run_recorder', 'scenario', 'servo_gains', 'soft_start', 'sprawled_leg',
+           'steering_table', 'terrain', 'tuned_gait', 'tuning', 'urdf_model', 'walk_bag']

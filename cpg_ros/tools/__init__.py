@@ -22,4 +22,5 @@ __all__ = ['analysis_plot', 'analysis_report', 'analyze', 'arguments', 'atlas', 
            'command_line', 'completion', 'cpg', 'demo', 'demo_course', 'demo_operator',
            'demo_processes', 'executables', 'export', 'gait_diagram', 'graph_topics', 'inversion',
            'network_options', 'optimize', 'own_robot', 'phase_plot', 'phase_report', 'precompile',
-           'reading_options', 'reproduce', 'reproduction_report', 'schedule_playing', 'tune']
+           'reading_options', 'record_dataset', 'reproduce', 'reproduction_report',
+           'schedule_playing', 'tune']

@@ -36,7 +36,8 @@ EXECUTABLES = {'generator': 'nodes.generator', 'robot_sim': 'nodes.robot_sim',
                'servo_bus': 'nodes.servos.bus', 'panel': 'panel.panel_node',
                **{name: f'tools.{name}'
                   for name in ('inversion', 'cpg', 'demo', 'analyze', 'check_robot', 'optimize',
-                               'reproduce', 'tune', 'calibrate', 'atlas', 'export')}}
+                               'reproduce', 'tune', 'calibrate', 'atlas', 'record_dataset',
+                               'export')}}
 #: What does with kernels in plain Python, and steps in C; for the others that is far too slow.
 WITHOUT_NUMBA = ('generator', 'export', 'unitree_bridge', 'check_robot')
 

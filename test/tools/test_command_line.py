@@ -30,7 +30,7 @@ import pytest
 
 NODES = ('generator', 'robot_sim', 'inversion', 'panel')
 TOOLS = ('demo', 'analyze', 'check_robot', 'optimize', 'reproduce', 'tune', 'calibrate', 'atlas',
-         'export')
+         'record_dataset', 'export')
 
 
 def run(executable, *words):
