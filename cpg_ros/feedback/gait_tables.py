@@ -33,7 +33,7 @@ class GaitTables(NamedTuple):
         swinging: whether each leg is meant to, shape (SLOTS, POINTS, legs).
         progress: share of that swing, or else of its stance, that is over, the same.
         duty: share of the stride that each leg stands, shape (SLOTS, legs).
-        one_by_one: whether, for most of the stride, at most one leg swings, shape (SLOTS,).
+        one_by_one: 1 where, for most of the stride, at most one leg swings, else 0, the same.
         turns: 1 where left and right legs take turns, 0 where they hop, shape (SLOTS,).
         speeds: of the efference copies, m/s, shape (SLOTS, SPEEDS).
         expected: efference copies, shape (SLOTS, SPEEDS, BINS, SIGNALS).
@@ -61,7 +61,7 @@ class GaitTables(NamedTuple):
     def empty(cls, legs: int) -> 'GaitTables':
         """Nothing known of any gait."""
         return cls(np.zeros((SLOTS, POINTS, legs), dtype=bool), np.zeros((SLOTS, POINTS, legs)),
-                   np.ones((SLOTS, legs)), np.zeros(SLOTS, dtype=bool), np.ones(SLOTS),
+                   np.ones((SLOTS, legs)), np.zeros(SLOTS), np.ones(SLOTS),
                    np.zeros((SLOTS, SPEEDS)), np.zeros((SLOTS, SPEEDS, BINS, SIGNALS)),
                    np.zeros(SLOTS, dtype=bool), np.zeros((SLOTS, ROWS)),
                    np.ones((SLOTS, ROWS)), np.zeros(legs))

@@ -26,7 +26,8 @@ LAW = Law(
                             'share of the way to the vertical through the body by which feet '
                             'are moved'),
         'slope_share_up': Gain(0.35, 7.0, '',
-                               'the same uphill, where feet that are far ahead shorten strides'),
+                               'the same uphill in gaits whose legs swing two or more at a '
+                               'time, where feet that are far ahead shorten strides'),
         'slope_height': Gain(0.3, 3.0, 'm', 'height of the body above its feet'),
         'slope_filter': Gain(0.5, 5.0, 's',
                              'time constant of the filter on the angles of the ground'),
@@ -42,9 +43,13 @@ def update_ground(ground, angle, gains, dt):
 
 
 @jit
-def shift_ahead(ground, gains):
-    """Return how far to move all feet forward, m, on ground at an angle in rad, > 0 downhill."""
-    return shift(ground, gains.slope_share if ground > 0.0 else gains.slope_share_up, gains)
+def shift_ahead(ground, singly, gains):
+    """Return how far to move all feet forward, m, on ground at an angle in rad, > 0 downhill.
+
+    Legs swing one by one where singly is 1, and two or more at a time where it is 0.
+    """
+    uphill = gains.slope_share_up + singly * (gains.slope_share - gains.slope_share_up)
+    return shift(ground, gains.slope_share if ground > 0.0 else uphill, gains)
 
 
 @jit

@@ -156,13 +156,15 @@ def tick(legs, tables, gains, memory, sensors, planned, step, out):
         roll, pitch = off.roll - ground[0], off.pitch - ground[1]
         uphill_x = uphill_y = 0.0
         if gains.slope:
-            uphill_x = turns * slope.shift_ahead(ground[1], gains)
+            singly = tables.one_by_one[old] + mix * (
+                tables.one_by_one[new] - tables.one_by_one[old])
+            uphill_x = turns * slope.shift_ahead(ground[1], singly, gains)
             uphill_y = -turns * slope.shift(ground[0], gains.slope_share, gains)
         wide = (placement.step(off.vx, off.wy, gains.step, gains.step_pitch_rate, gains),
                 placement.step(off.vy, off.wx, gains.step_left, gains.step_roll_rate, gains))
         yielded = placement.yielding(
             off.vx, off.vy, gains.stiffen and memory.stiff_for[run] > 0.0
-            and tables.one_by_one[slot], gains)
+            and tables.one_by_one[slot] > 0.0, gains)
         memory.sidestep_correction[run] = sidestep.correct_speed(
             memory.sidestep_correction[run], -off.vy, left, gains, share * dt)
         sideways = left + memory.sidestep_correction[run]

@@ -34,9 +34,9 @@ LOADED, ALWAYS = 0.15, 0.5
 LEAST, LARGEST = 5.0, 95.0
 #: Contacts and lifts shorter than this share of a stride are those of a foot that bounces.
 BOUNCE = 0.08
-#: Touchdowns of a leg are at one phase if there are so many, and the mean vector of their phases
-#: is so long.
-TOUCHDOWNS, AGREE = 3, 0.9
+#: Touchdowns are at one phase if there are so many strides, and if single strides differ from most
+#: of them in no more than this share of the cycle; points of a cycle, and which samples are near.
+STRIDES, DISAGREE, POINTS, NEAR = 3.0, 0.15, 200, 0.02
 #: Fewest samples of a stride that tell stance from swing.
 FEWEST = 12
 #: Flight, as a share of the time, up to which legs walk, and from which on they run: a foot that
@@ -85,20 +85,29 @@ class FootContacts(ShortRepr):
               ) -> dict[str, float] | None:
         """Return by how much each leg touches down before the first, cycles.
 
+        A leg touches down where it begins to stand in most strides: a stumble in one of them, or
+        a foot that bounces, moves nothing.
+
         Args:
             phase: of the stride, cycles, at times, s.
             legs: names, in the order of the network.
 
         Returns:
-            None where a leg's touchdowns are too few, or are not at one phase.
+            None for too few strides, and where a leg does not stand at one part of them.
 
         """
-        means = {leg: np.exp(2j * np.pi * phase(self.strides(leg)[:, 0])) for leg in legs}
-        if any(one.size < TOUCHDOWNS or abs(one.mean()) < AGREE for one in means.values()):
+        cycles = phase(self.times)
+        if np.ptp(cycles) < STRIDES:
             return None
-        first = means[legs[0]].mean()
-        return {leg: float(np.angle(first / one.mean()) / (2.0 * np.pi) % 1.0)
-                for leg, one in means.items()}
+        grid = np.arange(POINTS) / POINTS
+        near = np.exp((np.cos(2.0 * np.pi * (grid[:, None] - cycles)) - 1.0)
+                      / (2.0 * np.pi * NEAR)**2)
+        stands = near @ self.down / near.sum(axis=1, keepdims=True)
+        down = {leg: at for leg in legs
+                if (at := _touchdown(stands[:, self.legs.index(leg)])) is not None}
+        if len(down) < len(legs):
+            return None
+        return {leg: (down[legs[0]] - one) % 1.0 for leg, one in down.items()}
 
     def strides(self, leg: str) -> np.ndarray:
         """Return touchdown, duration and stance of a leg's strides, s, shape (k, 3)."""
@@ -108,6 +117,23 @@ class FootContacts(ShortRepr):
         ends = touched[1:]
         stance = lifted[np.searchsorted(lifted, touched[:-1])] if len(ends) else ends
         return np.column_stack([touched[:-1], ends - touched[:-1], stance - touched[:-1]])
+
+
+def _touchdown(stands: np.ndarray) -> float | None:
+    """Return where the longest stance begins, cycles, given the share of strides that stand.
+
+    None where it is not clear when the leg stands: at most points strides have to agree.
+    """
+    most = stands > 0.5
+    if most.all() or not most.any() or np.abs(stands - most).mean() > DISAGREE:
+        return None
+    begins = np.flatnonzero(most & ~np.roll(most, 1))
+    ends = np.flatnonzero(~most & np.roll(most, 1))
+    long = (ends[np.searchsorted(ends, begins) % len(ends)] - begins) % len(most)
+    k = int(begins[np.argmax(long)])
+    # Where the share passes a half.
+    before, after = stands[k - 1], stands[k]
+    return float((k - (after - 0.5) / (after - before)) / len(most))
 
 
 def foot_contacts(loads: FootLoadsLike, legs: Collection[str], begin: float, end: float,

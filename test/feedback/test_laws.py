@@ -171,10 +171,12 @@ def test_feet_stand_under_the_body_on_a_slope():
 
 
 def test_feet_are_moved_less_uphill_than_downhill():
-    up, down = slope.shift_ahead(-0.2, GAINS), slope.shift_ahead(0.2, GAINS)
+    up, down = slope.shift_ahead(-0.2, 0.0, GAINS), slope.shift_ahead(0.2, 0.0, GAINS)
     assert up < 0.0 < down
     assert up / down == pytest.approx(-GAINS.slope_share_up / GAINS.slope_share)
-    assert slope.shift_ahead(0.0, GAINS) == 0.0
+    assert slope.shift_ahead(0.0, 0.0, GAINS) == 0.0
+    # A walk, three of whose feet stand, has the room.
+    assert slope.shift_ahead(-0.2, 1.0, GAINS) == pytest.approx(-down)
 
 
 def test_heading_turns_back_by_the_shorter_way():

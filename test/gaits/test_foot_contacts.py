@@ -79,6 +79,24 @@ def test_legs_that_are_built_unlike_are_in_step_by_their_feet():
     assert any('those of touchdown' in note for note in found.notes)
 
 
+@pytest.mark.parametrize(('share', 'by_feet'), [(0.2, True), (0.5, False)])
+def test_stumbles_do_not_move_touchdowns(share, by_feet):
+    recording, loads = recorded(0.62)
+    rng, stride = np.random.default_rng(8), loads.times // PERIOD
+    # In some strides the right foot, whose stance begins half a stride later, stands elsewhere.
+    for k in np.flatnonzero(rng.permutation(12) < round(12 * share)):
+        loads.loads[stride == k, 1] = 20.0
+        loads.loads[(stride == k) & (loads.times % PERIOD < 0.4 * PERIOD), 1] = 280.0
+    shifted = recording.positions.copy()
+    for column in (2, 3):
+        shifted[:, column] = np.interp(recording.times + 0.2 * PERIOD, recording.times,
+                                       recording.positions[:, column])
+    unlike = SimpleNamespace(**{**vars(recording), 'positions': shifted})
+    found = find_stride(unlike, LEGS, NETWORKS['biped'], loads=loads)
+    assert any('those of touchdown' in note for note in found.notes) == by_feet
+    assert found.phases['right'] == pytest.approx(0.5 if by_feet else 0.7, abs=0.03)
+
+
 def test_between_walk_and_run_it_cannot_tell():
     recording, loads = recorded(0.44)
     found = find_stride(recording, LEGS, NETWORKS['biped'], loads=loads)
