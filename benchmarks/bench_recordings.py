@@ -32,6 +32,7 @@ from cpg_ros.gaits.stride import find_stride, Stride
 from cpg_ros.inversion.recording_fit import fit_recording
 from cpg_ros.networks.delayed import Delayed
 from cpg_ros.recordings.csv_reader import read_csv
+from cpg_ros.recordings.servo import Servo
 from cpg_ros.robots.robot_file import load_robot
 from hostile_recordings import SEED, spoiled, WAYS
 import numpy as np
@@ -67,7 +68,8 @@ def outcome(number: int, folder: Path, seed: int = SEED) -> tuple[str, Stride | 
 def of_dataset(folder: Path) -> dict[str, object]:
     """Name the gaits of a set that record_dataset made, and compare with its truth."""
     tally = dict.fromkeys(('right', 'doubted', 'wrong', 'none'), 0)
-    off, duties, wrong, inside = [], [], [], []
+    off, duties, wrong = [], [], []
+    inside: dict[str, list[bool]] = {'angles': [], 'commands': []}
     for path in sorted(folder.glob('*/truth.yaml')):
         truth = yaml.safe_load(path.read_text())
         robot = load_robot(truth['robot'])
@@ -81,9 +83,13 @@ def of_dataset(folder: Path) -> dict[str, object]:
         right, sure = fit.stride.nearest == truth['gait'], fit.confidence >= 0.95
         tally['right' if right else 'wrong' if sure else 'doubted'] += 1
         if right:
-            known = truth['parameters']
-            inside += [one.low <= known[name] <= one.high
-                       for name, one in fit.fit.parameters.items() if name in known]
+            sent = read_recording(path.with_name('bag'), progress=False,
+                                  servo=Servo(**truth['servo']))
+            for kind, one in ('angles', fit), ('commands', fit_recording(
+                    sent, robot, truth['network'], truth['gait'])):
+                inside[kind] += [number.low <= truth['parameters'][name] <= number.high
+                                 for name, number in one.fit.parameters.items()
+                                 if name in truth['parameters']]
             off.append(abs(fit.stride.frequency / truth['frequency'] - 1.0))
             if fit.stride.contacts is not None:
                 duties += [abs(fit.stride.contacts.duty[leg] - share)
@@ -92,8 +98,8 @@ def of_dataset(folder: Path) -> dict[str, object]:
             wrong.append(path.parent.name)
     return {**tally, 'sure_and_wrong': wrong, 'median_frequency_error': float(np.median(off)),
             'most_frequency_error': float(np.max(off)),
-            'median_duty_error': float(np.median(duties)), 'intervals': len(inside),
-            'with_the_truth': sum(inside)}
+            'median_duty_error': float(np.median(duties)), 'intervals': len(inside['angles']),
+            'with_the_truth': {kind: sum(one) for kind, one in inside.items()}}
 
 
 def main() -> None:

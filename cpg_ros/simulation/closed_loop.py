@@ -83,7 +83,7 @@ class ClosedLoop(Bodies):
                 expected.
             noise: of the sensors.
             goal: way forward at which a run ends, m.
-            keep_senses: whether the outcome has what is measured.
+            keep_senses: whether the outcome has what is measured, and the efforts.
 
         """
         model, dt, parts = self.body.model, self.timestep, self.parts
@@ -112,6 +112,7 @@ class ClosedLoop(Bodies):
         senses = SensorData.zeros(runs, legs, len(order))
         kept = SensorData(*(np.zeros((steps, *one.shape)) for one in senses
                                 )) if keep_senses else None
+        efforts = np.zeros((steps, runs, len(order))) if keep_senses else None
         noisy = None if noise is None else NoisySenses(noise, runs, legs, dt)
         velocity, work = np.zeros((runs, 3)), np.zeros((steps, runs))
         fell, arrived = np.full((2, runs), np.inf)
@@ -153,6 +154,8 @@ class ClosedLoop(Bodies):
             _, applied = torques(model, joints[:, 0], senses.joint_positions[:, places], speeds,
                                  memory.kp_scale)
             work[k] = np.maximum(applied * speeds, 0.0).sum(axis=1)
+            if efforts is not None:
+                efforts[k] = applied[:, order]
             earlier, before = state[:, base].copy(), state[some, moving]
             if stiff:
                 models = [(stiff if memory.kp_scale[run] > 1.0 else all_models)[run]
@@ -182,4 +185,5 @@ class ClosedLoop(Bodies):
             found[key] = found[key][:, :, 0]
         return Outcome(fell=fell, arrived=arrived, senses=None if kept is None else SensorData(
             *(rows.swapaxes(0, 1) for rows in kept)),
+                       efforts=None if efforts is None else efforts.swapaxes(0, 1),
                        cost=done / (self.geometry.weight * np.maximum(way, 1e-3)), **found)

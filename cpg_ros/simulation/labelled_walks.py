@@ -46,6 +46,7 @@ class LabelledWalk:
     Attributes:
         ground: 'flat', 'pushed' or 'rough'.
         senses: what was measured up to its end or its fall, of arrays (steps, ...).
+        efforts: of the joints, N m, shape (steps, joints).
         timestep: s.
         truth: what made it, of plain values; see the data card of ``record_dataset``.
 
@@ -53,6 +54,7 @@ class LabelledWalk:
 
     ground: str
     senses: SensorData
+    efforts: np.ndarray
     timestep: float
     truth: dict[str, Any]
 
@@ -92,17 +94,24 @@ def walks(program: GaitPlan, model: str, seconds: float, seed: Sequence[int]
     gains = None if program.motion.efference is None else robot_gains(program.robot)
     ran = loop.run(list(met.values()), seconds, gains, noise=SensorNoise(**NOISE, seed=seed[0]),
                    keep_senses=True)
-    assert ran.senses is not None
+    assert ran.senses is not None and ran.efforts is not None
     found = []
     for run, (ground, scenario) in enumerate(met.items()):
         steps = ran.senses.foot_forces.shape[1]
         if np.isfinite(ran.fell[run]):
             steps = round(float(ran.fell[run]) / loop.timestep)
         senses = SensorData(*(np.ascontiguousarray(one[run, :steps]) for one in ran.senses))
-        found.append(LabelledWalk(ground, senses, loop.timestep, _truth(
+        found.append(LabelledWalk(ground, senses, ran.efforts[run, :steps], loop.timestep, _truth(
             program, scenario, float(ran.fell[run]),
-            senses.foot_forces[steps // 3:] > LOADED * loop.geometry.weight)))
+            senses.foot_forces[steps // 3:] > LOADED * loop.geometry.weight)
+            | {'servo': _gains(loop)}))
     return found
+
+
+def _gains(loop: ClosedLoop) -> dict[str, float]:
+    """Return the gains of the servos, N m/rad and N m s/rad."""
+    model = loop.body.model
+    return {'kp': float(model.actuator_gainprm[0, 0]), 'kd': float(-model.actuator_biasprm[0, 2])}
 
 
 def _scenarios(rng: np.random.Generator, seconds: float, speed: float) -> dict[str, Scenario]:

@@ -112,6 +112,7 @@ class Outcome(ShortRepr):
         cost: of transport after BEGINNING, shape (runs,).
         senses: what was measured before each step, of arrays (runs, steps, ...), if it was kept;
             after a run's end it means nothing.
+        efforts: of the joints' servos in each step, N m, shape (runs, steps, joints), the same.
 
     """
 
@@ -127,6 +128,7 @@ class Outcome(ShortRepr):
     stiff: np.ndarray
     cost: np.ndarray
     senses: SensorData | None = None
+    efforts: np.ndarray | None = None
 
     @property
     def upright(self) -> np.ndarray:

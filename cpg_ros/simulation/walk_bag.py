@@ -29,13 +29,15 @@ JOINTS, IMU, LOADS = ('sensor_msgs/msg/JointState', 'sensor_msgs/msg/Imu',
                       'std_msgs/msg/Float64MultiArray')
 
 
-def write_bag(path: Path, robot: Robot, senses: SensorData, period: float) -> None:
+def write_bag(path: Path, robot: Robot, senses: SensorData, efforts: np.ndarray, period: float
+              ) -> None:
     """Write the topics ``joint_states``, ``imu`` and ``foot_contacts``, packed.
 
     Args:
         path: of the bag, a folder that is not there yet.
         robot: whose joints and legs they are.
         senses: of arrays (samples, ...).
+        efforts: of the joints, N m, shape (samples, joints).
         period: between samples, s.
 
     Raises:
@@ -59,7 +61,7 @@ def write_bag(path: Path, robot: Robot, senses: SensorData, period: float) -> No
         facing = turn(sr * cp * cy - cr * sp * sy, cr * sp * cy + sr * cp * sy,
                       cr * cp * sy - sr * sp * cy, cr * cp * cy + sr * sp * sy)
         for kind, message in (
-                (JOINTS, types[JOINTS](header, names, angles[k], speeds[k], np.zeros(0))),
+                (JOINTS, types[JOINTS](header, names, angles[k], speeds[k], efforts[k])),
                 (IMU, types[IMU](header, facing, unknown, vector(*turning[k]), unknown,
                                  vector(*acceleration[k]), unknown)),
                 (LOADS, types[LOADS](layout, loads[k]))):

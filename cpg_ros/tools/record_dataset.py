@@ -52,12 +52,13 @@ CARD = """# Simulated walks of {robots}
 **Simulated**: MuJoCo, sensors with noise (below), rigid ground. Nothing in it is of a person or
 an animal. Licence: CC0 1.0, public domain.
 
-Topics: `joint_states` (rad, rad/s), `imu` (orientation, rad/s, m/s^2), `foot_contacts` (N, legs
-in the label). Each folder's `truth.yaml` has the robot, the network with all parameters, gait,
-frequency, phases of the legs, the joints' readouts (offset and weights, rad) as they are planned,
-before any feedback; wish (m/s; null where the gait is not steered), ground, friction, pushes (s,
-N s forward and to the left), when it fell if it did (s; the bag ends there), and the share of the
-time that each foot bore a load, duty.
+Topics: `joint_states` (rad, rad/s, N m), `imu` (orientation, rad/s, m/s^2), `foot_contacts` (N,
+legs in the label). Each folder's `truth.yaml` has the robot, the network with all parameters,
+gait, frequency, phases of the legs, the joints' readouts (offset and weights, rad) as they are
+planned, before any feedback; wish (m/s; null where the gait is not steered), ground, friction,
+pushes (s, N s forward and to the left), when it fell if it did (s; the bag ends there), the share
+of the time that each foot bore a load, duty, and the gains of the joints' servos, kp in N m/rad
+and kd in N m s/rad (kp is doubled while a push is caught).
 
 Sensor noise: {noise}.
 
@@ -107,8 +108,8 @@ def _walked(program: GaitPlan, model: str, chosen: argparse.Namespace, seed: Seq
         place = folder / f'{robot.name}_{program.gait}_{one.ground}'
         place.mkdir(parents=True)
         every = round(1.0 / (chosen.rate * one.timestep))
-        write_bag(place / 'bag', robot, SensorData(*(sense[::every] for sense in one.senses)),
-                  every * one.timestep)
+        senses = SensorData(*(sense[::every] for sense in one.senses))
+        write_bag(place / 'bag', robot, senses, one.efforts[::every], every * one.timestep)
         (place / 'truth.yaml').write_text(yaml.safe_dump(one.truth, sort_keys=False))
         rows.append((place.name, one.truth['network'], program.gait, f'{program.frequency:g}',
                      str(one.truth['fell'] or 'no')))

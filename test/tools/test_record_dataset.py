@@ -19,6 +19,7 @@ from pathlib import Path
 
 from cpg_ros import read_recording
 from cpg_ros.inversion.recording_fit import fit_recording
+from cpg_ros.recordings.servo import Servo
 from cpg_ros.robots.robot_file import load_robot
 from cpg_ros.tools.record_dataset import main
 import numpy as np
@@ -47,6 +48,11 @@ def test_a_walk_that_is_kept_is_named_by_its_inversion(name):
     for leg, share in truth['duty'].items():
         assert found.stride.contacts.duty[leg] == pytest.approx(share, abs=0.1)
     assert any('intervals do not know' in line for line in found.warnings)
+    # By what joints did, and by what their servos were sent.
+    sent = read_recording(KEPT / name / 'bag', progress=False, servo=Servo(**truth['servo']))
+    for fit in found.fit, fit_recording(sent, load_robot('unitree_go2'), 'delayed',
+                                        free=['tau']).fit:
+        assert fit.parameters['tau'].low < truth['parameters']['tau'] < fit.parameters['tau'].high
 
 
 def test_a_set_is_what_its_card_says(tmp_path, capsys):
