@@ -15,7 +15,11 @@
 """Sidestep: feet carry the body sideways while they stand, and step back while they swing.
 
 How fast that is depends on how the gait rocks the body, so the speed is corrected by an integral.
+A gait that turns drifts to the side, too, so that the same integral acts as far as a turn is
+commanded.
 """
+
+import math
 
 from cpg_ros.feedback import placement
 from cpg_ros.feedback.law import Gain, Law, StateVariable
@@ -32,10 +36,14 @@ LAW = Law(
                               'corrected by what is missing of it'),
         'sidestep_more': Gain(1.0, 10.0, '',
                               'largest such correction, as a share of the commanded sideways '
-                              'speed')},
+                              'speed'),
+        'sidestep_turning': Gain(0.5, 5.0, 'm',
+                                 'and, while a turn is commanded, this times its rad/s'),
+        'sidestep_filter': Gain(0.5, 5.0, 's', 'time constant of the filter on that turn')},
     memory={
         'sidestep_displacement': StateVariable('of each foot to the left [m]', ('legs',)),
-        'sidestep_correction': StateVariable('added to the commanded sideways speed [m/s]')})
+        'sidestep_correction': StateVariable('added to the commanded sideways speed [m/s]'),
+        'commanded_turn': StateVariable('low-passed [rad/s]')})
 
 
 @jit
@@ -80,18 +88,25 @@ def advance(displacement, swinging, wanted, stance, gains, dt):
 
 
 @jit
-def correct_speed(correction, missing, wanted, gains, dt):
+def smooth_turn(turn, commanded, gains, dt):
+    """Return the low-passed turn, rad/s, dt in s later."""
+    return turn + (1.0 - math.exp(-dt / gains.sidestep_filter)) * (commanded - turn)
+
+
+@jit
+def correct_speed(correction, missing, wanted, turn, gains, dt):
     """Return what to add to the commanded speed to the left, m/s, dt in s later.
 
-    0 where none is commanded.
+    0 where none is commanded, and no turn.
 
     Args:
         correction: so far, m/s.
         missing: speed to the left, m/s.
         wanted: commanded speed to the left, m/s.
+        turn: commanded, low-passed, rad/s.
         gains: of the law.
         dt: s.
 
     """
-    most = gains.sidestep_more * abs(wanted)
+    most = gains.sidestep_more * abs(wanted) + gains.sidestep_turning * abs(turn)
     return min(max(correction + dt * gains.sidestep_rate * missing, -most), most)

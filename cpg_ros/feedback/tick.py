@@ -56,6 +56,7 @@ class PlannedMotion(NamedTuple):
         mix: share of the one that is entered, shape (runs,).
         velocity: wanted forward and to the left, m/s, shape (runs, 2).
         heading: wanted, rad, shape (runs,).
+        turn: wanted, rad/s, shape (runs,).
 
     """
 
@@ -65,6 +66,7 @@ class PlannedMotion(NamedTuple):
     mix: np.ndarray
     velocity: np.ndarray
     heading: np.ndarray
+    turn: np.ndarray
 
 
 class Deviation(NamedTuple):
@@ -165,8 +167,11 @@ def tick(legs, tables, gains, memory, sensors, planned, step, out):
         yielded = placement.yielding(
             off.vx, off.vy, gains.stiffen and memory.stiff_for[run] > 0.0
             and tables.one_by_one[slot] > 0.0, gains)
+        memory.commanded_turn[run] = sidestep.smooth_turn(
+            memory.commanded_turn[run], planned.turn[run], gains, dt)
         memory.sidestep_correction[run] = sidestep.correct_speed(
-            memory.sidestep_correction[run], -off.vy, left, gains, share * dt)
+            memory.sidestep_correction[run], -off.vy, left, memory.commanded_turn[run], gains,
+            share * dt)
         sideways = left + memory.sidestep_correction[run]
         strode = (phase - memory.last_phase[run] + 0.5) % 1.0 - 0.5
         memory.last_phase[run] = phase

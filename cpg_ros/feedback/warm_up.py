@@ -45,6 +45,6 @@ def warm_up(geometry: Geometry, joints: int) -> None:
     loads_of(geometry.rows, geometry.columns, some, some, 0.0, 0.0, load)
     agreement(load, 1.0, np.zeros(legs, dtype=bool), 0.1, 1.0)
     planned = PlannedMotion(some[None], one, np.zeros((1, 2), dtype=np.int64), one.copy(),
-                            np.zeros((1, 2)), one.copy())
+                            np.zeros((1, 2)), one.copy(), one.copy())
     feedback.advance(sensors, planned, 0.002, 0.0)
     Odometry(geometry).advance(sensors, np.zeros(3), np.zeros(legs, dtype=bool), 0.002)

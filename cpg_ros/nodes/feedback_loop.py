@@ -79,7 +79,7 @@ class FeedbackLoop:
         self._least = TOUCH * geometry.weight
         self._planned = PlannedMotion(np.zeros((1, len(pattern.robot.joints))), np.zeros(1),
                                       np.zeros((1, 2), dtype=np.int64), np.zeros(1),
-                                      np.zeros((1, 2)), np.zeros(1))
+                                      np.zeros((1, 2)), np.zeros(1), np.zeros(1))
         self.wanted, self.waiting, self.faults = False, True, ''
         self._trim = np.zeros(len(pattern.robot.legs))
         self._limits = pattern.robot.column('lower'), pattern.robot.column('upper')
@@ -160,7 +160,7 @@ class FeedbackLoop:
         planned.gaits[0] = feedback.slot(old), feedback.slot(new)
         planned.phase[0] = pattern.phases[0]
         forward, left, turn = self._motion()
-        planned.velocity[0] = forward, left
+        planned.velocity[0], planned.turn[0] = (forward, left), turn
         yaw = float(inputs.sensor_data.rpy[0, 2])
         if self.share and pattern.level:
             # Without a wanted turn the heading is kept; with one it advances.

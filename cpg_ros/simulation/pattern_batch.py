@@ -49,7 +49,6 @@ class _Drives(NamedTuple):
     target: np.ndarray
     now: np.ndarray
     rate: np.ndarray
-    turning: np.ndarray
     faded: np.ndarray
 
 
@@ -78,10 +77,9 @@ class PatternBatch:
         self.planned = PlannedMotion(
             self._last.copy(), np.array([one.phase for one in scenarios]),
             np.zeros((runs, 2), dtype=np.int64), np.ones(runs),
-            np.array([[one.speed, 0.0] for one in scenarios]), np.zeros(runs))
+            np.array([[one.speed, 0.0] for one in scenarios]), np.zeros(runs), np.zeros(runs))
         strides = np.ones((runs, len(robot.legs) + 1))
-        self._drives = _Drives(strides, strides.copy(), np.zeros_like(strides), np.zeros(runs),
-                               np.ones(runs))
+        self._drives = _Drives(strides, strides.copy(), np.zeros_like(strides), np.ones(runs))
         for run in range(runs):
             self._steer(run)
         self._drives.now[:] = strides
@@ -97,7 +95,7 @@ class PatternBatch:
         target[:] = 1.0
         if program.motion.steering is not None:
             target[:-1], target[-1] = program.steer(self.planned.velocity[run, 0],
-                                                    self._drives.turning[run])
+                                                    self.planned.turn[run])
 
     def advance(self, stride: np.ndarray, frequency_scale: np.ndarray) -> None:
         """Advance by one time step.
@@ -114,7 +112,7 @@ class PatternBatch:
                 self.planned.gaits[run] = self.planned.gaits[run, 1], self._names.index(name)
                 self._drives.faded[run] = 0.0
             else:
-                self.planned.velocity[run], self._drives.turning[run] = wish[:2], wish[2]
+                self.planned.velocity[run], self.planned.turn[run] = wish[:2], wish[2]
             self._steer(run)
         self.level = smoothstep(min(1.0, self._time / RAMP))[0]
         _advance(self._gaits, self._drives, stride, frequency_scale, self.level, self._dt,
@@ -140,7 +138,7 @@ def _advance(gaits, drives, strides, frequency_scales, level, dt, planned):
         approach(drives.target[run], strides[run], clock, drive[run], drives.rate[run])
         mixed = frequency[old] + mix * (frequency[new] - frequency[old])
         phase = planned.phase[run] = (planned.phase[run] + mixed * drive[run, -1] * clock) % 1.0
-        planned.heading[run] += drives.turning[run] * dt
+        planned.heading[run] += planned.turn[run] * dt
         low, high, on = between_phases(phase * POINTS, POINTS)
         for joint in range(len(gaits.offset)):
             stride, found = drive[run, gaits.leg[joint]], 0.0

@@ -201,7 +201,8 @@ def close(pattern, feedback, measure, velocity, heading):
     def correct(angles):
         old, new, mix[0] = pattern.fading
         gaits[0] = feedback.slot(old), feedback.slot(new)
-        planned = PlannedMotion(angles[None], pattern.phases[:1], gaits, mix, velocity, heading)
+        planned = PlannedMotion(angles[None], pattern.phases[:1], gaits, mix, velocity, heading,
+                                np.zeros(1))
         corrected = feedback.advance(measure(), planned, DT, 1.0, pattern.level)
         pattern.frequency_scale = float(memory.frequency_scale[0])
         stride, pace = new.steer(float(velocity[0, 0]), 0.0)

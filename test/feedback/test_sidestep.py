@@ -12,7 +12,7 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""A sidestep goes as fast as it is commanded to, and changes nothing where none is."""
+"""A sidestep goes as fast as it is commanded to, and changes nothing without a command."""
 
 import importlib.util
 
@@ -39,10 +39,30 @@ def loop():
 def test_what_is_missing_is_asked_for_up_to_a_share_of_what_is_wanted():
     added = 0.0
     for _ in range(round(10.0 / DT)):
-        added = sidestep.correct_speed(added, 0.05, 0.1, GAINS, DT)
+        added = sidestep.correct_speed(added, 0.05, 0.1, 0.0, GAINS, DT)
     assert added == pytest.approx(0.1 * GAINS.sidestep_more)
-    assert sidestep.correct_speed(added, -0.05, 0.1, GAINS, DT) < added
-    assert sidestep.correct_speed(added, 0.05, 0.0, GAINS, DT) == 0.0
+    assert sidestep.correct_speed(added, -0.05, 0.1, 0.0, GAINS, DT) < added
+    assert sidestep.correct_speed(added, 0.05, 0.0, 0.0, GAINS, DT) == 0.0
+    for turn in (0.1, -0.1):
+        assert sidestep.correct_speed(1.0, 0.0, 0.0, turn, GAINS, DT) == pytest.approx(
+            0.1 * GAINS.sidestep_turning)
+
+
+def test_a_turn_that_ends_is_forgotten_within_a_second():
+    turn = 0.0
+    for wanted in (1.0, 0.0):
+        for _ in range(round(2.0 / DT)):
+            turn = sidestep.smooth_turn(turn, wanted, GAINS, DT)
+        assert turn == pytest.approx(wanted, abs=0.02)
+
+
+def test_a_turn_does_not_drift_to_the_side(loop):
+    runs = [Scenario(speed=forward, commands=((2.0, forward, 0.0, turn),))
+            for forward, turn in ((0.4, 0.5), (0.3, -0.5), (0.0, 0.5))]
+    late = slice(round(6.0 / DT), None)
+    drift, before = (np.abs(loop.run(runs, 12.0, gains).velocity[:, late, 1].mean(axis=1))
+                     for gains in (GAINS, GAINS._replace(sidestep_turning=0.0)))
+    assert drift.max() < 0.02 and before.max() > 0.15
 
 
 def test_it_is_as_fast_on_the_spot_as_while_walking(loop):
@@ -56,7 +76,7 @@ def test_it_is_as_fast_on_the_spot_as_while_walking(loop):
         np.array([forward for forward, _ in asked]), abs=0.02)
 
 
-def test_without_a_command_to_the_side_nothing_changes_bit_for_bit(loop):
+def test_without_a_command_nothing_changes_bit_for_bit(loop):
     runs = [Scenario(), Scenario(pushes=(impulse(1.5, 5.0, 20.0),))]
     one, other = (loop.run(runs, 3.0, gains)
                   for gains in (GAINS, GAINS._replace(sidestep_rate=0.0)))
