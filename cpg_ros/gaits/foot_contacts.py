@@ -99,12 +99,17 @@ class FootContacts(ShortRepr):
         cycles = phase(self.times)
         if np.ptp(cycles) < STRIDES:
             return None
+        point = (cycles % 1.0 * POINTS).astype(np.int64) % POINTS
         grid = np.arange(POINTS) / POINTS
-        near = np.exp((np.cos(2.0 * np.pi * (grid[:, None] - cycles)) - 1.0)
+        near = np.exp((np.cos(2.0 * np.pi * (grid[:, None] - grid)) - 1.0)
                       / (2.0 * np.pi * NEAR)**2)
-        stands = near @ self.down / near.sum(axis=1, keepdims=True)
-        down = {leg: at for leg in legs
-                if (at := _touchdown(stands[:, self.legs.index(leg)])) is not None}
+        samples = near @ np.bincount(point, minlength=POINTS)
+        down = {}
+        for leg in legs:
+            stood = near @ np.bincount(point, self.down[:, self.legs.index(leg)], POINTS)
+            at = _touchdown(stood / samples)
+            if at is not None:
+                down[leg] = at
         if len(down) < len(legs):
             return None
         return {leg: (down[legs[0]] - one) % 1.0 for leg, one in down.items()}
