@@ -25,6 +25,7 @@ from cpg_ros.feedback.froude_scaling import robot_gains
 from cpg_ros.motion.plan import GaitPlan, plan
 from cpg_ros.networks.registry import PRESETS
 from cpg_ros.robots.robot import Robot
+from cpg_ros.short_repr import ShortRepr
 from cpg_ros.simulation.closed_loop import ClosedLoop
 from cpg_ros.simulation.scenario import impulse, PUSH, Scenario, SensorNoise
 from cpg_ros.simulation.terrain import Terrain
@@ -39,8 +40,8 @@ NOISE = {'force_bias': 0.05, 'force_noise': 0.03, 'orientation_bias': 0.005,
          'gyroscope_noise': 0.02, 'accelerometer_noise': 0.1}
 
 
-@dataclass(frozen=True)
-class LabelledWalk:
+@dataclass(frozen=True, eq=False, repr=False)
+class LabelledWalk(ShortRepr):
     """A run of a robot.
 
     Attributes:
@@ -57,6 +58,10 @@ class LabelledWalk:
     efforts: np.ndarray
     timestep: float
     truth: dict[str, Any]
+
+    def _summary(self) -> str:
+        return (f'{self.truth["robot"]}, {self.truth["gait"]}, {self.ground}: '
+                f'{len(self.efforts) * self.timestep:.3g} s')
 
 
 def gaits_to_record(robot: Robot, gaits: Sequence[str] = ()) -> Iterator[GaitPlan]:
