@@ -62,6 +62,15 @@ class SensorData(NamedTuple):
         return cls(*(np.zeros((runs, size)) for size in (joints, joints, legs, 3, 3, 3)))
 
 
+def fill_quaternion(roll: float, pitch: float, yaw: float, out: np.ndarray) -> None:
+    """Fill an orientation, w x y z, from its angles, rad."""
+    roll, pitch, yaw = 0.5 * roll, 0.5 * pitch, 0.5 * yaw
+    cr, sr, cp, sp = math.cos(roll), math.sin(roll), math.cos(pitch), math.sin(pitch)
+    cy, sy = math.cos(yaw), math.sin(yaw)
+    out[0], out[1] = cr * cp * cy + sr * sp * sy, sr * cp * cy - cr * sp * sy
+    out[2], out[3] = cr * sp * cy + sr * cp * sy, cr * cp * sy - sr * sp * cy
+
+
 def rpy_of(quaternions: np.ndarray) -> np.ndarray:
     """Return roll, pitch and yaw of orientations (w x y z), rad, shape (..., 3)."""
     w, x, y, z = np.moveaxis(quaternions, -1, 0)

@@ -24,7 +24,7 @@ corrections.
 from collections.abc import Callable
 import math
 
-from cpg_ros.feedback.estimate import SensorData
+from cpg_ros.feedback.estimate import fill_quaternion, SensorData
 from cpg_ros.feedback.kinematics import foot_of, Geometry
 from cpg_ros.integration.jit import bound, entry
 import numpy as np
@@ -162,11 +162,7 @@ class Odometry:
 
     def orientation(self, out: np.ndarray) -> None:
         """Fill the orientation in the odometry's frame, w x y z."""
-        roll, pitch, yaw = 0.5 * self._tilt[0], 0.5 * self._tilt[1], 0.5 * self.pose[3]
-        cr, sr, cp, sp = math.cos(roll), math.sin(roll), math.cos(pitch), math.sin(pitch)
-        cy, sy = math.cos(yaw), math.sin(yaw)
-        out[0], out[1] = cr * cp * cy + sr * sp * sy, sr * cp * cy - cr * sp * sy
-        out[2], out[3] = cr * sp * cy + sr * cp * sy, cr * cp * sy - sr * sp * cy
+        fill_quaternion(self._tilt[0], self._tilt[1], self.pose[3], out)
 
     def pose_covariance(self, out: np.ndarray) -> np.ndarray:
         """Fill that of x, y, z, roll, pitch and yaw in m and rad, shape (6, 6), as ROS has it."""

@@ -65,7 +65,7 @@ class LabelledWalk(ShortRepr):
 
 
 def gaits_to_record(robot: Robot, gaits: Sequence[str] = ()) -> Iterator[GaitPlan]:
-    """Yield a robot's gaits on its first network, those asked for or all.
+    """Yield a robot's gaits on its first network, those named, or all.
 
     Raises:
         InputError: a gait that the robot file does not have.

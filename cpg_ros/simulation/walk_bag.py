@@ -16,7 +16,7 @@
 
 from pathlib import Path
 
-from cpg_ros.feedback.estimate import SensorData
+from cpg_ros.feedback.estimate import fill_quaternion, SensorData
 from cpg_ros.recordings.bag_writer import BagWriter
 from cpg_ros.robots.robot import Robot
 import numpy as np
@@ -47,6 +47,7 @@ def write_bag(path: Path, robot: Robot, senses: SensorData, efforts: np.ndarray,
     types = STORE.types
     angles, speeds, loads, rpy, turning, acceleration = senses
     names, unknown = [joint.name for joint in robot.joints], np.zeros(9)
+    facing = np.zeros(4)
     legs = types['std_msgs/msg/MultiArrayDimension'](','.join(robot.legs), len(robot.legs), 1)
     layout = types['std_msgs/msg/MultiArrayLayout']([legs], 0)
     bag = BagWriter(path, packed=True)
@@ -57,12 +58,12 @@ def write_bag(path: Path, robot: Robot, senses: SensorData, efforts: np.ndarray,
         stamp = START + round(1e9 * k * period)
         header = types['std_msgs/msg/Header'](types['builtin_interfaces/msg/Time'](
             stamp // 10**9, stamp % 10**9), 'base_link')
-        (cr, cp, cy), (sr, sp, sy) = np.cos(0.5 * rpy[k]), np.sin(0.5 * rpy[k])
-        facing = turn(sr * cp * cy - cr * sp * sy, cr * sp * cy + sr * cp * sy,
-                      cr * cp * sy - sr * sp * cy, cr * cp * cy + sr * sp * sy)
+        roll, pitch, yaw = rpy[k].tolist()
+        fill_quaternion(roll, pitch, yaw, facing)
+        w, *xyz = facing.tolist()
         for kind, message in (
                 (JOINTS, types[JOINTS](header, names, angles[k], speeds[k], efforts[k])),
-                (IMU, types[IMU](header, facing, unknown, vector(*turning[k]), unknown,
+                (IMU, types[IMU](header, turn(*xyz, w), unknown, vector(*turning[k]), unknown,
                                  vector(*acceleration[k]), unknown)),
                 (LOADS, types[LOADS](layout, loads[k]))):
             bag.write(to[kind], stamp, bytes(STORE.serialize_cdr(message, kind)))
