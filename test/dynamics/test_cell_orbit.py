@@ -24,7 +24,7 @@ from cpg_ros.networks.biped import Biped
 from cpg_ros.networks.network import Preset
 from cpg_ros.networks.quadruped import Quadruped
 from cpg_ros.networks.registry import PRESETS
-from depth import examples
+from depth import examples, spread
 from hypothesis import given
 from hypothesis import strategies as st
 import numpy as np
@@ -32,7 +32,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 ALL = [(network, name) for network in ('quadruped', 'biped') for name in PRESETS[network]]
-EVERY = pytest.mark.parametrize(('network', 'name'), ALL)
+EVERY = pytest.mark.parametrize(('network', 'name'), spread(ALL))
 # docs/numbers_and_errata.md, section Periods of the quadruped network, and the next one.
 PERIODS = {'quadruped': {'pronk': 10.524, 'pace': 10.388, 'bound': 10.388, 'trot': 24.072,
                          'jump': 9.575, 'walk': 25.374},

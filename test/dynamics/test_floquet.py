@@ -28,13 +28,13 @@ from cpg_ros.networks.network import Preset
 from cpg_ros.networks.parameter_line import ParameterLine
 from cpg_ros.networks.quadruped import Quadruped
 from cpg_ros.networks.registry import PRESETS
-from depth import in_depth
+from depth import in_depth, spread
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
 ALL = [(network, name) for network in ('quadruped', 'biped') for name in PRESETS[network]]
-EVERY = pytest.mark.parametrize(('network', 'name'), ALL)
+EVERY = pytest.mark.parametrize(('network', 'name'), spread(ALL))
 
 
 @cache

@@ -23,7 +23,7 @@ from cpg_ros.networks.biped import Biped
 from cpg_ros.networks.delayed import Delayed
 from cpg_ros.networks.quadruped import Quadruped
 from cpg_ros.networks.registry import NETWORKS, PRESETS
-from depth import examples
+from depth import examples, spread
 from hypothesis import given
 from hypothesis import strategies as st
 from motion import BY_LEG, Driven, GAITS, leg, NAMES, noisy, quadruped, Recorded, stamps
@@ -47,7 +47,7 @@ def trot(rng, duration=15.0, rate=200.0, frequency=2.0, gait='trot', **how):
     return t, noisy(rng, quadruped(frequency * t, gait))
 
 
-@pytest.mark.parametrize(('network', 'name'), EVERY, ids=lambda value: value)
+@pytest.mark.parametrize(('network', 'name'), spread(EVERY, 4), ids=lambda value: value)
 def test_every_preset_is_measured_and_named(network, name):
     driven, rng = Driven(network, name), np.random.default_rng(1)
     t = stamps(rng, 15.0, 200.0)

@@ -25,6 +25,7 @@ from cpg_ros.networks.delayed import Delayed, PRESETS
 from cpg_ros.networks.symmetry import GAITS
 from cpg_ros.robots.robot import JointMotion, Motion
 from cpg_ros.robots.robot_file import read_robot
+from depth import spread
 import numpy as np
 import pytest
 
@@ -81,8 +82,8 @@ def check_in_gait(pattern, one, tolerance):
 
 
 @pytest.mark.parametrize(('requests', 'waits', 'dt'), [
-    *(([(old, 1.0, 1.0, 'quadruped'), (new, 1.0, 1.0, 'quadruped')], [1.5], 0.001)
-      for old, new in PAIRS),
+    *spread([([(old, 1.0, 1.0, 'quadruped'), (new, 1.0, 1.0, 'quadruped')], [1.5], 0.001)
+             for old, new in PAIRS], 4),
     *((requests, [4.0], dt) for dt in (0.001, 0.02) for requests in (
         [('trot', 2.0, 1.0), ('walk', 0.7, 0.5)], [('pace', 1.0, 0.3), ('jump', 1.5, 2.0)],
         [('pronk', 3.0, 0.5), ('bound', 0.5, 2.0)], [('trot', 1.0, 1.0), ('trot', 2.5, 0.2)])),
@@ -102,7 +103,7 @@ def test_switches_are_smooth(requests, waits, dt):
     assert (pattern.faults, pattern.held) == (0, 0)
 
 
-@pytest.mark.parametrize(('old', 'new'), PAIRS)
+@pytest.mark.parametrize(('old', 'new'), spread(PAIRS, 4))
 def test_without_a_transition_the_network_settles_by_itself(old, new):
     pattern = in_swing(program(old), 0.1 * PAIRS.index((old, new)))
     pattern.apply(program(new), 0.0)

@@ -30,7 +30,7 @@ from cpg_ros.motion.pattern import Pattern
 from cpg_ros.motion.plan import plan, PlanError
 from cpg_ros.networks.registry import PRESETS
 from cpg_ros.robots.robot_file import read_robot
-from depth import in_depth
+from depth import in_depth, spread
 import numpy as np
 import pytest
 
@@ -44,7 +44,7 @@ SETS, SPREAD = 4, 0.5
 #: Ticks of the twin in one.
 TICKS = 4
 SIMPSON = np.array([1.0, 4.0, 2.0, 4.0, 1.0]) / 12.0
-EACH = pytest.mark.parametrize('network', [*list(PRESETS)[::2], *in_depth(*list(PRESETS)[1::2])])
+EACH = pytest.mark.parametrize('network', spread(PRESETS, 2))
 RATES = pytest.mark.parametrize('rate', [500.0, *in_depth(100.0, 2000.0)])
 
 

@@ -31,7 +31,7 @@ from cpg_ros.networks.parameter_line import ParameterLine
 from cpg_ros.networks.registry import NETWORKS, PRESETS
 from cpg_ros.networks.stated_gait import stated_gait
 from cpg_ros.robots.robot_file import load_robot
-from depth import examples, in_depth
+from depth import examples, in_depth, spread
 from hypothesis import given
 from hypothesis import strategies as st
 import numpy as np
@@ -55,7 +55,7 @@ def followed(network, start, duration):
     return run.y[:, -1]
 
 
-@pytest.mark.parametrize(('network', 'gait'), ALL[::2] + in_depth(*ALL[1::2], *HEXAPODS))
+@pytest.mark.parametrize(('network', 'gait'), spread(ALL, 2) + in_depth(*HEXAPODS))
 def test_every_gait_is_an_orbit_of_the_papers_equations_and_attracts(network, gait):
     preset = PRESETS[network][gait]
     orbit = solve_preset(preset)
@@ -89,7 +89,7 @@ def off(phases, wanted):
 AGREE = 1e-6
 
 
-@pytest.mark.parametrize(('network', 'gait'), ALL[::3] + in_depth(*ALL[1::3], *ALL[2::3]))
+@pytest.mark.parametrize(('network', 'gait'), spread(ALL))
 def test_simulation_and_orbit_agree_and_noise_is_survived(network, gait):
     preset = PRESETS[network][gait]
     orbit, kind = solve_preset(preset), NETWORKS[network]
@@ -284,7 +284,8 @@ def test_a_simulation_over_kinks_is_of_second_order():
     assert order == pytest.approx(2.0, abs=0.35)
 
 
-@pytest.mark.parametrize('share', [1.0, *in_depth(0.5, 2.0)])
+@pytest.mark.deep  # the papers' reproduction has the same
+@pytest.mark.parametrize('share', [0.5, 1.0, 2.0])
 def test_two_neurons_obey_matsuokas_laws(share):
     """Scale with c, speed with the time constants, oscillate for 1 + tau/tau_v < a < 1 + beta."""
     network = alone('matsuoka', 'trot')

@@ -77,8 +77,9 @@ def off(phases, wanted):
     return float(np.abs((gap + 0.5) % 1.0 - 0.5).max())
 
 
-@pytest.mark.parametrize('name', [name for name in NAMES[:-3] if name != 'biped']
-                         + in_depth('biped', *NAMES[-3:]))
+@pytest.mark.parametrize('name', [
+    name for name in NAMES[:-3] if name not in ('quadruped', 'biped')]
+    + in_depth('quadruped', 'biped', *NAMES[-3:]))
 def test_what_is_found_is_the_gait_asked_for_or_nothing_is(name):
     network, found = NETWORKS[name], Counter()
     for preset_name, preset in network.presets().items():

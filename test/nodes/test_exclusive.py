@@ -30,7 +30,7 @@ def test_another_publisher_is_named_and_gone_again(stepped):
     until(lambda: watcher.diagnostics[-1].level == DiagnosticStatus.ERROR
           and watcher.diagnostics[-1].message
           == '/dog/lf/joint_states is published by /watcher, too', 'the error')
-    watcher.node.destroy_publisher(publisher)
+    watcher.destroy(publisher)
     until(lambda: watcher.diagnostics[-1].level != DiagnosticStatus.ERROR, 'the way back')
     assert generator.log.count('too') == 1
 

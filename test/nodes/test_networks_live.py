@@ -68,7 +68,7 @@ def live(request, generators):
         yield request.param, generator.watcher
 
 
-def test_all_ordered_pairs_switch_without_a_jerk(live):
+def test_gaits_switch_without_a_jerk(live):
     network, watcher = live
     robot = read_robot(CONFIG / f'{network}.yaml')
     programs = {name: plan(robot, name, preset, preset.network, 3.0)

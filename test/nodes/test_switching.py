@@ -40,7 +40,7 @@ def programs():
     return {gait: plan(ROBOT, gait, PRESETS[gait], PRESETS[gait].network, 2.0) for gait in GAITS}
 
 
-def test_all_ordered_pairs_switch_without_a_jerk(running, programs):
+def test_gaits_switch_without_a_jerk(running, programs):
     check_all_switches(running[1], ROBOT, programs, PHASES, 0.6, slack=1e-6)
 
 

@@ -36,7 +36,7 @@ def collect(watcher, kind, topic, count=50):
     messages = []
     subscription = watcher.node.create_subscription(kind, topic, messages.append, 1000)
     until(lambda: len(messages) >= count, f'{count} messages on {topic}')
-    watcher.node.destroy_subscription(subscription)
+    watcher.destroy(subscription)
     return messages
 
 

@@ -171,7 +171,7 @@ def test_another_publisher_is_refused_and_sits_it_down(walk):
     answer = walk.watcher.call(Trigger, '/unitree_bridge/start', Trigger.Request())
     assert answer.success
     walk.bridge.wait_for('not started: the robot is commanded by /watcher')
-    walk.watcher.node.destroy_publisher(rival)
+    walk.watcher.destroy(rival)
     assert walk.robot.damped
 
 

@@ -231,7 +231,7 @@ def test_another_node_that_steers_is_shown_and_confirmed_by_a_click(rig, open_pa
     until(lambda: '/watcher: both steer.' in holder(page), 'both')
     assert steered(rig, page) == (0.5, 0.0)
     page.keyboard.up('ArrowUp')
-    rig[2].node.destroy_publisher(publisher)
+    rig[2].destroy(publisher)
     until(lambda: holder(page) == 'This page has control.', 'the end of it')
 
 

@@ -40,6 +40,22 @@ def examples(most: int, **options) -> settings:
     return settings(max_examples=max(share, min(FEWEST, most)), **options)
 
 
+def spread(cases, every: int = 3):
+    """Return cases for parametrize: the first and every third, or so; in depth, all of them."""
+    return [case if place % every == 0 else in_depth(case)[0]
+            for place, case in enumerate(cases)]
+
+
+def in_full() -> bool:
+    """Whether tests run in depth."""
+    return settings.default.max_examples == PROFILES['deep']
+
+
+def few(cases, every: int = 4):
+    """Return every fourth of some cases, or so, for a test to go through; in depth, all."""
+    return cases[::1 if in_full() else every]
+
+
 def in_depth(*cases):
     """Return cases for parametrize that run in make test-deep only; a tuple has several values."""
     return [pytest.param(*(case if isinstance(case, tuple) else (case,)), marks=pytest.mark.deep)

@@ -36,7 +36,9 @@ from rcl_interfaces.srv import (
 import rclpy
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.parameter import Parameter
+from rclpy.publisher import Publisher
 from rclpy.qos import DurabilityPolicy, qos_profile_parameters, QoSProfile
+from rclpy.subscription import Subscription
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray, String
@@ -247,6 +249,15 @@ class Watcher:
         first = len(self.phases)
         until(lambda: len(self.phases) >= first + count, 'phases')
         return np.array(self.phases[first:first + count])
+
+    def destroy(self, one: Publisher | Subscription) -> None:
+        """End a publisher or subscription of the node, where the thread that spins does not wait.
+
+        rclpy's executor ends with an error if what it is about to wait for is destroyed.
+        """
+        end = (self.node.destroy_subscription if isinstance(one, Subscription)
+               else self.node.destroy_publisher)
+        until(self._executor.create_task(end, one).done, f'the end of {one.topic_name}')
 
     def end(self) -> None:
         """Leave the graph."""

@@ -16,6 +16,7 @@
 
 from itertools import pairwise
 
+from depth import in_full
 from graph import off_grid
 import numpy as np
 
@@ -43,7 +44,9 @@ def by_leg(watcher, robot, table):
 
 
 def check_all_switches(watcher, robot, programs, phases, lasting, slack=1e-5):
-    """Switch between all ordered pairs of gaits and hold every message against their orbits.
+    """Switch between ordered pairs of gaits and hold every message against their orbits.
+
+    Between all of them in depth, and between a third of them before a commit.
 
     Args:
         watcher: of a generator at 200 Hz.
@@ -56,6 +59,7 @@ def check_all_switches(watcher, robot, programs, phases, lasting, slack=1e-5):
     """
     offset, way = robot.column('offset'), tour(list(programs))
     assert len(set(pairwise(way))) == len(way) - 1 == len(programs) * (len(programs) - 1)
+    way = way if in_full() else way[:len(way) // 3 + 1]
     assert watcher.set(gait=way[0])[0].successful
     watcher.record(lasting)
     for old, new in pairwise(way):
