@@ -28,6 +28,7 @@ from cpg_ros.integration.simulate import simulate
 from cpg_ros.networks.biped import Biped
 from cpg_ros.networks.parameter_line import ParameterLine
 from cpg_ros.networks.registry import NETWORKS, PRESETS
+from depth import in_depth
 from late_two_rhythms import LateTwoRhythms
 import numpy as np
 import pytest
@@ -112,9 +113,9 @@ def beside_a_branch(branch, point, leaving, cycles):
 
 @pytest.mark.parametrize(('network', 'preset', 'line', 'near', 'soft'), [
     ('delayed', 'walk', 'tau', 0.35218, False),
-    ('delayed', 'liu2024_pace', 'd', 0.77323, False),
     ('biped', 'walk', 'w_a', -0.27684, True),
-    ('biped', 'walk', 'w_a', 0.27693, False)])
+    *in_depth(('delayed', 'liu2024_pace', 'd', 0.77323, False),
+              ('biped', 'walk', 'w_a', 0.27693, False))])
 def test_a_branch_leaves_as_the_normal_form_has_it(network, preset, line, near, soft):
     branch, point = point_of(network, preset, line, near)
     found = normal_form_at(point)

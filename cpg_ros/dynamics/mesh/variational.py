@@ -27,7 +27,7 @@ from cpg_ros.dynamics.mesh.newton import path_of, Reduced
 from cpg_ros.dynamics.mesh.orbit import MeshOrbit
 from cpg_ros.networks.field import Field, States
 import numpy as np
-import scipy.sparse
+import scipy
 
 
 class Variational:
@@ -103,7 +103,7 @@ class Variational:
         points = path_of(self._reduced, self._orbit.solution)(self._mesh[:-1])
         return self._reduced.rates(points)[:, self._reduced.place].ravel()
 
-    def matrix(self, turn: complex) -> scipy.sparse.csc_array:
+    def matrix(self, turn: complex) -> 'scipy.sparse.csc_array':
         """Return the matrix of the unknowns.
 
         Args:
