@@ -211,17 +211,18 @@ def chain():
 
 def test_a_bus_that_ends_with_its_bridge_waits_for_its_way_down(tmp_path, chain):
     domain, path = free_domain(), calibrated(tmp_path, chain.path)
-    bus = started(domain, path, 'command_timeout:=1.0', 'end_timeout:=30.0', executable=BUS)
+    bus = started(domain, path, 'command_timeout:=5.0', 'end_timeout:=30.0', executable=BUS)
     bridge = started(domain, path)
     try:
         bridge.wait_for('standing: it has risen')
-        assert all(chain.torque.values())
+        until(lambda: all(chain.torque.values()), 'torque')
         # As Ctrl-C in a terminal, or ros2 launch, to all.
         bus.signal(signal.SIGINT)
         bridge.signal(signal.SIGINT)
         assert bridge.wait() == 0 and bus.wait() == 0, bridge.log + bus.log
         assert not any(chain.torque.values())
-        assert np.abs([chain.goals[k] for k in (1, 2, 3, 4)] - steps(LYING)).max() <= 1
+        goals = [chain.goals[k] for k in (1, 2, 3, 4)]
+        assert np.abs(goals - steps(LYING)).max() <= 1, bridge.log + bus.log
     finally:
         for process in (bridge, bus):
             process.end()
