@@ -91,9 +91,9 @@ test: install/.built messages
 
 # All tests, all examples of properties; and what measures the machine, by itself.
 test-deep: install/.built messages
-	@$(ENTER); for part in '$(OFFLINE) -m "not (live or browser)" --hypothesis-profile=deep' \
+	@$(ENTER); for part in '$(OFFLINE) -m "not (live or browser)"' \
 		'$(ONLINE) -m "live and not (alone or browser)"' '-m "alone and not browser"'; do \
-		eval $(PYTEST) $$part $(ARGS) || [ $$? = 5 ]; done
+		eval $(PYTEST) --hypothesis-profile=deep $$part $(ARGS) || [ $$? = 5 ]; done
 
 # Exported gaits as compiled C, and on simulated microcontrollers with their cycles, flash and RAM:
 # gcc-avr, avr-libc, simavr, gcc-arm-none-eabi, libnewlib-arm-none-eabi, qemu-system-arm of Debian.

@@ -25,7 +25,7 @@ from graph import until
 import numpy as np
 import pytest
 from std_srvs.srv import SetBool
-from switches import by_leg, check_all_switches, off
+from switches import by_leg, check_switches, off
 
 ROBOT = read_robot(Path(get_package_share_directory('cpg_ros')) / 'config' / 'quadruped.yaml')
 OFFSET, LOWER, UPPER = (ROBOT.column(key) for key in ('offset', 'lower', 'upper'))
@@ -41,7 +41,7 @@ def programs():
 
 
 def test_gaits_switch_without_a_jerk(running, programs):
-    check_all_switches(running[1], ROBOT, programs, PHASES, 0.6, slack=1e-6)
+    check_switches(running[1], ROBOT, programs, PHASES, 0.6, slack=1e-6)
 
 
 def test_gait_loads_its_preset_and_the_batch_overrides_it(running):

@@ -47,13 +47,8 @@ def spread(cases, every: int = 3):
 
 
 def in_full() -> bool:
-    """Whether tests run in depth."""
+    """Return whether tests run in depth, for one that goes through a part of its cases else."""
     return settings.default.max_examples == PROFILES['deep']
-
-
-def few(cases, every: int = 4):
-    """Return every fourth of some cases, or so, for a test to go through; in depth, all."""
-    return cases[::1 if in_full() else every]
 
 
 def in_depth(*cases):

@@ -43,7 +43,7 @@ def by_leg(watcher, robot, table):
     return table[:, [watcher.names.index(joint.name) for joint in robot.joints]]
 
 
-def check_all_switches(watcher, robot, programs, phases, lasting, slack=1e-5):
+def check_switches(watcher, robot, programs, phases, lasting, slack=1e-5):
     """Switch between ordered pairs of gaits and hold every message against their orbits.
 
     Between all of them in depth, and between a third of them before a commit.
