@@ -66,7 +66,7 @@ setup(
     version='0.1.0',
     cmdclass={'install_scripts': Scripts, 'dist_info': WheelMetadata},
     packages=find_packages(include=['cpg_ros', 'cpg_ros.*']),
-    package_data={'cpg_ros': ['py.typed', 'panel/page/*', 'export/c/*']},
+    package_data={'cpg_ros': ['py.typed', 'nodes/*.xml', 'panel/page/*', 'export/c/*']},
     data_files=[
         ('share/ament_index/resource_index/packages', ['resource/cpg_ros']),
         ('share/cpg_ros', ['package.xml']),

@@ -25,6 +25,7 @@ import tempfile
 import time
 
 from common import log, ROOT
+from cpg_ros.nodes.transport import leave_shared_memory
 
 HERE = Path(__file__).resolve().parent
 GENERATOR = [str(ROOT / 'install/cpg_ros/lib/cpg_ros/generator')]
@@ -56,6 +57,8 @@ def enter_workspace() -> None:
                        'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST',
                        'ROS_DOMAIN_ID': str(50 + os.getpid() % 50)})
     os.environ.pop('ROS_PYTHON_CHECK_FIELDS', None)
+    # So that nodes, their peers and their listeners have the same transport.
+    leave_shared_memory()
 
 
 class Process:

@@ -20,18 +20,20 @@ import signal
 
 # As nodes and tools run: before numpy loads.
 os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
-# As nodes do, before rclpy loads: shared memory makes whoever sends wait for 333 ms at times.
-os.environ.setdefault('FASTDDS_BUILTIN_TRANSPORTS', 'UDPv4')
+os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
 # Shells make what they start in the background ignore it, and its children would, too.
 if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
+from cpg_ros.nodes.transport import leave_shared_memory  # noqa: E402
 import depth  # noqa: E402
 from graph import EXECUTABLE, Process, Watcher  # noqa: E402
 import pytest  # noqa: E402
 from stepped import SteppedGenerator  # noqa: E402
 
 depth.register()
+# As nodes do, and all processes of tests with them.
+leave_shared_memory()
 
 #: What Chromium is called, and how it runs on a machine without a screen or a network.
 CHROMIUM = 'chromium', 'chromium-browser', 'google-chrome'

@@ -27,4 +27,4 @@ __all__ = ['bag_recorder', 'balance_loop', 'balance_switch', 'bounded_request', 
            'odometry_messages', 'odometry_publisher', 'other_publishers', 'parameter_services',
            'parameter_spec', 'polled_group', 'qos_profiles', 'raw_messages', 'real_time',
            'robot_sim', 'sensor_input', 'sensor_publishers', 'servos', 'shutdown',
-           'start_progress', 'unitree', 'watchdog', 'watchdog_link']
+           'start_progress', 'transport', 'unitree', 'watchdog', 'watchdog_link']

@@ -28,8 +28,8 @@ from cpg_ros.errors import CpgError
 from cpg_ros.nodes.log_queue import NO_FILE, QUEUE, QueuedLogger
 from cpg_ros.nodes.parameter_services import StrictParameterService
 from cpg_ros.nodes.parameter_spec import as_doubles, as_list, kind_of, Spec
-from cpg_ros.nodes.real_time import leave_shared_memory
 from cpg_ros.nodes.shutdown import ended, endings
+from cpg_ros.nodes.transport import leave_shared_memory
 from rcl_interfaces.msg import ParameterDescriptor, ParameterType
 import rclpy
 from rclpy.exceptions import (

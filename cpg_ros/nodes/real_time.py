@@ -25,8 +25,6 @@ from cpg_ros.errors import CpgError
 from cpg_ros.nodes.parameter_spec import fixed, Spec
 from rclpy.impl.rcutils_logger import RcutilsLogger
 
-#: With which transport a participant of Fast DDS speaks; the user's own choice goes first.
-TRANSPORT = 'FASTDDS_BUILTIN_TRANSPORTS', 'UDPv4'
 #: Of mlockall: the pages that are there, and those to come.
 MCL_CURRENT, MCL_FUTURE = 1, 2
 LIMITS = 'in /etc/security/limits.conf, and log in again'
@@ -107,19 +105,6 @@ class RealTime:
             logger.warning(line)
         if granted:
             logger.info(f'real time: {", ".join(granted)}')
-
-
-def leave_shared_memory() -> None:
-    """Make this process use UDP alone, also on this computer; call it before rclpy.init.
-
-    A participant that joins the graph on the same computer has a port of shared memory, and the
-    first to send there checks whether it is alive. If its listener is not waiting at that instant,
-    Fast DDS sleeps for a third of healthy_check_timeout_ms, 333 ms, and keeps the lock that every
-    publisher of the process needs: a robot would be without commands for that time. With the
-    discovery range LOCALHOST the middleware of ROS uses shared memory anyway; no robot is reached
-    that way.
-    """
-    os.environ.setdefault(*TRANSPORT)
 
 
 def _raise_others() -> None:

@@ -108,8 +108,8 @@ def watch(listener: socket.socket, publisher: Publisher, command: JointCommand,
                 lines.remove(line)
         if not ready and wait is None and not alive(process):
             return
+        before = monitor.alarms
         if monitor.due(time.monotonic()):
-            before = monitor.alarms
             command.damp(monitor.kd[:len(command.kd)])
             publisher.publish(command.encode())
             if before != monitor.alarms:

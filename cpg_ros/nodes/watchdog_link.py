@@ -56,8 +56,8 @@ class WatchdogLink:
 
         """
         self._address = address(interface.maker, 'watchdog', domain, topic)
-        self._command = [sys.executable, '-m', 'cpg_ros.nodes.watchdog', interface.reference(),
-                         str(domain), topic, str(period), str(os.getpid())]
+        self._command = [sys.executable, '-P', '-m', 'cpg_ros.nodes.watchdog',
+                         interface.reference(), str(domain), topic, str(period), str(os.getpid())]
         self._socket = unconnected()
         self._process: subprocess.Popen | None = None
         self._read = float('inf')

@@ -219,6 +219,11 @@ def test_a_bus_that_ends_with_its_bridge_waits_for_its_way_down(tmp_path, chain)
         # As Ctrl-C in a terminal, or ros2 launch, to all.
         bus.signal(signal.SIGINT)
         bridge.signal(signal.SIGINT)
+        # A bridge that is late meanwhile has its watchdog let the servos go, but comes back.
+        bridge.wait_for('sitting: SIGINT').signal(signal.SIGSTOP)
+        bus.wait_for('the servos are let go: as commanded')
+        bridge.signal(signal.SIGCONT)
+        until(lambda: 'the bridge is silent: damping until it is back' in bridge.log, 'an alarm')
         assert bridge.wait() == 0 and bus.wait() == 0, bridge.log + bus.log
         assert not any(chain.torque.values())
         goals = [chain.goals[k] for k in (1, 2, 3, 4)]

@@ -121,8 +121,7 @@ def test_its_walk_and_its_run_come_back_from_bags(stage, tmp_path):
         assert stage.watcher.set(gait=gait)[0].successful
         stage.drive(speed)
         stage.pass_time(3.0)
-        environment = {**os.environ, 'ROS_DOMAIN_ID': str(stage.generator.domain),
-                       'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST'}
+        environment = {**os.environ, 'ROS_DOMAIN_ID': str(stage.generator.domain)}
         recorder = subprocess.Popen(
             [EXECUTABLE.with_name('cpg'), 'record', tmp_path / gait, 'joint_states',
              'foot_contacts'], env=environment, stderr=subprocess.PIPE, text=True)

@@ -50,7 +50,7 @@ class Launched:
     def __init__(self, file, words, folder):
         self.log = folder / 'log'
         variables = dict(os.environ, ROS_DOMAIN_ID=str(free_domain()), PYTHONUNBUFFERED='1',
-                         ROS_AUTOMATIC_DISCOVERY_RANGE='LOCALHOST', ROS_LOG_DIR=str(folder))
+                         ROS_LOG_DIR=str(folder))
         with open(self.log, 'w') as log:
             self.process = subprocess.Popen(
                 [sys.executable, '-c', START, SHARE / 'launch' / file, *words], cwd=folder,

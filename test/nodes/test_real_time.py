@@ -22,7 +22,7 @@ import subprocess
 import sys
 
 from cpg_ros.nodes.real_time import NoSuchCore, RealTime
-from graph import EXECUTABLE, Process
+from graph import EXECUTABLE
 import pytest
 
 MAY = 'import os; os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(1))'
@@ -64,20 +64,6 @@ def test_nothing_is_asked_for_by_default(start):
     process, _ = start()
     assert set(threads(process.pid).values()) == {(os.SCHED_OTHER, 0)}
     assert 'real time' not in process.log
-
-
-@pytest.mark.parametrize(('chosen', 'shared'), [({}, False), (
-    {'FASTDDS_BUILTIN_TRANSPORTS': 'DEFAULT'}, True)])
-def test_nobody_who_joins_can_make_it_wait_for_shared_memory(monkeypatch, chosen, shared):
-    # A participant that joins while its listener is busy holds up all that send to it by shared
-    # memory for 333 ms; the user's own choice goes first. LOCALHOST brings shared memory itself.
-    monkeypatch.delenv('FASTDDS_BUILTIN_TRANSPORTS', raising=False)
-    process = Process(environment={'ROS_AUTOMATIC_DISCOVERY_RANGE': 'SUBNET', **chosen})
-    try:
-        process.wait_for('publishing')
-        assert ('/fastrtps_' in Path(f'/proc/{process.pid}/maps').read_text()) == shared
-    finally:
-        process.end()
 
 
 def test_what_is_refused_is_a_line_that_says_what_to_set():

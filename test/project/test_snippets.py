@@ -57,7 +57,6 @@ def command(line):
 @pytest.mark.parametrize('page', RUN)
 def test_the_blocks_of_a_page_run(page, tmp_path):
     variables = dict(os.environ, ROS_DOMAIN_ID=str(free_domain()),
-                     ROS_AUTOMATIC_DISCOVERY_RANGE='LOCALHOST',
                      PATH=f'{EXECUTABLE.parent}{os.pathsep}{os.environ["PATH"]}')
     found = subprocess.run(['bash', '-c', script(page)], cwd=tmp_path, env=variables, text=True,
                            capture_output=True, timeout=300, check=False)

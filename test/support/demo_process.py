@@ -26,8 +26,7 @@ DEMO = EXECUTABLE.with_name('demo')
 @contextmanager
 def demo(folder, *arguments, domain=None, stdin=subprocess.PIPE):
     """Run it in a domain of its own; end it in the end."""
-    variables = dict(os.environ, ROS_DOMAIN_ID=str(domain or free_domain()),
-                     ROS_AUTOMATIC_DISCOVERY_RANGE='LOCALHOST', PYTHONUNBUFFERED='1')
+    variables = dict(os.environ, ROS_DOMAIN_ID=str(domain or free_domain()), PYTHONUNBUFFERED='1')
     process = subprocess.Popen([DEMO, '--out', folder, *arguments], env=variables,
                                stdin=stdin, stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
     try:

@@ -78,8 +78,8 @@ class Process:
                  output: int = subprocess.PIPE) -> None:
         self.domain = free_domain() if domain is None else domain
         variables = {**os.environ, 'ROS_DOMAIN_ID': str(self.domain),
-                     'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST', 'ROS_PYTHON_CHECK_FIELDS': '1',
-                     'PYTHONUNBUFFERED': '1', **(environment or {})}
+                     'ROS_PYTHON_CHECK_FIELDS': '1', 'PYTHONUNBUFFERED': '1',
+                     **(environment or {})}
         command = [str(executable), *(['--ros-args', *ros_args] if ros_args else [])]
         self._process = subprocess.Popen(command, env=variables, stdout=output,
                                          stderr=subprocess.STDOUT, text=True)

@@ -31,6 +31,7 @@ import time
 folder = Path(sys.argv[1]).resolve()
 GAIT, SWITCH = map(float, sys.argv[2:4] or ('10', '3'))
 os.environ.update(ROS_AUTOMATIC_DISCOVERY_RANGE='SUBNET', ROS_DOMAIN_ID='1')
+os.environ.pop('FASTRTPS_DEFAULT_PROFILES_FILE', None)
 for words in ('link set lo up', 'link set lo multicast on', 'route add 224.0.0.0/4 dev lo'):
     subprocess.run(['ip', *words.split()], check=True)
 

@@ -37,8 +37,7 @@ CPG = EXECUTABLE.with_name('cpg')
 
 
 def variables(domain, **more):
-    return dict(os.environ, ROS_DOMAIN_ID=str(domain), ROS_AUTOMATIC_DISCOVERY_RANGE='LOCALHOST',
-                **more)
+    return dict(os.environ, ROS_DOMAIN_ID=str(domain), **more)
 
 
 def ask(domain, *words):

@@ -18,6 +18,7 @@ It lets the servos go when it is told to, when commands stop, and when anything 
 process of its own so that the bridge's watchdog reaches the servos if the bridge is killed.
 """
 
+import math
 import sys
 import time
 
@@ -72,7 +73,8 @@ class ServoBus(StartedNode):
         self._publisher = self.create_publisher(JointState, Servos.state_topic, command_qos())
         #: Where servos that cannot be asked are taken to be: at rest, until they are commanded.
         self._assumed = self._calibration.rest
-        self._driven, self._heard = False, 0.0
+        #: When angles were last commanded, s.
+        self._driven, self._heard = False, -math.inf
         self._board = open_board(self._calibration)
         self.thread = self._ticker = Ticker(self, self._value('rate'), self._tick, lambda: None,
                                             self._failed, lambda _: None)
@@ -136,7 +138,9 @@ class ServoBus(StartedNode):
     def finish(self) -> None:
         """End the thread, and let the servos go, whatever has failed."""
         longest = time.monotonic() + self._value('end_timeout')
-        while self._driven and self.failure is None and time.monotonic() < longest:
+        # Not until they are let go: the watchdog does that, too, while the bridge is late.
+        while self.failure is None and time.monotonic() < min(longest,
+                                                              self._heard + self._timeout):
             time.sleep(0.02)
         self._ticker.end()
         self._ticker.join(timeout=1.0)
