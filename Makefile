@@ -36,8 +36,8 @@ ONLINE := -n $(LIVE) --dist loadgroup
 # What make test-deep, make browser and make docs run.
 LEFT_OUT := deep or alone or browser or docs
 # A shared machine may stall for seconds: before a commit, a live test that fails runs once more, and
-# is listed. In depth, and without a graph, nothing does.
-AGAIN := --reruns 1 -r aR
+# is listed with what failed. In depth, and without a graph, nothing does.
+AGAIN := --reruns 1 --rerun-show-tracebacks -r aR
 # Compiled while linters run, before tests in several processes would at once.
 KERNELS := feedback delayed quadruped biped phase hopf matsuoka
 # What tests compile is kept here from run to run, whatever becomes of install/.
