@@ -13,6 +13,7 @@
 # limitations under the License.
 
 from contextlib import ExitStack
+import gc
 import os
 from pathlib import Path
 import shutil
@@ -58,6 +59,12 @@ def pytest_collection_modifyitems(items):
         if {'start', 'running', 'stepped', 'generators'} & fixtures or any(
                 thing is one for thing in known for one in (EXECUTABLE, Process, Watcher)):
             item.add_marker('live')
+
+
+def pytest_collection_finish():
+    """Spare the garbage collector what stays until the end."""
+    gc.collect()
+    gc.freeze()
 
 
 def pytest_terminal_summary(terminalreporter, config):
