@@ -144,6 +144,7 @@ def test_a_lease_ends(open_page, how):
     one, other = open_page().ready(), open_page().ready()
     one.send(do='take_over')
     one.lease(yours=True)
+    other.lease(yours=False, holder=one.last['lease']['page'])
     began = time.monotonic()
     if how == 'closed':
         one.end()
