@@ -21,7 +21,6 @@ import signal
 
 # As nodes and tools run: before numpy loads.
 os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
-os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
 # Shells make what they start in the background ignore it, and its children would, too.
 if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
@@ -33,7 +32,8 @@ import pytest  # noqa: E402
 from stepped import SteppedGenerator  # noqa: E402
 
 depth.register()
-# As nodes do, and all processes of tests with them.
+# As nodes do, for this process and all that tests start.
+os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
 leave_shared_memory()
 
 #: What Chromium is called, and how it runs on a machine without a screen or a network.
