@@ -38,10 +38,9 @@ LEFT_OUT := deep or alone or browser or docs
 # A shared machine may stall for seconds: before a commit, a live test that fails runs once more, and
 # is listed with what failed. In depth, and without a graph, nothing does.
 AGAIN := --reruns 1 --rerun-show-tracebacks -r aR
-# Compiled while linters run, before tests in several processes would at once.
-KERNELS := feedback delayed quadruped biped phase hopf matsuoka
-# What tests compile is kept here from run to run, whatever becomes of install/.
-test test-deep test-export browser coverage mutants docs: export NUMBA_CACHE_DIR ?= $(CURDIR)/.numba
+# Compiled while linters run, before tests in several processes would at once; what a build has
+# compiled, and an earlier run, is there.
+KERNELS := feedback delayed quadruped biped balance delayed6 phase hopf matsuoka
 
 .PHONY: build run demo shell test test-deep test-export browser mutants docs figures coverage \
 	bench wheel messages unitree clean
@@ -156,4 +155,4 @@ install/.compiled: | install/.built
 	@touch $@
 
 clean:
-	rm -rf build install log out .numba docs/_build $(VENV)
+	rm -rf build install log out docs/_build $(VENV)

@@ -15,7 +15,8 @@
 """Compile what the first start of a generator would otherwise wait for.
 
 ``make build`` runs it once for each installation: the networks of the shipped robots with two and
-four legs, and the feedback. Whatever is not done in time is compiled when it is first used.
+four legs, and the feedback of either. Whatever is not done in time is compiled when it is first
+used.
 """
 
 from collections.abc import Sequence
@@ -25,6 +26,7 @@ import sys
 import time
 
 from cpg_ros.export.c_kernel import choose
+from cpg_ros.feedback.biped.feedback import BipedFeedback
 from cpg_ros.feedback.kinematics import geometry_of
 from cpg_ros.feedback.warm_up import warm_up
 from cpg_ros.integration.jit import COMPILED
@@ -33,26 +35,29 @@ from cpg_ros.robots.robot_file import load_robot
 from cpg_ros.tools.command_line import say
 
 #: What is compiled, those that the demonstration needs first, and the longest it may take, s.
-PARTS, LIMIT = ('delayed', *(['feedback'] if COMPILED else []), 'quadruped', 'biped'), 85.0
-#: Of the feedback: its kernels are the same for every robot with such legs.
-ROBOT = 'unitree_go2'
+PARTS, LIMIT = (('delayed', 'feedback', 'quadruped', 'biped', 'balance') if COMPILED else
+                ('delayed', 'quadruped', 'biped')), 85.0
+#: Of the feedback and of a biped's: their kernels are the same for every robot with such legs.
+ROBOT, BIPED = 'unitree_go2', 'humanoid'
 
 
 def compile_part(part: str) -> None:
-    """Compile or load the kernels of a network, or those of the feedback."""
+    """Compile or load the kernels of a network, of the feedback, or those that balance a biped."""
     choose()
     if part == 'feedback':
         robot = load_robot(ROBOT)
         warm_up(geometry_of(robot), len(robot.joints))
+    elif part == 'balance':
+        BipedFeedback(load_robot(BIPED))
     else:
         precompile(part)
 
 
-def compile_all() -> None:
-    """Compile all parts, in a process each, as many at once as there are cores."""
-    began, waiting = time.monotonic(), list(PARTS)
+def compile_parts(parts: Sequence[str]) -> None:
+    """Compile parts in a process each, as many at once as there are cores."""
+    began, waiting = time.monotonic(), list(parts)
     running: dict[str, subprocess.Popen] = {}
-    say(f'compiling the numerical kernels, so that no start waits for it: {", ".join(PARTS)} '
+    say(f'compiling the numerical kernels, so that no start waits for it: {", ".join(parts)} '
         f'(at most {LIMIT:g} s)')
     while (waiting or running) and time.monotonic() < began + LIMIT:
         while waiting and len(running) < (os.cpu_count() or 1):
@@ -73,11 +78,11 @@ def compile_all() -> None:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Compile the parts that are named, or all; return the exit code."""
-    parts = sys.argv[1:] if arguments is None else arguments
-    for part in parts:
-        compile_part(part)
-    if not parts:
-        compile_all()
+    parts = (sys.argv[1:] if arguments is None else arguments) or PARTS
+    if len(parts) == 1:
+        compile_part(parts[0])
+    else:
+        compile_parts(parts)
     return 0
 
 

@@ -162,7 +162,7 @@ def _wave(chart, share):
 @pytest.fixture(scope='module')
 def drawn(tmp_path_factory):
     out = tmp_path_factory.mktemp('atlas') / 'out'
-    words = ['--over', 'c=4:8', 'tau=0.2:0.8', '--points', '9x9', '--gaits', 'trot', 'pace',
+    words = ['--over', 'c=4:8', 'tau=0.2:0.8', '--points', '7x7', '--gaits', 'trot', 'pace',
              '--jobs', '1', '--interactive', '--out', str(out)]
     assert atlas.main(words) == 0
     return out, words
@@ -170,7 +170,7 @@ def drawn(tmp_path_factory):
 
 def test_the_table_agrees_with_the_formula_everywhere(drawn):
     table = parquet.read_table(drawn[0] / 'atlas.parquet').to_pylist()
-    assert len(table) == 2 * 9 * 9
+    assert len(table) == 2 * 7 * 7
     for row in table:
         j, k = GAITS[row['gait']]
         real = abs(TROT.a + TROT.b + (TROT.d * 1j**-j).real)
@@ -197,7 +197,7 @@ def test_the_page_is_one_file_with_everything_in_it(drawn):
     assert 'src=' not in page
     assert 'href=' not in page
     told = json.loads(page.split('id="atlas">')[1].split('</script>')[0])
-    assert told['counts'] == [9, 9]
+    assert told['counts'] == [7, 7]
     assert set(told['gaits']) == {'trot', 'pace'}
     assert told['gaits']['trot']['waves']
 

@@ -106,14 +106,9 @@ class Copy:
         shutil.copytree(ROOT / 'install', place / 'install', symlinks=True)
         if not (place / '.venv').exists():
             (place / '.venv').symlink_to(ROOT / '.venv')
-        # Mutants would push compiled code that is good out of the developer's own folder.
-        cache = Path(os.environ.get('NUMBA_CACHE_DIR', ROOT / '.numba'))
-        if cache.is_dir():
-            shutil.copytree(cache, place / '.numba')
         paths = {name: value.replace(str(ROOT), str(place)) for name, value in os.environ.items()
                  if name in ('PYTHONPATH', 'AMENT_PREFIX_PATH', 'COLCON_PREFIX_PATH')}
-        self._variables = {**os.environ, **paths, 'NUMBA_CACHE_DIR': str(place / '.numba'),
-                           'COLUMNS': '1000'}
+        self._variables = {**os.environ, **paths, 'COLUMNS': '1000'}
         self._package = next((place / 'install' / 'cpg_ros' / 'lib').glob(
             'python3*/*-packages/cpg_ros'))
 

@@ -38,6 +38,7 @@ if any(importlib.util.find_spec(name) is None for name in ('mujoco', 'gym_quadru
 SUPPORT = Path(__file__).parents[1] / 'support'
 ROBOT = Path(__file__).parents[2] / 'config' / 'unitree_go2.yaml'
 #: Way in m, headings in degrees, posture: the last line of robot_sim.
+RATE = 'rate:=250.0'
 ENDED = re.compile(r'\(x (-?[\d.]+), y (-?[\d.]+)\).* heading (-?\d+) degrees, (\w+), ')
 
 
@@ -50,10 +51,10 @@ def walk(*parameters, seconds=7.0, bag=None):
                 [sys.executable, str(SUPPORT / 'recorder.py'), str(bag), 'joint_states'],
                 env=dict(os.environ, ROS_DOMAIN_ID=str(domain)), stdout=subprocess.PIPE, text=True)
             assert recorder.stdout.readline() == 'listening\n'
-        body = Process('-p', 'real_time_factor:=0.0', '-p', f'duration:={seconds}',
+        body = Process('-p', 'real_time_factor:=0.0', '-p', f'duration:={seconds}', '-p', RATE,
                        domain=domain, executable=EXECUTABLE.with_name('robot_sim'))
         ending.append(body)
-        ending.append(Process('-p', 'use_sim_time:=true', '-p', 'rate:=500.0',
+        ending.append(Process('-p', 'use_sim_time:=true', '-p', RATE,
                               '-p', "combined_topic:=''", '-p', 'feedback.enabled:=false',
                               *parameters, domain=domain))
         code = body.wait()

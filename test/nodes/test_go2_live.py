@@ -101,7 +101,7 @@ def test_it_goes_and_turns_as_cmd_vel_asks_and_stops(robot):
     until(lambda: publisher.get_subscription_count() and track.now > 1.0, 'a robot that listens')
     assert np.ptp(track.after(0.5)[:, 1]) < 0.02
 
-    def ask(speed, turn, seconds=4.5):
+    def ask(speed, turn, seconds=3.5):
         """Ask for some simulated time; return speed and yaw rate over the last two thirds."""
         message = Twist()
         message.linear.x, message.angular.z = speed, turn

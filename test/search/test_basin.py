@@ -23,7 +23,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-STATES = 6
+STATES = 4
 
 
 def test_what_returns_and_what_rests_is_what_scipy_finds():

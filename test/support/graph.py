@@ -293,13 +293,13 @@ class SimulatedTime:
             self._tell(now)
             time.sleep(0.5 * step)
 
-    def lead(self, start: float, end: float, step: float) -> None:
-        """Go on after run, each step once joint states of those before have come."""
-        samples = self._watcher.samples
+    def lead(self, start: float, end: float, step: float, *others: Watcher) -> None:
+        """Go on after run, each step once joint states of those before have come, others' too."""
+        moving = [watcher.samples for watcher in (self._watcher, *others)]
         for now in np.arange(start, end, step):
             self._tell(now)
             ends, waits = time.monotonic() + PATIENCE, 0
-            while samples[-1][0] < now - 2.5 * step:
+            while any(samples[-1][0] < now - 2.5 * step for samples in moving):
                 assert time.monotonic() < ends, f'waited {PATIENCE} s in vain for joint states'
                 time.sleep(0.0002)
                 waits += 1
