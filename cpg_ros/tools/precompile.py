@@ -27,6 +27,7 @@ import time
 
 from cpg_ros.export.c_kernel import choose
 from cpg_ros.feedback.biped.feedback import BipedFeedback
+from cpg_ros.feedback.estimate import SensorData
 from cpg_ros.feedback.kinematics import geometry_of
 from cpg_ros.feedback.warm_up import warm_up
 from cpg_ros.integration.jit import COMPILED
@@ -48,7 +49,9 @@ def compile_part(part: str) -> None:
         robot = load_robot(ROBOT)
         warm_up(geometry_of(robot), len(robot.joints))
     elif part == 'balance':
-        BipedFeedback(load_robot(BIPED))
+        biped = BipedFeedback(load_robot(BIPED))
+        # The first tick compiles.
+        biped.advance(SensorData.zeros(1, len(biped.robot.legs), len(biped.order)), 1e-3)
     else:
         precompile(part)
 

@@ -109,6 +109,8 @@ class Copy:
         paths = {name: value.replace(str(ROOT), str(place)) for name, value in os.environ.items()
                  if name in ('PYTHONPATH', 'AMENT_PREFIX_PATH', 'COLCON_PREFIX_PATH')}
         self._variables = {**os.environ, **paths, 'COLUMNS': '1000'}
+        # Mutants would push compiled code that is good out of a folder that others use, too.
+        self._variables.pop('NUMBA_CACHE_DIR', None)
         self._package = next((place / 'install' / 'cpg_ros' / 'lib').glob(
             'python3*/*-packages/cpg_ros'))
 

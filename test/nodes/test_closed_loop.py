@@ -37,8 +37,9 @@ if any(importlib.util.find_spec(name) is None for name in ('mujoco', 'gym_quadru
 
 SUPPORT = Path(__file__).parents[1] / 'support'
 ROBOT = Path(__file__).parents[2] / 'config' / 'unitree_go2.yaml'
-#: Way in m, headings in degrees, posture: the last line of robot_sim.
+#: Of the body and the generator, which are in step.
 RATE = 'rate:=250.0'
+#: Way in m, headings in degrees, posture: the last line of robot_sim.
 ENDED = re.compile(r'\(x (-?[\d.]+), y (-?[\d.]+)\).* heading (-?\d+) degrees, (\w+), ')
 
 

@@ -104,7 +104,7 @@ def test_a_set_without_gait_is_told_its_nearest_threshold(capsys, changes, name,
                         for factor in (0.99, 1.01))
         assert not any(one['exists'] for one in below['gaits'].values())
         assert below['nearest_threshold'].partition(' (')[0] == nearest.partition(' (')[0]
-        there = {name for name, one in above['gaits'].items() if one['exists']}
+        there = {found for found, one in above['gaits'].items() if one['exists']}
         assert there and (gait is None or gait in there)
     else:
         below, above = (as_json(capsys, '--set', *rest, f'c={factor * threshold}',
