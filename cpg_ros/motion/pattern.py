@@ -82,8 +82,7 @@ class Pattern:
     def restart(self, ramp: float, enabled: bool = True) -> None:
         """Begin anew at phase 0, with the newest program, from where the joints are."""
         newest = self._tracks[-1]
-        newest.phase = 0.0
-        newest.reseed()
+        newest.reseed(0.0)
         self._tracks = [newest]
         self.velocity[:] = 0.0
         self._wanted, self._rate = self.position.copy(), self.velocity.copy()
@@ -237,7 +236,7 @@ class Pattern:
                 self._tracks[0].drift_to(what)
                 self._absorption.begin()
             elif len(self._tracks) < MOST_TRACKS:
-                how.align(self._tracks[-1].phase)
+                how.reseed(self._tracks[-1].phase)
                 how.drive = self.drive
                 self._tracks.append(how)
             else:

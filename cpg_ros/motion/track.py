@@ -65,15 +65,6 @@ class Track:
         self._look(0.0)
         self.phase = float(self.legs[0])
 
-    def align(self, phase: float) -> None:
-        """Bring the first leg to this phase, from the orbit's start."""
-        ahead = (phase - self.program.readout.start) % 1.0
-        self.stepper.advance(ahead * self.program.orbit.period)
-        self._clocks = self.program.readout.clocks(ahead)
-        self._look(0.0)
-        self.phase = float(self.legs[0])
-        self._astray = 0.0
-
     def _look(self, strides: float) -> float:
         program, now, angle, rise = self.program, self.stepper.now, self.angle, self.rise
         clocks = self._clocks
@@ -112,11 +103,18 @@ class Track:
             self._astray = 0.0
         return self._astray <= PATIENCE
 
-    def reseed(self) -> None:
-        """Put the network back on its orbit, at the phase the clock has."""
+    def reseed(self, phase: float | None = None) -> None:
+        """Put the network on its orbit where its first leg is at a phase, cycles.
+
+        The phase is the clock's if not given.
+        """
+        ahead = ((self.phase if phase is None else phase) - self.program.readout.start) % 1.0
         self.stepper = self.program.seed.copy()
-        self.settling = 0.0
-        self.align(self.phase)
+        self.stepper.advance(ahead * self.program.orbit.period)
+        self._clocks = self.program.readout.clocks(ahead)
+        self._look(0.0)
+        self.phase = float(self.legs[0])
+        self.settling = self._astray = 0.0
 
     def drift_to(self, program: GaitPlan) -> None:
         """Take a program's parameters and leave the change to the network's own dynamics.

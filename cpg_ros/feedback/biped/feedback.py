@@ -184,7 +184,7 @@ class BipedFeedback:
         self._goal = track
         self._set_frequency(track.program)
         if gait == self.program.gait and same:
-            track.align(self.track.phase)
+            track.reseed(self.track.phase)
             self._adopt(track)
 
     def advance(self, sensors: SensorData, dt: float) -> np.ndarray:
@@ -292,8 +292,7 @@ class BipedFeedback:
                 sign = 1.0 if self.kind == WALKS else -1.0
                 memory.lift_off[leg] += sign * memory.pose.soles[1 - leg]
                 memory.ground[0] = memory.pose.soles[1 - leg, 2]
-                wanted.reseed()
-                wanted.align(0.5 * leg)
+                wanted.reseed(0.5 * leg)
                 self._adopt(wanted)
                 half = 0.5 * (1.0 - self.gains.duty)
                 np.mod(wanted.legs + half, 1.0, out=memory.phases)
@@ -311,6 +310,5 @@ class BipedFeedback:
         memory.clock[:] = 1.0, 0.0
         memory.lift_off[:] = memory.pose.soles
         memory.ground[0] = memory.pose.soles[:, 2].mean()
-        self.track.reseed()
-        self.track.align(STARTS[self.kind])
+        self.track.reseed(STARTS[self.kind])
         self._choose(0.0)
