@@ -18,6 +18,7 @@ from functools import cache
 
 from cpg_ros.motion.pattern import Pattern
 from cpg_ros.motion.plan import plan, PlanError
+from cpg_ros.motion.resumption import HOLD
 from cpg_ros.networks.registry import PRESETS
 from cpg_ros.robots.robot_file import load_robot
 from depth import examples
@@ -78,8 +79,9 @@ def test_no_story_outruns_a_limit(network, rate, tolerance, story):
             arguments[0] = gaits[arguments[0] % len(gaits)]
         getattr(pattern, name)(*arguments)
         if name in ('restart', 'resume'):
-            # A new motion begins at rest, or slowly: where the joints are.
-            before = before[0], np.zeros_like(before[1])
+            # A new motion begins at rest, and after a stall the slower, the longer it was.
+            pace = 0.0 if name == 'restart' else max(0.0, 1.0 - arguments[0] / HOLD)
+            before = before[0], pace * before[1]
         before = check(pattern, 1.0 / rate, pause, before, tolerance)
 
 
