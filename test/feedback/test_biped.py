@@ -99,7 +99,8 @@ def test_the_laws_need_no_physics_engine():
     code = ("import sys; import cpg_ros.feedback.biped.feedback as f; from cpg_ros.robots."
             "robot_file import load_robot; f.BipedFeedback(load_robot('humanoid')); "
             "print('mujoco' in sys.modules)")
-    ran = subprocess.run([sys.executable, '-c', code], text=True, capture_output=True, check=True)
+    ran = subprocess.run([sys.executable, '-P', '-c', code], text=True, capture_output=True,
+                         check=True)
     assert ran.stdout.strip() == 'False'
 
 

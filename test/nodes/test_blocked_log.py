@@ -188,7 +188,8 @@ def test_a_bridge_sits_down(console, number):
 
 def run(code, output, **options):
     """Run Python code whose standard error and output go to a descriptor."""
-    return subprocess.Popen([sys.executable, '-c', code], stdout=output, stderr=output, **options)
+    return subprocess.Popen([sys.executable, '-P', '-c', code], stdout=output, stderr=output,
+                            **options)
 
 
 STRAYS = """

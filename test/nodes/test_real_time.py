@@ -79,7 +79,7 @@ granted, refused = RealTime(80, (), True).claim()
 assert granted == [], granted
 print(*refused, sep='\\n')
 """
-    ended = subprocess.run([sys.executable, '-c', text], capture_output=True, text=True)
+    ended = subprocess.run([sys.executable, '-P', '-c', text], capture_output=True, text=True)
     assert ended.returncode == 0, ended.stderr
     memory, priority = ended.stdout.splitlines()
     assert memory == ('lock_memory refused: Operation not permitted. Raise the limit memlock '

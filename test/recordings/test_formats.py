@@ -122,7 +122,7 @@ def test_a_format_of_ones_own_is_read_by_the_tool_and_found_in_folders(steps, ba
 
 
 def test_the_help_lists_the_formats_that_come_with_the_package():
-    text = subprocess.run([sys.executable, '-m', 'cpg_ros.tools.inversion', '--help'],
+    text = subprocess.run([sys.executable, '-P', '-m', 'cpg_ros.tools.inversion', '--help'],
                           capture_output=True, text=True, check=True).stdout
     assert '(--bag DIR | --bags FOLDER [FOLDER ...] | --csv FILE | --mot FILE' in text
     assert text.index('--topics') < text.index('--joints') < text.index('--unit')
