@@ -25,6 +25,7 @@ from concurrent.futures import CancelledError, Executor, ProcessPoolExecutor
 import contextlib
 import logging
 import multiprocessing
+from multiprocessing.context import SpawnContext, SpawnProcess
 import os
 import signal
 import threading
@@ -49,10 +50,26 @@ class NoCluster(CpgError):
     """No usable scheduler responds at an address; the message says why."""
 
 
-def _begin(parent: int) -> None:
-    """Make a worker process exit with its parent, and leave Ctrl-C to the parent."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+class _Worker(SpawnProcess):
+    """A worker process that leaves Ctrl-C to its parent, also while it starts."""
 
+    def start(self) -> None:
+        # What a thread blocks is blocked in the processes that it starts.
+        before = signal.pthread_sigmask(signal.SIG_BLOCK, (signal.SIGINT,))
+        try:
+            super().start()
+        finally:
+            signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+class _Workers(SpawnContext):
+    """Spawned: a process with threads, as numba's, must not be forked."""
+
+    Process = _Worker
+
+
+def _begin(parent: int) -> None:
+    """Make a worker process exit with its parent."""
     def watch() -> None:
         while os.getppid() == parent:
             time.sleep(1.0)
@@ -72,8 +89,7 @@ def processes(jobs: int = 0) -> Fleet:
     held: list[ProcessPoolExecutor] = []
 
     def made() -> tuple[Executor, int]:
-        held[:] = [ProcessPoolExecutor(count, multiprocessing.get_context('spawn'), _begin,
-                                       (os.getpid(),))]
+        held[:] = [ProcessPoolExecutor(count, _Workers(), _begin, (os.getpid(),))]
         return held[0], AHEAD * count
 
     def close(wait: bool) -> None:

@@ -15,13 +15,12 @@
 """All rows and figures of the papers, their parts computed side by side."""
 
 from collections.abc import Callable, Sequence
-from concurrent.futures import as_completed, ProcessPoolExecutor
+from concurrent.futures import as_completed
 from dataclasses import dataclass
 from io import BytesIO
-import multiprocessing
-import signal
 
 from cpg_ros.errors import CpgError
+from cpg_ros.fleet.executors import processes
 from cpg_ros.papers.catalogue import PAPERS
 from cpg_ros.papers.errata import ERRATA
 from cpg_ros.papers.row import Paper, Picture, ReproducedRow
@@ -122,19 +121,15 @@ def reproduce(names: Sequence[str], jobs: int = 1, draw: bool = True,
             done[place] = _section(*task)
             progress(len(done))
     else:
-        # Spawned: a process with threads, as numba's, must not be forked.
-        context = multiprocessing.get_context('spawn')
-        # Ctrl-C reaches all processes: this one ends the others.
-        with ProcessPoolExecutor(min(jobs, len(tasks)), context, signal.signal,
-                                 (signal.SIGINT, signal.SIG_IGN)) as pool:
-            waiting = {pool.submit(_section, *task): place for place, task in enumerate(tasks)}
-            try:
-                for future in as_completed(waiting):
-                    done[waiting[future]] = future.result()
-                    progress(len(done))
-            except BaseException:
-                pool.shutdown(wait=False, cancel_futures=True)
-                raise
+        pool = processes(min(jobs, len(tasks)))
+        waiting = {pool.submit(_section, *task): place for place, task in enumerate(tasks)}
+        try:
+            for future in as_completed(waiting):
+                done[waiting[future]] = future.result()
+                progress(len(done))
+        finally:
+            # After an error or Ctrl-C, jobs that are under way are of no use.
+            pool.shutdown(wait=len(done) == len(tasks))
     parts = [done[place] for place in range(len(tasks))]
     return Reproduction(papers, tuple(row for rows, _ in parts for row in rows),
                         tuple(figure for _, figures in parts for figure in figures))

@@ -18,8 +18,10 @@ from argparse import ArgumentParser
 from concurrent.futures import ThreadPoolExecutor
 import io
 import itertools
+import os
 from pathlib import Path
 import shutil
+import signal
 import subprocess
 import sys
 import time
@@ -108,6 +110,26 @@ def test_workers_end_with_a_client_that_is_killed():
             return
         time.sleep(0.1)
     pytest.fail('the worker goes on')
+
+
+@pytest.mark.parametrize('after', [0.05, 0.2, 0.5])
+def test_ctrl_c_while_workers_start_is_the_clients_alone(after):
+    # They import for a second; a terminal sends Ctrl-C to all processes of a command.
+    script = ('from cpg_ros.fleet.executors import processes\nimport sys, time\n'
+              'fleet = processes(2)\ntry:\n'
+              '    jobs = [fleet.submit(time.sleep, 60) for _ in range(2)]\n'
+              '    print("submitted", flush=True)\n    jobs[0].result()\n'
+              'except KeyboardInterrupt:\n    fleet.shutdown(wait=False)\n'
+              '    sys.exit("stopped")\n')
+    # A shell that runs the tests in the background has them ignore it.
+    running = subprocess.Popen(
+        [sys.executable, '-P', '-c', script], stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+        text=True, start_new_session=True,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL))
+    assert running.stdout.readline() == 'submitted\n'
+    time.sleep(after)
+    os.killpg(running.pid, signal.SIGINT)
+    assert running.communicate(timeout=60) == ('', 'stopped\n')
 
 
 @pytest.mark.parametrize(('address', 'said'), [
