@@ -230,7 +230,8 @@ def test_a_panel_that_was_stopped_publishes_zero_first(rig, twists, open_page):
     page.send(do='steer', speed=1.0, turn=0.0)
     time.sleep(0.05)
     rig[1].signal(signal.SIGSTOP)
-    time.sleep(0.2)
+    # Longer than a command is fresh, 0.3 s.
+    time.sleep(0.4)
     twists.clear()
     page.steer(1.0)
     assert not twists
