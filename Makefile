@@ -88,11 +88,13 @@ test: install/.built messages
 		'$(ONLINE) $(AGAIN) -m "live and not ($(LEFT_OUT))"'; do \
 		eval $(PYTEST) $$part $(ARGS) || [ $$? = 5 ]; done  # 5: none selected
 
-# All tests, all examples of properties; and what measures the machine, by itself.
+# All tests, all examples of properties; and what measures the machine, by itself. A part that fails
+# does not keep the others from being run.
 test-deep: install/.built messages
-	@$(ENTER); for part in '$(OFFLINE) -m "not (live or browser)"' \
+	@$(ENTER); failed=0; for part in '$(OFFLINE) -m "not (live or browser)"' \
 		'$(ONLINE) -m "live and not (alone or browser)"' '-m "alone and not browser"'; do \
-		eval $(PYTEST) --hypothesis-profile=deep $$part $(ARGS) || [ $$? = 5 ]; done
+		eval $(PYTEST) --hypothesis-profile=deep $$part $(ARGS) || [ $$? = 5 ] || failed=1; \
+		done; exit $$failed
 
 # Exported gaits as compiled C, and on simulated microcontrollers with their cycles, flash and RAM:
 # gcc-avr, avr-libc, simavr, gcc-arm-none-eabi, libnewlib-arm-none-eabi, qemu-system-arm of Debian.
