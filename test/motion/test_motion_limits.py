@@ -96,3 +96,23 @@ def test_a_stop_on_the_way_to_the_stand_shortens_it(network):
     check(pattern, 0.002, 0.52, before, 0.04)
     assert pattern.standing
     assert np.abs(pattern.position - pattern.robot.column('offset')).max() < 1e-12
+
+
+def test_a_leap_of_a_correction_is_followed_no_faster_than_joints_may():
+    pattern, dt = Pattern(programs('delayed')[0], 0.0), 0.002
+    for _ in range(500):
+        pattern.advance(dt)
+    most = pattern.robot.column('velocity') * dt
+    assert not pattern.held and (most < 0.1).all()
+    before, steps = pattern.position.copy(), []
+    pattern.correct = lambda wanted: wanted + 0.2
+    for _ in range(50):
+        pattern.advance(dt)
+        steps.append(pattern.position - before)
+        before = pattern.position.copy()
+    # Its first steps take all that is allowed; then it is there, and nothing holds it.
+    assert steps[0] == pytest.approx(most, rel=1e-6)
+    assert (np.abs(steps) <= most * (1.0 + 1e-6)).all()
+    held = pattern.held
+    pattern.advance(dt)
+    assert 0 < held == pattern.held
