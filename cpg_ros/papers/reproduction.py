@@ -122,8 +122,8 @@ def reproduce(names: Sequence[str], jobs: int = 1, draw: bool = True,
             progress(len(done))
     else:
         pool = processes(min(jobs, len(tasks)))
-        waiting = {pool.submit(_section, *task): place for place, task in enumerate(tasks)}
         try:
+            waiting = {pool.submit(_section, *task): place for place, task in enumerate(tasks)}
             for future in as_completed(waiting):
                 done[waiting[future]] = future.result()
                 progress(len(done))
