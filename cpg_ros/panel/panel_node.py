@@ -50,8 +50,8 @@ SPECS = fixed({
     'host': Spec('127.0.0.1', 'address to listen on; an address that other machines can reach '
                  'needs a token'),
     'port': Spec(8080, 'port to listen on; 0 for any free one', 0, 65535),
-    'token': Spec('', 'token required in the page address, as ?token=WORD; auto: make one, shown '
-                  'in the terminal; empty: none'),
+    'token': Spec('', 'token required in the page address, as ?token=WORD, of at least 22 '
+                  'characters; auto: make one, shown in the terminal; empty: none'),
     'urdf': Spec('', "URDF file with the robot's shape; if empty, robot_description, the "
                  "simulation's model if it is shipped, or a stick figure is used"),
     'max_speed': Spec(0.5, 'maximum speed of the steering pad [m/s]', 0.0, 5.0),
