@@ -92,7 +92,7 @@ class WebServer:
                 bag = path.removeprefix(BAGS).removesuffix('.zip')
                 return _response(HTTPStatus.OK, await asyncio.to_thread(self._bag, bag),
                                  'application/zip')
-            except (ValueError, OSError) as error:
+            except ValueError as error:
                 return _text(HTTPStatus.NOT_FOUND, str(error))
         return _text(HTTPStatus.NOT_FOUND, 'there is nothing here')
 

@@ -14,6 +14,7 @@
 
 """The panel on a graph, seen by pages without a browser."""
 
+from concurrent.futures import ThreadPoolExecutor
 import contextlib
 import http.client
 from io import BytesIO
@@ -256,8 +257,12 @@ def test_a_recording_can_be_fetched_and_read(rig, page):
     page.send(do='record', on=False)
     until(lambda: not page.last['state']['recording'], 'the end')
     bag = page.last['state']['bag']
-    answer, body = get(address, f'/bags/{bag}.zip')
-    assert answer.status == 200
+    # Two pages fetch it at once.
+    with ThreadPoolExecutor(8) as pool:
+        answers = list(pool.map(lambda _: get(address, f'/bags/{bag}.zip'), range(8)))
+    assert [answer.status for answer, _ in answers] == [200] * 8
+    _, body = answers[0]
+    assert all(other == body for _, other in answers)
     names = zipfile.ZipFile(BytesIO(body)).namelist()
     assert f'{bag}/metadata.yaml' in names
     told = yaml.safe_load(zipfile.ZipFile(BytesIO(body)).read(f'{bag}/metadata.yaml'))
@@ -266,6 +271,15 @@ def test_a_recording_can_be_fetched_and_read(rig, page):
     # Every message of 200 a second, not thirty.
     assert counts['/joint_states'] > 100 and counts['/cpg_generator/gait'] == 1
     assert counts['/felt'] > 0
+
+
+def test_an_error_of_the_disk_shows_a_page_no_path(rig, tmp_path_factory):
+    (folder,) = tmp_path_factory.getbasetemp().glob('recordings0')
+    (folder / 'panel_1').mkdir()
+    (folder / 'panel_1.zip').mkdir()
+    answer, body = get(rig[2], '/bags/panel_1.zip')
+    assert answer.status == 404 and b'a directory' in body
+    assert str(folder).encode() not in body
 
 
 HOSTILE = ['', '{', '[' * 4000, 'null', '{"do":"set","name":"gait","value":NaN}',
