@@ -105,9 +105,10 @@ class RobotView:
                 str(self.controls.value('robot') or ''), self._urdf)
             doubts: list[str] = []
             shape = await asyncio.to_thread(shape_source.find, known, doubts.append)
-            for doubt in doubts[:5]:
+            doubts = list(dict.fromkeys(doubts))[:5]
+            for doubt in doubts:
                 self._node.get_logger().warning(doubt)
-            self._keep({**shape.message(), 'doubts': doubts[:5]})
+            self._keep({**shape.message(), 'doubts': doubts})
         except CallError as error:
             self._report(str(error))
             self._stale = True

@@ -128,7 +128,7 @@ const takes = {
     body = new Body(message);
     scene.show(body);
     plots.shaped(message);
-    at('source').textContent = `shape: ${message.source}`;
+    at('source').textContent = [`shape: ${message.source}`, ...message.doubts.slice(0, 1)].join('; ');
     at('source').title = message.doubts.join('\n');
     fresh = true;
   },
