@@ -25,7 +25,7 @@ from cpg_ros.nodes.polled_group import PolledSubscription
 from cpg_ros.nodes.qos_profiles import best_effort, latched
 from cpg_ros.panel import shape_source
 from cpg_ros.panel.controls import Controls
-from cpg_ros.panel.graph import Graph, namespace
+from cpg_ros.panel.graph import Graph, level, namespace
 from cpg_ros.panel.teleop import Teleop
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import Wrench
@@ -35,7 +35,6 @@ from rclpy.node import Node
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray, String
 
-LEVELS = {0: 'ok', 1: 'warn', 2: 'error', 3: 'stale'}
 #: Decimal places of values: a tenth of a milliradian is less than a pixel.
 DIGITS = 4
 
@@ -203,17 +202,17 @@ class RobotView:
                 if values := self.controls.hear(event):
                     self._send({'type': 'values', 'values': values})
         if health := self._topics.get('/diagnostics'):
-            owners = (f'{self.name}: ',
-                      f'{self.graph.beside(self.name, self.graph.simulations) or "-"}: ')
+            beside = (self.graph.beside(self.name, kind)
+                      for kind in (self.graph.simulations, self.graph.bridges))
+            owners = tuple(f'{name}: ' for name in (self.name, *beside) if name)
             for message, _ in health.take():
                 for status in message.status:
                     if status.name.startswith(owners):
                         self._keep_health(status)
 
     def _keep_health(self, status: Any) -> None:
-        level = status.level if isinstance(status.level, int) else status.level[0]
         parts = {**self._kept.get('health', {}).get('parts', {}), status.name: {
-            'level': LEVELS.get(level, 'stale'), 'text': status.message,
+            'level': level(status), 'text': status.message,
             'values': {value.key: value.value for value in status.values}}}
         self._keep({'type': 'health', 'parts': parts})
 

@@ -1,5 +1,6 @@
 // The page: messages from the node go to its parts, and user actions go to the node.
 import { Body } from './body.js';
+import { Bridges } from './bridges.js';
 import { Lease } from './lease.js';
 import { Parameters } from './parameters.js';
 import { Plots } from './plots.js';
@@ -45,6 +46,7 @@ const parameters = new Parameters((name, value) => {
   set(name, value);
 });
 const lease = new Lease(send);
+const bridges = new Bridges(send);
 const steering = new Steering((held) => link.postMessage({ held }));
 const scene = new Scene(at('scene'), camera, () => {
   fresh = true;
@@ -73,7 +75,8 @@ function beside() {
   at('reset').disabled = !simulation;
   at('pushing').hidden = !simulation;
   at('fit').disabled = !inversion;
-  const steered = parameters.known.cmd_vel?.value === true;
+  const there = state.generators?.includes(view.node);
+  const steered = there && parameters.known.cmd_vel?.value === true;
   steering.enable(steered && lease.steers);
   tour.enable(steering.able, parameters.gaitNames);
   at('steered').textContent = lease.reason || (steered
@@ -92,8 +95,10 @@ const takes = {
     at('download').href = `bags/${message.bag}.zip${token ? `?token=${encodeURIComponent(token)}`
       : ''}`;
     if (!message.generators.length) chip(at('now'), 'no generator yet');
-    at('starting').textContent = message.starting || 'waiting for a generator';
-    at('starting').hidden = message.generators.length > 0;
+    const gone = takes.wanted && !message.generators.includes(view.node);
+    at('starting').textContent = message.starting || (gone ? `${view.node} is gone`
+      : 'waiting for a generator');
+    at('starting').hidden = message.generators.length > 0 && !gone;
     beside();
   },
   chosen(message) {
@@ -105,6 +110,8 @@ const takes = {
       return;
     }
     takes.wanted = true;
+    // What was held was for another robot.
+    if (view.node !== message.node) steering.release();
     view.node = message.node;
     at('generators').value = message.node;
     for (const key of Object.keys(last)) delete last[key];
@@ -116,6 +123,9 @@ const takes = {
     chip(at('now'), 'no gait');
     beside();
     remember();
+  },
+  bridges(message) {
+    bridges.take(message);
   },
   controls(message) {
     parameters.show(message.controls);
