@@ -178,8 +178,8 @@ class Panel(StartedNode):
             self._views[name].teleop.look()
         for page in self._pages.everyone:
             # A page never turns to another robot by itself, whoever steers that.
-            if not page.node and graph.generators:
-                self._choose(page, self._first())
+            if not page.node and (first := self._first()):
+                self._choose(page, first)
 
     def _lease_news(self) -> None:
         """Send each page the state of its robot's lease, if that has changed."""
@@ -215,14 +215,17 @@ class Panel(StartedNode):
     def _come(self, page: Page) -> None:
         self._pages.send([page], self._state())
         self._pages.send([page], self._bridges.message)
-        if self._graph.generators:
-            self._choose(page, self._first())
+        if first := self._first():
+            self._choose(page, first)
 
     def _first(self) -> str:
-        """Return what a new page shows: the generator of the panel's namespace, or the first."""
+        """Return what a new page shows: the generator in the panel's namespace, '' for none.
+
+        A panel without a namespace shows any.
+        """
         own = self.get_namespace().rstrip('/')
-        return (self._graph.beside(f'{own}/', self._graph.generators)
-                or self._graph.generators[0])
+        found = self._graph.beside(f'{own}/', self._graph.generators)
+        return found or ('' if own else next(iter(self._graph.generators), ''))
 
     def _gone(self, page: Page) -> None:
         for view in self._views.values():

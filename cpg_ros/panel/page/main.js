@@ -76,6 +76,9 @@ function beside() {
   at('pushing').hidden = !simulation;
   at('fit').disabled = !inversion;
   const there = state.generators?.includes(view.node);
+  at('starting').hidden = there;
+  at('starting').textContent = state.starting || (takes.wanted ? `${view.node} is gone`
+    : state.generators?.length ? 'choose a generator' : 'waiting for a generator');
   const steered = there && parameters.known.cmd_vel?.value === true;
   steering.enable(steered && lease.steers);
   tour.enable(steering.able, parameters.gaitNames);
@@ -95,10 +98,6 @@ const takes = {
     at('download').href = `bags/${message.bag}.zip${token ? `?token=${encodeURIComponent(token)}`
       : ''}`;
     if (!message.generators.length) chip(at('now'), 'no generator yet');
-    const gone = takes.wanted && !message.generators.includes(view.node);
-    at('starting').textContent = message.starting || (gone ? `${view.node} is gone`
-      : 'waiting for a generator');
-    at('starting').hidden = message.generators.length > 0 && !gone;
     beside();
   },
   chosen(message) {
