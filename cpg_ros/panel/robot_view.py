@@ -34,6 +34,7 @@ from rcl_interfaces.msg import ParameterEvent
 from rclpy.node import Node
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray, String
+from std_srvs.srv import SetBool
 
 #: Decimal places of values: a tenth of a milliradian is less than a pixel.
 DIGITS = 4
@@ -67,6 +68,8 @@ class RobotView:
         self._node, self._watch, self._services = node, watch, services
         self._report, self._send = report, send
         self.controls = Controls(NodeClient(services, name), report)
+        # A client that the generator does not know yet would delay a stop.
+        services.client(SetBool, f'{name}/enable')
         self._pushes: Any = None
         self.teleop = Teleop(
             node, f'{self._space}/cmd_vel', fastest,

@@ -15,7 +15,7 @@
 """The panel on a graph, seen by pages without a browser."""
 
 from concurrent.futures import ThreadPoolExecutor
-import contextlib
+from contextlib import ExitStack, suppress
 import http.client
 from io import BytesIO
 import math
@@ -35,6 +35,8 @@ pytest.importorskip('websockets')
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus  # noqa: E402
 from geometry_msgs.msg import TwistStamped  # noqa: E402
 from graph import free_domain, Process, until, Watcher  # noqa: E402, I100
+from lifecycle_msgs.msg import Transition  # noqa: E402
+from lifecycle_msgs.srv import ChangeState  # noqa: E402
 from panel_client import Client, PANEL, start_panel, steered_robot  # noqa: E402
 from rclpy.qos import qos_profile_sensor_data  # noqa: E402
 from std_msgs.msg import String  # noqa: E402
@@ -244,6 +246,42 @@ def test_stop_and_enable(rig, page):
     assert sum('there is no' in text for text in page.said) == 3
 
 
+def test_stop_works_on_a_managed_generator_in_every_state():
+    generator = Process('-p', 'managed:=true', '-p', 'ramp:=0.2')
+    with ExitStack() as ending:
+        ending.callback(generator.end)
+        panel, address = start_panel(generator.domain)
+        ending.callback(panel.end)
+        watcher = Watcher(generator.domain)
+        ending.callback(watcher.end)
+        page = Client(address)
+        ending.callback(page.end)
+        until(lambda: page.last.get('chosen'), 'the generator')
+
+        def stopped():
+            before = len(page.said)
+            page.send(do='stop')
+            until(lambda: len(page.said) > before, 'an answer')
+            return page.said[-1]
+
+        def change(transition):
+            request = ChangeState.Request(transition=Transition(id=transition))
+            return watcher.call(ChangeState, '/cpg_generator/change_state', request).success
+
+        assert 'managed' not in stopped()
+        assert change(Transition.TRANSITION_CONFIGURE)
+        assert 'managed' not in stopped()
+        assert change(Transition.TRANSITION_ACTIVATE)
+        until(lambda: watcher.samples and max(watcher.samples[-1][2]) > 0.1, 'a walk')
+        assert stopped().startswith('ramping down')
+        until(lambda: not any(watcher.samples[-1][2]), 'the stand')
+        # Activated again, it can walk again.
+        assert change(Transition.TRANSITION_ACTIVATE)
+        # A refusal is shown with its reason.
+        page.send(do='enable', on=True)
+        until(lambda: 'managed' in page.said[-1], 'the refusal')
+
+
 def test_a_recording_can_be_fetched_and_read(rig, page):
     address = rig[2]
     # As sensors are published.
@@ -296,7 +334,7 @@ def test_nothing_hostile_changes_anything(rig, page):
     twists.clear()
     where = urlsplit(address)
     for k in range(100):
-        with contextlib.suppress(Exception):
+        with suppress(Exception):
             one = Client(address)
             if k % 4 == 0:
                 one.send_raw('x' * 70_000)  # longer than a request may be: it is cut off
@@ -304,7 +342,7 @@ def test_nothing_hostile_changes_anything(rig, page):
             for text in HOSTILE:
                 one.send_raw(text)
             one.end()
-        with contextlib.suppress(OSError), socket.create_connection(
+        with suppress(OSError), socket.create_connection(
                 (where.hostname, where.port), timeout=5) as raw:
             raw.sendall([b'\x16\x03\x01\x00', b'GET / HTTP/9\r\n\r\n', b'POST /socket HTTP/1.1\r\n'
                          b'Host: localhost\r\n\r\n', os.urandom(300)][k % 4])
@@ -316,7 +354,7 @@ def test_nothing_hostile_changes_anything(rig, page):
 
 def test_a_flood_is_cut_off(rig):
     one = Client(rig[2]).ready()
-    with contextlib.suppress(Exception):
+    with suppress(Exception):
         for _ in range(2000):
             one.send(do='alive')
     until(lambda: one.closed == '1008', 'the end of it')
