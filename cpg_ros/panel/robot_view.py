@@ -17,6 +17,7 @@
 import asyncio
 from collections.abc import Callable
 import math
+import re
 import time
 from typing import Any
 
@@ -38,6 +39,8 @@ from std_srvs.srv import SetBool
 
 #: Decimal places of values: a tenth of a milliradian is less than a pixel.
 DIGITS = 4
+#: The folder of an absolute path.
+FOLDER = re.compile(r"(?<![\w/:.])/(?:[^/\s:'\"]+/)+")
 
 
 class RobotView:
@@ -110,6 +113,10 @@ class RobotView:
             doubts = list(dict.fromkeys(doubts))[:5]
             for doubt in doubts:
                 self._node.get_logger().warning(doubt)
+            # A page sees folders only of files that the graph names, not of the panel's own.
+            named = ' '.join((known.robot, known.model, known.description))
+            doubts = [FOLDER.sub(lambda found: found[0] * (found[0] in named), doubt)
+                      for doubt in doubts]
             self._keep({**shape.message(), 'doubts': doubts})
         except CallError as error:
             self._report(str(error))

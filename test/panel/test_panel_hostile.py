@@ -89,10 +89,10 @@ def shown():
     """Yield what shows a page an impostor, and returns the panel, its page and the shape."""
     started = []
 
-    def show(robot, description=''):
+    def show(robot, description='', *panel_args):
         impostor = Impostor(free_domain(), robot, description)
         started.append(impostor)
-        panel, address = start_panel(impostor.domain)
+        panel, address = start_panel(impostor.domain, *panel_args)
         started.append(panel)
         page = Client(address)
         started.append(page)
@@ -148,6 +148,14 @@ def test_meshes_of_a_description_are_those_of_installed_packages(shown, tmp_path
     before = page.frames
     until(lambda: page.frames > before + 5, 'frames')
     assert peak(panel.pid) < 1e9
+
+
+def test_a_page_sees_no_folder_of_the_panels_own_files(shown, tmp_path):
+    urdf = tmp_path / 'own.urdf'
+    urdf.write_text(URDF.format(mesh='meshes/missing.stl'))
+    panel, _, shape = shown('/no/robot.yaml', '', '-p', f'urdf:={urdf}')
+    assert shape['source'] == 'own.urdf' and str(tmp_path) not in json.dumps(shape)
+    assert 'missing.stl' in shape['doubts'][0] and str(tmp_path) in panel.log
 
 
 BALL = '<visual><geometry><sphere radius="1"/></geometry></visual>'
