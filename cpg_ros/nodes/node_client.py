@@ -94,10 +94,7 @@ class ServiceClients:
             CallError: it does not answer in time.
 
         """
-        if name not in self._clients:
-            self._clients[name] = self._node.create_client(kind, name,
-                                                           callback_group=PolledGroup())
-        client = self._clients[name]
+        client = self.client(kind, name)
         try:
             await self._found(client, name)
             end = self._end or time.monotonic() + patience
@@ -111,6 +108,13 @@ class ServiceClients:
         except InvalidHandle:  # it was forgotten meanwhile
             raise NoService(name) from None
         return answer.result()
+
+    def client(self, kind: Any, name: str) -> Client:
+        """Return the client of a service; made early, the service knows it before a call."""
+        if name not in self._clients:
+            self._clients[name] = self._node.create_client(kind, name,
+                                                           callback_group=PolledGroup())
+        return self._clients[name]
 
     async def _found(self, client: Client, name: str) -> None:
         began = time.monotonic()

@@ -23,6 +23,7 @@ from cpg_ros.errors import needed
 # Before any of its modules: one line where the extra is missing, not a traceback.
 needed('websockets', part='websockets.asyncio')
 
-__all__ = ['access_control', 'body_shape', 'controls', 'graph', 'lease', 'model_shape', 'pages',
-           'panel_node', 'recorder', 'request_handler', 'requests', 'robot_view', 'shape_source',
-           'start_watch', 'stick_figure', 'teleop', 'urdf_shape', 'web_server']
+__all__ = ['access_control', 'body_shape', 'bridge_views', 'controls', 'graph', 'lease',
+           'model_shape', 'pages', 'panel_node', 'recorder', 'request_handler', 'requests',
+           'robot_view', 'shape_source', 'start_watch', 'stick_figure', 'teleop', 'urdf_shape',
+           'web_server']

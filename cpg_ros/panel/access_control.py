@@ -14,9 +14,7 @@
 
 """Access control: pages of this machine on loopback, holders of the token elsewhere."""
 
-from collections import OrderedDict
 import hmac
-import ipaddress
 import secrets
 from urllib.parse import parse_qs, urlsplit
 
@@ -25,15 +23,11 @@ from cpg_ros.files.loopback import is_loopback
 
 #: In place of a token: generate one of 128 bits, and show it in the terminal.
 AUTO = 'auto'
-#: Least number of characters of a token: that of 128 bits, 6 bits each.
+#: Least number of characters of a token: that of 128 bits, 6 bits each. Guesses are not delayed: a
+#: delay of an address would also lock out the holder of the token behind the same address.
 SHORTEST = 22
 #: How to generate a token.
 RECIPE = 'python3 -c "import secrets; print(secrets.token_urlsafe(16))"'
-#: Delay of a peer after a wrong token, s, doubled by each further one, up to the longest; time
-#: without one that resets it, s; number of peers remembered; bits of an IPv6 address that count.
-FIRST_WAIT, LONGEST_WAIT, FORGIVEN, PEERS, PREFIX = 0.25, 4.0, 60.0, 1024, 64
-#: Reason for rejecting a wrong token.
-WRONG = 'the token is wrong'
 
 
 class AccessError(CpgError):
@@ -49,8 +43,8 @@ def token_for(host: str, wish: str, terminal: bool) -> str:
         terminal: whether there is a terminal to show a new token in.
 
     Raises:
-        AccessError: other machines would have access without a token, or with one that can be
-            guessed; or nobody would see a new one.
+        AccessError: other machines would have access without a token; the token can be guessed;
+            or nobody would see a new one.
 
     """
     if wish == AUTO:
@@ -58,14 +52,12 @@ def token_for(host: str, wish: str, terminal: bool) -> str:
             raise AccessError(f'token:={AUTO} shows the token in the terminal, and there is none: '
                               f'make one ({RECIPE}) and set it in a parameter file')
         return secrets.token_urlsafe(16)
-    if not is_loopback(host):
-        if not wish:
-            raise AccessError(f"host '{host}' can be reached from other machines: set the "
-                              f"parameter "
-                              f'token to protect it; token:={AUTO} makes one')
-        if len(wish) < SHORTEST:
-            raise AccessError(f'the token has {len(wish)} characters, and can be guessed: it '
-                              f'needs {SHORTEST}; token:={AUTO} makes one, or: {RECIPE}')
+    if not wish and not is_loopback(host):
+        raise AccessError(f"host '{host}' can be reached from other machines: set the parameter "
+                          f'token to protect it; token:={AUTO} makes one')
+    if wish and len(wish) < SHORTEST:
+        raise AccessError(f'the token has {len(wish)} characters, and can be guessed: it '
+                          f'needs {SHORTEST}; token:={AUTO} makes one, or: {RECIPE}')
     return wish
 
 
@@ -93,41 +85,8 @@ class AccessControl:
             if not given:
                 return 'the token is missing'
             if not hmac.compare_digest(given.encode(errors='replace'), self._token):
-                return WRONG
+                return 'the token is wrong'
         # A name that its owner lets point at this machine (DNS rebinding) is another site's, too.
         elif not is_loopback(urlsplit(f'//{host}').hostname or ''):
             return f"'{host[:80]}' is not a name of this machine"
         return ''
-
-
-class Delays:
-    """Delays each peer after wrong tokens, independently of the others."""
-
-    def __init__(self) -> None:
-        # Peer -> how long it waits, and until when, both s; who was wrong last comes last.
-        self._peers: OrderedDict[str, tuple[float, float]] = OrderedDict()
-
-    def waits(self, address: str, now: float) -> bool:
-        """Return whether a peer is being delayed: its tokens are not checked meanwhile."""
-        return now < self._peers.get(_peer(address), (0.0, now))[1]
-
-    def wrong(self, address: str, now: float) -> float:
-        """Count a wrong token of a peer that is not delayed; return its delay, s."""
-        wait, until = self._peers.pop(_peer(address), (0.0, now))
-        wait = FIRST_WAIT if now - until > FORGIVEN else min(max(2.0 * wait, FIRST_WAIT),
-                                                             LONGEST_WAIT)
-        self._peers[_peer(address)] = wait, now + wait
-        if len(self._peers) > PEERS:
-            self._peers.popitem(last=False)
-        return wait
-
-
-def _peer(address: str) -> str:
-    """Return the peer of an address: for IPv6 its network, all of which one peer has."""
-    try:
-        found = ipaddress.ip_address(address.partition('%')[0])
-    except ValueError:
-        return address
-    if found.version == 4:
-        return address
-    return str(ipaddress.ip_network((found, PREFIX), strict=False))

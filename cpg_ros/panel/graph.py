@@ -16,6 +16,7 @@
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import Any
 
 from rclpy.node import Node
 
@@ -24,6 +25,16 @@ GENERATOR = {'phase': 'std_msgs/msg/Float64MultiArray', 'gait': 'std_msgs/msg/St
              'enable': 'std_srvs/srv/SetBool'}
 SIMULATION = {'push': 'geometry_msgs/msg/Wrench', 'reset': 'std_srvs/srv/Trigger'}
 INVERSION = {'fit': 'std_srvs/srv/Trigger'}
+BRIDGE = {'state': 'std_msgs/msg/String', 'stop': 'std_srvs/srv/Trigger',
+          'damp': 'std_srvs/srv/Trigger'}
+#: Levels of /diagnostics, as pages name them.
+LEVELS = {0: 'ok', 1: 'warn', 2: 'error', 3: 'stale'}
+
+
+def level(status: Any) -> str:
+    """Return the level of a diagnostic status, which rclpy has as bytes, as pages name it."""
+    number = status.level if isinstance(status.level, int) else ord(status.level)
+    return LEVELS.get(number, 'stale')
 
 
 @dataclass(frozen=True)
@@ -33,6 +44,7 @@ class Graph:
     generators: tuple[str, ...] = ()
     simulations: tuple[str, ...] = ()
     inversions: tuple[str, ...] = ()
+    bridges: tuple[str, ...] = ()
     topics: frozenset[tuple[str, str]] = frozenset()
 
     def beside(self, generator: str, kind: tuple[str, ...]) -> str:
@@ -58,6 +70,11 @@ def look(node: Node) -> Graph:
         owners: Iterable[str] = (name.removesuffix(f'/{first}') for name, kind in known
                                  if name.endswith(f'/{first}') and kind == what[first])
         return tuple(sorted(owner for owner in owners if owner and all(
-            (f'{owner}/{end}', kind) in known for end, kind in what.items())))
+            there(f'{owner}/{end}', kind) for end, kind in what.items())))
 
-    return Graph(having(GENERATOR), having(SIMULATION), having(INVERSION), frozenset(topics))
+    def there(name: str, kind: str) -> bool:
+        # The panel's own clients keep the name of a service on the graph.
+        return (name, kind) in known and ('/srv/' not in kind or node.count_services(name) > 0)
+
+    return Graph(having(GENERATOR), having(SIMULATION), having(INVERSION), having(BRIDGE),
+                 frozenset(topics))

@@ -30,6 +30,8 @@ RATE, BURST = 60.0, 120.0
 #: Bytes that a page has not received yet: above the first limit it gets no frames; above the
 #: second, or above the first for PATIENCE s, it is disconnected.
 SLOW, LARGEST, PATIENCE = 200_000, 16_000_000, 20.0
+#: Longest message to a page, characters: below LARGEST, so that none disconnects a page.
+LONGEST = 8_000_000
 
 
 class Page:
@@ -148,8 +150,13 @@ class Pages:
         return [page for page in self.open if page.node == node]
 
     def send(self, pages: Iterable[Page], message: dict[str, Any]) -> None:
-        """Send a message to pages."""
-        broadcast([page.connection for page in pages], json.dumps(message, allow_nan=False))
+        """Send a message to pages; in place of one that is too long, a line that says so."""
+        text = json.dumps(message, allow_nan=False)
+        if len(text) > LONGEST:
+            self.notify(pages, f"'{message['type']}' is not shown: it has {len(text) / 1e6:.3g} "
+                        f'MB, more than the {LONGEST / 1e6:g} MB that a page is sent')
+        else:
+            broadcast([page.connection for page in pages], text)
 
     def frame(self, pages: Iterable[Page], frame: dict[str, Any], stamp: float) -> None:
         """Send a frame, which may be lost, and a stamp to echo; without a frame the stamp."""

@@ -30,6 +30,7 @@ from cpg_ros.nodes.node_client import ServiceClients
 from cpg_ros.nodes.parameter_spec import fixed, Spec
 from cpg_ros.panel import requests
 from cpg_ros.panel.access_control import AccessControl, token_for
+from cpg_ros.panel.bridge_views import BridgeViews, STOPS
 from cpg_ros.panel.graph import Graph, look
 from cpg_ros.panel.pages import Page, Pages, SLOW
 from cpg_ros.panel.recorder import Recorder
@@ -41,6 +42,7 @@ from cpg_ros.panel.web_server import WebServer
 from cpg_ros.robots.urdf import load_urdf
 import rclpy
 from rclpy.node import Node
+from std_srvs.srv import Trigger
 
 NAME = 'cpg_panel'
 #: Frames per second, and interval of looking at the graph, s.
@@ -50,8 +52,8 @@ SPECS = fixed({
     'host': Spec('127.0.0.1', 'address to listen on; an address that other machines can reach '
                  'needs a token'),
     'port': Spec(8080, 'port to listen on; 0 for any free one', 0, 65535),
-    'token': Spec('', 'token required in the page address, as ?token=WORD; auto: make one, shown '
-                  'in the terminal; empty: none'),
+    'token': Spec('', 'token required in the page address, as ?token=WORD, of at least 22 '
+                  'characters; auto: make one, shown in the terminal; empty: none'),
     'urdf': Spec('', "URDF file with the robot's shape; if empty, robot_description, the "
                  "simulation's model if it is shipped, or a stick figure is used"),
     'max_speed': Spec(0.5, 'maximum speed of the steering pad [m/s]', 0.0, 5.0),
@@ -86,6 +88,7 @@ class Panel(StartedNode):
         self._pages = Pages()
         self._calls = ServiceClients(self)
         self._views: dict[str, RobotView] = {}
+        self._bridges = BridgeViews(self._watch, self._calls)
         self._graph, self._starting, self._starts = Graph(), '', StartWatch(self._watch)
         self._recorder = Recorder(
             self._watch, Path(self._value('recordings')).expanduser(),
@@ -146,6 +149,8 @@ class Panel(StartedNode):
                 if pages := self._pages.of(view.name):
                     view.news()
                     self._pages.frame(pages, view.frame(), loop.time())
+            if message := self._bridges.news():
+                self._pages.send(self._pages.everyone, message)
             self._lease_news()
             due = max(due + 1.0 / FRAMES, loop.time() - 1.0 / FRAMES)
             await asyncio.sleep(max(due - loop.time(), 0.0))
@@ -162,6 +167,7 @@ class Panel(StartedNode):
         if (graph, starting) != (self._graph, self._starting):
             self._graph, self._starting = graph, starting
             self._pages.send(self._pages.everyone, self._state())
+        self._bridges.look(graph.bridges, bool(self._pages.everyone))
         for name in set(self._views) - set(graph.generators):
             self._views.pop(name).close()
         for name in graph.generators:
@@ -171,8 +177,9 @@ class Panel(StartedNode):
             self._views[name].ready()
             self._views[name].teleop.look()
         for page in self._pages.everyone:
-            if page.node not in self._views and graph.generators:
-                self._choose(page, graph.generators[0])
+            # A page never turns to another robot by itself, whoever steers that.
+            if not page.node and (first := self._first()):
+                self._choose(page, first)
 
     def _lease_news(self) -> None:
         """Send each page the state of its robot's lease, if that has changed."""
@@ -207,8 +214,18 @@ class Panel(StartedNode):
 
     def _come(self, page: Page) -> None:
         self._pages.send([page], self._state())
-        if self._graph.generators:
-            self._choose(page, self._graph.generators[0])
+        self._pages.send([page], self._bridges.message)
+        if first := self._first():
+            self._choose(page, first)
+
+    def _first(self) -> str:
+        """Return what a new page shows: the generator in the panel's namespace, '' for none.
+
+        A panel without a namespace shows any.
+        """
+        own = self.get_namespace().rstrip('/')
+        found = self._graph.beside(f'{own}/', self._graph.generators)
+        return found or ('' if own else next(iter(self._graph.generators), ''))
 
     def _gone(self, page: Page) -> None:
         for view in self._views.values():
@@ -218,8 +235,6 @@ class Panel(StartedNode):
         view = self._views.get(name)
         if view is None:
             raise RequestError(f"there is no generator '{name}'")
-        if page.waiting() > SLOW:
-            raise RequestError('the page has not yet processed what it was sent')
         self._gone(page)
         page.node = name
         self._pages.send([page], {'type': 'chosen', 'node': name})
@@ -233,9 +248,18 @@ class Panel(StartedNode):
         try:
             request = requests.read(text)
             if request.action == 'choose':
+                if page.waiting() > SLOW:
+                    raise RequestError('the page has not yet processed what it was sent')
                 self._choose(page, request.values['node'])
+            elif request.action in STOPS:
+                # Which needs neither the lease nor a generator.
+                bridge = request.values['bridge']
+                if bridge not in self._graph.bridges:
+                    raise RequestError(f"there is no bridge '{bridge}'")
+                await self._orders.command(page, bridge, Trigger, STOPS[request.action])
             elif page.node not in self._views:
-                raise RequestError('there is no generator on the graph')
+                raise RequestError(f'{page.node} is gone' if page.node else
+                                   'there is no generator on the graph')
             else:
                 await self._orders.carry_out(page, self._views[page.node], request)
         except CpgError as error:

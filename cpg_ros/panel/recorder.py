@@ -15,8 +15,8 @@
 """Records the topics of a robot into bags, one after another, in a thread of its own."""
 
 from collections.abc import Callable, Iterable
+import os
 from pathlib import Path
-import shutil
 import threading
 import time
 import zipfile
@@ -47,7 +47,7 @@ class Recorder:
 
         """
         self._node, self._folder, self._largest, self._ended = node, folder, largest, ended
-        self._stop = threading.Event()
+        self._stop, self._packing = threading.Event(), threading.Lock()
         self._thread: threading.Thread | None = None
         self.bag = ''
 
@@ -66,12 +66,13 @@ class Recorder:
         """
         if self.running:
             raise BagError(f'{self.bag} is being recorded already')
-        bag = time.strftime('panel_%Y%m%d_%H%M%S')
+        # Another panel may record to the same folder in the same second.
+        bag = time.strftime(f'panel_%Y%m%d_%H%M%S_{os.getpid()}')
         try:
             self._folder.mkdir(parents=True, exist_ok=True)
             recorder = BagRecorder(self._node, self._folder / bag)
-        except OSError as error:
-            raise BagError(f'{self._folder}: {error.strerror}') from error
+        except (BagError, OSError) as error:
+            raise BagError(self._shown(error)) from error
         for name, kind in sorted(topics):
             recorder.subscribe(name, kind)
         if not recorder.counts:
@@ -93,12 +94,12 @@ class Recorder:
                     why = f'{self.bag} is full ({recorder.size / 1e6:.0f} MB)'
                     break
         except BagError as error:
-            why = str(error)
+            why = self._shown(error)
         finally:
             try:
                 recorder.close()
             except BagError as error:
-                why = why or str(error)
+                why = why or self._shown(error)
         if why:
             self._ended(why)
 
@@ -112,7 +113,7 @@ class Recorder:
         """Return a recording that has ended as a zip archive.
 
         Raises:
-            BagError: there is no such recording, or it has not ended.
+            BagError: there is no such recording, it has not ended, or the disk is full or broken.
 
         """
         path = self._folder / bag
@@ -124,10 +125,22 @@ class Recorder:
         if not path.is_dir():
             raise BagError(f'there is no recording {bag}')
         archive = self._folder / f'{bag}.zip'
-        if not archive.is_file():
-            part = archive.with_suffix('.part')
-            with zipfile.ZipFile(part, 'w', zipfile.ZIP_DEFLATED) as made:
-                for file in sorted(path.iterdir()):
-                    made.write(file, f'{bag}/{file.name}')
-            shutil.move(part, archive)
-        return archive.read_bytes()
+        try:
+            # Several pages may download it at once.
+            with self._packing:
+                if not archive.is_file():
+                    part = archive.with_suffix('.part')
+                    with zipfile.ZipFile(part, 'w', zipfile.ZIP_DEFLATED) as made:
+                        for file in sorted(path.iterdir()):
+                            made.write(file, f'{bag}/{file.name}')
+                    part.replace(archive)
+            return archive.read_bytes()
+        except OSError as error:
+            raise BagError(self._shown(error)) from error
+
+    def _shown(self, error: Exception) -> str:
+        """Log an error, and return it for pages, without the folder."""
+        self._node.get_logger().warning(str(error))
+        text = (f'{Path(error.filename or self._folder).name}: {error.strerror}'
+                if isinstance(error, OSError) else str(error))
+        return text.replace(f'{self._folder}/', '')

@@ -62,7 +62,7 @@ class RequestHandler:
         teleop.lease.renew(page, now)
         if action == 'stop' or (action == 'enable' and not values['on']):
             teleop.stop()
-            await self._command(page, view.name, SetBool, 'enable', data=False)
+            await self.command(page, view.name, SetBool, 'enable', data=False)
             return
         if page.stop_only and action != 'alive':
             raise RequestError(f'{MOST} pages are open already: this one can only stop the '
@@ -76,7 +76,7 @@ class RequestHandler:
         elif action == 'release':
             teleop.release(page)
         elif action == 'enable':
-            await self._command(page, view.name, SetBool, 'enable', data=True)
+            await self.command(page, view.name, SetBool, 'enable', data=True)
         elif action == 'push':
             await asyncio.to_thread(view.push, values['force'], values['direction'])
         elif action == 'record':
@@ -87,7 +87,7 @@ class RequestHandler:
             node = view.graph.beside(view.name, nodes)
             if not node:
                 raise RequestError(f'there is no {what} for {view.name}')
-            await self._command(page, node, Trigger, action, FIT)
+            await self.command(page, node, Trigger, action, FIT)
 
     def _acquire(self, page: Page, view: RobotView, request: Request, now: float) -> None:
         """Give a page the lease, if its request is fresh and no other page has it."""
@@ -114,8 +114,14 @@ class RequestHandler:
                 page.refused = str(error)
                 raise
 
-    async def _command(self, page: Page, node: str, kind: Any, service: str,
-                       patience: float = PATIENCE, **fields: Any) -> None:
+    async def command(self, page: Page, node: str, kind: Any, service: str,
+                      patience: float = PATIENCE, **fields: Any) -> None:
+        """Call a service of a node, and show the page the answer.
+
+        Raises:
+            CallError: the node refuses, or does not answer.
+
+        """
         other = NodeClient(self._services, node)
         self._pages.notify([page], await other.command(kind, service, patience, **fields), 'told')
 

@@ -17,6 +17,7 @@
 import asyncio
 from collections.abc import Callable
 import math
+import re
 import time
 from typing import Any
 
@@ -25,7 +26,7 @@ from cpg_ros.nodes.polled_group import PolledSubscription
 from cpg_ros.nodes.qos_profiles import best_effort, latched
 from cpg_ros.panel import shape_source
 from cpg_ros.panel.controls import Controls
-from cpg_ros.panel.graph import Graph, namespace
+from cpg_ros.panel.graph import Graph, level, namespace
 from cpg_ros.panel.teleop import Teleop
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import Wrench
@@ -34,10 +35,12 @@ from rcl_interfaces.msg import ParameterEvent
 from rclpy.node import Node
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray, String
+from std_srvs.srv import SetBool
 
-LEVELS = {0: 'ok', 1: 'warn', 2: 'error', 3: 'stale'}
 #: Decimal places of values: a tenth of a milliradian is less than a pixel.
 DIGITS = 4
+#: The folder of an absolute path.
+FOLDER = re.compile(r"(?<![\w/:.])/(?:[^/\s:'\"]+/)+")
 
 
 class RobotView:
@@ -68,6 +71,8 @@ class RobotView:
         self._node, self._watch, self._services = node, watch, services
         self._report, self._send = report, send
         self.controls = Controls(NodeClient(services, name), report)
+        # A client that the generator does not know yet would delay a stop.
+        services.client(SetBool, f'{name}/enable')
         self._pushes: Any = None
         self.teleop = Teleop(
             node, f'{self._space}/cmd_vel', fastest,
@@ -105,9 +110,14 @@ class RobotView:
                 str(self.controls.value('robot') or ''), self._urdf)
             doubts: list[str] = []
             shape = await asyncio.to_thread(shape_source.find, known, doubts.append)
-            for doubt in doubts[:5]:
+            doubts = list(dict.fromkeys(doubts))[:5]
+            for doubt in doubts:
                 self._node.get_logger().warning(doubt)
-            self._keep({**shape.message(), 'doubts': doubts[:5]})
+            # A page sees folders only of files that the graph names, not of the panel's own.
+            named = ' '.join((known.robot, known.model, known.description))
+            doubts = [FOLDER.sub(lambda found: found[0] * (found[0] in named), doubt)
+                      for doubt in doubts]
+            self._keep({**shape.message(), 'doubts': doubts})
         except CallError as error:
             self._report(str(error))
             self._stale = True
@@ -202,17 +212,17 @@ class RobotView:
                 if values := self.controls.hear(event):
                     self._send({'type': 'values', 'values': values})
         if health := self._topics.get('/diagnostics'):
-            owners = (f'{self.name}: ',
-                      f'{self.graph.beside(self.name, self.graph.simulations) or "-"}: ')
+            beside = (self.graph.beside(self.name, kind)
+                      for kind in (self.graph.simulations, self.graph.bridges))
+            owners = tuple(f'{name}: ' for name in (self.name, *beside) if name)
             for message, _ in health.take():
                 for status in message.status:
                     if status.name.startswith(owners):
                         self._keep_health(status)
 
     def _keep_health(self, status: Any) -> None:
-        level = status.level if isinstance(status.level, int) else status.level[0]
         parts = {**self._kept.get('health', {}).get('parts', {}), status.name: {
-            'level': LEVELS.get(level, 'stale'), 'text': status.message,
+            'level': level(status), 'text': status.message,
             'values': {value.key: value.value for value in status.values}}}
         self._keep({'type': 'health', 'parts': parts})
 

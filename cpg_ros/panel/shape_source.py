@@ -17,6 +17,7 @@
 import asyncio
 from collections.abc import Callable
 from dataclasses import dataclass, field
+import json
 from pathlib import Path
 from typing import Any
 
@@ -29,6 +30,7 @@ from cpg_ros.nodes.qos_profiles import latched
 from cpg_ros.panel import stick_figure, urdf_shape
 from cpg_ros.panel.body_shape import Shape
 from cpg_ros.panel.graph import Graph, namespace
+from cpg_ros.panel.pages import LONGEST
 from cpg_ros.robots.robot import Robot
 from cpg_ros.robots.robot_file import load_robot, RobotError
 from rclpy.node import Node
@@ -39,6 +41,10 @@ from std_msgs.msg import String
 SHIPPED = {'unitree_go2': 'go2', 'quadruped': 'quadruped.urdf'}
 #: A topic that is silent for this long has no message, s.
 PATIENCE = 1.0
+
+
+class ShapeError(CpgError):
+    """A shape is too large for the page; one line for the user."""
 
 
 @dataclass(frozen=True)
@@ -137,6 +143,9 @@ def find(known: Known, report: Callable[[str], None]) -> Shape:
     for make in (_from_urdf, _from_description, _from_model):
         try:
             shape = make(known, robot, report)
+            if shape is not None and (size := len(json.dumps(shape.message()))) > LONGEST:
+                raise ShapeError(f'{shape.source} is not drawn: its shape has {size / 1e6:.3g} '
+                                 f'MB, more than the {LONGEST / 1e6:g} MB that a page is sent')
         except (CpgError, OSError) as error:
             report(str(error))
             continue

@@ -30,7 +30,7 @@ from cpg_ros.robots.urdf import describe, mesh_folder, numbers, parse_tree, read
 import numpy as np
 
 #: Largest text on ``robot_description``, bytes; triangles and bytes of meshes that are drawn.
-LARGEST, TRIANGLES, MESHES = 4_000_000, 1_000_000, 500_000_000
+LARGEST, TRIANGLES, MESHES = 4_000_000, 100_000, 500_000_000
 #: Nothing that is drawn is longer or further away, m.
 FURTHEST = 1e4
 
@@ -117,7 +117,7 @@ class _Drawing:
         self._path, self._folder = path, mesh_folder(tree)
         self._colours = {one.get('name', ''): one for one in tree.findall('material')}
         self._meshes: dict[Path, np.ndarray] = {}
-        self._bytes = self._triangles = 0
+        self._bytes, self._left = 0, TRIANGLES
 
     def add(self, link: Link, visual: Xml.Element) -> None:
         """Add a visual to its link.
@@ -132,9 +132,9 @@ class _Drawing:
         colour = solids.GREY if material is None else self._colour(material)
         for one in visual.iterfind('geometry/*'):
             found = self._solid(one)
-            self._triangles += len(found)
-            if self._triangles > TRIANGLES:
-                raise MeshError(f'the robot has more than {TRIANGLES} triangles')
+            if len(found) > self._left:
+                raise MeshError(f'what exceeds {TRIANGLES} triangles of the whole robot')
+            self._left -= len(found)
             link.add(found, colour, place, pose)
 
     def _colour(self, material: Xml.Element) -> tuple[float, ...]:

@@ -21,7 +21,7 @@ import logging
 from pathlib import Path
 from urllib.parse import urlsplit
 
-from cpg_ros.panel.access_control import AccessControl, Delays, WRONG
+from cpg_ros.panel.access_control import AccessControl
 from cpg_ros.panel.pages import Page, Pages
 from websockets.asyncio.server import serve, Server, ServerConnection
 from websockets.datastructures import Headers
@@ -53,7 +53,6 @@ class WebServer:
                  on_request: Callable[[Page, str | bytes], Awaitable[None]],
                  gone: Callable[[Page], None]) -> None:
         self._access, self._pages, self._bag = access, pages, bag
-        self._delays = Delays()
         self._come, self._on_request, self._gone = come, on_request, gone
         self._files = {'/' if file.name == 'index.html' else f'/{file.name}':
                        (file.read_bytes(), TYPES[file.suffix])
@@ -82,11 +81,6 @@ class WebServer:
         if path in self._files and (not refused or 'token' in refused):
             body, kind = self._files[path]
             return _response(HTTPStatus.OK, body, f'{kind}; charset=utf-8')
-        peer, now = str(connection.remote_address[0]), asyncio.get_running_loop().time()
-        if self._delays.waits(peer, now):
-            return _text(HTTPStatus.TOO_MANY_REQUESTS, f'{WRONG}: wait, and try again')
-        if refused == WRONG:
-            await asyncio.sleep(self._delays.wrong(peer, now))
         if refused:
             return _text(HTTPStatus.FORBIDDEN, refused)
         if path == '/socket':
@@ -98,7 +92,7 @@ class WebServer:
                 bag = path.removeprefix(BAGS).removesuffix('.zip')
                 return _response(HTTPStatus.OK, await asyncio.to_thread(self._bag, bag),
                                  'application/zip')
-            except (ValueError, OSError) as error:
+            except ValueError as error:
                 return _text(HTTPStatus.NOT_FOUND, str(error))
         return _text(HTTPStatus.NOT_FOUND, 'there is nothing here')
 

@@ -22,7 +22,7 @@ pytest.importorskip('websockets')
 
 from cpg_ros.files.loopback import is_loopback  # noqa: E402, I100
 from cpg_ros.nodes.parameter_spec import choices  # noqa: E402
-from cpg_ros.panel.access_control import AccessControl, AccessError, Delays, PEERS, token_for  # noqa: E402
+from cpg_ros.panel.access_control import AccessControl, AccessError, token_for  # noqa: E402
 from cpg_ros.panel.controls import unit  # noqa: E402
 from cpg_ros.panel.requests import LONGEST, read, RequestError  # noqa: E402
 
@@ -49,33 +49,11 @@ def test_another_host_needs_a_token_that_cannot_be_guessed(wish, said):
 def test_tokens():
     assert token_for('0.0.0.0', LONG, terminal=False) == LONG
     assert token_for('127.0.0.1', '', terminal=False) == ''
-    assert token_for('127.0.0.1', 'word', terminal=False) == 'word'
+    with pytest.raises(AccessError, match='the token has 4 characters'):
+        token_for('127.0.0.1', 'word', terminal=False)
     made = {token_for('0.0.0.0', 'auto', terminal=True) for _ in range(100)}
     # 6 bits a character.
     assert len(made) == 100 and all(6 * len(one) >= 128 for one in made)
-
-
-def test_wrong_tokens_make_their_own_peer_wait_longer_and_longer():
-    delays, now, waits = Delays(), 100.0, []
-    for _ in range(7):
-        waits.append(delays.wrong('10.0.0.1', now))
-        assert delays.waits('10.0.0.1', now + 0.99 * waits[-1])
-        assert not delays.waits('10.0.0.2', now)
-        now += waits[-1]
-        assert not delays.waits('10.0.0.1', now)
-    assert waits == [0.25, 0.5, 1.0, 2.0, 4.0, 4.0, 4.0]
-    assert delays.wrong('10.0.0.1', now + 61.0) == 0.25
-    # A network of IPv6 is one peer.
-    delays.wrong('2001:db8::1', now)
-    assert delays.waits('2001:db8::ffff', now) and not delays.waits('2001:db8:1::1', now)
-
-
-def test_the_memory_of_wrong_tokens_is_bounded():
-    delays = Delays()
-    for k in range(3 * PEERS):
-        delays.wrong(f'10.0.{k // 256}.{k % 256}', 100.0)
-    assert sum(delays.waits(f'10.0.{k // 256}.{k % 256}', 100.0)
-               for k in range(3 * PEERS)) == PEERS
 
 
 @pytest.mark.parametrize(('path', 'host', 'origin', 'said'), [

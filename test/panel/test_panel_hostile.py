@@ -14,6 +14,7 @@
 
 """A node on the graph names files that hurt whoever opens them: the panel opens none of them."""
 
+import json
 import os
 import threading
 
@@ -54,7 +55,7 @@ class Impostor:
         node.declare_parameter('robot', robot)
         node.create_publisher(Float64MultiArray, '~/phase', 10)
         node.create_publisher(String, '~/gait', 10)
-        node.create_service(SetBool, '~/enable', lambda _, answer: answer)
+        node.create_service(SetBool, '~/enable', self._enable)
         if description:
             self._latched = node.create_publisher(String, 'robot_description', LATCHED)
             self._latched.publish(String(data=description))
@@ -65,6 +66,11 @@ class Impostor:
         self._executor.add_node(node)
         self._thread = threading.Thread(target=self._executor.spin, daemon=True)
         self._thread.start()
+
+    @staticmethod
+    def _enable(_, answer):
+        answer.success, answer.message = True, 'ramping down'
+        return answer
 
     def _move(self):
         for leg, publisher in self._joints.items():
@@ -83,10 +89,10 @@ def shown():
     """Yield what shows a page an impostor, and returns the panel, its page and the shape."""
     started = []
 
-    def show(robot, description=''):
+    def show(robot, description='', *panel_args):
         impostor = Impostor(free_domain(), robot, description)
         started.append(impostor)
-        panel, address = start_panel(impostor.domain)
+        panel, address = start_panel(impostor.domain, *panel_args)
         started.append(panel)
         page = Client(address)
         started.append(page)
@@ -142,3 +148,33 @@ def test_meshes_of_a_description_are_those_of_installed_packages(shown, tmp_path
     before = page.frames
     until(lambda: page.frames > before + 5, 'frames')
     assert peak(panel.pid) < 1e9
+
+
+def test_a_page_sees_no_folder_of_the_panels_own_files(shown, tmp_path):
+    urdf = tmp_path / 'own.urdf'
+    urdf.write_text(URDF.format(mesh='meshes/missing.stl'))
+    panel, _, shape = shown('/no/robot.yaml', '', '-p', f'urdf:={urdf}')
+    assert shape['source'] == 'own.urdf' and str(tmp_path) not in json.dumps(shape)
+    assert 'missing.stl' in shape['doubts'][0] and str(tmp_path) in panel.log
+
+
+BALL = '<visual><geometry><sphere radius="1"/></geometry></visual>'
+LINK = ('<link name="{k}"/><joint name="{k}j" type="revolute"><parent link="base"/>'
+        '<child link="{k}"/><limit lower="-1" upper="2" velocity="3"/></joint>')
+
+
+@pytest.mark.parametrize(('kind', 'source', 'said'), [
+    ('balls', 'robot_description', 'not drawn: what exceeds 100000 triangles'),
+    ('links', "stick figure of '/no/robot.yaml'", 'more than the 8 MB that a page is sent')])
+def test_a_large_description_leaves_pages_and_their_stop(shown, kind, source, said):
+    more = {'balls': BALL * 12_000, 'links': BALL * 380}[kind]
+    links = {'balls': '', 'links': ''.join(LINK.format(k=k) for k in range(15_000))}[kind]
+    text = URDF.replace('<visual>', f'{more}<visual>', 1).replace('</robot>', f'{links}</robot>')
+    _, page, shape = shown('/no/robot.yaml', text)
+    assert shape['source'] == source and any(said in one for one in shape['doubts'])
+    assert len(json.dumps(shape)) < 8e6
+    before = page.frames
+    until(lambda: page.frames > before + 5, 'frames')
+    assert not page.closed
+    page.send(do='stop')
+    until(lambda: any('ramping down' in text for text in page.said), 'the answer to the stop')

@@ -20,7 +20,6 @@ import re
 import secrets
 import subprocess
 import threading
-import time
 from urllib.error import HTTPError
 from urllib.parse import urlsplit
 from urllib.request import urlopen
@@ -49,19 +48,18 @@ def test_it_asks_for_its_token():
     try:
         here = f'http://127.0.0.1:{urlsplit(address).port}/'
         for query in ('', '?token=', f'?token={token[:-1]}', f'?token={token.swapcase()}'):
-            with pytest.raises(InvalidStatus, match=r'403|429'):
+            with pytest.raises(InvalidStatus, match='403'):
                 Client(here + query)
-        assert status(here + 'bags/panel_1.zip') in (403, 429)
-        # While this one waits, others do not; and what it sends meanwhile is not looked at.
-        waiting = threading.Thread(target=status, args=(f'{here}socket?token={token[1:]}',))
-        waiting.start()
-        time.sleep(0.1)
-        assert status(f'{here}socket?token={token}') == 429
-        other = f'http://127.0.0.1:{urlsplit(address).port}/?token={token}'
-        Client(other, source_address=('127.0.0.2', 0)).end()
-        waiting.join()
-        time.sleep(0.1)
-        Client(f'{here}?token={token}').end()
+        assert status(here + 'bags/panel_1.zip') == 403
+        # Whatever others guess from the same address, the holder of the token is let in.
+        guesses = [threading.Thread(target=status, args=(f'{here}socket?token={token[k:]}',))
+                   for k in range(1, 20)]
+        for guess in guesses:
+            guess.start()
+        for _ in range(20):
+            Client(f'{here}?token={token}').end()
+        for guess in guesses:
+            guess.join()
         assert token not in panel.log
     finally:
         panel.end()

@@ -1,5 +1,6 @@
 // The page: messages from the node go to its parts, and user actions go to the node.
 import { Body } from './body.js';
+import { Bridges } from './bridges.js';
 import { Lease } from './lease.js';
 import { Parameters } from './parameters.js';
 import { Plots } from './plots.js';
@@ -45,6 +46,7 @@ const parameters = new Parameters((name, value) => {
   set(name, value);
 });
 const lease = new Lease(send);
+const bridges = new Bridges(send);
 const steering = new Steering((held) => link.postMessage({ held }));
 const scene = new Scene(at('scene'), camera, () => {
   fresh = true;
@@ -73,7 +75,11 @@ function beside() {
   at('reset').disabled = !simulation;
   at('pushing').hidden = !simulation;
   at('fit').disabled = !inversion;
-  const steered = parameters.known.cmd_vel?.value === true;
+  const there = state.generators?.includes(view.node);
+  at('starting').hidden = there;
+  at('starting').textContent = state.starting || (takes.wanted ? `${view.node} is gone`
+    : state.generators?.length ? 'choose a generator' : 'waiting for a generator');
+  const steered = there && parameters.known.cmd_vel?.value === true;
   steering.enable(steered && lease.steers);
   tour.enable(steering.able, parameters.gaitNames);
   at('steered').textContent = lease.reason || (steered
@@ -92,8 +98,6 @@ const takes = {
     at('download').href = `bags/${message.bag}.zip${token ? `?token=${encodeURIComponent(token)}`
       : ''}`;
     if (!message.generators.length) chip(at('now'), 'no generator yet');
-    at('starting').textContent = message.starting || 'waiting for a generator';
-    at('starting').hidden = message.generators.length > 0;
     beside();
   },
   chosen(message) {
@@ -105,6 +109,8 @@ const takes = {
       return;
     }
     takes.wanted = true;
+    // What was held was for another robot.
+    if (view.node !== message.node) steering.release();
     view.node = message.node;
     at('generators').value = message.node;
     for (const key of Object.keys(last)) delete last[key];
@@ -117,6 +123,9 @@ const takes = {
     beside();
     remember();
   },
+  bridges(message) {
+    bridges.take(message);
+  },
   controls(message) {
     parameters.show(message.controls);
     beside();
@@ -128,7 +137,7 @@ const takes = {
     body = new Body(message);
     scene.show(body);
     plots.shaped(message);
-    at('source').textContent = `shape: ${message.source}`;
+    at('source').textContent = [`shape: ${message.source}`, ...message.doubts.slice(0, 1)].join('; ');
     at('source').title = message.doubts.join('\n');
     fresh = true;
   },
