@@ -47,8 +47,8 @@ def bridge_specs(robot: str, **others: Spec) -> dict[str, Spec]:
         'tilt': Spec(50.0, 'tilt of the body at which the robot is damped [deg]', 10.0, 90.0),
         'hottest': Spec(85.0, 'motor temperature at which the robot is damped [deg C]', 30.0,
                         110.0),
-        'tracking_error': Spec(0.3, 'mean distance of a joint from its commanded angle at which the '
-                               'robot sits down [rad]', 0.05, 3.0),
+        'tracking_error': Spec(0.3, 'mean distance of a joint from its commanded angle at which '
+                               'the robot sits down [rad]', 0.05, 3.0),
         'tracking_time': Spec(1.0, 'time over which that mean is taken [s]', 0.1, 10.0),
         'own_publishers': Spec(0, "number of the robot's own publishers on the command topic", 0,
                                4),

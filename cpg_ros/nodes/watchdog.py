@@ -15,8 +15,8 @@
 """A process that damps the robot while its bridge is silent: see ``safety.tick_monitor``.
 
 The bridge starts it: python -m cpg_ros.nodes.watchdog INTERFACE DOMAIN NAMESPACE TOPIC PERIOD
-TIMEOUT PROCESS. It ends when a bridge reports that the robot is at rest, or when the bridge ends before it
-ever drove the robot. It accepts connections from processes of its own user only.
+TIMEOUT PROCESS. It ends when a bridge reports that the robot is at rest, or when the bridge ends
+before it ever drove the robot. It accepts connections from processes of its own user only.
 """
 
 import contextlib
