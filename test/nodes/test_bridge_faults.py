@@ -145,7 +145,7 @@ def test_servos_that_were_let_go_stay_so_until_a_new_start(robot, bus, bridge, w
         assert not any(value for _, value in one.chain.torques[begun:])
         watcher.call(Trigger, '/a/servo_bridge/start', Trigger.Request())
         until(lambda: one.bridge.log.count('following: ') == 2, 'following again')
-        assert all(one.chain.torque.values())
+        until(lambda: all(one.chain.torque.values()), 'torque')
 
 
 def test_a_servo_that_is_stuck_makes_the_robot_sit(robot):

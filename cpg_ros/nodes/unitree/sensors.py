@@ -32,9 +32,9 @@ FEET = tuple(name.partition('_')[0] for name in JOINTS[::len(PARTS)])
 class Sensors:
     """Publishes ``joint_states``, ``imu``, ``foot_contacts``; once a second ``battery``."""
 
-    def __init__(self, node: Node, robot: Robot, state: LowState, forces: FootForces) -> None:
+    def __init__(self, node: Node, robot: Robot, state: LowState, feet: FootForces) -> None:
         """Publish the contents of ``state``, joints in ``robot.order``."""
-        self._state, self._forces, self._legs = state, forces, tuple(robot.legs)
+        self._state, self._forces, self._legs = state, feet, tuple(robot.legs)
         names = robot.order
         self._from = [JOINTS.index(name) for name in names]
         self._feet = [FEET.index(leg[0].name.partition('_')[0]) for leg in robot.legs.values()]
