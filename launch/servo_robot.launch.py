@@ -38,6 +38,10 @@ BRIDGE = {
     'dry_run': ('false', bool, 'compute and log everything, but send nothing'),
     'autostart': ('false', bool, 'start the robot at launch; if false, wait for ~/start'),
 }
+BUS = {
+    'no_position_feedback': ('false', bool, 'drive servos that do not report their position, as '
+                             'those of a PCA9685, the robot lying in its rest pose'),
+}
 COMMAND = {'command': 'forward_position'}
 #: Ctrl-C makes the robot sit down and rest, s, before it may be hurried.
 SITTING = '8'
@@ -47,8 +51,8 @@ def nodes(context):
     """Return bus, bridge and generator."""
     return [
         # It gets Ctrl-C with the bridge, whose way down it has to wait for.
-        started(context, 'servo_bus', 'servo_bus', SERVOS, {'end_timeout': float(SITTING)},
-                on_exit=Shutdown(), sigterm_timeout=SITTING),
+        started(context, 'servo_bus', 'servo_bus', {**SERVOS, **BUS},
+                {'end_timeout': float(SITTING)}, on_exit=Shutdown(), sigterm_timeout=SITTING),
         started(context, 'servo_bridge', 'servo_bridge', {**ROBOT, **SERVOS, **BRIDGE}, COMMAND,
                 on_exit=Shutdown(), sigterm_timeout=SITTING),
         # Its end makes the robot sit down; the bridge must be there to do it.
@@ -59,5 +63,5 @@ def nodes(context):
 
 def generate_launch_description():
     """Return bus, bridge and generator, optionally in a namespace."""
-    return LaunchDescription([*declared({**ROBOT, **SERVOS, **GENERATOR, **BRIDGE}),
+    return LaunchDescription([*declared({**ROBOT, **SERVOS, **BUS, **GENERATOR, **BRIDGE}),
                               OpaqueFunction(function=nodes)])

@@ -27,7 +27,7 @@ from cpg_ros.nodes.bridge_loop import BridgeLoop
 from cpg_ros.nodes.bridge_start import StartRefused, StartSequence, Wait
 from cpg_ros.nodes.health_publisher import Health, HealthPublisher, STEADY
 from cpg_ros.nodes.log_queue import QUEUE
-from cpg_ros.nodes.other_publishers import others_on
+from cpg_ros.nodes.other_publishers import NAMELESS, others_on
 from cpg_ros.nodes.shutdown import endings
 from cpg_ros.safety.robot_state import RobotState
 from cpg_ros.safety.supervisor import ACTIVE, BridgeState
@@ -35,7 +35,7 @@ from diagnostic_msgs.msg import DiagnosticStatus
 from std_srvs.srv import Trigger
 
 #: How often the network is checked for others who command the robot, s.
-CHECK = 0.25
+CHECK = 0.1
 #: How long a start waits for the first state, s.
 STATE = 10.0
 #: Two programs on a network have discovered each other after this time, s.
@@ -63,9 +63,10 @@ class BridgeNode(BridgeLoop):
         """Declare the parameters, check them, and prepare to start; as the base class does."""
         super().__init__(state)
         self._start: StartSequence | None = None
-        self._refusal = self._hazard = ''
+        self._refusal = self._hazard = self._conflict = ''
         self._ended_at = 0.0
         self.create_service(Trigger, '~/stop', self._stop)
+        self.create_service(Trigger, '~/damp', self._damp)
         self.create_service(Trigger, '~/start', self._start_again)
         self._before = 0, 0, 0
         self._health = HealthPublisher(self, 'robot', self.robot.name, self._report_health)
@@ -135,19 +136,18 @@ class BridgeNode(BridgeLoop):
     def _others(self) -> str:
         """Return who else commands the robot, or ''."""
         return others_on(self, self.topic, int(not self.dry), self._value('own_publishers'),
-                         f'/{self.interface.watchdog_name()}')
+                         f'{self.get_namespace().rstrip("/")}/{self.interface.watchdog_name()}')
 
     def _check_publishers(self, wait: Wait) -> None:
         if self._hazard:
             raise StartRefused(self._hazard)
         end, logged = time.monotonic() + FORGOTTEN, False
-        while names := self._others():
-            if not names.endswith(f'/{self.interface.bridge_name()}') or ',' in names:
-                raise StartRefused(f'the robot is commanded by {names}, too')
-            if time.monotonic() > end:
-                raise StartRefused(f'the robot is commanded by another bridge ({names}), too')
+        while (conflict := self._find_conflict())[0]:
+            text, of_one_name = conflict
+            if not of_one_name or time.monotonic() > end:
+                raise StartRefused(text)
             if not logged:
-                self.log_step(f'waiting for {names} to be gone from the network')
+                self.log_step(f'waiting until a node that was killed is forgotten: {text}')
             logged = True
             wait(0.1)
         self.log_step('nobody else commands it')
@@ -177,7 +177,20 @@ class BridgeNode(BridgeLoop):
     # -- services and timers --------------------------------------------------------------
 
     def _stop(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        self._requests.append(lambda now: self._halt('~/stop', now))
+        """Sit down, then damp, in any state."""
+        state = self.supervisor.state
+        message = ('it sits down, then damps' if state in ACTIVE else
+                   'the start is cancelled' if self._start is not None else f'it is {state.value}')
+        # Not in the loop's thread: a start that is asked for after this must not be cancelled.
+        self._cancel_start('~/stop')
+        self._requests.append(lambda now: self.supervisor.sit(now, '~/stop'))
+        response.success, response.message = True, message
+        return response
+
+    def _damp(self, request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        """Damp at once, in any state."""
+        self._cancel_start('~/damp')
+        self._requests.append(lambda now: self.supervisor.damp(now, '~/damp'))
         response.success, response.message = True, 'damping'
         return response
 
@@ -197,9 +210,28 @@ class BridgeNode(BridgeLoop):
         if (hazard := self.network_hazard()) and not self._hazard:
             self._hazard = hazard
             self.get_logger().error(hazard)
-        if self.supervisor.state in ACTIVE and (names := self._others()):
-            reason = f'the robot is commanded by {names}, too'
+        before, (self._conflict, _) = self._conflict, self._find_conflict()
+        if self._conflict and self.supervisor.state in ACTIVE:
+            reason = self._conflict
             self._requests.append(lambda now: self.supervisor.sit(now, reason))
+        # The name of a node may be known later than its publisher.
+        if self._conflict and self._conflict != before and NAMELESS in before:
+            self.get_logger().error(self._conflict)
+
+    def _find_conflict(self) -> tuple[str, bool]:
+        """Return who commands the robot beside the bridge, or sends targets beside a generator.
+
+        The text is '' for nobody. The second value is whether all have one name, as a node has
+        that was killed and started again, until the network forgets it.
+        """
+        if names := self._others():
+            return (f'the robot is commanded by {names}, too',
+                    names == self.get_fully_qualified_name())
+        for topic in self._commands.topics if self._value('exclusive') else ():
+            if names := others_on(self, topic, 0, 1):
+                return (f'{topic} is published by {names}: only one may publish it (exclusive)',
+                        len(set(names.split(', '))) == 1)
+        return '', False
 
     def _report_health(self) -> Health:
         """Publish what changes slowly, and return the status.
@@ -216,6 +248,8 @@ class BridgeNode(BridgeLoop):
             self.get_logger().info(f'dry run: {state.value}, {self.dry_report()}')
         if state in (BridgeState.DAMPING, BridgeState.SITTING):
             level, text = DiagnosticStatus.ERROR, f'{state.value}: {supervisor.reason}'
+            if self._conflict and self._conflict not in text:
+                text += f'; {self._conflict}'
         elif self._refusal and state is BridgeState.IDLE:
             level, text = DiagnosticStatus.ERROR, f'not started: {self._refusal}'
         elif not received:
@@ -227,6 +261,7 @@ class BridgeNode(BridgeLoop):
             'states in the last second': received, 'commands in the last second': sent,
             'late ticks': ticker.late, 'dropped ticks': ticker.dropped,
             'worst delay of a tick [ms]': f'{1e3 * ticker.worst:.3f}',
+            'largest tracking error [rad]': supervisor.tracking.worst,
             'log lines dropped': QUEUE.dropped, **self.measured_values()}
 
     # -- beginning and end ----------------------------------------------------------------

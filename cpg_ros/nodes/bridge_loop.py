@@ -85,7 +85,9 @@ class BridgeLoop(StartedNode):
         command_type, state_type = interface.command_type(), interface.state_type()
         self.robot = load_robot(value('robot'))
         common = {'period': period, 'target_timeout': value('target_timeout'),
-                  'state_timeout': value('state_timeout'), 'astray': math.inf if self.dry else 0.4}
+                  'state_timeout': value('state_timeout'), 'astray': math.inf if self.dry else 0.4,
+                  'tracking_error': math.inf if self.dry else value('tracking_error'),
+                  'tracking_time': value('tracking_time')}
         # Of what some robots do not measure, their bridges have no parameter.
         if 'tilt' in self.specs:
             common['tilt'] = math.radians(value('tilt'))
@@ -107,7 +109,9 @@ class BridgeLoop(StartedNode):
                 raise StartError(f'another bridge on this computer commands the robot on {topic} '
                                  f'in domain {domain} already: {error}') from error
             self._publisher = self.create_publisher(command_type, topic, command_qos())
-            self.watchdog = WatchdogLink(interface, domain, topic, period)
+            self.watchdog = WatchdogLink(interface, domain, self.get_namespace(), topic,
+                                         period, value('watchdog_timeout')
+                                         or value('state_timeout'))
         self._states = PolledSubscription(self, state_type, interface.state_topic,
                                           raw=interface.raw_states)
         self._commands = Commands(self, self.robot, value('command'), period,
@@ -154,6 +158,9 @@ class BridgeLoop(StartedNode):
         supervisor.kp_scale = self._kp_scale.take(now)
         while self._requests:
             self._requests.popleft()(now)
+        # Before anything is sent: joints that have given way must not be driven back at once.
+        if self.watchdog is not None and self.watchdog.acted():
+            supervisor.damp(now, 'the watchdog has damped the robot: the bridge was silent')
         if supervisor.step(now):
             message = supervisor.command.encode()
             if self._publisher is not None:

@@ -41,10 +41,18 @@ def bridge_specs(robot: str, **others: Spec) -> dict[str, Spec]:
                                '[s]', 0.02, 1.0),
         'state_timeout': Spec(0.02, 'time without a new state, or without a tick of the bridge, '
                               'after which the robot is damped [s]', 0.005, 0.2),
+        'watchdog_timeout': Spec(0.0, 'time without a tick of the bridge after which its watchdog '
+                                 'damps the robot, which then stays damped [s]; 0 for '
+                                 'state_timeout', 0.0, 5.0),
         'tilt': Spec(50.0, 'tilt of the body at which the robot is damped [deg]', 10.0, 90.0),
         'hottest': Spec(85.0, 'motor temperature at which the robot is damped [deg C]', 30.0,
                         110.0),
+        'tracking_error': Spec(0.3, 'mean distance of a joint from its commanded angle at which '
+                               'the robot sits down [rad]', 0.05, 3.0),
+        'tracking_time': Spec(1.0, 'time over which that mean is taken [s]', 0.1, 10.0),
         'own_publishers': Spec(0, "number of the robot's own publishers on the command topic", 0,
                                4),
+        'exclusive': Spec(True, 'make the robot sit down if more than one node publishes the '
+                          'commands to follow; if false, follow them all'),
         'autostart': Spec(True, 'start the robot at launch; if false, wait for ~/start'),
         'dry_run': Spec(False, 'compute and log everything, but send nothing')}

@@ -14,11 +14,12 @@
 
 """A process that damps the robot while its bridge is silent: see ``safety.tick_monitor``.
 
-The bridge starts it: python -m cpg_ros.nodes.watchdog INTERFACE DOMAIN TOPIC PERIOD PROCESS. It
-ends when a bridge reports that the robot is at rest, or when the bridge ends before it ever drove
-the robot. It accepts connections from processes of its own user only.
+The bridge starts it: python -m cpg_ros.nodes.watchdog INTERFACE DOMAIN NAMESPACE TOPIC PERIOD
+TIMEOUT PROCESS. It ends when a bridge reports that the robot is at rest, or when the bridge ends
+before it ever drove the robot. It accepts connections from processes of its own user only.
 """
 
+import contextlib
 import os
 from pathlib import Path
 import pkgutil
@@ -93,6 +94,14 @@ def accept(listener: socket.socket) -> list[socket.socket]:
     return []
 
 
+def tell(lines: list[socket.socket]) -> None:
+    """Tell the bridge that its robot was damped in its absence."""
+    for line in lines:
+        # One that is gone, or whose queue is full of the same, needs no other.
+        with contextlib.suppress(OSError):
+            line.send(TickMonitor.ACTED)
+
+
 def watch(listener: socket.socket, publisher: Publisher, command: JointCommand,
           monitor: TickMonitor, process: int, logger: RcutilsLogger) -> None:
     """Damp whenever ticks are missing, until the bridge announces its end."""
@@ -113,21 +122,23 @@ def watch(listener: socket.socket, publisher: Publisher, command: JointCommand,
             command.damp(monitor.kd[:len(command.kd)])
             publisher.publish(command.encode())
             if before != monitor.alarms:
+                tell(lines[1:])
                 logger.error('the bridge is silent: damping until it is back')
 
 
 def main(args: list[str]) -> int:
     """Watch until a bridge announces its end; return the exit code."""
-    interface, domain, topic = pkgutil.resolve_name(args[0]), int(args[1]), args[2]
-    period, process = float(args[3]), int(args[4])
+    interface, domain, namespace, topic = (pkgutil.resolve_name(args[0]), int(args[1]),
+                                           *args[2:4])
+    period, timeout, process = float(args[4]), float(args[5]), int(args[6])
     name = interface.watchdog_name()
     # Ctrl-C in the bridge's terminal is the bridge's to handle.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     QUEUE.start(name, [])
     rclpy.init(args=['--ros-args', NO_FILE], domain_id=domain,
                signal_handler_options=SignalHandlerOptions.NO)
-    node = rclpy.create_node(name, enable_rosout=False, start_parameter_services=False,
-                             use_global_arguments=False)
+    node = rclpy.create_node(name, namespace=namespace, enable_rosout=False,
+                             start_parameter_services=False, use_global_arguments=False)
     publisher = node.create_publisher(interface.command_type(), topic, command_qos())
     logger = QueuedLogger(node.get_logger().name)
     if not spared():
@@ -138,7 +149,8 @@ def main(args: list[str]) -> int:
         rclpy.shutdown()
         return NAME_TAKEN
     with listener:
-        watch(listener, publisher, interface.make_command(), TickMonitor(period), process, logger)
+        watch(listener, publisher, interface.make_command(), TickMonitor(period, timeout),
+              process, logger)
     rclpy.shutdown()
     return 0
 

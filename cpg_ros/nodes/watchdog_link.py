@@ -44,20 +44,24 @@ class WatchdogLink:
     A watchdog outlives its bridge; the next bridge of its user for the same robot takes it over.
     """
 
-    def __init__(self, interface: type[RobotInterface], domain: int, topic: str, period: float
-                 ) -> None:
+    def __init__(self, interface: type[RobotInterface], domain: int, namespace: str, topic: str,
+                 period: float, timeout: float) -> None:
         """Prepare the command line of a watchdog.
 
         Args:
             interface: of the robot.
             domain: of ROS.
+            namespace: of the bridge.
             topic: of the commands, resolved.
             period: of the bridge, s.
+            timeout: without a tick, after which the watchdog damps the robot, s.
 
         """
         self._address = address(interface.maker, 'watchdog', domain, topic)
         self._command = [sys.executable, '-P', '-m', 'cpg_ros.nodes.watchdog',
-                         interface.reference(), str(domain), topic, str(period), str(os.getpid())]
+                         interface.reference(), str(domain), namespace, topic, str(period),
+                         str(timeout), str(os.getpid())]
+        self._timeout = timeout
         self._socket = unconnected()
         self._process: subprocess.Popen | None = None
         self._read = float('inf')
@@ -104,9 +108,20 @@ class WatchdogLink:
             line.close()
             raise ForeignWatchdog(f'what answers as the watchdog of this robot is {who}, another '
                                   'user than the bridge: end it')
+        # One that an earlier bridge started has that bridge's timeout.
+        with contextlib.suppress(OSError):
+            line.send(TickMonitor.hello(self._timeout))
         self._socket = line
         before.close()
         return True
+
+    def acted(self) -> bool:
+        """Return whether the watchdog has damped the robot since the last call."""
+        acted = False
+        with contextlib.suppress(OSError):
+            while message := self._socket.recv(64):
+                acted |= message == TickMonitor.ACTED
+        return acted
 
     def tick(self, kd: np.ndarray, now: float) -> str:
         """Send a tick; return what is wrong with the watchdog, or ''.

@@ -53,6 +53,9 @@ class BridgeSettings(ShortRepr):
         margin: how far measured angles may exceed the joint limits, rad: a swinging leg runs
             into its stop.
         astray: largest distance from the stand after rising, rad.
+        tracking_error: largest mean distance of a joint from its commanded angle while it
+            follows targets, rad.
+        tracking_time: over which that mean is taken, s.
 
     """
 
@@ -80,6 +83,8 @@ class BridgeSettings(ShortRepr):
     hottest: float = 85.0
     margin: float = 0.2
     astray: float = 0.4
+    tracking_error: float = math.inf
+    tracking_time: float = 1.0
 
 
 def motor_places(robot: Robot, joints: tuple[str, ...], whose: str) -> np.ndarray:

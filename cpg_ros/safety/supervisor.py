@@ -26,6 +26,7 @@ from cpg_ros.safety.bridge_settings import BridgeSettings
 from cpg_ros.safety.robot_state import JointCommand, RobotState
 from cpg_ros.safety.safety_checks import SafetyChecks
 from cpg_ros.safety.targets import Targets
+from cpg_ros.safety.tracking_monitor import TrackingMonitor
 import numpy as np
 
 
@@ -64,6 +65,7 @@ class Supervisor:
         targets: of a generator.
         state: of the bridge.
         reason: why it is in this state.
+        tracking: how far joints are from their commanded angles.
         kp_scale: factor of kp while the robot follows targets, up to the settings' most_kp.
 
     """
@@ -83,6 +85,7 @@ class Supervisor:
         self.robot, self.command = robot, command
         self.targets = Targets(settings.names, settings.lower, settings.upper,
                                settings.velocity, settings.period)
+        self.tracking = TrackingMonitor(settings)
         self._checks = SafetyChecks(settings, robot)
         self.state, self.reason, self.kp_scale = BridgeState.IDLE, '', 1.0
         self._at = self._from = settings.stand
@@ -158,6 +161,9 @@ class Supervisor:
         if self.state is BridgeState.FOLLOWING:
             self._check_targets(now)
         dt, self._before = now - self._before, now
+        if self.state is BridgeState.FOLLOWING and (
+                reason := self.tracking.update(self._at, self.robot.q, dt)):
+            self.sit(now, reason)
         if self.state in ACTIVE:
             self._lead(now, dt)
         if self.state is BridgeState.DAMPING:
@@ -242,6 +248,7 @@ class Supervisor:
             self._enter(BridgeState.DAMPING, now, f'it has sat down: {self.reason}')
         elif (self.state is BridgeState.STANDING
               and now - self.targets.accepted < settings.target_timeout):
+            self.tracking.reset()
             self._enter(BridgeState.FOLLOWING, now, 'targets have come')
 
     def _hold(self) -> None:

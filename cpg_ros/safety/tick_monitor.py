@@ -14,6 +14,8 @@
 
 """Monitoring of a process's ticks by its watchdog."""
 
+import struct
+
 import numpy as np
 
 #: A tick is missing this many periods after the last one: two should have come, and had time to.
@@ -30,9 +32,15 @@ class TickMonitor:
 
     """
 
-    def __init__(self, period: float) -> None:
-        """Wait for the first tick of a process that ticks every ``period`` s."""
-        self._period = period
+    def __init__(self, period: float, timeout: float) -> None:
+        """Wait for the first tick of a process.
+
+        Args:
+            period: between two ticks, s.
+            timeout: since the last tick after which damping begins, s; 2.5 periods at least.
+
+        """
+        self._period, self._timeout = period, timeout
         self._last = self._sent = np.inf
         self._missing = False
         self.kd = np.zeros(0, '<f4')
@@ -45,14 +53,24 @@ class TickMonitor:
 
     #: Message of a process that ends.
     END = b'end'
-    #: Message that only checks whether a watchdog is connected.
+    #: Message that only checks whether a watchdog is connected; it may bring a new timeout.
     HELLO = b'hello'
+    #: Message to the process: the joints have been damped in its absence.
+    ACTED = b'acted'
+
+    @staticmethod
+    def hello(timeout: float) -> bytes:
+        """Return the message that connects a process with a timeout of its own, s."""
+        return TickMonitor.HELLO + struct.pack('<d', timeout)
 
     def receive(self, message: bytes, now: float) -> None:
         """Take a message of the process, now in s."""
         if message == self.END:
             self.ended = True
-        elif message != self.HELLO and len(message) % 4 == 0:
+        elif message.startswith(self.HELLO):
+            if len(message) == len(self.hello(0.0)):
+                self._timeout = struct.unpack('<d', message[len(self.HELLO):])[0]
+        elif len(message) % 4 == 0:
             self.kd = np.frombuffer(message, '<f4')
             self._last, self._missing = now, False
 
@@ -60,7 +78,8 @@ class TickMonitor:
         """Return how long to wait for a message, s; None: without limit."""
         if self._last == np.inf:
             return None
-        due = self._sent + self._period if self._missing else self._last + MISSING * self._period
+        due = self._sent + self._period if self._missing else self._last + max(
+            self._timeout, MISSING * self._period)
         return max(0.0, due - now)
 
     def due(self, now: float) -> bool:

@@ -17,5 +17,5 @@
 Imports ``files`` and what is below; knows nothing of ROS. None of it has been run on hardware.
 """
 
-__all__ = ['boards', 'calibration', 'dynamixel', 'feetech', 'pca9685', 'serial_board',
-           'serial_port', 'servo_board']
+__all__ = ['boards', 'calibration', 'command_owner', 'dynamixel', 'feetech', 'pca9685',
+           'serial_board', 'serial_port', 'servo_board']

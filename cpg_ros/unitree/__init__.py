@@ -17,4 +17,4 @@
 Imports ``safety`` and what is below; knows nothing of ROS.
 """
 
-__all__ = ['crc', 'low_cmd', 'low_state', 'models', 'participants']
+__all__ = ['crc', 'foot_forces', 'low_cmd', 'low_state', 'models', 'participants']

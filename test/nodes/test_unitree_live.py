@@ -116,7 +116,7 @@ def test_bridge_and_watchdog_killed_together_leave_the_last_command(walk):
 def test_stop_is_at_once(walk, how):
     walk.walking()
     if how == 'service':
-        assert walk.watcher.call(Trigger, '/unitree_bridge/stop', Trigger.Request()).success
+        assert walk.watcher.call(Trigger, '/unitree_bridge/damp', Trigger.Request()).success
     else:
         walk.robot.buttons = 1 << 9
     walk.wait_for('damping')

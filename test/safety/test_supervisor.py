@@ -14,6 +14,7 @@
 
 """The machine that keeps a robot and people safe, and its watchdog; no ROS graph."""
 
+from dataclasses import replace
 import math
 
 from cpg_ros.errors import CpgError
@@ -41,7 +42,7 @@ class Rig:
                                   lambda state, reason: self.states.append(state))
         self.state.q[:] = q
         self.state.quaternion[:] = 1.0, 0.0, 0.0, 0.0
-        self.mute, self.target, self.commands = False, None, []
+        self.mute, self.target, self.commands, self.stuck = False, None, [], None
 
     def run(self, seconds, every=1):
         for _ in range(round(seconds / DT)):
@@ -56,6 +57,8 @@ class Rig:
                 self.commands.append(np.array([command.q, command.kp, command.kd]))
                 if command.kp.any():
                     self.state.q[:] = command.q
+                if self.stuck is not None:
+                    self.state.q[self.stuck[0]] = self.stuck[1]
         return self
 
     def following(self):
@@ -300,10 +303,23 @@ def test_another_robot_is_refused():
         settings_of(load_robot('goat'), MODELS['go2'], [60.0], [2.0])
 
 
+def test_a_joint_that_does_not_follow_makes_it_sit():
+    rig = Rig(settings=replace(GO2, tracking_error=0.1, tracking_time=0.5)).following()
+    rig.run(1.0)
+    assert rig.machine.state is BridgeState.FOLLOWING
+    # 0.2 rad away: the mean of the time constant 0.5 s passes 0.1 rad after 0.5 ln 2 = 0.347 s.
+    rig.stuck = 3, rig.state.q[3] + 0.2
+    rig.run(0.34)
+    assert rig.machine.state is BridgeState.FOLLOWING
+    rig.run(0.02)
+    assert rig.machine.state is BridgeState.SITTING
+    assert rig.machine.reason.startswith('FL_hip_joint does not follow: it is at')
+
+
 # -- the watchdog ------------------------------------------------------------------------------
 
 def test_the_watchdog_damps_after_two_missing_ticks_until_the_next():
-    monitor, kd = TickMonitor(DT), np.full(12, 5.0)
+    monitor, kd = TickMonitor(DT, 0.0), np.full(12, 5.0)
     assert monitor.timeout(0.0) is None and not monitor.due(100.0)
     monitor.receive(TickMonitor.HELLO, 100.0)
     assert monitor.timeout(100.0) is None

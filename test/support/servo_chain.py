@@ -39,12 +39,20 @@ def calibrated(folder, device):
     return path
 
 
+def servo_steps(angles):
+    """Return the servos' steps at angles, rad, shape (4,)."""
+    signs = np.array([1.0, -1.0, 1.0, -1.0])
+    return np.round(2048 + signs * STEPS * np.array(angles)).astype(int)
+
+
 class ServoChain:
     """Answers SYNC READ and follows SYNC WRITE, by the maker's manual; independent of the package.
 
     Attributes:
         path: of the port.
         goals, torque: by identity.
+        written, torques: all goals, and switchings of the torque, as pairs of identity and value.
+        jammed: servos that are stuck: where, by identity.
         answering: whether servos answer.
         error: the byte that reports errors.
 
@@ -52,6 +60,7 @@ class ServoChain:
 
     def __init__(self, positions):
         self.goals, self.torque = dict(positions), dict.fromkeys(positions, False)
+        self.written, self.torques, self.jammed = [], [], {}
         self.answering, self.error, self.packets = True, 0, 0
         self._master, self._slave = pty.openpty()
         self.path = os.ttyname(self._slave)
@@ -75,12 +84,14 @@ class ServoChain:
         if instruction == 0x82 and self.answering:
             assert (address, length) == (56, 2)
             for servo in data:
-                body = bytes((servo, 4, self.error)) + self.goals[servo].to_bytes(2, 'little')
+                place = self.jammed.get(servo, self.goals[servo])
+                body = bytes((servo, 4, self.error)) + place.to_bytes(2, 'little')
                 os.write(self._master, b'\xff\xff' + body + bytes((~sum(body) & 0xFF,)))
         elif instruction == 0x83:
             for k in range(0, len(data), length + 1):
                 servo, value = data[k], int.from_bytes(data[k + 1:k + 1 + length], 'little')
                 {40: self.torque, 42: self.goals}[address][servo] = value
+                {40: self.torques, 42: self.written}[address].append((servo, value))
 
     def end(self):
         self._going = False

@@ -74,7 +74,8 @@ class Walk:
         self.domain, self._frequency = free_domain(), frequency
         self.robot = StandIn(self.domain, services=services)
         self._parameters = [word for name in (
-            'command:=forward_position', f'motion_switcher:={str(services).lower()}', *parameters)
+            'command:=forward_position', f'motion_switcher:={str(services).lower()}',
+            'exclusive:=false', *parameters)
             for word in ('-p', name)]
         self.phases = []
         self.robot.start()
@@ -258,10 +259,10 @@ def interrupted(walk):
 FAULTS = {generator_killed: (1.6 + 0.1, 0.1), generator_stopped: (1.6 + 0.1, 0.1),
           generator_restarted: (1.6 + 0.1, 0.1), nan_target: (0.02, None),
           target_leaps: (1.6 + 0.1, 0.1), state_frozen: (0.04, None), tilt: (0.02, None),
-          bridge_killed: (0.02, None), network_cut: (0.02, None),
+          bridge_killed: (0.04, None), network_cut: (0.02, None),
           interrupted: (0.5 + 1.5 + 0.1, 0.02)}
 if os.geteuid() == 0:
-    FAULTS[fed_by_another_user] = (0.02, None)
+    FAULTS[fed_by_another_user] = (0.04, None)
 
 
 def mend(walk):

@@ -14,6 +14,7 @@
 
 """The node ``servo_bridge``: drives a robot of servo motors by what a generator publishes."""
 
+import secrets
 import sys
 
 from cpg_ros.errors import InputError
@@ -65,7 +66,9 @@ class ServoBridge(BridgeNode):
 
     def make_command(self) -> ServoCommand:
         """Return a command for the joints of the calibration file."""
-        return ServoCommand(len(self._state.q))
+        # Two bridges of one name are two senders, too.
+        return ServoCommand(len(self._state.q),
+                            f'{self.get_fully_qualified_name()} {secrets.token_hex(4)}')
 
     def dry_report(self) -> str:
         """Return how far the servos would have to go."""

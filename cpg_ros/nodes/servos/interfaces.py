@@ -18,7 +18,7 @@ from cpg_ros.nodes.bridge_interface import RobotInterface
 from cpg_ros.safety.robot_state import JointCommand, RobotState
 import numpy as np
 from sensor_msgs.msg import JointState
-from std_msgs.msg import Float64MultiArray
+from std_msgs.msg import Float64MultiArray, MultiArrayDimension, MultiArrayLayout
 
 
 class ServoState(RobotState):
@@ -45,16 +45,28 @@ class ServoState(RobotState):
 class ServoCommand(JointCommand):
     """Angles. Servos take no gains: they hold their angle, or nothing."""
 
+    def __init__(self, joints: int, sender: str) -> None:
+        """Command servos as ``sender``, by which the bus tells its bridge from others."""
+        super().__init__(joints)
+        self._layout = MultiArrayLayout(dim=[MultiArrayDimension(label=sender)])
+
     def encode(self) -> Float64MultiArray:
         """Return the angles, rad; none if the servos are to be let go."""
-        return Float64MultiArray(data=self.q.tolist() if self.kp.any() else [])
+        return Float64MultiArray(layout=self._layout,
+                                 data=self.q.tolist() if self.kp.any() else [])
+
+
+def sender_of(command: Float64MultiArray) -> str:
+    """Return who sent a command, '' if it does not say so."""
+    dimensions = command.layout.dim
+    return dimensions[0].label if dimensions else ''
 
 
 class Servos(RobotInterface):
-    """Topics and messages of servos."""
+    """Topics and messages of servos; topics are relative, so that namespaces separate robots."""
 
     maker = 'servo'
-    command_topic, state_topic = '/servo/commands', '/servo/joint_states'
+    command_topic, state_topic = 'servo/commands', 'servo/joint_states'
 
     @staticmethod
     def command_type() -> type:
@@ -69,4 +81,4 @@ class Servos(RobotInterface):
     @staticmethod
     def make_command() -> ServoCommand:
         """Return a command for no joints, which lets all servos go: a watchdog needs no other."""
-        return ServoCommand(0)
+        return ServoCommand(0, Servos.watchdog_name())

@@ -26,6 +26,7 @@ from cpg_ros.nodes.unitree.parameters import SPECS
 from cpg_ros.nodes.unitree.sensors import Sensors
 from cpg_ros.robots.robot import Robot
 from cpg_ros.safety.bridge_settings import BridgeSettings
+from cpg_ros.unitree.foot_forces import FootForces
 from cpg_ros.unitree.low_state import BUTTONS, LowState
 from cpg_ros.unitree.models import MODELS, settings_of
 from cpg_ros.unitree.participants import Announcements
@@ -51,7 +52,9 @@ class UnitreeBridge(BridgeNode):
         self._state = LowState()
         super().__init__(self._state)
         self._button = BUTTONS[self._value('stop_button')]
-        self._sensors = Sensors(self, self.robot, self._state)
+        self._sensors = Sensors(self, self.robot, self._state, FootForces(
+            len(self.robot.legs), self._value('foot_scale'), self._value('foot_offset'),
+            self._value('foot_threshold')))
         self._announcements = Announcements(self.context.get_domain_id())
 
     def make_settings(self, robot: Robot, common: dict[str, float]) -> BridgeSettings:

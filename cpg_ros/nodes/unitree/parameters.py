@@ -26,6 +26,11 @@ SPECS = fixed(bridge_specs(
     kp=Spec([60.0], 'proportional gains [N m / rad]',
             constraints='one number, three for hip, thigh and calf, or twelve in motor order'),
     kd=Spec([2.0], 'damping gains [N m s / rad]', constraints='as kp'),
+    foot_scale=Spec(1.0, 'force per unit of a foot sensor [N]', 0.001, 1000.0),
+    foot_offset=Spec([0.0], "what a foot sensor reads in the air, in the robot's units",
+                     constraints="one number, or one for each leg in the robot file's order"),
+    foot_threshold=Spec([0.0], 'force below which a foot is taken to be in the air [N]',
+                        constraints='as foot_offset'),
     stop_button=Spec('B', 'button of the wireless remote that stops the robot, pressed alone or '
                      'with others', constraints=one_of(BUTTONS)),
     motion_switcher=Spec(True, "ask the robot's own service to release its motion modes; set to "

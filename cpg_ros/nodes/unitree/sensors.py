@@ -18,6 +18,7 @@ from cpg_ros.nodes.joint_publishers import joint_state, labelled
 from cpg_ros.nodes.message_block import each, MessageBlock, places, Template
 from cpg_ros.nodes.qos_profiles import OVERRIDABLE
 from cpg_ros.robots.robot import Robot
+from cpg_ros.unitree.foot_forces import FootForces
 from cpg_ros.unitree.low_state import LowState
 from cpg_ros.unitree.models import JOINTS, PARTS
 from rclpy.node import Node
@@ -31,9 +32,9 @@ FEET = tuple(name.partition('_')[0] for name in JOINTS[::len(PARTS)])
 class Sensors:
     """Publishes ``joint_states``, ``imu``, ``foot_contacts``; once a second ``battery``."""
 
-    def __init__(self, node: Node, robot: Robot, state: LowState) -> None:
+    def __init__(self, node: Node, robot: Robot, state: LowState, feet: FootForces) -> None:
         """Publish the contents of ``state``, joints in ``robot.order``."""
-        self._state = state
+        self._state, self._forces, self._legs = state, feet, tuple(robot.legs)
         names = robot.order
         self._from = [JOINTS.index(name) for name in names]
         self._feet = [FEET.index(leg[0].name.partition('_')[0]) for leg in robot.legs.values()]
@@ -57,7 +58,7 @@ class Sensors:
         state, joints = self._state, self._from
         self._block.publish(stamp, (
             state.q[joints], state.dq[joints], state.torque[joints], state.quaternion,
-            state.gyroscope, state.accelerometer, state.feet[self._feet]))
+            state.gyroscope, state.accelerometer, self._forces.newtons(state.feet[self._feet])))
 
     def publish_battery(self, stamp: int) -> None:
         """Publish the battery's state; stamp in ns."""
@@ -72,9 +73,11 @@ class Sensors:
         self._battery.publish(message)
 
     def values(self) -> dict[str, object]:
-        """Return temperatures in deg C and the charge of the battery in %, for /diagnostics."""
+        """Return temperatures in deg C, charge in % and raw foot sensors, for /diagnostics."""
         state = self._state
         heat = {f'{name} [deg C]': value
                 for name, value in zip(JOINTS, state.temperature.tolist(), strict=True)}
-        return {**heat, 'imu [deg C]': state.imu_temperature,
+        feet = {f'foot {leg} [raw]': raw for leg, raw in zip(
+            self._legs, state.feet[self._feet].tolist(), strict=True)}
+        return {**heat, **feet, 'imu [deg C]': state.imu_temperature,
                 'battery [%]': round(100.0 * state.charge)}
