@@ -67,7 +67,8 @@ def nodes(context):
             folders[picture] = path.parent
     both = [started(context, 'generator', 'cpg_generator', {**BOTH, **GENERATOR}, {
                 'rate': 500.0, 'combined_topic': '', 'command': COMMANDS.get(command, command),
-                'use_sim_time': True}, on_exit=Shutdown()),
+                # The simulation begins at the stand, with the generator's first command.
+                'assume_stand': True, 'use_sim_time': True}, on_exit=Shutdown()),
             started(context, 'robot_sim', 'robot_sim', {**BOTH, **SIMULATION}, {
                 'lockstep': True, **unwanted}, on_exit=Shutdown(), sigterm_timeout=DRAWING),
             *page(context)]

@@ -14,6 +14,7 @@
 
 """The generator's health, once a second on /diagnostics."""
 
+from collections.abc import Callable
 from typing import Any
 
 from cpg_ros.motion.pattern import Pattern
@@ -37,7 +38,8 @@ class Diagnostics:
     """
 
     def __init__(self, node: Node, pattern: Pattern, ticker: Ticker, others: OtherPublishers,
-                 cmd_vel: CmdVel | None, feedback: FeedbackSwitch, awaited: str) -> None:
+                 cmd_vel: CmdVel | None, feedback: FeedbackSwitch,
+                 awaited: Callable[[], str]) -> None:
         self._feedback, self._awaited = feedback, awaited
         self._node, self._pattern, self._ticker = node, pattern, ticker
         self._others, self._cmd_vel = others, cmd_vel
@@ -110,7 +112,7 @@ class Diagnostics:
         clock: Any = self._node.get_clock()
         now = clock.now().nanoseconds
         if self._ticker.waiting:
-            return f'waiting for {self._awaited}'
+            return f'waiting for {self._awaited()}'
         if not clock.ros_time_is_active:
             return f'no tick for {self._silent} s'
         return f'simulated time is still {1e-9 * now:.3f} s' if now else 'no /clock yet'
@@ -118,7 +120,7 @@ class Diagnostics:
     def _state(self) -> str:
         pattern = self._pattern
         if self._ticker.waiting:
-            return f'waiting for {self._awaited}'
+            return f'waiting for {self._awaited()}'
         if pattern.standing:
             return 'standing'
         if pattern.level < 1.0:

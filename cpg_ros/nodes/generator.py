@@ -42,6 +42,7 @@ from cpg_ros.nodes.generator_parameters import (
     presets_of,
     specs,
 )
+from cpg_ros.nodes.health_publisher import STEADY
 from cpg_ros.nodes.joint_publishers import CellsPublisher, Outputs
 from cpg_ros.nodes.kernels import compile_kernels
 from cpg_ros.nodes.lifecycle import Lifecycle
@@ -53,8 +54,10 @@ from cpg_ros.nodes.real_time import RealTime, SPECS
 from cpg_ros.nodes.sensor_input import CONTACTS
 from cpg_ros.robots.robot import Robot
 from cpg_ros.robots.robot_file import load_robot
+import numpy as np
 from rcl_interfaces.msg import ParameterType, SetParametersResult
 from rclpy.parameter import Parameter
+from rclpy.timer import Timer
 from std_msgs.msg import String
 from std_srvs.srv import SetBool
 
@@ -64,6 +67,8 @@ LAST_RAMP, LAST_DEADLINE = 0.5, 0.95
 #: Two nodes know of one another this long after the later one joined the graph, s: they are
 #: announced every 3 s, and the first announcements of a busy machine are lost at times.
 DISCOVERY = 3.5
+#: How often the pose to begin from is searched for, s.
+SEARCH = 0.05
 
 
 class Generator(StartedNode):
@@ -129,6 +134,9 @@ class Generator(StartedNode):
             self, self.pattern, self._motion, self._outputs.topics)
         self._cells = CellsPublisher(self, network)
         self._measured = self._measured_pose(robot)
+        #: Searches for the pose to begin from, and why it has not begun.
+        self._search: Timer | None = None
+        self._unmeasured = ''
         self._gait = self.create_publisher(String, '~/gait', latched(),
                                            qos_overriding_options=OVERRIDABLE)
         self.create_service(SetBool, '~/enable', self._enable)
@@ -137,8 +145,7 @@ class Generator(StartedNode):
                              self.pattern.resume, partial(real_time.request, self.get_logger()))
         self._others = OtherPublishers(self, self._outputs.topics)
         self._diagnostics = Diagnostics(self, self.pattern, self.ticker, self._others,
-                                        self._cmd_vel, self._feedback,
-                                        'configure' if managed else '~/enable')
+                                        self._cmd_vel, self._feedback, lambda: self._awaited)
         self.add_on_set_parameters_callback(self._judge)
         self.add_post_set_parameters_callback(self._apply)
         self._warn_of_unknown()
@@ -209,35 +216,75 @@ class Generator(StartedNode):
 
     def _measured_pose(self, robot: Robot) -> MeasuredPose | None:
         topic = self._value('measured_topic')
-        if not topic or self.resolve_topic_name(topic) in self._outputs.topics:
-            return None
-        return MeasuredPose(self, robot, topic)
+        if topic and self.resolve_topic_name(topic) not in self._outputs.topics:
+            return MeasuredPose(self, robot, topic)
+        if self._leads:
+            raise StartError(
+                f"command '{self._value('command')}' begins at the measured pose, but "
+                + (f"measured_topic '{topic}' is the generator's own: set combined_topic to ''"
+                   if topic else "measured_topic is ''")
+                + ', or set assume_stand to true if nothing measures the joints')
+        return None
 
-    def _lead_to_the_stand(self) -> str:
-        """Start from the measured pose, if it is known; return the name of the pose."""
-        try:
-            pose = self._measured.take() if self._measured else None
-        except ValueError as error:
-            self.get_logger().warning(f'the pose is not known, starting at the stand: {error}')
-            pose = None
-        if pose is None:
-            return 'the stand'
-        self.pattern.start_from(pose, self._value('ramp'))
-        return 'the measured pose'
+    @property
+    def _leads(self) -> bool:
+        """Whether it must know where the joints are before it moves them."""
+        return self._value('command') != 'none' and not self._value('assume_stand')
+
+    def _find_pose(self) -> tuple[str, np.ndarray | None]:
+        """Return why it cannot begin, or '', and the measured pose, None for the stand."""
+        if self._measured is None:
+            return '', None
+        angles = self._measured.take()
+        lacking = self._measured.lacks(angles)
+        if not lacking:
+            return '', angles
+        if self._leads:
+            return f'the pose is not known, and the joints must not jump: {lacking}', None
+        if np.isfinite(angles).any():
+            self.get_logger().warning(f'the pose is not known, starting at the stand: {lacking}')
+        return '', None
 
     def _begin_at_the_stand(self) -> tuple[str, str]:
         """Start publishing; return why not, or '', and the name of the pose to start from."""
         if self._value('exclusive') and self._others.look():
             return self._others.text, ''
+        refusal, pose = self._find_pose()
+        if refusal:
+            return refusal, ''
+        self._end_search()
         if self.ticker.paused:
             self.pattern.restart(self._value('ramp'), False)
             self._feedback.restart()
-        pose = self._lead_to_the_stand()
+        if pose is not None:
+            self.pattern.start_from(pose, self._value('ramp'))
         if self.ticker.is_alive():
             self.ticker.paused = False
         else:
             self.ticker.start()
-        return '', pose
+        return '', 'the stand' if pose is None else 'the measured pose'
+
+    def _look_for_pose(self) -> None:
+        """Start publishing as soon as the pose is measured; log news of why it is not."""
+        refusal, pose = self._begin_at_the_stand()
+        if not refusal:
+            self.get_logger().info(f'beginning from {pose}')
+        elif refusal != self._unmeasured:
+            self.get_logger().warning(f'waiting: {refusal}')
+        self._unmeasured = refusal
+
+    def _end_search(self) -> None:
+        """Wait for the pose no longer."""
+        if self._search is not None:
+            self.destroy_timer(self._search)
+            self._search, self._unmeasured = None, ''
+
+    @property
+    def _awaited(self) -> str:
+        """What publishing waits for."""
+        if self._search is not None and self._measured is not None:
+            return f'the measured pose on {self._measured.topic}'
+        return '~/enable' if self._lifecycle is None else 'configure'
 
     def _walk(self, wanted: bool) -> str:
         """Ramp into the gait, or down to the stand; return ''."""
@@ -273,6 +320,7 @@ class Generator(StartedNode):
             return response
         if not self.ticker.is_alive():
             if not request.data:
+                self._end_search()
                 response.message = 'nothing is published yet'
                 return response
             refusal, pose = self._begin_at_the_stand()
@@ -313,6 +361,10 @@ class Generator(StartedNode):
         at = f"{names} joints of '{self.pattern.robot.name}' at {self.ticker.rate:g} Hz"
         if self._lifecycle is not None:
             self.get_logger().info(f'publishing nothing until it is configured, then {at}')
+        elif self._value('autostart') and self._leads and self._measured is not None:
+            self.get_logger().info('publishing nothing until the pose is measured on '
+                                   f'{self._measured.topic}, then {at}')
+            self._search = self.create_timer(SEARCH, self._look_for_pose, clock=STEADY)
         elif self._value('autostart'):
             self.get_logger().info(f'publishing {at}')
             self.ticker.start()

@@ -70,10 +70,16 @@ def specs(network: type[Network]) -> dict[str, Spec]:
         'command': Spec('none', 'command topic for ros2_control', read_only=True,
                         constraints=one_of(COMMANDS)),
         'measured_topic': Spec('joint_states', "topic of the robot's measured joint states, from "
-                               'which the generator moves it to the stand if autostart is false; '
-                               'empty for none', read_only=True),
-        'autostart': Spec(True, 'ramp into the gait at start; if false, publish nothing until '
-                          '~/enable is called', read_only=True),
+                               'which the generator moves it to the stand if it commands the '
+                               'robot (command) or autostart is false; empty for none',
+                               read_only=True),
+        'assume_stand': Spec(False, 'begin at the stand where no pose is measured, although '
+                             'command is not none: for robots that do not measure positions, '
+                             'whose joints jump there, and behind a bridge or a simulation that '
+                             'moves the robot to the stand itself', read_only=True),
+        'autostart': Spec(True, 'ramp into the gait at start, with a command as soon as the pose '
+                          'is measured; if false, publish nothing until ~/enable is called',
+                          read_only=True),
         'managed': Spec(False, 'be a managed node (ros2 lifecycle): silent until it is '
                         'configured, then at the stand, and in the gait while it is active; '
                         'autostart and ~/enable have no effect', read_only=True),
