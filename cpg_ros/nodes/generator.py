@@ -314,11 +314,14 @@ class Generator(StartedNode):
         response.success = True
         response.message = (f'ramping {"up" if request.data else "down"} over '
                             f'{self._value("ramp"):g} s')
-        if self._lifecycle is not None:
+        if self._lifecycle is not None and request.data:
             response.success = False
-            response.message = 'this node is managed: activate and deactivate it instead'
+            response.message = 'this node is managed: activate it instead'
             return response
-        if not self.ticker.is_alive():
+        if self._lifecycle is not None and self._lifecycle.active:
+            self._lifecycle.trigger_deactivate()
+            return response
+        if self.ticker.waiting:
             if not request.data:
                 self._end_search()
                 response.message = 'nothing is published yet'

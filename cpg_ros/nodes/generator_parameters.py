@@ -82,7 +82,8 @@ def specs(network: type[Network]) -> dict[str, Spec]:
                           read_only=True),
         'managed': Spec(False, 'be a managed node (ros2 lifecycle): silent until it is '
                         'configured, then at the stand, and in the gait while it is active; '
-                        'autostart and ~/enable have no effect', read_only=True),
+                        'autostart has no effect, and ~/enable only stops: false deactivates it',
+                        read_only=True),
         'cmd_vel': Spec(False, 'follow the commands on cmd_vel; the robot file must have steering '
                         'tables', read_only=True),
         'stamped_cmd_vel': Spec(False, "type of cmd_vel: geometry_msgs/TwistStamped, as Jazzy's "
