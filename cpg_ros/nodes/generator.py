@@ -110,7 +110,8 @@ class Generator(StartedNode):
         self._declare(feedback_parameters.specs(robot))
         if FORMER in self._parameter_overrides:
             raise StartError(f"there is no parameter '{FORMER}': it is '{ENABLED}'")
-        self._declare({ENABLED: usual(self, robot, self._value('combined_topic'))})
+        self._declare({ENABLED: usual(self, robot, self._value('combined_topic'),
+                                      self._value('command') != 'none')})
         self._one_of('feedback.contacts', CONTACTS)
         for parameter in self._planner.given(self._value('gait'), self._parameter_overrides):
             self._parameter_overrides[parameter.name] = parameter
@@ -276,7 +277,7 @@ class Generator(StartedNode):
     def _end_search(self) -> None:
         """Wait for the pose no longer."""
         if self._search is not None:
-            self.destroy_timer(self._search)
+            self._search.cancel()
             self._search, self._unmeasured = None, ''
 
     @property

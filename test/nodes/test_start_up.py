@@ -115,13 +115,16 @@ def test_it_begins_at_the_measured_pose(measured):
 
 @pytest.fixture
 def driver(stepped):
-    """Start a generator that commands a robot, and what the robot's driver does beside it."""
+    """Start a generator that commands a robot, and what the robot's driver does beside it.
+
+    The time of these tests waits for joint_states of the generator: the robot's are elsewhere.
+    """
     def begin(*more, command='forward_position', topic=COMMANDS, kind=Float64MultiArray):
         generator, watcher = stepped('-p', 'combined_topic:=""', '-p', f'command:={command}',
-                                     *more)
+                                     '-p', 'measured_topic:=measured', *more)
         rows = heard(watcher, (kind, topic))
         until(lambda: watcher.node.count_publishers(topic), 'its publisher')
-        publisher = watcher.node.create_publisher(JointState, 'joint_states', 10)
+        publisher = watcher.node.create_publisher(JointState, 'measured', 10)
         until(publisher.get_subscription_count, 'the generator listening')
         message = JointState()
         watcher.node.create_timer(0.02, lambda: message.name and publisher.publish(message))
@@ -140,11 +143,11 @@ def test_the_first_command_is_where_the_robot_is(driver, command):
     generator, watcher, rows, measure = driver(command=command, topic=topic, kind=kind)
     # It waits for the whole pose, and says so.
     generator.wait_for('waiting: the pose is not known, and the joints must not jump: no joint '
-                       'states on /joint_states')
+                       'states on /measured')
     measure(ROBOT.order[1:], CROUCH[1:])
-    generator.wait_for(f'waiting: .*: /joint_states has no angle of {ROBOT.order[0]}')
+    generator.wait_for(f'waiting: .*: /measured has no angle of {ROBOT.order[0]}')
     until(lambda: any(status.message == 'nothing is published: waiting for the measured pose on '
-                      '/joint_states' for status in watcher.diagnostics), 'the warning')
+                      '/measured' for status in watcher.diagnostics), 'the warning')
     assert not rows
     measure(ROBOT.order, CROUCH)
     generator.wait_for('beginning from the measured pose')
@@ -172,8 +175,8 @@ def test_a_stop_ends_the_wait_for_the_pose(driver):
 def test_without_a_measured_pose_it_is_not_enabled(driver):
     _, watcher, rows, measure = driver('-p', 'autostart:=false')
     why = 'the pose is not known, and the joints must not jump: '
-    for names, reason in (((), 'no joint states on /joint_states'),
-                          (ROBOT.order[1:], f'/joint_states has no angle of {ROBOT.order[0]}')):
+    for names, reason in (((), 'no joint states on /measured'),
+                          (ROBOT.order[1:], f'/measured has no angle of {ROBOT.order[0]}')):
         measure(names, CROUCH[:len(names)])
         until(lambda reason=reason: enable(watcher, True).message == why + reason, 'the reason')
         assert not enable(watcher, True).success and not rows
