@@ -61,9 +61,9 @@ class Lifecycle(LifecycleNodeMixin):
         try:
             return self._change(request, response)
         except rclpy_implementation.RCLError:
-            wanted = request.transition
+            wanted, state = request.transition, self._state_machine.current_state[1]
             self._logger.warning(f'{wanted.label or f"transition {wanted.id}"}: refused: the '
-                                 f"state '{self._state_machine.current_state[1]}' does not have it")
+                                 f"state '{state}' does not have it")
             response.success = False
             return response
 
