@@ -28,7 +28,7 @@ from cpg_ros.motion.strides import Drive
 from cpg_ros.nodes import feedback_parameters
 from cpg_ros.nodes.feedback_loop import FeedbackLoop, Motion
 from cpg_ros.nodes.feedback_parameters import ENABLED, PREFIX
-from cpg_ros.nodes.kernels import announced, FEEDBACK
+from cpg_ros.nodes.kernels import announced, compile_apart, FEEDBACK
 from cpg_ros.nodes.kp_scale import KpScalePublisher
 from cpg_ros.nodes.node_base import StartError
 from cpg_ros.nodes.odometry_publisher import OdometryPublisher
@@ -109,7 +109,11 @@ class FeedbackSwitch:
         self._odometry: OdometryPublisher | None = None
         if refusal := self.judge([node.get_parameter(ENABLED)]):
             raise StartError(refusal)
+        self._hindrance = ''
+        #: Whether the robot may move meanwhile.
+        self._started = False
         self.apply()
+        self._started = True
 
     def _value(self, name: str) -> Any:
         return self._node.get_parameter(PREFIX + name).value
@@ -141,12 +145,21 @@ class FeedbackSwitch:
             self.loop = self._make()
         if self.loop is not None:
             self._set_gains()
-            self.loop.wanted = wanted
+            self.loop.wanted = wanted and not self._hindrance
+
+    def hinder(self, reason: str) -> None:
+        """Fade the feedback out as long as there is a reason, '' for none."""
+        self._hindrance = reason
+        if self.loop is not None:
+            self.loop.wanted = (self._node.get_parameter(ENABLED).value and not self.obstacle()
+                                and not reason)
 
     def _make(self) -> Any:
         """Return the loop, its kernels compiled."""
         robot, pattern = self._pattern.robot, self._pattern
         geometry = geometry_of(robot)
+        if self._started:
+            compile_apart(self._node, 'feedback', FEEDBACK)
         with announced(self._node, 'the feedback', FEEDBACK):
             warm_up(geometry, len(robot.joints))
         loop = FeedbackLoop(pattern, geometry, self._inputs(geometry), self._motion)
