@@ -32,14 +32,16 @@ QUIET = 5.0
 
 
 class Diagnostics:
-    """Reports ERROR on a fault until the pattern is back, and on other publishers; else WARN.
+    """Reports ERROR on a fault until the pattern is back, and on other publishers and joints that
+    do not follow; else WARN.
 
     A warning is for lateness, and for silence: what is not published is not OK.
     """
 
     def __init__(self, node: Node, pattern: Pattern, ticker: Ticker, others: OtherPublishers,
                  cmd_vel: CmdVel | None, feedback: FeedbackSwitch,
-                 awaited: Callable[[], str]) -> None:
+                 awaited: Callable[[], str], lag: Callable[[], str]) -> None:
+        self._lag = lag
         self._feedback, self._awaited = feedback, awaited
         self._node, self._pattern, self._ticker = node, pattern, ticker
         self._others, self._cmd_vel = others, cmd_vel
@@ -67,6 +69,8 @@ class Diagnostics:
                 text += ' (symmetry_gain is 0: no gait is stable)'
         elif self._others.text:
             level, text = DiagnosticStatus.ERROR, self._others.text
+        elif lag := self._lag():
+            level, text = DiagnosticStatus.ERROR, lag
         elif new['jumps back of simulated time']:
             level = DiagnosticStatus.WARN
             text = self._why_anew(new['jumps back of simulated time'])

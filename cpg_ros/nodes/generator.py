@@ -44,6 +44,7 @@ from cpg_ros.nodes.generator_parameters import (
 )
 from cpg_ros.nodes.health_publisher import STEADY
 from cpg_ros.nodes.joint_publishers import CellsPublisher, Outputs
+from cpg_ros.nodes.joint_tracking import JointTracking
 from cpg_ros.nodes.kernels import compile_kernels
 from cpg_ros.nodes.lifecycle import Lifecycle
 from cpg_ros.nodes.measured_pose import MeasuredPose
@@ -135,6 +136,10 @@ class Generator(StartedNode):
             self, self.pattern, self._motion, self._outputs.topics)
         self._cells = CellsPublisher(self, network)
         self._measured = self._measured_pose(robot)
+        #: What was sent last, rad; of the ticks.
+        self._sent: np.ndarray | None = None
+        self._tracking = JointTracking(self, robot, self._measured, self._commanded,
+                                       self._lag) if self._measured else None
         #: Searches for the pose to begin from, and why it has not begun.
         self._search: Timer | None = None
         self._unmeasured = ''
@@ -146,7 +151,8 @@ class Generator(StartedNode):
                              self.pattern.resume, partial(real_time.request, self.get_logger()))
         self._others = OtherPublishers(self, self._outputs.topics)
         self._diagnostics = Diagnostics(self, self.pattern, self.ticker, self._others,
-                                        self._cmd_vel, self._feedback, lambda: self._awaited)
+                                        self._cmd_vel, self._feedback, lambda: self._awaited,
+                                        lambda: self._tracking.text if self._tracking else '')
         self.add_on_set_parameters_callback(self._judge)
         self.add_post_set_parameters_callback(self._apply)
         self._warn_of_unknown()
@@ -338,13 +344,25 @@ class Generator(StartedNode):
         self.get_logger().info(response.message)
         return response
 
+    def _commanded(self) -> np.ndarray | None:
+        """Return the angles that were sent last, rad, or None while none are sent."""
+        return None if self.ticker.waiting or self._sent is None else self._sent.copy()
+
+    def _lag(self, reason: str) -> None:
+        """Switch the feedback off while a joint does not follow: it would correct by it."""
+        self._feedback.hinder(reason)
+        if reason:
+            self.get_logger().error(reason)
+        else:
+            self.get_logger().info('all joints follow again')
+
     def _tick(self, dt: float, stamp: int) -> None:
         if self.ticker.paused:
             return
         self._feedback.sense(dt, stamp)
         self.pattern.advance(dt)
-        self._outputs.publish(stamp, dt, self._feedback.targets(self.pattern.position),
-                              self.pattern.velocity, self.pattern.phases)
+        self._sent = self._feedback.targets(self.pattern.position)
+        self._outputs.publish(stamp, dt, self._sent, self.pattern.velocity, self.pattern.phases)
         self._feedback.publish(dt, stamp)
         self._cells.publish(dt, self.pattern.state)
         if self.ticker.stopping and self.pattern.standing:

@@ -77,6 +77,12 @@ def specs(network: type[Network]) -> dict[str, Spec]:
                              'command is not none: for robots that do not measure positions, '
                              'whose joints jump there, and behind a bridge or a simulation that '
                              'moves the robot to the stand itself', read_only=True),
+        'tracking_error': Spec(0.3, 'mean distance of a measured joint from its commanded angle '
+                               'at which /diagnostics reports an error and feedback fades out '
+                               '[rad]',
+                               0.01, 10.0, read_only=True),
+        'tracking_time': Spec(1.0, 'time over which that mean is taken [s]', 0.1, 10.0,
+                              read_only=True),
         'autostart': Spec(True, 'ramp into the gait at start, with a command as soon as the pose '
                           'is measured; if false, publish nothing until ~/enable is called',
                           read_only=True),

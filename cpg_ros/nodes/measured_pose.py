@@ -44,16 +44,13 @@ class MeasuredPose:
         self._subscription = PolledSubscription(node, JointState, topic, best_effort(8))
         self.topic = self._subscription.topic
 
-    def take(self) -> np.ndarray:
-        """Return the angle of each joint, rad, leg by leg; NaN where it was not measured of late.
-
-        What has arrived is of late for FRESH s.
-        """
+    def take(self, fresh: float = FRESH) -> np.ndarray:
+        """Return the angle of each joint, rad, leg by leg; NaN where none is ``fresh``, in s."""
         for message, arrived in self._subscription.take():
             for name, angle in zip(message.name, message.position, strict=False):
                 if (k := self._index.get(name)) is not None and math.isfinite(angle):
                     self._angles[k], self._arrived[k] = angle, arrived
-        return np.where(self._arrived > time.time_ns() - FRESH * 1e9, self._angles, math.nan)
+        return np.where(self._arrived > time.time_ns() - fresh * 1e9, self._angles, math.nan)
 
     def lacks(self, angles: np.ndarray) -> str:
         """Return why angles that were taken are not the robot's pose, or ''."""

@@ -18,4 +18,4 @@ Imports ``motion`` and what is below; knows nothing of ROS and of no maker's mes
 """
 
 __all__ = ['bridge_settings', 'robot_state', 'safety_checks', 'supervisor', 'targets',
-           'tick_monitor']
+           'tick_monitor', 'tracking_monitor']
