@@ -31,6 +31,8 @@ ARGUMENTS = {
     'cmd_vel': ('false', bool, 'follow the commands on cmd_vel (geometry_msgs/Twist); the robot '
                 'file must have steering tables'),
     'stamped_cmd_vel': ('false', bool, 'cmd_vel is a geometry_msgs/TwistStamped'),
+    'assume_stand': ('false', bool, 'begin at the stand where no pose is measured, although '
+                     'command is not none'),
     'autostart': ('true', bool, 'ramp into the gait at start'),
     'use_sim_time': ('false', bool, 'follow /clock'),
 }

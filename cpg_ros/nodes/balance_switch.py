@@ -23,7 +23,7 @@ from cpg_ros.nodes import feedback_parameters
 from cpg_ros.nodes.balance_loop import BalanceLoop
 from cpg_ros.nodes.feedback_switch import FeedbackSwitch
 from cpg_ros.nodes.held_joints import HeldPublisher
-from cpg_ros.nodes.kernels import announced, BALANCE
+from cpg_ros.nodes.kernels import announced, BALANCE, compile_apart
 from cpg_ros.robots.biped_keys import SPEEDS
 
 
@@ -44,10 +44,15 @@ class BalanceSwitch(FeedbackSwitch):
                     'needs foot_contacts or wrenches')
         return super().obstacle()
 
+    def hinder(self, reason: str) -> None:
+        """Do nothing: without its balance the robot falls."""
+
     def _make(self) -> BalanceLoop:
         pattern = cast(BalancedPattern, self._pattern)
         biped = pattern.robot.biped
         assert biped is not None
+        if self._started:
+            compile_apart(self._node, 'balance', BALANCE)
         inputs = self._inputs(GRAVITY * biped.total)
         if self._value('odometry_topic'):
             self._node.get_logger().warning('no odometry: there is none for legs with soles yet')

@@ -32,6 +32,9 @@ from rclpy.qos import QoSProfile
 LOOK = 0.02
 #: Time between two warnings of a kind, s.
 QUIET = 5.0
+#: Frames that are the robot's base by name, beside the parameter ``feedback.base_frame``; '' is
+#: that of a publisher without frames.
+BASES = '', 'base', 'base_link', 'base_footprint'
 #: Largest speed to the side, m/s, which needs feedback.
 ASIDE = 0.2
 
@@ -114,13 +117,18 @@ class CmdVel:
         return text
 
     def _take_stamped(self, message: TwistStamped) -> None:
-        """Take a command, unless it was on its way for too long; a stamp of 0 is none."""
-        stamp = message.header.stamp
-        now = self._node.get_clock().now().nanoseconds * 1e-9
-        age = now - stamp.sec - 1e-9 * stamp.nanosec
-        if (stamp.sec or stamp.nanosec) and age > self._timeout():
-            self._log.warning(f'cmd_vel ignored: its stamp is {age:.3g} s old; the clocks of '
-                              'sender and generator must agree', throttle_duration_sec=QUIET)
+        """Take a command in the base's frame and of this time; a stamp of 0 is none."""
+        stamp, frame = message.header.stamp, message.header.frame_id
+        base = self._node.get_parameter('feedback.base_frame').value
+        if frame not in (*BASES, base):
+            self._log.warning(f"cmd_vel ignored: it is in the frame '{frame}', not in the base's "
+                              f"'{base}' (feedback.base_frame)", once=True)
+            return
+        age = self._node.get_clock().now().nanoseconds * 1e-9 - stamp.sec - 1e-9 * stamp.nanosec
+        if (stamp.sec or stamp.nanosec) and abs(age) > self._timeout():
+            side = 'old' if age > 0.0 else 'ahead'
+            self._log.warning(f'cmd_vel ignored: its stamp is {abs(age):.3g} s {side}; the clocks '
+                              'of sender and generator must agree', throttle_duration_sec=QUIET)
             return
         self._take(message.twist)
 

@@ -14,6 +14,7 @@
 
 """The generator's health, once a second on /diagnostics."""
 
+from collections.abc import Callable
 from typing import Any
 
 from cpg_ros.motion.pattern import Pattern
@@ -31,13 +32,16 @@ QUIET = 5.0
 
 
 class Diagnostics:
-    """Reports ERROR on a fault until the pattern is back, and on other publishers; else WARN.
+    """Reports ERROR on a fault until the pattern is back, and on other publishers and joints that
+    do not follow; else WARN.
 
     A warning is for lateness, and for silence: what is not published is not OK.
     """
 
     def __init__(self, node: Node, pattern: Pattern, ticker: Ticker, others: OtherPublishers,
-                 cmd_vel: CmdVel | None, feedback: FeedbackSwitch, awaited: str) -> None:
+                 cmd_vel: CmdVel | None, feedback: FeedbackSwitch,
+                 awaited: Callable[[], str], lag: Callable[[], str]) -> None:
+        self._lag = lag
         self._feedback, self._awaited = feedback, awaited
         self._node, self._pattern, self._ticker = node, pattern, ticker
         self._others, self._cmd_vel = others, cmd_vel
@@ -65,6 +69,8 @@ class Diagnostics:
                 text += ' (symmetry_gain is 0: no gait is stable)'
         elif self._others.text:
             level, text = DiagnosticStatus.ERROR, self._others.text
+        elif lag := self._lag():
+            level, text = DiagnosticStatus.ERROR, lag
         elif new['jumps back of simulated time']:
             level = DiagnosticStatus.WARN
             text = self._why_anew(new['jumps back of simulated time'])
@@ -110,7 +116,7 @@ class Diagnostics:
         clock: Any = self._node.get_clock()
         now = clock.now().nanoseconds
         if self._ticker.waiting:
-            return f'waiting for {self._awaited}'
+            return f'waiting for {self._awaited()}'
         if not clock.ros_time_is_active:
             return f'no tick for {self._silent} s'
         return f'simulated time is still {1e-9 * now:.3f} s' if now else 'no /clock yet'
@@ -118,7 +124,7 @@ class Diagnostics:
     def _state(self) -> str:
         pattern = self._pattern
         if self._ticker.waiting:
-            return f'waiting for {self._awaited}'
+            return f'waiting for {self._awaited()}'
         if pattern.standing:
             return 'standing'
         if pattern.level < 1.0:

@@ -34,8 +34,8 @@ PREFIX = 'feedback.'
 ENABLED, FORMER = f'{PREFIX}enabled', PREFIX.rstrip('.')
 #: Its default is false where the feedback cannot be on.
 SWITCH = Spec(True, "correct the gait by the robot's sensors; false by default if the robot file "
-              'is not calibrated, or if the generator itself publishes the topic joint_states '
-              'that it would measure from')
+              'is not calibrated, if the generator itself publishes the topic joint_states '
+              "that it would measure from, or if it commands a robot's controllers (command)")
 
 #: Topics, read when the feedback is first switched on.
 TOPICS = fixed({

@@ -28,7 +28,7 @@ from cpg_ros.motion.strides import Drive
 from cpg_ros.nodes import feedback_parameters
 from cpg_ros.nodes.feedback_loop import FeedbackLoop, Motion
 from cpg_ros.nodes.feedback_parameters import ENABLED, PREFIX
-from cpg_ros.nodes.kernels import announced, FEEDBACK
+from cpg_ros.nodes.kernels import announced, compile_apart, FEEDBACK
 from cpg_ros.nodes.kp_scale import KpScalePublisher
 from cpg_ros.nodes.node_base import StartError
 from cpg_ros.nodes.odometry_publisher import OdometryPublisher
@@ -61,19 +61,26 @@ def shortfalls(robot: Robot) -> list[str]:
             for leg in robot.legs if leg not in known or len(known[leg].joints) == 2]
 
 
-def usual(node: Any, robot: Robot, combined: str) -> Spec:
+def usual(node: Any, robot: Robot, combined: str, commands: bool) -> Spec:
     """Return the parameter that enables the feedback, by default true where nothing prevents it.
+
+    On a robot's controllers the user enables it, who has checked the signs of its sensors.
 
     Args:
         node: that has declared the feedback's topics.
         robot: to be corrected.
         combined: topic of all joints that the node publishes, or ''.
+        commands: whether the node commands controllers.
 
     """
     measured = node.get_parameter(f'{PREFIX}joint_states_topic').value
     own = combined and (node.resolve_topic_name(combined) == node.resolve_topic_name(measured))
     helps = robot.feedback is None or robot.feedback.enabled
-    return replace(feedback_parameters.SWITCH, default=helps and not (own or lacking(robot)))
+    able = helps and not (own or lacking(robot))
+    if able and commands and ENABLED not in node._parameter_overrides:
+        node.get_logger().info("feedback is off, as by default with a robot's controllers: set "
+                               f'{ENABLED} to true once its sensors are checked')
+    return replace(feedback_parameters.SWITCH, default=able and not commands)
 
 
 class FeedbackSwitch:
@@ -102,7 +109,11 @@ class FeedbackSwitch:
         self._odometry: OdometryPublisher | None = None
         if refusal := self.judge([node.get_parameter(ENABLED)]):
             raise StartError(refusal)
+        self._hindrance = ''
+        #: Whether the robot may move meanwhile.
+        self._started = False
         self.apply()
+        self._started = True
 
     def _value(self, name: str) -> Any:
         return self._node.get_parameter(PREFIX + name).value
@@ -134,12 +145,21 @@ class FeedbackSwitch:
             self.loop = self._make()
         if self.loop is not None:
             self._set_gains()
-            self.loop.wanted = wanted
+            self.loop.wanted = wanted and not self._hindrance
+
+    def hinder(self, reason: str) -> None:
+        """Fade the feedback out as long as there is a reason, '' for none."""
+        self._hindrance = reason
+        if self.loop is not None:
+            self.loop.wanted = (self._node.get_parameter(ENABLED).value and not self.obstacle()
+                                and not reason)
 
     def _make(self) -> Any:
         """Return the loop, its kernels compiled."""
         robot, pattern = self._pattern.robot, self._pattern
         geometry = geometry_of(robot)
+        if self._started:
+            compile_apart(self._node, 'feedback', FEEDBACK)
         with announced(self._node, 'the feedback', FEEDBACK):
             warm_up(geometry, len(robot.joints))
         loop = FeedbackLoop(pattern, geometry, self._inputs(geometry), self._motion)

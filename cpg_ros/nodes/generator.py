@@ -42,7 +42,9 @@ from cpg_ros.nodes.generator_parameters import (
     presets_of,
     specs,
 )
+from cpg_ros.nodes.health_publisher import STEADY
 from cpg_ros.nodes.joint_publishers import CellsPublisher, Outputs
+from cpg_ros.nodes.joint_tracking import JointTracking
 from cpg_ros.nodes.kernels import compile_kernels
 from cpg_ros.nodes.lifecycle import Lifecycle
 from cpg_ros.nodes.measured_pose import MeasuredPose
@@ -53,8 +55,10 @@ from cpg_ros.nodes.real_time import RealTime, SPECS
 from cpg_ros.nodes.sensor_input import CONTACTS
 from cpg_ros.robots.robot import Robot
 from cpg_ros.robots.robot_file import load_robot
+import numpy as np
 from rcl_interfaces.msg import ParameterType, SetParametersResult
 from rclpy.parameter import Parameter
+from rclpy.timer import Timer
 from std_msgs.msg import String
 from std_srvs.srv import SetBool
 
@@ -64,6 +68,8 @@ LAST_RAMP, LAST_DEADLINE = 0.5, 0.95
 #: Two nodes know of one another this long after the later one joined the graph, s: they are
 #: announced every 3 s, and the first announcements of a busy machine are lost at times.
 DISCOVERY = 3.5
+#: How often the pose to begin from is searched for, s.
+SEARCH = 0.05
 
 
 class Generator(StartedNode):
@@ -105,7 +111,8 @@ class Generator(StartedNode):
         self._declare(feedback_parameters.specs(robot))
         if FORMER in self._parameter_overrides:
             raise StartError(f"there is no parameter '{FORMER}': it is '{ENABLED}'")
-        self._declare({ENABLED: usual(self, robot, self._value('combined_topic'))})
+        self._declare({ENABLED: usual(self, robot, self._value('combined_topic'),
+                                      self._value('command') != 'none')})
         self._one_of('feedback.contacts', CONTACTS)
         for parameter in self._planner.given(self._value('gait'), self._parameter_overrides):
             self._parameter_overrides[parameter.name] = parameter
@@ -129,6 +136,13 @@ class Generator(StartedNode):
             self, self.pattern, self._motion, self._outputs.topics)
         self._cells = CellsPublisher(self, network)
         self._measured = self._measured_pose(robot)
+        #: What was sent last, rad; of the ticks.
+        self._sent: np.ndarray | None = None
+        self._tracking = JointTracking(self, robot, self._measured, self._commanded,
+                                       self._lag) if self._measured else None
+        #: Searches for the pose to begin from, and why it has not begun.
+        self._search: Timer | None = None
+        self._unmeasured = ''
         self._gait = self.create_publisher(String, '~/gait', latched(),
                                            qos_overriding_options=OVERRIDABLE)
         self.create_service(SetBool, '~/enable', self._enable)
@@ -137,8 +151,8 @@ class Generator(StartedNode):
                              self.pattern.resume, partial(real_time.request, self.get_logger()))
         self._others = OtherPublishers(self, self._outputs.topics)
         self._diagnostics = Diagnostics(self, self.pattern, self.ticker, self._others,
-                                        self._cmd_vel, self._feedback,
-                                        'configure' if managed else '~/enable')
+                                        self._cmd_vel, self._feedback, lambda: self._awaited,
+                                        lambda: self._tracking.text if self._tracking else '')
         self.add_on_set_parameters_callback(self._judge)
         self.add_post_set_parameters_callback(self._apply)
         self._warn_of_unknown()
@@ -209,35 +223,75 @@ class Generator(StartedNode):
 
     def _measured_pose(self, robot: Robot) -> MeasuredPose | None:
         topic = self._value('measured_topic')
-        if not topic or self.resolve_topic_name(topic) in self._outputs.topics:
-            return None
-        return MeasuredPose(self, robot, topic)
+        if topic and self.resolve_topic_name(topic) not in self._outputs.topics:
+            return MeasuredPose(self, robot, topic)
+        if self._leads:
+            raise StartError(
+                f"command '{self._value('command')}' begins at the measured pose, but "
+                + (f"measured_topic '{topic}' is the generator's own: set combined_topic to ''"
+                   if topic else "measured_topic is ''")
+                + ', or set assume_stand to true if nothing measures the joints')
+        return None
 
-    def _lead_to_the_stand(self) -> str:
-        """Start from the measured pose, if it is known; return the name of the pose."""
-        try:
-            pose = self._measured.take() if self._measured else None
-        except ValueError as error:
-            self.get_logger().warning(f'the pose is not known, starting at the stand: {error}')
-            pose = None
-        if pose is None:
-            return 'the stand'
-        self.pattern.start_from(pose, self._value('ramp'))
-        return 'the measured pose'
+    @property
+    def _leads(self) -> bool:
+        """Whether it must know where the joints are before it moves them."""
+        return self._value('command') != 'none' and not self._value('assume_stand')
+
+    def _find_pose(self) -> tuple[str, np.ndarray | None]:
+        """Return why it cannot begin, or '', and the measured pose, None for the stand."""
+        if self._measured is None:
+            return '', None
+        angles = self._measured.take()
+        lacking = self._measured.lacks(angles)
+        if not lacking:
+            return '', angles
+        if self._leads:
+            return f'the pose is not known, and the joints must not jump: {lacking}', None
+        if np.isfinite(angles).any():
+            self.get_logger().warning(f'the pose is not known, starting at the stand: {lacking}')
+        return '', None
 
     def _begin_at_the_stand(self) -> tuple[str, str]:
         """Start publishing; return why not, or '', and the name of the pose to start from."""
         if self._value('exclusive') and self._others.look():
             return self._others.text, ''
+        refusal, pose = self._find_pose()
+        if refusal:
+            return refusal, ''
+        self._end_search()
         if self.ticker.paused:
             self.pattern.restart(self._value('ramp'), False)
             self._feedback.restart()
-        pose = self._lead_to_the_stand()
+        if pose is not None:
+            self.pattern.start_from(pose, self._value('ramp'))
         if self.ticker.is_alive():
             self.ticker.paused = False
         else:
             self.ticker.start()
-        return '', pose
+        return '', 'the stand' if pose is None else 'the measured pose'
+
+    def _look_for_pose(self) -> None:
+        """Start publishing as soon as the pose is measured; log news of why it is not."""
+        refusal, pose = self._begin_at_the_stand()
+        if not refusal:
+            self.get_logger().info(f'beginning from {pose}')
+        elif refusal != self._unmeasured:
+            self.get_logger().warning(f'waiting: {refusal}')
+        self._unmeasured = refusal
+
+    def _end_search(self) -> None:
+        """Wait for the pose no longer."""
+        if self._search is not None:
+            self._search.cancel()
+            self._search, self._unmeasured = None, ''
+
+    @property
+    def _awaited(self) -> str:
+        """What publishing waits for."""
+        if self._search is not None and self._measured is not None:
+            return f'the measured pose on {self._measured.topic}'
+        return '~/enable' if self._lifecycle is None else 'configure'
 
     def _walk(self, wanted: bool) -> str:
         """Ramp into the gait, or down to the stand; return ''."""
@@ -267,12 +321,16 @@ class Generator(StartedNode):
         response.success = True
         response.message = (f'ramping {"up" if request.data else "down"} over '
                             f'{self._value("ramp"):g} s')
-        if self._lifecycle is not None:
+        if self._lifecycle is not None and request.data:
             response.success = False
-            response.message = 'this node is managed: activate and deactivate it instead'
+            response.message = 'this node is managed: activate it instead'
             return response
-        if not self.ticker.is_alive():
+        if self._lifecycle is not None and self._lifecycle.active:
+            self._lifecycle.trigger_deactivate()
+            return response
+        if self.ticker.waiting:
             if not request.data:
+                self._end_search()
                 response.message = 'nothing is published yet'
                 return response
             refusal, pose = self._begin_at_the_stand()
@@ -286,13 +344,25 @@ class Generator(StartedNode):
         self.get_logger().info(response.message)
         return response
 
+    def _commanded(self) -> np.ndarray | None:
+        """Return the angles that were sent last, rad, or None while none are sent."""
+        return None if self.ticker.waiting or self._sent is None else self._sent.copy()
+
+    def _lag(self, reason: str) -> None:
+        """Switch the feedback off while a joint does not follow: it would correct by it."""
+        self._feedback.hinder(reason)
+        if reason:
+            self.get_logger().error(reason)
+        else:
+            self.get_logger().info('all joints follow again')
+
     def _tick(self, dt: float, stamp: int) -> None:
         if self.ticker.paused:
             return
         self._feedback.sense(dt, stamp)
         self.pattern.advance(dt)
-        self._outputs.publish(stamp, dt, self._feedback.targets(self.pattern.position),
-                              self.pattern.velocity, self.pattern.phases)
+        self._sent = self._feedback.targets(self.pattern.position)
+        self._outputs.publish(stamp, dt, self._sent, self.pattern.velocity, self.pattern.phases)
         self._feedback.publish(dt, stamp)
         self._cells.publish(dt, self.pattern.state)
         if self.ticker.stopping and self.pattern.standing:
@@ -313,6 +383,10 @@ class Generator(StartedNode):
         at = f"{names} joints of '{self.pattern.robot.name}' at {self.ticker.rate:g} Hz"
         if self._lifecycle is not None:
             self.get_logger().info(f'publishing nothing until it is configured, then {at}')
+        elif self._value('autostart') and self._leads and self._measured is not None:
+            self.get_logger().info('publishing nothing until the pose is measured on '
+                                   f'{self._measured.topic}, then {at}')
+            self._search = self.create_timer(SEARCH, self._look_for_pose, clock=STEADY)
         elif self._value('autostart'):
             self.get_logger().info(f'publishing {at}')
             self.ticker.start()

@@ -70,13 +70,26 @@ def specs(network: type[Network]) -> dict[str, Spec]:
         'command': Spec('none', 'command topic for ros2_control', read_only=True,
                         constraints=one_of(COMMANDS)),
         'measured_topic': Spec('joint_states', "topic of the robot's measured joint states, from "
-                               'which the generator moves it to the stand if autostart is false; '
-                               'empty for none', read_only=True),
-        'autostart': Spec(True, 'ramp into the gait at start; if false, publish nothing until '
-                          '~/enable is called', read_only=True),
+                               'which the generator moves it to the stand if it commands the '
+                               'robot (command) or autostart is false; empty for none',
+                               read_only=True),
+        'assume_stand': Spec(False, 'begin at the stand where no pose is measured, although '
+                             'command is not none: for robots that do not measure positions, '
+                             'whose joints jump there, and behind a bridge or a simulation that '
+                             'moves the robot to the stand itself', read_only=True),
+        'tracking_error': Spec(0.3, 'mean distance of a measured joint from its commanded angle '
+                               'at which /diagnostics reports an error and feedback fades out '
+                               '[rad]',
+                               0.01, 10.0, read_only=True),
+        'tracking_time': Spec(1.0, 'time over which that mean is taken [s]', 0.1, 10.0,
+                              read_only=True),
+        'autostart': Spec(True, 'ramp into the gait at start, with a command as soon as the pose '
+                          'is measured; if false, publish nothing until ~/enable is called',
+                          read_only=True),
         'managed': Spec(False, 'be a managed node (ros2 lifecycle): silent until it is '
                         'configured, then at the stand, and in the gait while it is active; '
-                        'autostart and ~/enable have no effect', read_only=True),
+                        'autostart has no effect, and ~/enable only stops: false deactivates it',
+                        read_only=True),
         'cmd_vel': Spec(False, 'follow the commands on cmd_vel; the robot file must have steering '
                         'tables', read_only=True),
         'stamped_cmd_vel': Spec(False, "type of cmd_vel: geometry_msgs/TwistStamped, as Jazzy's "

@@ -74,8 +74,9 @@ SPECS = {
     'kp': Spec(0.0, 'proportional gain of the joint controllers [N m/rad], to fit the commands, '
                'position + (effort + kd velocity) / kp; 0 fits the measured positions', 0.0, 1e5),
     'kd': Spec(0.0, 'damping gain of the joint controllers [N m s/rad]', 0.0, 1e4),
-    'out': Spec('', 'parameter file to write; empty for none'),
-    'report': Spec('', 'HTML report to write; empty for none'),
+    # Whoever reaches the graph may start a fit, but not choose which of the user's files it writes.
+    'out': Spec('', 'parameter file to write; empty for none', read_only=True),
+    'report': Spec('', 'HTML report to write; empty for none', read_only=True),
     'apply_to': Spec('', 'generator whose parameters are set after a fit, such as /cpg_generator; '
                      "the joints' readouts, too, where both have the same 'robot'; empty for "
                      'none')}
@@ -216,8 +217,8 @@ class Inversion(StartedNode):
         written = self._value('out')
         return True, (f'; applied to {target}: gait, frequency and network, not the readout, as '
                       "'robot' here is not its robot; to move as recorded, "
-                      + (f'start it with --params-file {written}' if written
-                         else "set 'out' and start it with the file written there"))
+                      + (f'start it with --params-file {written}' if written else
+                         "start this node with 'out', and it with the file written there"))
 
     async def _set(self, target: NodeClient, found: RecordingFit) -> bool:
         """Set the parameters of a generator; return whether its robot can take the readouts."""

@@ -16,16 +16,22 @@
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+import subprocess
+import sys
+from typing import Any
 
 from cpg_ros.export.c_kernel import choose
 from cpg_ros.integration.jit import COMPILED, noticing
 from cpg_ros.motion.network_kernels import precompile
+from cpg_ros.nodes.node_base import StartError
 from cpg_ros.nodes.start_progress import StartProgress
 from rclpy.node import Node
 
 #: How long a network's kernels, those of the feedback and those of a biped's take, on one core of
 #: 2023, s.
 NETWORK, FEEDBACK, BALANCE = 20.0, 25.0, 15.0
+#: How often it is seen whether a compiling process has ended, s.
+LOOK = 0.05
 
 
 def compile_kernels(network: str, kernel: str, node: Node) -> None:
@@ -73,3 +79,43 @@ def announced(node: Node, what: str, seconds: float) -> Iterator[None]:
     finally:
         for progress in begun:
             progress.end()
+
+
+def compile_apart(node: Any, part: str, seconds: float) -> None:
+    """Compile in a process of its own, whose results this one then loads from the disk.
+
+    The compiler keeps the interpreter's lock for up to seconds, and the ticks of a robot that
+    moves would wait for it.
+
+    Args:
+        node: a StartedNode that moves a robot meanwhile.
+        part: of cpg_ros.tools.precompile.
+        seconds: that this takes at its first time, s.
+
+    Raises:
+        StartError: the node ends.
+
+    """
+    node.get_logger().info(f'making the {part} ready in a process of its own: about {seconds:g} s '
+                           'at its first start on this installation')
+    progress = StartProgress(node, f'compiling the {part}', seconds)
+    # Ctrl-C in the terminal is for the node.
+    child = subprocess.Popen(
+        ['nice', sys.executable, '-P', '-m', 'cpg_ros.tools.precompile', part],
+        stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE,
+        start_new_session=True)
+    try:
+        while child.poll() is None:
+            if node.stop.wait(LOOK):
+                raise StartError(f'the node ends while it makes the {part} ready')
+        if child.returncode:
+            assert child.stderr is not None
+            lines = child.stderr.read().decode(errors='replace').split('\n')
+            node.get_logger().warning(f'the process that compiles the {part} failed, and the node '
+                                      f'does it: {next(filter(None, lines[::-1]), "no reason")}')
+        else:
+            node.get_logger().info(f'ready after {progress.passed:.1f} s')
+    finally:
+        child.kill()
+        child.wait()
+        progress.end()

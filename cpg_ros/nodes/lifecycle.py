@@ -15,7 +15,10 @@
 """ROS's life cycle beside a node that is no LifecycleNode: a step for each transition."""
 
 from collections.abc import Callable, Mapping
+from typing import Any
 
+from lifecycle_msgs.srv import ChangeState
+from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.lifecycle import LifecycleNodeMixin, LifecycleState, TransitionCallbackReturn
 from rclpy.node import Node
 
@@ -41,6 +44,28 @@ class Lifecycle(LifecycleNodeMixin):
         self.default_callback_group = node.default_callback_group
         self._services = node._services
         super().__init__()
+        service: Any = self._service_change_state
+        self._change, service.callback = service.callback, self._answered_change
+
+    @property
+    def active(self) -> bool:
+        """Whether the state is active."""
+        return self._state_machine.current_state[1] == 'active'
+
+    def _answered_change(self, request: ChangeState.Request, response: ChangeState.Response
+                         ) -> ChangeState.Response:
+        """Change the state; refuse a transition that the state does not have.
+
+        rclpy raises an exception for that one, and the client waits for ever.
+        """
+        try:
+            return self._change(request, response)
+        except rclpy_implementation.RCLError:
+            wanted, state = request.transition, self._state_machine.current_state[1]
+            self._logger.warning(f'{wanted.label or f"transition {wanted.id}"}: refused: the '
+                                 f"state '{state}' does not have it")
+            response.success = False
+            return response
 
     def _step(self, name: str) -> TransitionCallbackReturn:
         if reason := self._steps[name]():

@@ -29,25 +29,32 @@ FRESH = 1.0
 
 
 class MeasuredPose:
-    """The newest joint states of a topic, read on demand."""
+    """The newest angles of the joints on a topic of joint states, read on demand.
+
+    Attributes:
+        topic: its resolved name.
+
+    """
 
     def __init__(self, node: Node, robot: Robot, topic: str) -> None:
-        self._names = [joint.name for joint in robot.joints]
+        self._index = {joint.name: k for k, joint in enumerate(robot.joints)}
+        self._angles = np.full(len(self._index), math.nan)
+        self._arrived = np.zeros(len(self._index), dtype=np.int64)
         # Several publishers may share the topic.
-        self._subscription = PolledSubscription(node, JointState, topic, best_effort(50))
+        self._subscription = PolledSubscription(node, JointState, topic, best_effort(8))
+        self.topic = self._subscription.topic
 
-    def take(self) -> np.ndarray | None:
-        """Return the angle of each joint, rad, leg by leg; None where nothing is published.
-
-        Raises:
-            ValueError: what is published does not have all joints.
-
-        """
-        found: dict[str, float] = {}
+    def take(self, fresh: float = FRESH) -> np.ndarray:
+        """Return the angle of each joint, rad, leg by leg; NaN where none is ``fresh``, in s."""
         for message, arrived in self._subscription.take():
-            if time.time_ns() - arrived < FRESH * 1e9:
-                found.update(zip(message.name, message.position, strict=False))
-        missing = [name for name in self._names if not math.isfinite(found.get(name, math.nan))]
-        if found and missing:
-            raise ValueError(f'{self._subscription.topic} has no angle of {missing[0]}')
-        return np.array([found[name] for name in self._names]) if found else None
+            for name, angle in zip(message.name, message.position, strict=False):
+                if (k := self._index.get(name)) is not None and math.isfinite(angle):
+                    self._angles[k], self._arrived[k] = angle, arrived
+        return np.where(self._arrived > time.time_ns() - fresh * 1e9, self._angles, math.nan)
+
+    def lacks(self, angles: np.ndarray) -> str:
+        """Return why angles that were taken are not the robot's pose, or ''."""
+        missing = [name for name, k in self._index.items() if math.isnan(angles[k])]
+        if len(missing) == len(self._index):
+            return f'no joint states on {self.topic}'
+        return f'{self.topic} has no angle of {missing[0]}' if missing else ''

@@ -60,16 +60,18 @@ class _Batch:
                  answer: Callable[[SetParametersResult], None]) -> None:
         self.parameters, self.answer = parameters, answer
         self.names = frozenset(parameter.name for parameter in parameters)
+        #: Earlier ones that this one replaces if it is accepted.
+        self.replaced: list[_Batch] = []
 
 
 class StrictParameterService(ParameterService):
     """rclpy's services, with changes applied in a thread of their own.
 
     The executor stays free for what must not wait, such as a stop. Of several waiting changes of
-    the same parameters, only the last one is applied. Values of no known type, unknown names and
-    more than MOST of them are rejected with a reason: in rclpy 7.1 a value of no known type raises
-    an exception in the executor, so that one request ends the node, and an unknown name is
-    rejected without naming it.
+    the same parameters, only the last one that is valid is applied. Values of no known type,
+    unknown names and more than MOST of them are rejected with a reason: in rclpy 7.1 a value of no
+    known type raises an exception in the executor, so that one request ends the node, and an
+    unknown name is rejected without naming it.
 
     Attributes:
         thread: applies the changes, once it is started.
@@ -120,7 +122,14 @@ class StrictParameterService(ParameterService):
                 waiting = _thinned(waiting + self._taken())
                 if waiting and not self._ending:
                     batch = waiting.pop(0)
-                    batch.answer(self._judged(batch))
+                    result = self._judged(batch)
+                    batch.answer(result)
+                    if not result.successful:
+                        waiting[:0] = batch.replaced
+                        continue
+                    for one in batch.replaced:
+                        one.answer(_refused('superseded: a later request that came while this '
+                                            'one was waiting sets the same'))
         except rclpy_implementation.RCLError:
             # The graph is gone when the node ends while this thread is at work.
             if not self._ending:
@@ -227,14 +236,13 @@ def _respond(service: Service, header: object, results: list[SetParametersResult
 
 
 def _thinned(batches: list[_Batch]) -> list[_Batch]:
-    """Reject batches whose parameters a later one sets, too; return the others."""
-    later: set[frozenset[str]] = set()
-    left = []
+    """Put batches whose parameters a later one sets, too, behind that one; return the others."""
+    left: list[_Batch] = []
     for batch in reversed(batches):
-        if any(batch.names <= names for names in later):
-            batch.answer(_refused('superseded: a later request that came while this one was '
-                                  'waiting sets the same'))
-        else:
-            later.add(batch.names)
+        later = next((one for one in left if batch.names <= one.names), None)
+        if later is None:
             left.append(batch)
+        else:
+            later.replaced[:0] = [*batch.replaced, batch]
+            batch.replaced = []
     return left[::-1]

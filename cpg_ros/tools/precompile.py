@@ -29,7 +29,7 @@ from cpg_ros.export.c_kernel import choose
 from cpg_ros.feedback.biped.feedback import BipedFeedback
 from cpg_ros.feedback.estimate import SensorData
 from cpg_ros.feedback.kinematics import geometry_of
-from cpg_ros.feedback.warm_up import warm_up
+from cpg_ros.feedback.warm_up import warm_up, warm_up_judges
 from cpg_ros.integration.jit import COMPILED
 from cpg_ros.motion.network_kernels import precompile
 from cpg_ros.robots.robot_file import load_robot
@@ -50,6 +50,7 @@ def compile_part(part: str) -> None:
         warm_up(geometry_of(robot), len(robot.joints))
     elif part == 'balance':
         biped = BipedFeedback(load_robot(BIPED))
+        warm_up_judges(len(biped.robot.legs), len(biped.order))
         # The first tick compiles.
         biped.advance(SensorData.zeros(1, len(biped.robot.legs), len(biped.order)), 1e-3)
     else:

@@ -31,8 +31,10 @@ import rclpy
 KINDS: dict[str, tuple[Callable[[], StartedNode], tuple[dict[str, str], ...]]] = {
     'generator': (Generator, (
         {'command': 'joint_trajectory', 'exclusive': 'false', 'robot': 'unitree_go2',
+         'assume_stand': 'true',
          'cmd_vel': 'true'},
-        {'command': 'forward_position', 'exclusive': 'false', 'combined_topic': '""'},
+        {'command': 'forward_position', 'exclusive': 'false', 'combined_topic': '""',
+         'assume_stand': 'true'},
         {'robot': 'unitree_go2', 'feedback.enabled': 'true', 'combined_topic': '""',
          'feedback.odometry_topic': 'odom'})),
     'robot_sim': (RobotSim, ({'clock': 'true'}, {'command': 'joint_trajectory'},

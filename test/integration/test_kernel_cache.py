@@ -252,6 +252,63 @@ def test_it_starts_where_neither_the_package_nor_the_home_can_be_written(tmp_pat
     assert seen[0] == seen[-1], 'the cache was not used'
 
 
+GENERATED = """
+from cpg_ros.networks.generated import load
+print('loaded', load('some', 'kernel', lambda: 'value = 1').value)
+"""
+#: Somebody other than the user; only root can give files away.
+NOBODY = 65534
+as_root = pytest.mark.skipif(os.getuid() != 0, reason='only root can give files away')
+
+
+def opened(mode):
+    """Return what lets others write into a file or folder."""
+    return lambda path: path.chmod(mode)
+
+
+def given_away(path):
+    """Give a file or folder to somebody else."""
+    os.chown(path, NOBODY, NOBODY)
+
+
+@pytest.mark.parametrize('which', ['kernel', 'folder', 'place', 'parent'])
+@pytest.mark.parametrize('change', [opened(0o777), pytest.param(given_away, marks=as_root)],
+                         ids=['writable', 'owner'])
+def test_code_that_others_may_have_written_is_not_executed(tmp_path, which, change):
+    parent = tmp_path / 'parent'
+    given = environment(NUMBA_CACHE_DIR=str(parent / 'cache'))
+
+    def run():
+        return subprocess.run([sys.executable, '-c', GENERATED], env=given, text=True,
+                              capture_output=True, check=True)
+
+    assert (run().stdout, run().stderr) == ('loaded 1\n', '')
+    (kernel,) = parent.glob('cache/cpg_ros/some-*/kernel.py')
+    kernel.write_text('value = 2\n')
+    assert run().stdout == 'loaded 2\n', 'the cache is not used'
+    path = {'kernel': kernel, 'folder': kernel.parent, 'place': kernel.parents[1],
+            'parent': parent}[which]
+    if which == 'kernel':
+        kernel.parent.chmod(0o755)
+    change(path)
+    found = run()
+    assert found.stdout == 'loaded 1\n'
+    (line,) = found.stderr.splitlines()
+    assert line.startswith(f'compiled code is not loaded: {path} ')
+
+
+def test_a_cache_below_a_sticky_folder_is_used(tmp_path):
+    place = tmp_path / 'shared'
+    place.mkdir()
+    place.chmod(0o1777)
+    given = environment(NUMBA_CACHE_DIR=str(place / 'cache'))
+    for _ in range(2):
+        ended = subprocess.run([sys.executable, '-c', GENERATED], env=given, text=True,
+                               capture_output=True, check=True)
+        assert (ended.stdout, ended.stderr) == ('loaded 1\n', '')
+    assert list(place.glob('cache/cpg_ros/some-*/kernel.py'))
+
+
 LIMIT = """
 import resource
 resource.setrlimit(resource.RLIMIT_FSIZE, ({room}, {room}))

@@ -215,3 +215,27 @@ def test_stamped_commands_are_taken_and_others_named(stepped, robot):
     ask(1.5)
     assert re.search(r'cmd_vel ignored: its stamp is [0-9.]+ s old', generator.log)
     assert still(generator)
+
+
+@pytest.mark.parametrize(('ahead', 'frame', 'reason'), [
+    (3600.0, 'base_link', 'its stamp is 3.6e+03 s ahead'),
+    (None, 'map', "it is in the frame 'map', not in the base's 'base_link'"),
+    (0.0, 'base_link', ''), (None, 'body', '')])
+def test_commands_of_another_time_or_frame_move_nothing(stepped, robot, ahead, frame, reason):
+    generator, watcher = stepped(
+        '-p', f'robot:={robot}', '-p', 'cmd_vel:=true', '-p', 'stamped_cmd_vel:=true', '-p',
+        f'rate:={RATE}', '-p', 'ramp:=0.3',
+        *(('-p', 'feedback.base_frame:=body') if frame == 'body' else ()), running=False)
+    publisher = watcher.node.create_publisher(TwistStamped, 'cmd_vel', 10)
+    until(publisher.get_subscription_count, 'the generator listening')
+    command = TwistStamped()
+    command.header.frame_id, command.twist.linear.x = frame, 0.3
+    generator.run(0.2)
+    for _ in range(17):
+        if ahead is not None:
+            now = generator.now + ahead
+            command.header.stamp.sec, command.header.stamp.nanosec = int(now), int(now % 1 * 1e9)
+        publisher.publish(command)
+        generator.run(0.06)
+    assert still(generator) == bool(reason)
+    assert generator.log.count('cmd_vel ignored') == bool(reason) and reason in generator.log

@@ -46,13 +46,14 @@ def test_two_of_one_name_warn_of_one_another(stepped):
 
 @pytest.mark.parametrize('command', ['joint_trajectory', 'forward_position'])
 def test_one_that_commands_does_not_start_beside_another(stepped, command):
-    one, _ = stepped('-p', f'command:={command}', running=False)
-    reason = refused('-p', f'command:={command}', domain=one.domain)
+    words = '-p', f'command:={command}', '-p', 'assume_stand:=true'
+    one, _ = stepped(*words, running=False)
+    reason = refused(*words, domain=one.domain)
     assert 'is published by /cpg_generator, too' in reason and '\n' not in reason
     assert reason.endswith('rename the topic, or set exclusive to false')
     # In another namespace, or told to, it does.
     for more in (('-r', '__ns:=/b'), ('-p', 'exclusive:=false')):
-        stepped('-p', f'command:={command}', *more, domain=one.domain, running=False)
+        stepped(*words, *more, domain=one.domain, running=False)
 
 
 def test_exclusive_without_commands(stepped):

@@ -138,3 +138,18 @@ def test_the_closed_go2_walks_and_an_input_that_fails_is_named(between):
     assert len(scales) > 20
     watcher.pass_by(1.0)
     assert 'fallen' not in body.log and min(row[2] for row in watcher.rows[500:]) > 0.2
+
+
+@pytest.mark.parametrize(('words', 'enabled'), [
+    ((), True), (('command:=none', 'feedback.enabled:=false'), False),
+    (('command:=forward_position',), False), (('command:=joint_trajectory',), False),
+    (('command:=forward_position', 'feedback.enabled:=true'), True)])
+def test_it_is_off_by_default_with_controllers(stepped, words, enabled):
+    generator, watcher = stepped(*(word for one in (
+        'robot:=unitree_go2', 'combined_topic:=""', *words) for word in ('-p', one)),
+        running=False)
+    assert watcher.get('feedback.enabled') == [enabled]
+    said = "feedback is off, as by default with a robot's controllers: set feedback.enabled"
+    assert (said in generator.log) == (len(words) == 1)
+    # Its user may switch it on at any time.
+    assert watcher.set(**{'feedback.enabled': True})[0].successful

@@ -25,7 +25,7 @@ from depth import in_depth
 from graph import EXECUTABLE, PATIENCE, Process, SimulatedTime, until, Watcher
 import numpy as np
 import pytest
-from rcl_interfaces.srv import SetParametersAtomically
+from rcl_interfaces.srv import SetParameters, SetParametersAtomically
 from rclpy.parameter import Parameter
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from std_msgs.msg import String
@@ -188,6 +188,25 @@ def test_live_fits_on_call_written_and_applied(ending, tmp_path):
     node.signal(signal.SIGINT)
     assert node.wait() == 0
     assert 'Traceback' not in node.log
+
+
+def test_the_graph_cannot_choose_which_files_are_written(ending, tmp_path):
+    profile = tmp_path / '.bashrc'
+    profile.write_text('export PATH\n')
+    node = Process('-p', f'out:={tmp_path / "fitted.yaml"}', executable=INVERSION)
+    ending.append(node)
+    node.wait_for('listening to /joint_states')
+    watcher = Watcher(node.domain, '/cpg_inversion')
+    ending.append(watcher)
+    for name in ('out', 'report'):
+        (result,) = watcher.call(SetParameters, '/cpg_inversion/set_parameters',
+                                 SetParameters.Request(parameters=[Parameter(
+                                     name, value=str(profile)).to_parameter_msg()])).results
+        assert not result.successful
+        assert result.reason == f'{name} is read-only: set it when the node starts'
+    assert watcher.get('out', 'report') == [
+        str(tmp_path / 'fitted.yaml'), '']
+    assert profile.read_text() == 'export PATH\n'
 
 
 def test_a_running_generator_moves_as_what_was_fitted(ending):

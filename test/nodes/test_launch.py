@@ -164,7 +164,7 @@ def test_go2_speaks_one_command_and_takes_turns(described, given, command, monke
     assert set(to_generator) - {'network', 'use_sim_time'} <= set(known)
     assert to_generator == {'network': 'delayed', 'gait': 'walk', 'robot': 'unitree_go2',
                             'rate': 500.0, 'combined_topic': '', 'cmd_vel': True,
-                            'stamped_cmd_vel': False,
+                            'stamped_cmd_vel': False, 'assume_stand': True,
                             'command': command, 'use_sim_time': True}
     to_simulation = parameters(found, simulation)
     assert to_simulation == {
@@ -216,7 +216,7 @@ def test_go2_robot_is_on_the_robots_network(described, given, domain, switch, co
     assert parameters(found, generator) == {
         'network': 'delayed', 'gait': 'walk', 'robot': 'unitree_go2', 'rate': 500.0,
         'combined_topic': '', 'cmd_vel': False, 'stamped_cmd_vel': False,
-        'feedback.enabled': False, 'command': command}
+        'feedback.enabled': False, 'command': command, 'assume_stand': True}
     to_bridge = parameters(found, bridge)
     assert to_bridge['motion_switcher'] is switch
     assert to_bridge['command'] == given.get('command', 'forward_position')
@@ -239,6 +239,8 @@ def test_a_robot_of_servos_lies_still_and_its_bus_outlives_the_bridge(described)
     assert bus['calibration'] == bridge['calibration'] == 'servos.yaml'
     assert bridge['robot'] == generator['robot'] == 'mine.yaml'
     assert bridge['command'] == generator['command'] == 'forward_position'
+    # The bridge moves the robot to the stand.
+    assert generator['assume_stand'] is True
     assert bridge['autostart'] is False and 5.0 < bus['end_timeout'] <= 10.0
     assert not set(generator) - set(of_generator('delayed')) - {'network'}
     assert all('on_exit' in node_of(found, name).options for name in ('servo_bus', 'servo_bridge'))

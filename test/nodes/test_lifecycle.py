@@ -14,6 +14,7 @@
 
 """A managed generator: ROS's life cycle, mapped on silence, the stand and the gait."""
 
+from cpg_ros.tools.cpg import main as cpg
 from diagnostic_msgs.msg import DiagnosticStatus
 from graph import Process, until, Watcher
 from lifecycle_msgs.msg import Transition
@@ -47,7 +48,6 @@ def silent(watcher):
 def test_it_stands_when_configured_walks_while_active_and_falls_silent(stepped):
     _, watcher = stepped('-p', 'managed:=true')
     assert silent(watcher) and not watcher.samples and state(watcher) == 'unconfigured'
-    assert not watcher.call(SetBool, '/cpg_generator/enable', SetBool.Request(data=True)).success
     assert change(watcher, Transition.TRANSITION_CONFIGURE) and state(watcher) == 'inactive'
     _, positions, _ = watcher.record(1.0)
     assert positions == pytest.approx(np.broadcast_to(STAND, positions.shape), abs=1e-9)
@@ -70,6 +70,61 @@ def test_it_stands_when_configured_walks_while_active_and_falls_silent(stepped):
     assert change(watcher, Transition.TRANSITION_ACTIVATE)
     _, positions, _ = watcher.record(2.5)
     assert np.ptp(positions[-100:], axis=0).max() > 0.4
+
+
+@pytest.mark.parametrize('door', ['service', 'cpg'])
+def test_a_stop_is_accepted_in_every_state(stepped, capsys, monkeypatch, door):
+    generator, watcher = stepped('-p', 'managed:=true', '-p', 'ramp:=0.5')
+    monkeypatch.setenv('ROS_DOMAIN_ID', str(generator.domain))
+
+    def stop():
+        if door == 'cpg':
+            assert cpg(['disable']) == 0, capsys.readouterr().err
+            return capsys.readouterr().out.strip()
+        answer = watcher.call(SetBool, '/cpg_generator/enable', SetBool.Request(data=False))
+        assert answer.success
+        return answer.message
+
+    assert stop() == 'nothing is published yet' and state(watcher) == 'unconfigured'
+    assert change(watcher, Transition.TRANSITION_CONFIGURE)
+    stop()
+    assert state(watcher) == 'inactive'
+    assert change(watcher, Transition.TRANSITION_ACTIVATE)
+    _, positions, _ = watcher.record(1.5)
+    assert np.ptp(positions, axis=0).max() > 0.2
+    assert stop() == 'ramping down over 0.5 s' and state(watcher) == 'inactive'
+    _, positions, velocities = watcher.record(2.0)
+    assert positions[-1] == pytest.approx(STAND, abs=1e-9) and not velocities[-1].any()
+    # It can be activated again, by its own door only.
+    answer = watcher.call(SetBool, '/cpg_generator/enable', SetBool.Request(data=True))
+    assert not answer.success and answer.message == 'this node is managed: activate it instead'
+    assert change(watcher, Transition.TRANSITION_ACTIVATE)
+
+
+def test_every_transition_is_answered_in_every_state(stepped):
+    generator, watcher = stepped('-p', 'managed:=true', '-p', 'ramp:=0.05')
+    allowed = {'unconfigured': {1}, 'inactive': {2, 3}, 'active': {4}}
+    into = {'unconfigured': [], 'inactive': [1], 'active': [1, 3]}
+    asked = [*range(5), *range(8, 13), 20, 30, 40, 50, 60, 62, 97, 98, 99, 255]
+    for name, steps in into.items():
+        for one in steps:
+            assert change(watcher, one)
+        for one in asked:
+            if one not in allowed[name]:
+                assert not change(watcher, one), (name, one)
+        # By names, and that of a shutdown in another state than it is for.
+        for label in ('no such', 'transition_success', ''):
+            request = ChangeState.Request(transition=Transition(id=99, label=label))
+            assert not watcher.call(ChangeState, '/cpg_generator/change_state', request).success
+        for one in {5, 6, 7} - {5 + list(into).index(name)}:
+            assert not change(watcher, one), (name, one)
+        assert state(watcher) == name
+        for one in {'active': [4], 'inactive': [2]}.get(name, []):
+            assert change(watcher, one)
+        if name == 'active':
+            until(lambda: change(watcher, 2), 'the stand')
+    assert "refused: the state 'active' does not have it" in generator.log
+    assert 'Traceback' not in generator.log
 
 
 def test_shutdown_ramps_down_and_ends_the_process():

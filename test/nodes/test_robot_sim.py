@@ -117,7 +117,8 @@ def test_it_walks_in_lockstep_whatever_it_is_commanded_by(graph, tmp_path, comma
     until(lambda: all(watcher.node.count_publishers(topic) for topic in (
         '/clock', 'joint_states', 'odom')), 'its publishers')
     generator(process.domain, 'use_sim_time:=true',
-              *([] if command == 'joint_states' else [f'command:={command}']))
+              *([] if command == 'joint_states' else [
+                  f'command:={command}', 'assume_stand:=true']))
     assert process.wait() == 0, process.log
     assert 'Traceback' not in process.log
     forward, aside = result(process)

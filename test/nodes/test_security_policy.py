@@ -45,7 +45,8 @@ def allowed(executable, kind, what):
 
 @pytest.mark.parametrize(('executable', 'node', 'sign', 'words'), [
     ('generator', 'cpg_generator', 'publishing', [
-        'cmd_vel:=true', 'robot:=unitree_go2', 'command:=forward_position', "combined_topic:=''"]),
+        'cmd_vel:=true', 'robot:=unitree_go2', 'command:=forward_position', "combined_topic:=''",
+        'assume_stand:=true']),
     ('robot_sim', 'robot_sim', 'Go2|go2', []),
     ('inversion', 'cpg_inversion', 'listening', []),
     ('panel', 'cpg_panel', 'http://', ['port:=0']),

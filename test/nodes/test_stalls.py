@@ -58,7 +58,7 @@ def heard(watcher, kind, topic, angles):
 @pytest.mark.parametrize(('rate', 'seconds'), [(200, 0.2), *in_depth((100, 0.5), (100, 1.5))])
 def test_what_was_missed_is_not_run_through(start, rate, seconds):
     process, watcher = start('-p', f'rate:={rate}', '-p', 'frequency:=2', '-p', 'ramp:=0.2',
-                             '-p', 'command:=forward_position')
+                             '-p', 'command:=forward_position', '-p', 'assume_stand:=true')
     commands = heard(watcher, Float64MultiArray, 'forward_position_controller/commands',
                      lambda message: message.data)
     states = heard(watcher, JointState, 'lh/joint_states', lambda message: message.position)

@@ -23,12 +23,16 @@ from cpg_ros.networks.registry import PRESETS
 from cpg_ros.robots.robot_file import load_robot
 from diagnostic_msgs.msg import DiagnosticStatus
 from graph import Process, until, Watcher
+from lifecycle_msgs.msg import Transition
+from lifecycle_msgs.srv import ChangeState
 import numpy as np
 import pytest
 from rclpy.qos import QoSProfile
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray
 from std_srvs.srv import SetBool
+from stepped import refused
+from trajectory_msgs.msg import JointTrajectory
 
 ROBOT = load_robot('quadruped')
 STAND = np.tile([0.0, 0.8, -1.5], 4)
@@ -51,7 +55,8 @@ def enable(watcher, wanted):
 
 
 def test_it_publishes_nothing_until_it_is_enabled(stepped):
-    _, watcher = stepped('-p', 'autostart:=false', '-p', 'command:=forward_position')
+    _, watcher = stepped('-p', 'autostart:=false', '-p', 'command:=forward_position',
+                         '-p', 'assume_stand:=true')
     rows = heard(watcher, (Float64MultiArray, COMMANDS), (JointState, 'lh/joint_states'))
     until(lambda: watcher.node.count_publishers(COMMANDS), 'a publisher')
     until(lambda: len(watcher.diagnostics) >= 2, 'diagnostics')
@@ -108,12 +113,94 @@ def test_it_begins_at_the_measured_pose(measured):
     assert np.ptp(sent[-200:, 1::3], axis=0) == pytest.approx(0.5, abs=0.02)
 
 
-def test_a_pose_that_lacks_a_joint_is_not_known(measured):
-    watcher, rows = measured(list(ROBOT.order)[1:], CROUCH[1:].tolist())
-    answer = enable(watcher, True)
-    assert answer.message == 'ramping up over 1 s from the stand'
+@pytest.fixture
+def driver(stepped):
+    """Start a generator that commands a robot, and what the robot's driver does beside it.
+
+    The time of these tests waits for joint_states of the generator: the robot's are elsewhere.
+    """
+    def begin(*more, command='forward_position', topic=COMMANDS, kind=Float64MultiArray):
+        generator, watcher = stepped('-p', 'combined_topic:=""', '-p', f'command:={command}',
+                                     '-p', 'measured_topic:=measured', *more)
+        rows = heard(watcher, (kind, topic))
+        until(lambda: watcher.node.count_publishers(topic), 'its publisher')
+        publisher = watcher.node.create_publisher(JointState, 'measured', 10)
+        until(publisher.get_subscription_count, 'the generator listening')
+        message = JointState()
+        watcher.node.create_timer(0.02, lambda: message.name and publisher.publish(message))
+
+        def measure(names, angles):
+            message.position = list(angles)
+            message.name = list(names)
+        return generator, watcher, rows, measure
+    return begin
+
+
+@pytest.mark.parametrize('command', ['forward_position', 'joint_trajectory'])
+def test_the_first_command_is_where_the_robot_is(driver, command):
+    topic, kind = {'forward_position': (COMMANDS, Float64MultiArray), 'joint_trajectory': (
+        'joint_trajectory_controller/joint_trajectory', JointTrajectory)}[command]
+    generator, watcher, rows, measure = driver(command=command, topic=topic, kind=kind)
+    # It waits for the whole pose, and says so.
+    generator.wait_for('waiting: the pose is not known, and the joints must not jump: no joint '
+                       'states on /measured')
+    measure(ROBOT.order[1:], CROUCH[1:])
+    generator.wait_for(f'waiting: .*: /measured has no angle of {ROBOT.order[0]}')
+    until(lambda: any(status.message == 'nothing is published: waiting for the measured pose on '
+                      '/measured' for status in watcher.diagnostics), 'the warning')
+    assert not rows
+    measure(ROBOT.order, CROUCH)
+    generator.wait_for('beginning from the measured pose')
+    until(lambda: len(rows) > 100, 'commands')
+    sent = np.array([message.data if command == 'forward_position' else
+                     message.points[0].positions for _, message in rows])
+    assert sent[0] == pytest.approx(CROUCH, abs=2e-3)
+    assert np.abs(np.diff(sent, axis=0)).max() < 0.01 * 6.0
+
+
+def test_a_stop_ends_the_wait_for_the_pose(driver):
+    generator, watcher, rows, measure = driver()
+    generator.wait_for('waiting: ')
+    assert enable(watcher, False).success
+    measure(ROBOT.order, CROUCH)
+    count = len(watcher.diagnostics)
+    until(lambda: len(watcher.diagnostics) >= count + 2, 'diagnostics')
+    assert not rows
+    assert watcher.diagnostics[-1].message == 'nothing is published: waiting for ~/enable'
+    assert enable(watcher, True).message == 'ramping up over 1 s from the measured pose'
     until(rows.__len__, 'commands')
-    assert np.array(rows[0][1].data) == pytest.approx(STAND, abs=1e-3)
+    assert np.array(rows[0][1].data) == pytest.approx(CROUCH, abs=2e-3)
+
+
+def test_without_a_measured_pose_it_is_not_enabled(driver):
+    _, watcher, rows, measure = driver('-p', 'autostart:=false')
+    why = 'the pose is not known, and the joints must not jump: '
+    for names, reason in (((), 'no joint states on /measured'),
+                          (ROBOT.order[1:], f'/measured has no angle of {ROBOT.order[0]}')):
+        measure(names, CROUCH[:len(names)])
+        until(lambda reason=reason: enable(watcher, True).message == why + reason, 'the reason')
+        assert not enable(watcher, True).success and not rows
+
+
+def test_a_managed_one_is_not_configured_without_a_measured_pose(driver):
+    generator, watcher, rows, measure = driver('-p', 'managed:=true')
+    configure = ChangeState.Request(transition=Transition(id=Transition.TRANSITION_CONFIGURE))
+    change = '/cpg_generator/change_state'
+    assert not watcher.call(ChangeState, change, configure).success and not rows
+    generator.wait_for('configure: refused: the pose is not known')
+    measure(ROBOT.order, CROUCH)
+    until(lambda: watcher.call(ChangeState, change, configure).success, 'its configuration')
+    until(rows.__len__, 'commands')
+    assert np.array(rows[0][1].data) == pytest.approx(CROUCH, abs=2e-3)
+
+
+@pytest.mark.parametrize(('words', 'reason'), [
+    ((), "measured_topic 'joint_states' is the generator's own: set combined_topic to ''"),
+    (('-p', 'measured_topic:=""'), "measured_topic is ''")])
+def test_a_pose_that_cannot_be_measured_is_refused_at_start(words, reason):
+    assert refused('-p', 'command:=forward_position', *words) == (
+        f"command 'forward_position' begins at the measured pose, but {reason}, or set "
+        'assume_stand to true if nothing measures the joints')
 
 
 @pytest.mark.parametrize('time', [0.0, 1.0, 3.0])

@@ -67,6 +67,19 @@ def test_a_flood_is_thinned_to_the_last(start, at_once):
     assert all(one.successful for one in both)
 
 
+@pytest.mark.parametrize(('asked', 'applied'), [
+    ([1.5, 9.9], [True, False]), ([1.4, 1.5, 9.9, 9.8], [False, True, False, False]),
+    ([9.9, 1.5], [False, True])])
+def test_a_valid_request_outlives_later_ones_that_are_refused(stepped, asked, applied):
+    _, watcher = stepped(running=False)
+    # All of them wait at once: they come in one message.
+    answers = results(ask(watcher, [('frequency', value) for value in asked]))
+    assert [one.successful for one in answers] == applied
+    assert watcher.get('frequency') == [1.5]
+    assert all('superseded' in one.reason or 'above its limit' in one.reason
+               for one in answers if not one.successful)
+
+
 def test_enable_false_does_not_wait_for_plans(start):
     process, watcher = start('-p', 'rate:=200', '-p', 'network:=quadruped', '-p', 'ramp:=0.2')
     watcher.record(0.5)

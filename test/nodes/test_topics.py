@@ -170,7 +170,8 @@ def test_goat_on_topics_of_another_name(stepped):
 
 
 def test_joint_trajectory_for_ros2_control(stepped):
-    _, watcher = stepped('-p', 'command:=joint_trajectory', '-p', 'gait:=walk')
+    _, watcher = stepped('-p', 'command:=joint_trajectory', '-p', 'gait:=walk',
+                         '-p', 'assume_stand:=true')
     messages = collect(watcher, JointTrajectory, '/joint_trajectory_controller/joint_trajectory')
     for message in messages:
         (point,) = message.points
@@ -181,7 +182,8 @@ def test_joint_trajectory_for_ros2_control(stepped):
 
 
 def test_forward_position_for_ros2_control(stepped):
-    _, watcher = stepped('-p', 'command:=forward_position', '-p', 'rate:=50')
+    _, watcher = stepped('-p', 'command:=forward_position', '-p', 'rate:=50', '-p',
+                         'assume_stand:=true')
     commands = collect(watcher, Float64MultiArray, '/forward_position_controller/commands')
     sent = {tuple(message.data) for message in commands}
     assert len(sent & {tuple(p) for _, p, _ in watcher.samples}) > 30

@@ -96,7 +96,8 @@ class Walk:
         self.generator = Process(*(word for name in (
             'robot:=unitree_go2', 'rate:=500.0', "combined_topic:=''",
             'feedback.enabled:=false', 'gait:=trot', f'frequency:={self._frequency}',
-            'command:=forward_position', 'exclusive:=false') for word in ('-p', name)),
+            'command:=forward_position', 'exclusive:=false',
+            'assume_stand:=true') for word in ('-p', name)),
             domain=self.domain)
 
     @property

@@ -76,7 +76,7 @@ def read():
 threading.Thread(target=read, daemon=True).start()
 generator = process('generator', 'robot:=unitree_go2', 'rate:=500.0', "combined_topic:=''",
                     'feedback.enabled:=false',
-                    'command:=forward_position', f'gait:={GAITS[0]}')
+                    'command:=forward_position', 'assume_stand:=true', f'gait:={GAITS[0]}')
 bridge = process('unitree_bridge', 'command:=forward_position', 'motion_switcher:=false',
                  'state_timeout:=0.2')
 watcher = Watcher(1)
