@@ -34,8 +34,8 @@ def parse(data: bytes, fail: Callable[[str], CpgError]) -> Element:
         fail: makes the error out of its reason.
 
     Raises:
-        CpgError: as ``fail`` makes it: it is no XML, declares an entity, is nested too deep, or has
-            too many elements.
+        CpgError: as ``fail`` makes it: it is no XML, declares an entity, is nested too deep,
+            or has too many elements.
 
     """
     builder, parser, depth, count = TreeBuilder(), expat.ParserCreate(), 0, 0

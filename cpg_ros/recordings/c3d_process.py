@@ -63,12 +63,12 @@ def read_apart(path: Path, size: int) -> tuple[dict[str, Any], np.ndarray, np.nd
         out = Path(folder, 'points.npz')
         command = [sys.executable, '-P', '-m', __name__, os.path.abspath(path), str(out),
                    str(round(MEMORY + MEMORY_PER_BYTE * size)), str(round(seconds))]
+        environment = os.environ | {'OPENBLAS_NUM_THREADS': '1', 'PYTHONPATH': os.pathsep.join(
+            filter(None, (package, others)))}
         try:
             # A process that waits takes no time of the processor, but time.
             ended = subprocess.run(
-                command, env=os.environ | {'OPENBLAS_NUM_THREADS': '1', 'PYTHONPATH': os.pathsep.join(
-                    filter(None, (package, others)))},
-                stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE,
+                command, env=environment, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE,
                 timeout=6.0 * seconds)
         except subprocess.TimeoutExpired as error:
             raise UnreadableC3D(f'not read within {6.0 * seconds:.0f} s') from error

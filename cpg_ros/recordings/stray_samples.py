@@ -18,8 +18,8 @@ import numpy as np
 
 #: A position beyond this is of no joint (rad).
 FARTHEST = 1e6
-#: A position so many times as far from the median as most of them spread, the spread taken as 1 rad
-#: at least, is of no joint, either, where no more than one or this share of them is.
+#: A position so many times as far from the median as most of them spread, the spread taken as 1
+#: rad at least, is of no joint, either, where no more than one or this share of them is.
 SPIKE, RARE = 100.0, 0.01
 #: A gap of so many times what all samples take, and of this much (ns), has recordings on either
 #: side that do not belong together, or stamps that went wrong.

@@ -24,7 +24,6 @@ from cpg_ros.files.regular_file import one_line, read_bytes
 from cpg_ros.files.xml_reader import parse
 import numpy as np
 
-
 #: Most points and triangles of a Collada file, which can place a mesh any number of times, and
 #: most numbers in one of its lists.
 MOST, MOST_NUMBERS = 2_000_000, 6_000_000

@@ -300,7 +300,7 @@ def with_joints(made, change):
 def test_names_that_are_one_in_c_are_refused():
     made = with_joints(plans('quadruped', 'delayed', ('trot',)), lambda joint: replace(
         joint, name=joint.name.replace('lh_hip_joint', 'a.b').replace('rh_hip_joint', 'a-b')))
-    with pytest.raises(InputError, match="joint 'a.b' and 'a-b' are both A_B in C"):
+    with pytest.raises(InputError, match=r"joint 'a\.b' and 'a-b' are both A_B in C"):
         project_of(data_of(made))
 
 
