@@ -141,5 +141,5 @@ def walks_backward(robot: Robot, known: RobotDescription, gait: GaitPlan) -> Ite
         stride, lift = float(np.ptp(path[:, 0])), float(np.ptp(path[:, 2]))
         if lift > 0.02 * stride and steps[low].sum() > FORWARD * stride > 0.0:
             yield (f'{leg}: its foot moves forward while it is low in the {gait.name}, so that '
-                   f'the robot walks backward: are the axes of the {known.format} turned the other '
-                   'way?')
+                   f'the robot walks backward: are the axes of the {known.format} turned the '
+                   'other way?')

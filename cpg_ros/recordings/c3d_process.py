@@ -68,8 +68,8 @@ def read_apart(path: Path, size: int) -> tuple[dict[str, Any], np.ndarray, np.nd
         try:
             # A process that waits takes no time of the processor, but time.
             ended = subprocess.run(
-                command, env=environment, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE,
-                timeout=6.0 * seconds)
+                command, env=environment, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL,
+                stderr=subprocess.PIPE, timeout=6.0 * seconds)
         except subprocess.TimeoutExpired as error:
             raise UnreadableC3D(f'not read within {6.0 * seconds:.0f} s') from error
         if ended.returncode:
