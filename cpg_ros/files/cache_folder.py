@@ -17,15 +17,20 @@
 
 Contents with other inputs are in another folder, so nothing in a folder is ever out of date.
 Folders that are no longer used are removed when a new one is made.
+
+What is in the cache is executed. Only the user and root may have written it: a folder that others
+own or can write to, or that they could replace, is not used.
 """
 
 from collections.abc import Iterator
 import contextlib
 import fcntl
 from functools import cache
+import grp
 import logging
 import os
 from pathlib import Path
+import pwd
 import shutil
 import stat
 import tempfile
@@ -49,7 +54,8 @@ def cache_folder(name: str) -> Path | None:
         name: identifies the inputs of the contents.
 
     Returns:
-        The folder, created if need be; None if nothing can be written. A warning says so.
+        The folder, created if need be; None if nothing can be written, or if others than the
+        user and root may have written into it. A warning says so.
 
     """
     place = _place()
@@ -58,6 +64,10 @@ def cache_folder(name: str) -> Path | None:
     folder = place / name
     try:
         new = not folder.exists()
+        folder.mkdir(mode=0o700, exist_ok=True)
+        if reason := _untrusted_contents(folder):
+            _warn_untrusted(f'{reason}; compiled at every start until {folder} is removed')
+            return None
         _use(folder)
         if new:
             _remove_unused(place)
@@ -83,11 +93,77 @@ def _warn(reason: str) -> None:
 
 
 @cache
+def _warn_untrusted(reason: str) -> None:
+    _LOGGER.warning('compiled code is not loaded: %s', reason)
+
+
+def _writable_by_others(found: os.stat_result) -> bool:
+    """Whether more than the owner, or a group of the user alone, may write."""
+    if found.st_mode & stat.S_IWOTH:
+        return True
+    if not found.st_mode & stat.S_IWGRP:
+        return False
+    try:
+        user, group = pwd.getpwuid(os.getuid()), grp.getgrgid(found.st_gid)
+    except KeyError:
+        return True
+    # With the usual umask of 002 each user has a private group.
+    return group.gr_name != user.pw_name or not set(group.gr_mem) <= {user.pw_name}
+
+
+def _untrusted(path: Path, found: os.stat_result, sticky: bool = False) -> str:
+    """Return why others than the user and root may have written a file or folder, or ''.
+
+    Args:
+        path: named in the reason.
+        found: its status.
+        sticky: a folder in which others can only add what is theirs is trusted, too.
+
+    """
+    if found.st_uid not in (os.getuid(), 0):
+        return f'{path} belongs to the user {found.st_uid}'
+    if _writable_by_others(found) and not (sticky and found.st_mode & stat.S_ISVTX):
+        return f'{path} can be written by other users'
+    return ''
+
+
+def _untrusted_place(place: Path) -> str:
+    """Return why others may have written into a folder, or could replace it, or ''."""
+    if reason := _untrusted(place, place.stat()):
+        return reason
+    reasons = (_untrusted(parent, parent.stat(), sticky=True) for parent in place.parents)
+    return next(filter(None, reasons), '')
+
+
+def _untrusted_contents(folder: Path) -> str:
+    """Return why others may have written a folder of a trusted place or what is in it, or ''."""
+    found = folder.lstat()
+    if not stat.S_ISDIR(found.st_mode):
+        return f'{folder} is no folder'
+    if reason := _untrusted(folder, found):
+        return reason
+    closed = not found.st_mode & (stat.S_IXGRP | stat.S_IXOTH)
+    for root, folders, files in os.walk(folder):
+        for name in (*folders, *files):
+            path = Path(root, name)
+            with contextlib.suppress(FileNotFoundError):    # Being written by another process.
+                inner = path.lstat()
+                if stat.S_ISLNK(inner.st_mode):
+                    return f'{path} is a link'
+                reason = _untrusted(path, inner)
+                # Nobody else reaches the contents of a closed folder, whatever their modes.
+                if reason and not (closed and inner.st_uid == os.getuid()):
+                    return reason
+    return ''
+
+
+@cache
 def _place() -> Path | None:
     """Return where the folders are, created if need be.
 
     ``NUMBA_CACHE_DIR`` if it is set, else beside the package, else among the user's caches, else
-    one temporary folder a user, to which ``NUMBA_CACHE_DIR`` is set, for child processes.
+    one temporary folder a user, to which ``NUMBA_CACHE_DIR`` is set, for child processes. One that
+    others than the user and root may have written into is passed over, with a warning.
     """
     caches = Path(os.environ.get('XDG_CACHE_HOME') or '~/.cache').expanduser()
     wanted = [Path(__file__).resolve().parents[1] / '__pycache__' / 'compiled',
@@ -96,15 +172,18 @@ def _place() -> Path | None:
         wanted.insert(0, Path(os.environ['NUMBA_CACHE_DIR']) / 'cpg_ros')
     for place in wanted:
         with contextlib.suppress(OSError):
-            place.mkdir(parents=True, exist_ok=True)
+            place.mkdir(mode=0o700, parents=True, exist_ok=True)
+            place = place.resolve()
             if os.access(place, os.W_OK):
-                return place
+                if not (reason := _untrusted_place(place)):
+                    return place
+                _warn_untrusted(reason)
     tried = f'compiled code cannot be kept in {" or ".join(map(str, wanted))}'
     with contextlib.suppress(OSError):
         temporary = _temporary()
         os.environ['NUMBA_CACHE_DIR'] = str(temporary)
         _LOGGER.warning('%s: kept in %s', tried, temporary)
-        (temporary / 'cpg_ros').mkdir(exist_ok=True)
+        (temporary / 'cpg_ros').mkdir(mode=0o700, exist_ok=True)
         return temporary / 'cpg_ros'
     _LOGGER.warning('%s, nor in a temporary folder: it is compiled at every start', tried)
     return None
@@ -123,14 +202,16 @@ def _temporary() -> Path:
         place.mkdir(mode=0o700)
     found = place.lstat()
     if found.st_uid != user or found.st_mode != stat.S_IFDIR | 0o700:
-        return Path(tempfile.mkdtemp(prefix='cpg_ros-'))
+        place = Path(tempfile.mkdtemp(prefix='cpg_ros-'))
+    if reason := _untrusted_place(place.resolve()):
+        raise OSError(reason)
     return place
 
 
 def _use(folder: Path) -> None:
     """Create a folder if need be, and lock it against removal while this process runs."""
     while True:
-        folder.mkdir(exist_ok=True)
+        folder.mkdir(mode=0o700, exist_ok=True)
         try:
             lock = (folder / _LOCK).open('ab')
         except FileNotFoundError:
