@@ -112,10 +112,10 @@ def _leg_faults(own: LegGeometry, other: LegGeometry, what: str) -> Iterator[str
     if set(own.joints) == set(other.joints) and own.joints != other.joints:
         yield f"joints: {', '.join(own.joints)} come in the {what} as {', '.join(other.joints)}"
         return
-    for name, turn, theirs in zip(own.joints, own.turns, other.turns, strict=False):
-        if turn != theirs:
+    for name, turn, described in zip(own.joints, own.turns, other.turns, strict=False):
+        if turn != described:
             yield (f'turns: {name} turns the other way in the {what}: {turn:g} where it has '
-                   f'{theirs:g}')
+                   f'{described:g}')
     for key in ('hip', 'thigh', 'calf', 'foot'):
         mine, theirs = np.array(getattr(own, key)), np.array(getattr(other, key))
         room = LENGTH + LENGTH_SHARE * float(np.linalg.norm(theirs))
