@@ -17,4 +17,4 @@
 Imports ``motion``, ``gaits``, ``robots`` and what is below; knows nothing of ROS.
 """
 
-__all__ = ['description_match', 'leg_shapes', 'robot_template']
+__all__ = ['description_match', 'geometry_match', 'leg_shapes', 'robot_template']

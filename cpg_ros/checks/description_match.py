@@ -12,19 +12,22 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Comparison of a robot file with the robot's description: names, kinds, limits, gaits."""
+"""Comparison of a robot file with the robot's description: names, kinds, limits, shape, gaits."""
 
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from difflib import get_close_matches
 from itertools import combinations
 from math import inf, nan
 from typing import Any
 
+from cpg_ros.checks.geometry_match import differing, FORWARD_GAITS, implausible, walks_backward
 from cpg_ros.files.plain_text import table
 from cpg_ros.gaits.leg_names import legs_of, LegsError, role_of
 from cpg_ros.motion.plan import plan, PlanError
 from cpg_ros.networks.registry import NETWORKS
+from cpg_ros.robots.body_keys import BodyGeometry
 from cpg_ros.robots.description import JointDescription, RobotDescription, SERVOS, SLOW
 from cpg_ros.robots.robot import Joint, Motion, Robot
 
@@ -94,13 +97,14 @@ class RobotCheck:
     joints: tuple[JointCheck, ...]
     gaits: tuple[GaitCheck, ...]
     lopsided: tuple[str, ...]
+    shape: tuple[str, ...]
     notes: tuple[str, ...]
 
     @property
     def faults(self) -> list[str]:
         """What does not match, one line each."""
         return [f'{joint.joint.name}: {fault}' for joint in self.joints for fault in joint.faults
-                ] + [*self.lopsided] + [f'{gait.network} {gait.name}: {fault}'
+                ] + [*self.lopsided, *self.shape] + [f'{gait.network} {gait.name}: {fault}'
                                         for gait in self.gaits for fault in gait.faults]
 
     def as_dict(self) -> dict[str, Any]:
@@ -109,7 +113,8 @@ class RobotCheck:
         return {'robot': self.robot, source: self.source, 'matches': not self.faults,
                 'joints': [joint.as_dict(source) for joint in self.joints],
                 'gaits': [gait.as_dict() for gait in self.gaits],
-                'lopsided': list(self.lopsided), 'notes': list(self.notes)}
+                'lopsided': list(self.lopsided), 'shape': list(self.shape),
+                'notes': list(self.notes)}
 
     def text(self) -> str:
         """Return it as tables, then what does not match, then notes."""
@@ -140,8 +145,8 @@ class RobotCheck:
 
 
 def checked(robot: Robot, known: RobotDescription, names: tuple[str, str],
-            gaits: Sequence[str] = (), frequency: float | None = None, amplitude: float = 1.0
-            ) -> RobotCheck:
+            gaits: Sequence[str] = (), frequency: float | None = None, amplitude: float = 1.0,
+            geometry: BodyGeometry | None = None, notes: Sequence[str] = ()) -> RobotCheck:
     """Compare a robot file with the robot's description.
 
     Args:
@@ -152,6 +157,8 @@ def checked(robot: Robot, known: RobotDescription, names: tuple[str, str],
         frequency: strides per second (Hz), 0 for the model's own time; None takes what the
             robot file says of the gait, or else 1 Hz.
         amplitude: factor on the readout weights.
+        geometry: that the description gives, if the file's is to be compared with it.
+        notes: of the caller's.
 
     """
     near = _nearest(robot, known)
@@ -161,7 +168,23 @@ def checked(robot: Robot, known: RobotDescription, names: tuple[str, str],
               (gaits or NETWORKS[network].gaits()) if name in NETWORKS[network].presets()]
     return RobotCheck(*names, known.format, joints, tuple(
         _gait(robot, known, network, name, frequency, amplitude) for network, name in chosen),
-        tuple(_lopsided(robot)), tuple(_notes(robot, known)))
+        tuple(_lopsided(robot)), tuple(_shape(robot, known, chosen, geometry)),
+        (*notes, *_notes(robot, known)))
+
+
+def _shape(robot: Robot, known: RobotDescription, gaits: Sequence[tuple[str, str]],
+           geometry: BodyGeometry | None) -> Iterator[str]:
+    """Say what is wrong with lengths, masses and senses of rotation."""
+    yield from implausible(robot, known)
+    if robot.geometry is not None and geometry is not None:
+        yield from differing(robot.geometry, geometry, known.format)
+    for network, name in gaits:
+        preset = NETWORKS[network].presets()[name]
+        if preset.gait in FORWARD_GAITS:
+            with suppress(PlanError):    # which the gait's own check reports
+                made = plan(unlimited(robot), name, preset, preset.network, USUAL_FREQUENCY)
+                yield from walks_backward(robot, known, made)
+                return
 
 
 def _lopsided(robot: Robot) -> Iterator[str]:

@@ -21,7 +21,7 @@ import math
 
 from cpg_ros.export.c_text import part
 from cpg_ros.export.field_source import field_source, FieldSource
-from cpg_ros.export.gait_data import c_name, GaitData
+from cpg_ros.export.gait_data import c_name, check_names, comment, GaitData
 from cpg_ros.export.golden import Golden, golden_test
 from cpg_ros.motion.phase_readout import PhaseReadout
 from cpg_ros.networks.equations import equations_of
@@ -42,11 +42,24 @@ class CProject:
     header = 'cpg.h'
 
     def __init__(self, data: GaitData, title: str, substep: float = SUBSTEP) -> None:
-        """Take gaits, and the longest part of a tick while they fade, s."""
-        self.data, self.title, self.substep = data, title, substep
+        """Take gaits, and the longest part of a tick while they fade, s.
+
+        Raises:
+            InputError: two gaits, legs or joints have the same name in C.
+
+        """
+        self.data, self.title, self.substep = data, comment(title), substep
+        for what, names in self._names.items():
+            check_names(what, names)
         self._field = FieldSource('', 0, 0)
         if data.format.form == 'network':
             self._field = field_source(equations_of(type(data.network)), data.network.cells)
+
+    @property
+    def _names(self) -> dict[str, list[str]]:
+        robot = self.data.robot
+        return {'gait': [plan.name for plan in self.data.plans], 'leg': list(robot.legs),
+                'joint': [joint.name for joint in robot.joints]}
 
     @property
     def nodes(self) -> int:
@@ -102,12 +115,9 @@ class CProject:
         return values
 
     def _defines(self) -> str:
-        data, robot = self.data, self.data.robot
         lines = [f'#define {name} {value}'.rstrip() for name, value in self._sizes().items()]
-        for head, names in (('CPG_GAIT', [plan.name for plan in data.plans]),
-                            ('CPG_LEG', list(robot.legs)),
-                            ('CPG_JOINT', [joint.name for joint in robot.joints])):
-            listed = ', '.join(f'{head}_{c_name(name)}' for name in names)
+        for what, names in self._names.items():
+            listed = ', '.join(f'CPG_{what.upper()}_{c_name(name)}' for name in names)
             lines += ['', f'enum {{ {listed} }};']
         return '\n'.join(lines)
 
@@ -154,14 +164,15 @@ class CProject:
                 'TIME': '' if fixed else ', cpg_real(TICK) / 1000',
                 'PINS': ', '.join(map(str, range(2, 2 + joints))),
                 'ONES': ', '.join(['1'] * joints),
-                'JOINTS': ', '.join(joint.name for joint in self.data.robot.joints)})
+                'JOINTS': comment(', '.join(joint.name for joint in self.data.robot.joints))})
         return found
 
     def _properties(self) -> str:
-        name = f'cpg_{self.data.robot.name}'
+        robot = comment(self.data.robot.name)
+        name = f'cpg_{robot}'
         return '\n'.join([
             f'name={name}', 'version=1.0.0', 'author=cpg_ros export',
             'maintainer=the author of the robot file',
-            f'sentence=Gaits of {self.data.robot.name} by a central pattern generator.',
+            f'sentence=Gaits of {robot} by a central pattern generator.',
             f'paragraph={self.title}', 'category=Device Control',
             'url=https://cpg-ros.invalid', 'architectures=*', 'includes=cpg.h', ''])

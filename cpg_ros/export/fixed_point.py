@@ -36,6 +36,8 @@ POSITION = 13
 #: Most bits of an angle, so that the difference of two fits, too; and of a rate.
 ANGLE_BITS, RATE_BITS = 14, 13
 LEAST_TICKS = 4
+#: A joint that turns by less than this is not moving, rad per cycle.
+STILL = 1e-6
 
 
 def _halvings(largest: float, bits: int) -> int:
@@ -60,7 +62,7 @@ class FixedData(GaitData):
 
         Raises:
             InputError: a gait takes more than a quarter of a stride in a tick, or a joint turns by
-                more than 4 rad.
+                more than 4 rad, or no joint moves.
 
         """
         super().__init__(plans, CFormat('table', 'fixed', 0.0))
@@ -82,6 +84,10 @@ class FixedData(GaitData):
         self.coarser = _halvings(fastest / rate * 2.0**32, 16)
         bound = max(float(bound.max()) for bound in self._bounds)
         steepest = max(float(np.abs(one.rises).max()) for one in readouts)
+        if steepest < STILL:
+            raise InputError(f'{self.robot.name}: no joint moves in '
+                             f'{", ".join(plan.name for plan in plans)}, so that whole numbers '
+                             'have no unit: give joints an amplitude in the robot file')
         self.slope = -max(_halvings(steepest, 15), _halvings(bound, RATE_BITS) + 16 - self.coarser)
         self._rate_unit = self.slope + 16 - self.coarser
         self._angle = POSITION + self.fine

@@ -21,7 +21,9 @@ import re
 from typing import Any
 
 from cpg_ros.dynamics.orbit import Orbit
+from cpg_ros.errors import InputError
 from cpg_ros.export.c_text import braces, number
+from cpg_ros.files.plain_text import printable
 from cpg_ros.motion.phase_readout import PhaseReadout
 from cpg_ros.motion.plan import GaitPlan
 from cpg_ros.motion.readout import WaveReadout
@@ -54,7 +56,27 @@ class CFormat:
 
 def c_name(name: str) -> str:
     """Return a name as C can have it, in capitals."""
-    return re.sub(r'\W', '_', name).upper()
+    return re.sub(r'\W', '_', name, flags=re.ASCII).upper()
+
+
+def check_names(what: str, names: Sequence[str]) -> None:
+    """Check that names are distinct as C has them.
+
+    Raises:
+        InputError: two of them are the same there.
+
+    """
+    known: dict[str, str] = {}
+    for name in names:
+        other = known.setdefault(c_name(name), name)
+        if other != name:
+            raise InputError(f'{what} {other!r} and {name!r} are both {c_name(name)} in C: rename '
+                             'one of them')
+
+
+def comment(text: str) -> str:
+    """Return a text as a comment of C can have it, on one line."""
+    return printable(' '.join(text.split())).replace('*/', '* /').replace('/*', '/ *')
 
 
 def hermite_table(curve: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]], tolerance: float,

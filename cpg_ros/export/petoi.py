@@ -23,7 +23,7 @@ from collections.abc import Sequence
 
 from cpg_ros.errors import InputError
 from cpg_ros.export.c_text import braces
-from cpg_ros.export.gait_data import c_name
+from cpg_ros.export.gait_data import c_name, check_names, comment
 from cpg_ros.motion.plan import GaitPlan
 from cpg_ros.robots.robot import Robot
 import numpy as np
@@ -77,7 +77,13 @@ def skill(plan: GaitPlan) -> np.ndarray:
 
 
 def skills(plans: Sequence[GaitPlan], title: str) -> str:
-    """Write gaits as arrays of C."""
+    """Write gaits as arrays of C.
+
+    Raises:
+        InputError: as of skill, or two gaits have the same name in C.
+
+    """
+    check_names('gait', [plan.name for plan in plans])
     arrays = []
     for plan in plans:
         data = skill(plan)
@@ -86,4 +92,4 @@ def skills(plans: Sequence[GaitPlan], title: str) -> str:
         arrays.append(f'/* {data[0]} frames a stride: {plan.frequency:g} strides per second are '
                       f'{data[0] * plan.frequency:g} frames per second. */\n'
                       f'const int8_t {c_name(plan.name).lower()}[] PROGMEM = {{\n{numbers}}};\n')
-    return '\n'.join([f'/* {title}, as skill arrays of OpenCat. */', *arrays])
+    return '\n'.join([f'/* {comment(title)}, as skill arrays of OpenCat. */', *arrays])

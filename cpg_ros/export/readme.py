@@ -15,7 +15,7 @@
 """The README of an export: what is in it, how large it is, and how to use it."""
 
 from cpg_ros.export.c_project import CProject
-from cpg_ros.export.gait_data import c_name
+from cpg_ros.export.gait_data import c_name, comment
 from cpg_ros.export.golden import Golden
 
 TEXT = """\
@@ -93,5 +93,5 @@ def readme(project: CProject, golden: Golden, command: str, arduino: bool = Fals
         ramp=ramp, dt='' if fixed else f', {golden.dt!r}{f}',
         result='c.position[joint] in 2^-13 rad' if fixed else
         'c.position[joint] in rad and c.velocity[joint] in rad/s',
-        joints=', '.join(joint.name for joint in data.robot.joints[:3]),
+        joints=comment(', '.join(joint.name for joint in data.robot.joints[:3])),
         switch=f'{switch}   /* cross-fade in 1 s */\n' if switch else '')

@@ -22,6 +22,8 @@ from cpg_ros.errors import CpgError
 
 #: Elements within one another; descriptions of robots have a dozen, assemblies in Collada more.
 DEEPEST = 200
+#: Elements of a document; a robot with meshes has a few thousand.
+MOST = 1_000_000
 
 
 def parse(data: bytes, fail: Callable[[str], CpgError]) -> Element:
@@ -32,14 +34,17 @@ def parse(data: bytes, fail: Callable[[str], CpgError]) -> Element:
         fail: makes the error out of its reason.
 
     Raises:
-        CpgError: as ``fail`` makes it: it is no XML, declares an entity, or is nested too deep.
+        CpgError: as ``fail`` makes it: it is no XML, declares an entity, is nested too deep,
+            or has too many elements.
 
     """
-    builder, parser, depth = TreeBuilder(), expat.ParserCreate(), 0
+    builder, parser, depth, count = TreeBuilder(), expat.ParserCreate(), 0, 0
 
     def start(tag: str, attributes: dict[str, str]) -> None:
-        nonlocal depth
-        depth += 1
+        nonlocal depth, count
+        depth, count = depth + 1, count + 1
+        if count > MOST:
+            raise fail(f'it has more than {MOST} elements')
         if depth > DEEPEST:
             raise fail(f'line {parser.CurrentLineNumber}: elements are nested more than '
                        f'{DEEPEST} deep')

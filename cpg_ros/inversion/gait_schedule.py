@@ -26,6 +26,7 @@ from cpg_ros.files.atomic_write import write_atomically
 from cpg_ros.files.yaml_reader import shown, YamlReader
 from cpg_ros.inversion.parameter_files import (
     check_plan,
+    fitted_motion,
     fitted_robot,
     parameter_tree,
     robot_file_of,
@@ -34,7 +35,7 @@ from cpg_ros.inversion.parameter_files import (
 from cpg_ros.inversion.recording_fit import RecordingFit
 from cpg_ros.inversion.stretch_fits import StretchFit
 from cpg_ros.networks.registry import reference
-from cpg_ros.robots.robot import JointMotion, Motion, Robot
+from cpg_ros.robots.robot import Robot
 from cpg_ros.robots.robot_file import write_robot
 import yaml
 
@@ -120,9 +121,9 @@ def robot_of(stretches: Sequence[StretchFit], robot: Robot | None) -> Robot:
         bounds[joint.name] = replace(known, lower=min(known.lower, joint.lower),
                                      upper=max(known.upper, joint.upper),
                                      velocity=max(known.velocity, joint.velocity))
-    motions = {gait: Motion(float(fit.stride.frequency), {
-        name: JointMotion(offset, tuple(weights)) for name, (offset, weights)
-        in fit.fit.readouts.items()}) for gait, fit in longest.items()}
+    motions = made[0].motions | {
+        gait: fitted_motion(fit, None) if robot is None else one.motions[gait]
+        for (gait, fit), one in zip(longest.items(), made, strict=True)}
     legs = {leg: tuple(bounds[joint.name] for joint in joints)
             for leg, joints in made[0].legs.items()}
     return replace(made[0], legs=legs, motions=motions)

@@ -15,6 +15,7 @@
 """A fit as files that the generator loads: its parameters, and a robot file."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -23,17 +24,20 @@ from cpg_ros.errors import InputError
 from cpg_ros.files.atomic_write import write_atomically
 from cpg_ros.inversion.recording_fit import RecordingFit
 from cpg_ros.motion.joint_readout import standing
-from cpg_ros.motion.plan import plan, PlanError
-from cpg_ros.networks.registry import find_network, reference
+from cpg_ros.motion.plan import OutOfLimits, plan, PlanError
+from cpg_ros.networks.registry import find_network, NETWORKS, reference
 from cpg_ros.robots.gait_readouts import READOUT
-from cpg_ros.robots.robot import Joint, Motion, Robot
-from cpg_ros.robots.robot_file import read_robot, write_robot
+from cpg_ros.robots.robot import Joint, JointMotion, Motion, Robot, SteeringTable
+from cpg_ros.robots.robot_file import HASTE, read_robot, write_robot
 import numpy as np
 import yaml
 
 #: Limits of joints that no robot file gives: the share of the recorded range that is left on
 #: either side, and the multiple of the fastest fitted speed.
 ROOM, FASTER = 0.25, 3.0
+#: Factors on a robot file's weights at a stride of 0, of which the largest is taken that keeps
+#: them within the joints' limits beside the fitted offsets.
+IN_PLACE = (1.0, 0.9, 0.75, 0.5, 0.25, 0.0)
 
 
 def robot_file_of(path: Path) -> Path:
@@ -42,12 +46,12 @@ def robot_file_of(path: Path) -> Path:
 
 
 def fitted_robot(found: RecordingFit, robot: Robot | None) -> Robot:
-    """Return a robot whose joints move as the recorded ones.
+    """Return a robot that moves in the fitted gait as the recorded one.
 
     Args:
         found: the fit, as fit_recording returns it.
-        robot: whose limits, cells and joint order are kept; joints that were not recorded stay
-            as they are. Without one, limits are taken from the recording.
+        robot: which is kept but for the motion of this gait; joints that were not recorded move
+            as before. Without one, the joints are those recorded, and so are their limits.
 
     Raises:
         InputError: a leg of the network has no recorded joint, or a joint would swing about an
@@ -55,13 +59,17 @@ def fitted_robot(found: RecordingFit, robot: Robot | None) -> Robot:
 
     """
     fit = found.fit
-    # Without its frequency the gait would run at the generator's usual one.
-    motions = {fit.gait: Motion(float(found.stride.frequency))}
     if robot is not None:
-        legs = {leg: tuple(_moved(joint, found) for joint in joints)
-                for leg, joints in robot.legs.items()}
-        return Robot(robot.name, (fit.network.name,), robot.assignment, fit.harmonics, legs,
-                     robot.order, motions, robot.sides, robot.girdles)
+        networks = _networks(robot, fit.network.name)
+        presets = {name for network in networks for name in NETWORKS[network].presets()}
+        kept = {gait: motion for gait, motion in robot.motions.items() if gait in presets}
+        robot = replace(robot, networks=networks, harmonics=fit.harmonics, motions=kept)
+        motion = fitted_motion(found, robot)
+        for share in IN_PLACE:
+            moved = replace(robot, motions={**kept, fit.gait: _scaled(motion, share)})
+            if _within_limits(moved, found):
+                break
+        return moved
     network = type(fit.network)
     assignment = next(iter(network.legs))
     for leg in network.legs[assignment]:
@@ -72,20 +80,75 @@ def fitted_robot(found: RecordingFit, robot: Robot | None) -> Robot:
     legs = {leg: tuple(_guessed(name, leg, found) for name in names)
             for leg, names in found.legs.items()}
     order = tuple(name for name in found.recording.joints if name in fit.readouts)
+    # Without its frequency the gait would run at the generator's usual one.
     return Robot('fitted', (network.name,), assignment, fit.harmonics, legs, order,
-                 motions)
+                 {fit.gait: Motion(float(found.stride.frequency))})
 
 
-def _moved(joint: Joint, found: RecordingFit) -> Joint:
-    if joint.name not in found.fit.readouts:
-        return joint
-    offset, weights = found.fit.readouts[joint.name]
-    if not joint.lower <= offset <= joint.upper:
-        raise InputError(f'{found.recording.source}: joint {joint.name!r} swings about '
-                         f"{offset:.4g} rad, outside the robot file's limits {joint.lower:g} to "
-                         f'{joint.upper:g}')
-    return Joint(joint.name, joint.leg, joint.cell, offset, weights, joint.lower, joint.upper,
-                 joint.velocity)
+def _scaled(motion: Motion, share: float) -> Motion:
+    """Return a motion with the weights at a stride of 0 multiplied by a number."""
+    return replace(motion, joints={
+        name: replace(joint, in_place=tuple(share * weight for weight in joint.in_place))
+        for name, joint in motion.joints.items()})
+
+
+def _within_limits(robot: Robot, found: RecordingFit) -> bool:
+    """Whether the fitted gait keeps to the limits; what else forbids it is check_plan's to say."""
+    fit = found.fit
+    try:
+        plan(robot, fit.gait, type(fit.network).presets()[fit.gait], fit.network,
+             float(found.stride.frequency))
+    except OutOfLimits:
+        return False
+    except PlanError:
+        pass
+    return True
+
+
+def _networks(robot: Robot, fitted: str) -> tuple[str, ...]:
+    """Return the fitted network and those of the robot's that have the same legs and cells."""
+    if fitted in robot.networks:
+        return robot.networks
+    cells = NETWORKS[fitted].legs[robot.assignment]
+    return (fitted, *(name for name in robot.networks
+                      if NETWORKS[name].legs.get(robot.assignment) == cells))
+
+
+def fitted_motion(found: RecordingFit, robot: Robot | None) -> Motion:
+    """Return the fitted gait's motion; what was not fitted is that of the robot.
+
+    Args:
+        found: the fit, as fit_recording returns it.
+        robot: whose limits the joints keep to, None for no limits.
+
+    Raises:
+        InputError: a joint would swing about an angle outside its limits.
+
+    """
+    fit, frequency = found.fit, float(found.stride.frequency)
+    known = Motion() if robot is None else robot.motion(fit.gait, fit.gait)
+    limits = {} if robot is None else {joint.name: joint for joint in robot.joints}
+    joints = dict(known.joints)
+    for name, (offset, weights) in fit.readouts.items():
+        joint = limits.get(name)
+        if joint is not None and not joint.lower <= offset <= joint.upper:
+            raise InputError(f'{found.recording.source}: joint {name!r} swings about '
+                             f"{offset:.4g} rad, outside the robot file's limits {joint.lower:g} "
+                             f'to {joint.upper:g}')
+        in_place = joints[name].in_place if name in joints else ()
+        joints[name] = JointMotion(float(offset), tuple(map(float, weights)), in_place)
+    # What was fitted is not retimed: the legs stand for as long as they do by themselves.
+    return replace(known, frequency=frequency, joints=joints, duty=None,
+                   steering=_slower(known.steering, frequency))
+
+
+def _slower(table: SteeringTable | None, frequency: float) -> SteeringTable | None:
+    """Return those rows of a table whose frequencies a gait of this one allows."""
+    if table is None:
+        return None
+    rows = [row for row in zip(table.speed, table.stride, table.frequency, table.turn,
+                               strict=True) if row[2] <= HASTE * frequency]
+    return SteeringTable(*zip(*rows, strict=True)) if rows else None
 
 
 def _guessed(name: str, leg: str, found: RecordingFit) -> Joint:

@@ -17,9 +17,10 @@
 Imports ``files``; knows nothing of ROS, but for ``rosbag2_library``, which reads bags by it.
 """
 
-__all__ = ['bag_library', 'bag_reader', 'bag_storage', 'bag_writer', 'bvh_reader', 'c3d_reader',
-           'cdr', 'csv_reader', 'foot_loads', 'formats', 'frame_stamps', 'joint_patterns',
-           'joint_streams', 'live_buffer', 'load_stream', 'markers', 'mot_reader', 'npz_reader',
-           'number_rows', 'pose_reader', 'recording', 'recording_format', 'rosbag2_library',
-           'rosbags_library', 'segments', 'servo', 'stray_samples', 'table_columns', 'table_text',
-           'thinned', 'trc_reader', 'unfinished_mcap', 'unpacked_size']
+__all__ = ['bag_library', 'bag_reader', 'bag_storage', 'bag_writer', 'bvh_reader', 'c3d_process',
+           'c3d_reader', 'cdr', 'csv_reader', 'foot_loads', 'formats', 'frame_stamps',
+           'joint_patterns', 'joint_streams', 'live_buffer', 'load_stream', 'markers',
+           'mot_reader', 'npz_reader', 'number_rows', 'pose_reader', 'recording',
+           'recording_format', 'rosbag2_library', 'rosbags_library', 'segments', 'servo',
+           'stray_samples', 'table_columns', 'table_text', 'thinned', 'trc_reader',
+           'unfinished_mcap', 'unpacked_size']

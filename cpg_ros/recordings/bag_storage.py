@@ -29,6 +29,7 @@ from cpg_ros.recordings.bag_library import Reader, ReaderError
 from cpg_ros.recordings.cdr import JOINT_STATE
 from cpg_ros.recordings.recording import few, RecordingError
 from cpg_ros.recordings.unfinished_mcap import UnfinishedPath, whole_part
+from cpg_ros.recordings.unpacked_size import UnpackedSize
 
 #: Endings of a bag's storage files, and the name of the file that describes them.
 STORAGES, METADATA = ('.mcap', '.db3'), 'metadata.yaml'
@@ -39,12 +40,21 @@ LARGEST_METADATA = 16_000_000
 class Bag:
     """The readers of a bag: one, or one for each storage file where metadata.yaml is missing."""
 
-    def __init__(self, path: Path, readers: list[Reader], cut: bool, notes: list[str]) -> None:
+    def __init__(self, path: Path, readers: list[Reader], cut: bool, notes: list[str],
+                 size: int) -> None:
+        """Take readers; size is that of all storage files, bytes."""
+        self.size = size
         self.path, self.readers, self.notes = path, readers, notes
         self.connections = [one for reader in readers for one in reader.connections]
         # The library refuses unordered messages in files without an index; those of a single
         # topic mostly are in order.
         self.apart = cut
+        for one in self.connections:
+            for value, kind in ((one.topic, str), (one.msgtype, str), (one.msgcount, int)):
+                if type(value) is not kind:
+                    raise RecordingError(f'{path}: a topic is described by {str(value)[:40]!r}, '
+                                         f'where {"a number" if kind is int else "text"} is '
+                                         'needed')
 
     def choose(self, topics: Sequence[str]) -> list[str]:
         """Return the topics to read."""
@@ -78,11 +88,15 @@ class Bag:
     def messages(self, topics: Sequence[str]) -> Iterator[tuple[str, int, bytes]]:
         """Yield topic, receive time (ns) and bytes of each message."""
         read: Counter[str] = Counter()
+        unpacked = UnpackedSize(self.size)
         for reader in self.readers:
             chosen = [one for one in reader.connections if one.topic in topics]
             for some in [[one] for one in chosen] if self.apart else [chosen] * bool(chosen):
                 try:
                     for connection, received, message in reader.messages(some):
+                        if not isinstance(received, int) or not isinstance(message, bytes):
+                            raise ValueError('a message without time or content')
+                        unpacked.add(len(message))
                         read[connection.topic] += 1
                         yield connection.topic, received, message
                 # As to what the library raises, see opened.
@@ -102,9 +116,11 @@ def opened(path: Path) -> Iterator[Bag]:
     """
     try:
         files = _files(path)
+        size = 0
         for file in (path, *path.iterdir()) if path.is_dir() else (path,):
             if not file.is_dir():
                 _check(file)
+                size += file.stat().st_size
         notes = [f'{file}: its recorder did not finish it; what is whole before byte {end} is used'
                  for file in files if (end := whole_part(file)) is not None]
         whole = path.is_file() or (path / METADATA).exists()
@@ -124,7 +140,7 @@ def opened(path: Path) -> Iterator[Bag]:
                 raise RecordingError(f'{_culprit(one, files, error)}: {line(error)}') from error
             stack.callback(reader.close)
             readers.append(reader)
-        yield Bag(path, readers, cut, notes)
+        yield Bag(path, readers, cut, notes, size)
 
 
 def _check(file: Path) -> None:

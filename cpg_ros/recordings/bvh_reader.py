@@ -30,7 +30,7 @@ from cpg_ros.recordings.number_rows import number_rows
 from cpg_ros.recordings.recording import few, merged, Recording, RecordingError, require
 from cpg_ros.recordings.recording_format import RecordingFormat
 from cpg_ros.recordings.stray_samples import counted, FARTHEST
-from cpg_ros.recordings.table_text import opened
+from cpg_ros.recordings.table_text import opened, remaining_lines
 import numpy as np
 
 CHANNELS = {f'{axis}{kind}' for axis in 'XYZ' for kind in ('rotation', 'position', 'scale')}
@@ -60,7 +60,7 @@ def read_bvh(path: str | Path, joints: Sequence[str] = (), progress: bool = True
         words = _words(file)
         channels = _tree(words, path)
         count, interval, line = _motion(file, path, words)
-        rows, notes = number_rows(list(file), None, len(channels), path, line)
+        rows, notes = number_rows(remaining_lines(file, path), None, len(channels), path, line)
     if not len(rows):
         raise RecordingError(f'{path}: no frames')
     if len(rows) != count:

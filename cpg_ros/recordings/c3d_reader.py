@@ -13,10 +13,10 @@
 # limitations under the License.
 
 """Markers and joint angles out of C3D files, by the library ezc3d (Michaud & Begon 2021, Journal
-of Open Source Software 6(58), 2911).
+of Open Source Software 6(58), 2911), which runs in a process of its own (see c3d_process).
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -24,6 +24,7 @@ from typing import Any
 from cpg_ros.errors import needed
 from cpg_ros.files import regular_file
 from cpg_ros.files.plain_text import printable
+from cpg_ros.recordings.c3d_process import read_apart, UnreadableC3D
 from cpg_ros.recordings.frame_stamps import stamps_of_frames
 from cpg_ros.recordings.joint_patterns import matching
 from cpg_ros.recordings.markers import joint_recording, Markers
@@ -80,18 +81,14 @@ def _contents(path: Path) -> tuple[Markers, list[str], str]:
     """Return the points, the names of those that are angles, and the unit of these, '' if none."""
     stated = _stated(path)
     needed('ezc3d')
-    import ezc3d
     try:
-        file: Any = ezc3d.c3d(str(path))
-        point = file['parameters']['POINT']
-        rate, points = float(point['RATE']['value'][0]), np.asarray(file['data']['points'])
-        residuals = np.asarray(file['data']['meta_points']['residuals'])[0]
-        labels, angles = (_names(point, key) for key in ('LABELS', 'ANGLES'))
-        units = [str(one) for one in point.get('ANGLE_UNITS', {'value': []})['value']]
-    # The library does not list what damaged files make it raise.
-    except Exception as error:
+        point, points, residuals = read_apart(path, path.stat().st_size)
+        rate = float(point['RATE'][0])
+    except (UnreadableC3D, LookupError, TypeError, ValueError, OSError) as error:
         why = ' '.join(str(error).split()).rstrip('.') or type(error).__name__
         raise RecordingError(f'{path}: no C3D file that can be read: {why[:200]}') from error
+    labels, angles = (_names(point, key) for key in ('LABELS', 'ANGLES'))
+    units = [str(one) for one in point.get('ANGLE_UNITS', [])]
     count, frames = points.shape[1:]
     if not count or not frames:
         raise RecordingError(f'{path}: {counted(count, "point")} in {counted(frames, "frame")}')
@@ -106,10 +103,10 @@ def _contents(path: Path) -> tuple[Markers, list[str], str]:
     return found, [name for name in names if name in angles], ''.join(units[:1]).strip()
 
 
-def _names(point: Any, key: str) -> list[str]:
+def _names(point: Mapping[str, Any], key: str) -> list[str]:
     """Return a list of points; past 255 of them it goes on in LABELS2, and so on."""
     keys = sorted((one for one in point if one.startswith(key)), key=lambda one: (len(one), one))
-    return [name.rpartition(':')[2].strip() for one in keys for name in point[one]['value']]
+    return [str(name).rpartition(':')[2].strip() for one in keys for name in point[one]]
 
 
 def _modelled(points: Markers, angles: Sequence[str], unit: str, joints: Sequence[str]

@@ -33,8 +33,8 @@ from cpg_ros.recordings.servo import Servo
 from cpg_ros.recordings.thinned import LONG, Thinned
 import numpy as np
 
-#: Messages of a topic that are decoded together; a few MB.
-BATCH = 4096
+#: Messages of a topic that are decoded together, and from how many bytes on; a few MB.
+BATCH, BATCH_BYTES = 4096, 16_000_000
 #: Stamps later than this (ns) are of a clock that shows the date, where 0 means not stamped.
 DATED = 10**17
 
@@ -58,6 +58,7 @@ class Stream:
         #: What is not decoded yet, and the times of receipt in ns.
         self.messages: list[bytes] = []
         self.received: list[int] = []
+        self._bytes = 0
         #: Header stamps and receive times in ns, names, positions.
         self.parts: list[tuple[np.ndarray, np.ndarray, tuple[str, ...], np.ndarray]] = []
         self._size = 0
@@ -88,7 +89,8 @@ class Stream:
         """Take a serialised message, received at a time in ns; errors as of decode."""
         self.received.append(received)
         self.messages.append(message)
-        if len(self.messages) == BATCH:
+        self._bytes += len(message)
+        if len(self.messages) == BATCH or self._bytes > BATCH_BYTES:
             self.decode()
 
     def decode(self) -> None:
@@ -107,7 +109,7 @@ class Stream:
                 f'{self.source}{self.topic}: message {self.count + error.index + 1} is not '
                 f'a {JOINT_STATE}: {line(error)}') from error
         self.count += len(self.messages)
-        self.messages, self.received = [], []
+        self.messages, self.received, self._bytes = [], [], 0
 
     def _keep(self, block: SerializedBlock, received: np.ndarray) -> None:
         stamps, names, positions = block.stamps, block.names, block.positions

@@ -27,12 +27,14 @@ from cpg_ros.files.plain_text import printable
 from cpg_ros.recordings.joint_patterns import matching
 from cpg_ros.recordings.recording import few, merged, Recording, RecordingError
 from cpg_ros.recordings.segments import load_segments, Segments, shipped
-from cpg_ros.recordings.stray_samples import counted, FARTHEST
+from cpg_ros.recordings.stray_samples import counted
 from cpg_ros.short_repr import ShortRepr
 import numpy as np
 
 #: A segment that, as seen along the axis, has less than this share of its length has no direction.
 SHORTEST = 1e-3
+#: A coordinate beyond this is no place of a marker, whatever the unit.
+FARTHEST = 1e9
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -16,6 +16,8 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+import math
+import os
 from pathlib import Path
 import zipfile
 
@@ -33,6 +35,7 @@ from cpg_ros.recordings.recording import (
 )
 from cpg_ros.recordings.recording_format import JOINTS, RecordingFormat, UNIT
 from cpg_ros.recordings.stray_samples import counted
+from cpg_ros.recordings.unpacked_size import UnpackedSize
 import numpy as np
 
 #: What arrays may be called.
@@ -41,8 +44,8 @@ RATES = ('fps', 'rate', 'frequency', 'sampling_rate')
 NAMES = ('joints', 'joint_names', 'names')
 ANGLES = ('positions', 'angles', 'joint_positions', 'joint_angles', 'qpos', 'q')
 UNITS = ('unit', 'units')
-#: Largest archive once it is unpacked, bytes.
-LARGEST = 2_000_000_000
+#: Largest archive, bytes.
+LARGEST = 1_000_000_000
 
 
 def read_npz(path: str | Path, unit: str | None = None, fps: str | float | None = None,
@@ -66,8 +69,8 @@ def read_npz(path: str | Path, unit: str | None = None, fps: str | float | None 
 
     """
     path = Path(path)
-    arrays = _arrays(path)
     notes: list[str] = []
+    arrays = _arrays(path, notes)
     names, angles = _angles(arrays, path, notes)
     angles = angles * _scale(arrays, unit, path, notes)
     stamps = _stamps(arrays, fps, len(angles), path)
@@ -76,24 +79,39 @@ def read_npz(path: str | Path, unit: str | None = None, fps: str | float | None 
     return replace(found, notes=(*notes, *found.notes))
 
 
-def _arrays(path: Path) -> dict[str, np.ndarray]:
+def _arrays(path: Path, notes: list[str]) -> dict[str, np.ndarray]:
     """Read all arrays of numbers and texts."""
     with regular_file.opened(path, RecordingError, largest=LARGEST) as file:
         try:
             with zipfile.ZipFile(file) as packed:
-                size = sum(one.file_size for one in packed.infolist())
-            if size > LARGEST:
-                raise RecordingError(f'{path}: {size / 1e9:.3g} GB unpacked, more than the '
-                                     f'{LARGEST / 1e9:g} GB that are read')
+                members = [one.filename for one in packed.infolist()]
+                names = [name for name in members if name.endswith('.npy')]
+                unpacked = UnpackedSize(os.fstat(file.fileno()).st_size)
+                for name in names:
+                    unpacked.add(_needed(packed, name))
+            if others := [name for name in members if name not in names]:
+                notes.append(f'{counted(len(others), "member")} that are no arrays left out: '
+                             f'{few(others)}')
             file.seek(0)
             with np.load(file, allow_pickle=False) as archive:
-                return {name: archive[name] for name in archive.files}
-        except RecordingError:
-            raise
+                return {name.removesuffix('.npy'): archive[name] for name in names}
+        except RecordingError as error:
+            raise RecordingError(f'{path}: {error}') from error
         # Neither zipfile nor numpy lists what damaged archives make them raise.
         except Exception as error:
             why = ' '.join(str(error).split()).rstrip('.') or type(error).__name__
             raise RecordingError(f"{path}: no archive of numpy's arrays: {why[:200]}") from error
+
+
+def _needed(packed: zipfile.ZipFile, name: str) -> int:
+    """Return the bytes that an array takes as float64, from its header."""
+    with packed.open(name) as member:
+        version = np.lib.format.read_magic(member)
+        read = (np.lib.format.read_array_header_1_0 if version == (1, 0)
+                else np.lib.format.read_array_header_2_0)
+        shape, _, kind = read(member)
+    # Whole numbers of Python: a product of sizes may be beyond those of numpy.
+    return max(packed.getinfo(name).file_size, math.prod(shape) * max(8, kind.itemsize))
 
 
 def _named(arrays: Mapping[str, np.ndarray], names: Sequence[str]) -> str:

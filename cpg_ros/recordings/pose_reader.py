@@ -32,7 +32,7 @@ from cpg_ros.recordings.number_rows import number_rows
 from cpg_ros.recordings.recording import few, Recording, RecordingError
 from cpg_ros.recordings.recording_format import JOINTS, Option, RecordingFormat
 from cpg_ros.recordings.segments import SEGMENTS
-from cpg_ros.recordings.table_text import opened
+from cpg_ros.recordings.table_text import opened, remaining_lines
 import numpy as np
 
 INDIVIDUAL = Option('individual', 'of a table of several animals, the one to read', 'NAME')
@@ -94,7 +94,7 @@ def pose_markers(path: str | Path, fps: str | float | None, individual: str | No
         raise RecordingError(f'{path}: {path.suffix} files are not read: export the poses as CSV')
     with opened(path) as file:
         layout = _layout(file, path)
-        lines = list(file)
+        lines = remaining_lines(file, path)
     if layout.track is not None:
         lines = _of_track(lines, layout, path, individual)
     else:

@@ -24,7 +24,6 @@ from cpg_ros.errors import CpgError
 from cpg_ros.recordings.foot_loads import FootLoads
 from cpg_ros.recordings.stray_samples import (
     counted,
-    FARTHEST,
     Part,
     without_astray,
     without_far,
@@ -208,7 +207,7 @@ def merged(chunks: Iterable[Chunk], source: str, joints: Sequence[str] = ()) -> 
     odd -= far
     notes += [f'joint {wanted[k]!r}: {counted(int(odd[k]), "position")} not a finite number'
               for k in np.flatnonzero(odd)]
-    notes += [f'joint {wanted[k]!r}: {counted(int(far[k]), "position")} beyond {FARTHEST:g} rad, '
+    notes += [f'joint {wanted[k]!r}: {counted(int(far[k]), "position")} far beyond the others, '
               'left out' for k in np.flatnonzero(far)]
     there = ~np.isnan(positions)
     silent = [name for name, any_there in zip(wanted, there.any(axis=0), strict=True)

@@ -17,7 +17,10 @@
 import numpy as np
 
 #: A position beyond this is of no joint (rad).
-FARTHEST = 1e9
+FARTHEST = 1e6
+#: A position so many times as far from the median as most of them spread, the spread taken as 1
+#: rad at least, is of no joint, either, where no more than one or this share of them is.
+SPIKE, RARE = 100.0, 0.01
 #: A gap of so many times what all samples take, and of this much (ns), has recordings on either
 #: side that do not belong together, or stamps that went wrong.
 ASTRAY, GAP = 10.0, 60_000_000_000
@@ -59,7 +62,20 @@ def without_far(parts: list[Part], width: int) -> np.ndarray:
     for _, columns, positions in parts:
         # Column by column: a long recording is large.
         for k, column in zip(columns, positions.T, strict=True):
-            far = np.isfinite(column) & (np.abs(column) > FARTHEST)
+            far = _far(column)
             count[k] += np.count_nonzero(far)
             column[far] = np.nan
     return count
+
+
+def _far(column: np.ndarray) -> np.ndarray:
+    """Return which positions of a joint are beyond all others, shape (samples,)."""
+    there = np.isfinite(column)
+    far = there & (np.abs(column) > FARTHEST)
+    known = there & ~far
+    if known.any():
+        low, middle, high = np.percentile(column[known], (5.0, 50.0, 95.0))
+        spikes = known & (np.abs(column - middle) > SPIKE * max(high - low, 1.0))
+        if np.count_nonzero(spikes) <= max(1.0, RARE * np.count_nonzero(known)):
+            far |= spikes
+    return far

@@ -18,6 +18,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 import gzip
 import io
+import itertools
 import os
 from pathlib import Path
 import re
@@ -30,6 +31,8 @@ from cpg_ros.recordings.unpacked_size import UnpackedSize
 
 #: Largest file, bytes, packed or not, and longest line, letters.
 LARGEST, LONGEST = 4_000_000_000, 1 << 17
+#: Most lines of a file that is kept as text while it is read: six hours at 100 Hz.
+MOST_LINES = 2_000_000
 #: What a file packed by gzip begins with.
 GZIP = b'\x1f\x8b'
 #: The preamble of OpenSim's .mot and .sto files ends so, after this many lines at most.
@@ -108,6 +111,19 @@ def opened(path: Path) -> Iterator[io.TextIOBase]:
         raise RecordingError(f'{path}: {error.strerror}') from error
     except UnicodeDecodeError as error:
         raise RecordingError(f'{path}: not a text file ({error.reason})') from error
+
+
+def remaining_lines(text: io.TextIOBase, path: Path) -> list[str]:
+    """Return the lines that are left of a text.
+
+    Raises:
+        RecordingError: they are more than MOST_LINES.
+
+    """
+    lines = list(itertools.islice(text, MOST_LINES + 1))
+    if len(lines) > MOST_LINES:
+        raise RecordingError(f'{path}: more than {MOST_LINES} lines: divide it into parts')
+    return lines
 
 
 def preamble(first: str, text: io.TextIOBase

@@ -23,7 +23,7 @@ from cpg_ros.recordings.recording import few, LATEST, Recording, RecordingError
 from cpg_ros.recordings.recording_format import JOINTS, RecordingFormat
 from cpg_ros.recordings.segments import SEGMENTS
 from cpg_ros.recordings.stray_samples import counted
-from cpg_ros.recordings.table_text import opened
+from cpg_ros.recordings.table_text import opened, remaining_lines
 import numpy as np
 
 
@@ -56,7 +56,7 @@ def trc_markers(path: str | Path) -> Markers:
     path = Path(path)
     with opened(path) as file:
         head = [file.readline() for _ in range(5)]
-        rest = list(file)
+        rest = remaining_lines(file, path)
     if not head[0].startswith('PathFileType'):
         raise RecordingError(f"{path}: no TRC file: it does not begin with 'PathFileType'")
     keys, values = (line.split() for line in head[1:3])

@@ -17,7 +17,7 @@
 from cpg_ros.recordings.recording import RecordingError
 
 #: What a file may always unpack to, bytes; a larger one to so many times its own size.
-ALWAYS, RATIO = 200_000_000, 100
+ALWAYS, RATIO = 20_000_000, 100
 
 
 class UnpackedSize:

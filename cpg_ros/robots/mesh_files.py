@@ -24,6 +24,10 @@ from cpg_ros.files.regular_file import one_line, read_bytes
 from cpg_ros.files.xml_reader import parse
 import numpy as np
 
+#: Most points and triangles of a Collada file, which can place a mesh any number of times, and
+#: most numbers in one of its lists.
+MOST, MOST_NUMBERS = 2_000_000, 6_000_000
+
 
 class MeshError(CpgError):
     """A mesh cannot be found or read; the message names it and gives the reason."""
@@ -111,8 +115,9 @@ def _collada(root: Element) -> Mesh:
     scale = float(unit.get('meter', 1.0)) if unit is not None else 1.0
     meshes = {geometry.get('id', ''): _geometry(geometry) for geometry in root.iter('geometry')}
     parts: list[Mesh] = []
+    left = [MOST]
     for node in root.iterfind('.//visual_scene/node'):
-        _add(node, np.eye(4), meshes, parts)
+        _add(node, np.eye(4), meshes, parts, left)
     parts = parts or list(meshes.values()) or [Mesh(np.empty((0, 3)), np.empty((0, 3), int))]
     points = np.concatenate([part.points for part in parts])
     firsts = np.cumsum([0, *(len(part.points) for part in parts)])
@@ -134,8 +139,10 @@ def _geometry(geometry: Element) -> Mesh:
         for use in vertices.findall('input[@semantic="POSITION"]'):
             source = sources.get(use.get('source', '').removeprefix('#'))
             numbers = '' if source is None else source.findtext('float_array', '')
-            points.append(np.array(numbers.split(), dtype=float).reshape(-1, 3))
+            points.append(_numbers(numbers, float).reshape(-1, 3))
             count += len(points[-1])
+            if count > MOST:
+                raise ValueError(f'a mesh has more than {MOST} points')
     for kind in ('triangles', 'polylist', 'polygons'):
         for element in geometry.iter(kind):
             places = {use.get('semantic'): use for use in element.findall('input')}
@@ -143,20 +150,38 @@ def _geometry(geometry: Element) -> Mesh:
                             default=0)
             use = places['VERTEX']
             first, place = firsts[use.get('source', '').removeprefix('#')], use.get('offset', 0)
-            rows = [first + np.array((one.text or '').split(), dtype=int).reshape(-1, width)[
-                :, int(place)] for one in element.findall('p')]
+            rows = [first + _numbers(one.text, int).reshape(-1, width)[:, int(place)]
+                    for one in element.findall('p')]
             if kind == 'triangles':
                 triangles += [row.reshape(-1, 3) for row in rows]
                 continue
             if kind == 'polylist' and rows:
-                counts = np.array(element.findtext('vcount', '').split(), dtype=int)
+                counts = _numbers(element.findtext('vcount', ''), int)
                 rows = np.split(rows[0], np.cumsum(counts)[:-1])
             triangles += [np.array(_fan(row.tolist()), int).reshape(-1, 3) for row in rows]
     return Mesh(np.concatenate(points), np.concatenate(triangles))
 
 
-def _add(node: Element, above: np.ndarray, meshes: dict[str, Mesh], parts: list[Mesh]) -> None:
-    """Collect the meshes of a node and all below it, in the frame of the scene."""
+def _numbers(text: str | None, kind: type) -> np.ndarray:
+    """Return the numbers of a list."""
+    text = text or ''
+    if sum(map(text.count, ' \t\r\n')) > MOST_NUMBERS:
+        raise ValueError(f'a list has more than {MOST_NUMBERS} numbers')
+    return np.array(text.split(), dtype=kind)
+
+
+def _add(node: Element, above: np.ndarray, meshes: dict[str, Mesh], parts: list[Mesh],
+         left: list[int]) -> None:
+    """Collect the meshes of a node and all below it, in the frame of the scene.
+
+    Args:
+        node: of the scene.
+        above: frame of the node above it.
+        meshes: by name.
+        parts: to which they are added.
+        left: one number, how many points and triangles there may still be.
+
+    """
     place = above.copy()
     for step in node:
         if step.tag in ('matrix', 'translate', 'rotate', 'scale'):
@@ -164,9 +189,12 @@ def _add(node: Element, above: np.ndarray, meshes: dict[str, Mesh], parts: list[
     for use in node.findall('instance_geometry'):
         mesh = meshes.get(use.get('url', '').removeprefix('#'))
         if mesh is not None:
+            left[0] -= len(mesh.points) + len(mesh.triangles) + 1
+            if left[0] < 0:
+                raise ValueError(f'its meshes have more than {MOST} points and triangles')
             parts.append(Mesh(mesh.points @ place[:3, :3].T + place[:3, 3], mesh.triangles))
     for below in node.findall('node'):
-        _add(below, place, meshes, parts)
+        _add(below, place, meshes, parts, left)
 
 
 def _transform(kind: str, numbers: np.ndarray) -> np.ndarray:

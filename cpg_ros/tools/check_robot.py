@@ -49,7 +49,8 @@ from cpg_ros.tools.command_line import note, Parser, run, say
 
 DESCRIPTION = """\
 Compare a robot file with the robot's URDF or MuJoCo model (MJCF): report joints that are missing
-from it or cannot be driven, limits wider than its own, and gaits that would exceed them. Works
+from it or cannot be driven, limits wider than its own, gaits that would exceed them or walk
+backward, and lengths, senses of rotation and masses that differ or that no robot has. Works
 without ROS."""
 EPILOG = """\
 examples:
@@ -110,8 +111,23 @@ def _checked(chosen: Namespace) -> RobotCheck:
         if name not in presets:
             raise InputError(f"--gaits: '{name}' is not one of "
                              f'{", ".join(dict.fromkeys(presets))}')
+    geometry, notes = _compared(chosen, robot, known)
     return checked(robot, known, (chosen.robot or str(chosen.make), source),
-                   list(dict.fromkeys(chosen.gaits)), chosen.frequency, chosen.amplitude)
+                   list(dict.fromkeys(chosen.gaits)), chosen.frequency, chosen.amplitude,
+                   geometry, notes)
+
+
+def _compared(chosen: Namespace, robot: Robot, known: RobotDescription
+              ) -> tuple[BodyGeometry | None, list[str]]:
+    """Return the description's geometry, None where there is nothing to compare, and notes."""
+    if robot.geometry is None or any(
+            joint.name not in known.joints or known.joints[joint.name].flaw
+            for joint in robot.joints):
+        return None, []
+    try:
+        return _geometry(chosen, robot, known), []
+    except SimulationError as error:
+        return None, [f'lengths and mass are not compared: {error}']
 
 
 def _made(chosen: Namespace, known: RobotDescription) -> Robot:

@@ -89,6 +89,59 @@ def test_narrower_limits_in_the_file_and_rounding_are_fine(check):
     assert code == 0 and said['matches']
 
 
+def calves_in_mm(urdf):
+    """Return a URDF with the feet of all legs so many m away."""
+    assert urdf.count('xyz="0 0 -0.22"') >= 4
+    return urdf.replace('xyz="0 0 -0.22"', 'xyz="0 0 -220"')
+
+
+def test_lengths_in_mm(check):
+    code, said = check(calves_in_mm(URDF), '--gaits', 'trot')
+    assert code == 1 and not said['matches']
+    assert any('the link below lh_calf_joint is 220 m long in the URDF' in line
+               for line in said['shape'])
+
+
+def test_axes_that_turn_the_other_way(check):
+    urdf = URDF.replace('<axis xyz="0 1 0"/>', '<axis xyz="0 -1 0"/>').replace(
+        '<axis xyz="1 0 0"/>', '<axis xyz="-1 0 0"/>')
+    code, said = check(urdf, '--gaits', 'trot')
+    assert code == 1 and not said['matches']
+    assert len(said['shape']) == 4
+    assert all('moves forward while it is low in the trot' in line for line in said['shape'])
+
+
+def test_a_mass_that_no_robot_has(check):
+    urdf = re.sub(r'<mass value="[^"]*"/>', '<mass value="0.001"/>', URDF)
+    code, said = check(urdf, '--gaits', 'trot')
+    assert code == 1 and not said['matches']
+    (line,) = said['shape']
+    assert re.match(r'the URDF has a mass of 0\.0\d+ kg with legs of 0\.\d+ m', line)
+
+
+@pytest.mark.parametrize(('change', 'words'), [
+    (lambda tree: tree | {'mass': 0.015}, 'geometry.mass 0.015 kg is not'),
+    (lambda tree: tree | {'legs': {leg: one | {'turns': [-turn for turn in one['turns']]}
+                                   for leg, one in tree['legs'].items()}},
+     'turns: lh_hip_joint turns the other way in the URDF: -1 where it has 1'),
+    (lambda tree: tree | {'legs': {leg: one | {'foot': [1000.0 * x for x in one['foot']]}
+                                   for leg, one in tree['legs'].items()}},
+     'foot: [0.0, 0.0, -220.0] m is')])
+def test_geometry_that_is_not_the_descriptions(check, tmp_path, capsys, change, words):
+    (tmp_path / 'of.urdf').write_text(URDF)
+    made = tmp_path / 'made.yaml'
+    assert main(['--urdf', str(tmp_path / 'of.urdf'), '--make', str(made)]) == 0
+    capsys.readouterr()
+    tree = yaml.safe_load(made.read_text())
+    code, said = check(URDF, '--gaits', 'trot', robot=str(made))
+    assert code == 0 and said['matches'], said['shape']
+    tree['geometry'] = change(tree['geometry'])
+    made.write_text(yaml.safe_dump(tree))
+    code, said = check(URDF, '--gaits', 'trot', robot=str(made))
+    assert code == 1 and not said['matches']
+    assert any(words in line for line in said['shape']), said['shape']
+
+
 def test_continuous_joints_and_missing_velocities_limit_nothing(check):
     urdf = re.sub(r'revolute(">\s*<origin[^>]*>\s*<axis[^>]*>\s*<parent link=".._hip)',
                   r'continuous\1', URDF).replace(' velocity="20"', '')

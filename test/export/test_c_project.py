@@ -12,15 +12,21 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
+from dataclasses import replace
 import re
 import shutil
 import subprocess
 
 from c_export import compiled, data_of, needs_gcc, output, plans, project_of
 from cpg_ros.dynamics.orbit import solve_orbit
+from cpg_ros.errors import InputError
+from cpg_ros.export.c_project import CProject
 from cpg_ros.export.fixed_point import FixedData
 from cpg_ros.export.golden import golden_of
+from cpg_ros.export.readme import readme
 from cpg_ros.integration.stepper import Stepper
+from cpg_ros.motion.plan import plan
+from cpg_ros.networks.registry import PRESETS
 from depth import in_depth
 import numpy as np
 import pytest
@@ -217,6 +223,106 @@ def test_nothing_takes_joints_out_of_their_limits(tmp_path):
     assert (found[..., 0] >= lower - 1e-6).all() and (found[..., 0] <= upper + 1e-6).all()
     assert (np.abs(found[..., 1]) <= fastest * (1.0 + 1e-6)).all()
     assert np.abs(np.diff(found[:, :, 0], axis=0)).max() > 1e-3
+
+
+TIMES = """
+#include "cpg.h"
+#include <math.h>
+#include <stdio.h>
+int main(void)
+{
+    static cpg c;
+    const cpg_real times[] = {(cpg_real)-1.0, (cpg_real)NAN, (cpg_real)INFINITY,
+                              (cpg_real)-INFINITY, (cpg_real)1e30, (cpg_real)-1e30, 0};
+    for (int first = 0; first < 7; first++) {
+        cpg_start(&c, 0, times[first]);
+        for (int n = 0; n < 7; n++) {
+            cpg_advance(&c, (cpg_real)0.01);
+            cpg_switch(&c, 1, times[n]);
+            cpg_advance(&c, times[first]);
+            cpg_enable(&c, 0, times[n]);
+            cpg_advance(&c, times[n]);
+            cpg_enable(&c, 1, times[first]);
+        }
+        cpg_enable(&c, 1, (cpg_real)0.1);
+        for (int n = 0; n < 300; n++) {
+            cpg_advance(&c, (cpg_real)0.01);
+            for (int joint = 0; joint < CPG_JOINTS; joint++) {
+                printf("%.9g ", (double)c.position[joint]);
+            }
+        }
+    }
+    return 0;
+}
+"""
+
+
+@needs_gcc
+@pytest.mark.parametrize('form', ['network', 'table'])
+def test_times_that_are_none_break_nothing(tmp_path, form):
+    # Compiled with checks of addresses and of what C does not define.
+    made = plans('quadruped', 'delayed', ('trot', 'walk'))
+    program = compiled(tmp_path, data_of(made, form, 'float32'), shim=TIMES)
+    found = np.array(output(program).split(), float).reshape(7, 300, -1)
+    assert np.isfinite(found).all()
+    assert (np.ptp(found[:, -100:], axis=1).max(axis=1) > 0.1).all(), 'it walks on'
+    assert np.abs(np.diff(found, axis=1)).max() <= 0.01 * made[0].robot.column('velocity').max()
+
+
+@needs_gcc
+def test_whole_numbers_take_times_that_are_none(tmp_path):
+    shim = """
+#include "cpg.h"
+#include <math.h>
+#include <stdio.h>
+int main(void)
+{
+    static cpg c;
+    cpg_start(&c, 0, CPG_TICKS(-1.0));
+    cpg_advance(&c);
+    printf("%d %d %d %d", CPG_TICKS(-1.0), CPG_TICKS((double)NAN), CPG_TICKS(1e30),
+           cpg_leg_phase(&c, 200) == cpg_leg_phase(&c, 0));
+    return 0;
+}
+"""
+    data = FixedData(plans('quadruped', 'delayed', ('trot',)), 50.0)
+    assert output(compiled(tmp_path, data, shim=shim)) == '0 0 65535 1'
+
+
+def with_joints(made, change):
+    """Return plans for a robot whose joints are changed."""
+    robot = made[0].robot
+    legs = {leg: tuple(map(change, joints)) for leg, joints in robot.legs.items()}
+    return [plan(replace(robot, legs=legs), one.name, PRESETS['delayed'][one.name],
+                 one.orbit.network, one.frequency) for one in made]
+
+
+def test_names_that_are_one_in_c_are_refused():
+    made = with_joints(plans('quadruped', 'delayed', ('trot',)), lambda joint: replace(
+        joint, name=joint.name.replace('lh_hip_joint', 'a.b').replace('rh_hip_joint', 'a-b')))
+    with pytest.raises(InputError, match=r"joint 'a\.b' and 'a-b' are both A_B in C"):
+        project_of(data_of(made))
+
+
+@needs_gcc
+def test_names_that_would_end_a_comment(tmp_path):
+    made = with_joints(plans('quadruped', 'delayed', ('trot',)), lambda joint: replace(
+        joint, name=joint.name.replace('lh_hip', 'a*/int x;/*é')))
+    data = data_of(made, real='float32')
+    project = CProject(data, 'Gaits of a */ robot /*')
+    files = project.files(golden_of(data, 0.01), arduino=True)
+    files['README.md'] = readme(project, golden_of(data, 0.01), 'export')
+    (line,) = [line for line in files['examples/walk/walk.ino'].splitlines() if 'int x' in line]
+    assert line.count('*/') == 1 and line.endswith(' */')
+    assert all(text.count('/*') == text.count('*/') for text in files.values())
+    output(compiled(tmp_path, data, golden_of(data, 0.01)))
+
+
+def test_whole_numbers_need_a_joint_that_moves():
+    made = with_joints(plans('quadruped', 'delayed', ('trot',)),
+                       lambda joint: replace(joint, weights=(0.0,)))
+    with pytest.raises(InputError, match='no joint moves in trot'):
+        FixedData(made, 50.0)
 
 
 @needs_gcc

@@ -19,7 +19,8 @@ import os
 from pathlib import Path
 
 from bags import storage_file, walk, write_bag
-from cpg_ros.errors import CpgError
+from cpg_ros.errors import CpgError, InputError
+from cpg_ros.files import xml_reader
 from cpg_ros.files.regular_file import opened, read_bytes
 from cpg_ros.files.shared_resources import share
 from cpg_ros.files.yaml_reader import parsed
@@ -27,6 +28,7 @@ from cpg_ros.networks.preset_files import read_presets
 from cpg_ros.networks.registry import find_network, NETWORKS
 from cpg_ros.recordings.bag_reader import read_bag
 from cpg_ros.recordings.csv_reader import read_csv
+from cpg_ros.robots import mesh_files
 from cpg_ros.robots.robot_file import read_robot
 from cpg_ros.robots.urdf import load_urdf
 from cpg_ros.simulation.mesh_hull import hull
@@ -205,3 +207,34 @@ def test_whatever_a_file_has_in_it_is_read_or_refused_in_one_line(tmp_path_facto
         read(path)
     except CpgError as error:
         assert '\n' not in str(error)
+
+
+NODE = '<node><instance_geometry url="#g"/></node>'
+COLLADA = """<COLLADA><library_geometries><geometry id="g"><mesh>
+<source id="s"><float_array>0 0 0 1 0 0 0 1 0</float_array></source>
+<vertices id="v"><input semantic="POSITION" source="#s"/></vertices>
+<triangles><input semantic="VERTEX" source="#v" offset="0"/><p>{corners}</p></triangles>
+</mesh></geometry></library_geometries>
+<library_visual_scenes><visual_scene>{nodes}</visual_scene></library_visual_scenes></COLLADA>"""
+
+
+@pytest.mark.parametrize(('corners', 'nodes', 'words'), [
+    ('0 1 2', 600, 'more than 2000 points and triangles'),
+    ('0 1 2 ' * 2001, 1, 'a list has more than 6000 numbers')])
+def test_a_mesh_placed_without_end(tmp_path, monkeypatch, corners, nodes, words):
+    monkeypatch.setattr(mesh_files, 'MOST', 2000)
+    monkeypatch.setattr(mesh_files, 'MOST_NUMBERS', 6000)
+    path = tmp_path / 'leg.dae'
+    path.write_text(COLLADA.format(corners='0 1 2', nodes=NODE * 2))
+    assert len(mesh_files.read_mesh(path).points) == 6
+    path.write_text(COLLADA.format(corners=corners, nodes=NODE * nodes))
+    with pytest.raises(mesh_files.MeshError, match=words) as error:
+        mesh_files.read_mesh(path)
+    assert str(error.value).startswith(str(path))
+
+
+def test_more_elements_than_any_robot_has(monkeypatch):
+    monkeypatch.setattr(xml_reader, 'MOST', 1000)
+    assert len(xml_reader.parse(b'<a>' + b'<b/>' * 999 + b'</a>', InputError)) == 999
+    with pytest.raises(InputError, match='it has more than 1000 elements'):
+        xml_reader.parse(b'<a>' + b'<b/>' * 1000 + b'</a>', InputError)

@@ -132,7 +132,20 @@ def test_a_position_beyond_all_joints(tmp_path, capsys):
     angles[500:520, 3] = 1e300
     said = said_of(capsys, '--csv', table_of(tmp_path / 'walk.csv', names, t, angles))
     assert trot_found(said)
-    assert "joint 'rh_knee': 20 positions beyond 1e+09 rad, left out" in said['notes']
+    assert "joint 'rh_knee': 20 positions far beyond the others, left out" in said['notes']
+
+
+@pytest.mark.parametrize('angle', [1e7, -3e3])
+def test_one_position_far_from_the_others_is_no_motion(tmp_path, capsys, angle):
+    names, t, angles = walked(noise=0.01)
+    plain = said_of(capsys, '--csv', table_of(tmp_path / 'plain.csv', names, t, angles))
+    angles[500, 3] = angle
+    said = said_of(capsys, '--csv', table_of(tmp_path / 'walk.csv', names, t, angles))
+    assert trot_found(said)
+    assert "joint 'rh_knee': 1 position far beyond the others, left out" in said['notes']
+    assert said['rms_share'] == pytest.approx(plain['rms_share'], rel=0.05)
+    for name, one in plain['parameters'].items():
+        assert said['parameters'][name]['value'] == pytest.approx(one['value'], rel=0.02)
 
 
 def test_two_robots_in_one_topic(tmp_path, capsys):

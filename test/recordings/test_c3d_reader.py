@@ -17,8 +17,10 @@
 import sys
 
 from cpg_ros.errors import MissingLibraryError
+from cpg_ros.recordings import c3d_process
 from cpg_ros.recordings.c3d_reader import c3d_markers, read_c3d
 from cpg_ros.recordings.recording import RecordingError
+from depth import in_full
 import ezc3d
 import numpy as np
 import pytest
@@ -59,6 +61,36 @@ def test_a_cut_file_is_read_as_far_as_it_goes(path):
     assert len(found.stamps) < 40
     assert found.notes == (f'{len(found.stamps)} frames, where the header states 40: it may be '
                            'cut',)
+
+
+@pytest.mark.parametrize(('library', 'words'), [
+    ('import os, signal; os.kill(os.getpid(), signal.SIGSEGV)', 'ended with SIGSEGV'),
+    ('while True: pass', 'not read within 1 s of processor time'),
+    ('bytearray(10**11)', 'more memory than')], ids=['crash', 'hang', 'memory'])
+def test_what_the_library_does_ends_nothing_but_its_process(path, tmp_path, monkeypatch, library,
+                                                            words):
+    (tmp_path / 'ezc3d.py').write_text(library)
+    monkeypatch.setenv('PYTHONPATH', str(tmp_path))
+    monkeypatch.setattr(c3d_process, 'TIME', 1.0)
+    with pytest.raises(RecordingError, match=words) as error:
+        read_c3d(path)
+    assert str(error.value).startswith(f'{path}: ') and '\n' not in str(error.value)
+
+
+def test_mutations_of_a_file_are_read_or_refused(path):
+    data, rng = path.read_bytes(), np.random.default_rng(1)
+    for k in range(100):
+        mutant = bytearray(data)
+        for at in rng.integers(2, 512 * 3 if k % 2 else 40, 4):
+            mutant[at] = rng.integers(256)
+        # The last of these makes ezc3d 1.7.2 end the process.
+        if not in_full() and k not in (4, 7, 25):
+            continue
+        path.write_bytes(mutant)
+        try:
+            c3d_markers(path)
+        except RecordingError as error:
+            assert str(error).startswith(f'{path}: ') and '\n' not in str(error)
 
 
 def modelled(path, unit='deg'):

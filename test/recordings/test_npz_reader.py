@@ -74,11 +74,3 @@ def test_options_say_what_the_archive_does_not(tmp_path):
 def test_what_is_wrong_is_said(tmp_path, arrays, options, words):
     with pytest.raises(RecordingError, match=words):
         read(tmp_path, options, **arrays)
-
-
-def test_an_archive_that_unpacks_to_too_much_is_refused(tmp_path, monkeypatch):
-    monkeypatch.setattr('cpg_ros.recordings.npz_reader.LARGEST', 10_000)
-    path = tmp_path / 'walk.npz'
-    np.savez_compressed(path, hip=np.zeros(2000), fps=50)
-    with pytest.raises(RecordingError, match='GB unpacked, more than the'):
-        read_npz(path)

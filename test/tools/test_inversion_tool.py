@@ -22,8 +22,13 @@ import sys
 
 from bags import storage_file
 from cpg_ros.dynamics.orbit import solve_orbit
+from cpg_ros.inversion.parameter_files import write_fitted
+from cpg_ros.inversion.recording_fit import fit_recording
+from cpg_ros.motion.pattern import Pattern
+from cpg_ros.motion.plan import plan
 from cpg_ros.networks.registry import PRESETS
-from cpg_ros.robots.robot_file import read_robot
+from cpg_ros.recordings.recording import Recording
+from cpg_ros.robots.robot_file import load_robot, read_robot
 from cpg_ros.tools.inversion import main
 from depth import in_depth
 import numpy as np
@@ -130,7 +135,41 @@ def test_a_robot_file_keeps_its_cells_and_limits(tmp_path, capsys):
     fitted = read_robot(tmp_path / 'fitted_robot.yaml')
     for joint in fitted.joints:
         assert (joint.lower, joint.upper, joint.velocity) == (-3.0, 3.0, 40.0)
-        assert joint.weights == (0.1,) if 'gripper' in joint.name else len(joint.weights) == 6
+        assert (joint.offset, joint.weights) == (0.0, (0.1,))
+        moved = fitted.motion('trot', 'trot').joints.get(joint.name)
+        assert moved is None if 'gripper' in joint.name else len(moved.weights) == 6
+
+
+# A file with gaits of its own, geometry, feedback and steering; one with a body of a biped.
+@pytest.mark.parametrize(('name', 'gait', 'frequency'), [
+    ('unitree_go2', 'trot', 1.8), *in_depth(('humanoid', 'walk', 1.2))])
+def test_the_rest_of_a_robot_file_is_kept(tmp_path, name, gait, frequency):
+    robot = load_robot(name)
+    leg, *_ = robot.legs
+    robot = replace(robot, legs=robot.legs | {leg: tuple(
+        replace(joint, invented=('velocity',)) for joint in robot.legs[leg])})
+    network, path = robot.networks[0], tmp_path / 'fitted.yaml'
+    preset = PRESETS[network][gait]
+    ready = plan(robot, gait, preset, preset.network, frequency)
+    pattern = Pattern(ready, 1.0)
+    rows = []
+    for _ in range(1200):
+        pattern.advance(0.01)
+        rows.append(pattern.position.copy())
+    recording = Recording(tuple(joint.name for joint in robot.joints), np.arange(900) / 100.0,
+                          np.array(rows[300:]), 'made up')
+    write_fitted(path, fit_recording(recording, robot, network, gait), robot)
+    found = read_robot(tmp_path / 'fitted_robot.yaml')
+    motions = dict(found.motions)
+    fitted, known = motions.pop(gait), robot.motion(gait, gait)
+    others = {other: motion for other, motion in robot.motions.items() if other != gait}
+    assert replace(found, name=robot.name, motions=motions) == replace(robot, motions=others)
+    assert (fitted.steering, fitted.efference, fitted.stance) == (
+        known.steering, known.efference, known.stance)
+    assert fitted.frequency == pytest.approx(frequency, rel=2e-3)
+    again = plan(found, gait, preset, preset.network, frequency)
+    span = np.ptp(ready.span, axis=0)
+    assert np.abs(again.shift - ready.shift).max() < 0.05 * span.max()
 
 
 @pytest.mark.parametrize(('limits', 'words'), [

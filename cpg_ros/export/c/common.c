@@ -27,6 +27,12 @@ static cpg_real within(cpg_real value, cpg_real low, cpg_real high)
     return least(most(value, low), high);
 }
 
+/* A time in s that a caller gives: from low, which NaN becomes, too, to high. */
+static cpg_real time_within(cpg_real time, cpg_real low, cpg_real high)
+{
+    return time > low ? least(time, high) : low;
+}
+
 static cpg_real fraction(cpg_real cycles)
 {
     const cpg_real found = cycles - F(floor)(cycles);

@@ -2,7 +2,8 @@
  *
  * cpg_start once, then cpg_advance once a tick: position and velocity of every joint. Between
  * ticks cpg_switch changes the gait and cpg_enable ramps to the stand and back. Nothing here
- * allocates memory, calls itself or waits; a struct cpg holds all that changes.
+ * allocates memory, calls itself or waits; a struct cpg holds all that changes. Times of ramps and
+ * fades are taken as 0.05 s to an hour, whatever they are.
  */
 #ifndef CPG_H
 #define CPG_H
@@ -71,7 +72,8 @@ typedef struct cpg {
 /* Stand, every joint at its offset, then go into a gait within ramp s. */
 void cpg_start(cpg *c, uint8_t gait, cpg_real ramp);
 
-/* Advance by dt s and fill position and velocity. */
+/* Advance by dt s and fill position and velocity: by nothing if dt is negative or no number, and by
+ * 1 s at most. */
 void cpg_advance(cpg *c, cpg_real dt);
 
 /* Change to a gait by a cross-fade in s. If all tracks are taken it waits; of those that wait only

@@ -154,7 +154,7 @@ void cpg_switch(cpg *c, uint8_t gait, uint16_t transition)
 uint16_t cpg_leg_phase(const cpg *c, uint8_t leg)
 {
     const cpg_track *t = &c->track[c->tracks - 1];
-    return (uint16_t)((t->phase >> 16) + cpg_gaits[t->gait].leg_phase[leg]);
+    return (uint16_t)((t->phase >> 16) + cpg_gaits[t->gait].leg_phase[leg < CPG_LEGS ? leg : 0]);
 }
 
 /* Move a joint by an angle of the pattern, within its limits. */

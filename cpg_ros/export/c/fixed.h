@@ -18,7 +18,8 @@ extern "C" {
 @DEFINES@
 
 /* A time in s as ticks; a position in rad, and in tenths of degrees. */
-#define CPG_TICKS(seconds) ((uint16_t)((seconds) * CPG_RATE + 0.5))
+#define CPG_TICKS(seconds) (!((seconds) > 0) ? (uint16_t)0 : (seconds) * CPG_RATE < 65534.0 \
+                            ? (uint16_t)((seconds) * CPG_RATE + 0.5) : (uint16_t)65535)
 #define CPG_RADIANS(position) ((position) / 8192.0)
 #define CPG_TENTHS(position) ((int16_t)(((int32_t)(position) * 2292 + 16384) >> 15))
 
@@ -59,7 +60,8 @@ void cpg_switch(cpg *c, uint8_t gait, uint16_t transition);
 /* Ramp into the gait (1), or down to the stand (0), within so many ticks. */
 void cpg_enable(cpg *c, uint8_t enabled, uint16_t ramp);
 
-/* Return the phase of a leg, 2^-16 cycles, 0 where the leg's cell peaks. */
+/* Return the phase of a leg, 2^-16 cycles, 0 where the leg's cell peaks; of one that there is not,
+ * that of the first. */
 uint16_t cpg_leg_phase(const cpg *c, uint8_t leg);
 
 #ifdef CPG_INTERNAL

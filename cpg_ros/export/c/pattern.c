@@ -1,5 +1,8 @@
 
 #define SHORTEST R(0.05)
+/* Longest ramp or fade, and longest tick, s. */
+#define LONGEST R(3600.0)
+#define LONGEST_TICK R(1.0)
 #define SHIFTING R(2.0)
 #define SHORT_OF R(0.997)
 #define ABOVE R(1.000000001)
@@ -71,19 +74,19 @@ void cpg_start(cpg *c, uint8_t gait, cpg_real ramp)
     c->slowing = c->slower = R(1.0);
     c->frequency = cpg_gaits[gait].frequency;
     c->level = c->level_rate = c->transition = R(0.0);
-    ramp_to(c, R(1.0), most(ramp, SHORTEST));
+    ramp_to(c, R(1.0), time_within(ramp, SHORTEST, LONGEST));
 }
 
 void cpg_enable(cpg *c, uint8_t enabled, cpg_real ramp)
 {
-    ramp_to(c, enabled ? R(1.0) : R(0.0), most(ramp, SHORTEST));
+    ramp_to(c, enabled ? R(1.0) : R(0.0), time_within(ramp, SHORTEST, LONGEST));
 }
 
 void cpg_switch(cpg *c, uint8_t gait, cpg_real transition)
 {
     if (gait < CPG_GAITS) {
         c->waiting = (uint8_t)(gait + 1);
-        c->transition = most(transition, SHORTEST);
+        c->transition = time_within(transition, SHORTEST, LONGEST);
     }
 }
 
@@ -219,6 +222,7 @@ static void confine(cpg *c, cpg_real dt, const cpg_real *wanted, const cpg_real 
 void cpg_advance(cpg *c, cpg_real dt)
 {
     cpg_real wanted[CPG_JOINTS], rate[CPG_JOINTS];
+    dt = time_within(dt, R(0.0), LONGEST_TICK);
     take_waiting(c);
     if (c->tracks == 1 && c->ramp_parts == 0) {
         cruise(c, dt, wanted, rate);
