@@ -43,7 +43,13 @@ class Walker:
         self.pattern = BalancedPattern(program, 1.0, enabled=False)
         self.pattern.balance = BipedFeedback(robot, program=program)
         self.before = self.run.body.rates[None].copy()
-        self.blind, self.tilt = False, 0.0
+        self.blind, self.tilt, self.turned = False, 0.0, 0.0
+        self.lower, self.upper, self.fastest = (robot.column(name) for name in (
+            'lower', 'upper', 'velocity'))
+        servos = [robot.biped.links[name] for name in robot.order]
+        self.kp, self.effort = np.array([(one.kp, one.effort) for one in servos]).T
+        self.crossed, self.last = [], self.pattern.position.copy()
+        self.held = self.pattern.held_angles.copy()
 
     def go(self, seconds):
         """Go on; return by how much the base moved forward, m."""
@@ -52,17 +58,40 @@ class Walker:
         for _ in range(round(seconds / DT)):
             sensors = self.run.measure(self.before)
             self.before[0] = body.rates
+            sensors.rpy[0, 1] += self.turned
             pattern.sensors = None if self.blind else sensors
             pattern.advance(DT)
+            self.check()
             body.command(pattern.position[pattern.robot.places])
             body.step()
+            body.hold(self.held)
             self.tilt = max(self.tilt, math.acos(min(body.axes[2, 2], 1.0)))
         return body.base[0] - start
+
+    def check(self):
+        """Note limits that are crossed, and published speeds that are not those of the joints."""
+        pattern = self.pattern
+        position, step = pattern.position, (pattern.position - self.last) / DT
+        if (position < self.lower - 1e-9).any() or (position > self.upper + 1e-9).any():
+            self.crossed.append('position')
+        if (np.abs(step) > self.fastest * (1.0 + 1e-6)).any():
+            self.crossed.append('speed')
+        if pattern.balance is not None and np.abs(step - pattern.velocity).max() > 1e-6:
+            self.crossed.append('published speed')
+        pull = self.kp * np.abs(position[pattern.robot.places] - self.run.body.position)
+        if pattern.balancing and (pull > 1.02 * self.effort).any():
+            self.crossed.append('torque')
+        held = pattern.held_angles
+        if np.abs(held - self.held).max() > 20.0 * DT:
+            self.crossed.append('held joint')
+        self.last, self.held = position.copy(), held.copy()
 
 
 @pytest.fixture
 def walker():
-    return Walker()
+    made = Walker()
+    yield made
+    assert not made.crossed
 
 
 def test_it_stands_walks_as_wished_and_stops(walker):
@@ -126,6 +155,22 @@ def test_without_sensors_it_holds_the_stand(walker):
     walker.blind = False
     walker.go(2.0)
     assert pattern.balancing and walker.tilt < 0.1
+
+
+@pytest.mark.parametrize('fault', ['none', 'blind', 'tilted', 'switched off'])
+def test_limits_hold_in_a_walk_and_at_its_end(walker, fault):
+    pattern = walker.pattern
+    pattern.wish = 0.5, 0.0, 0.0
+    pattern.enable(True, 1.0)
+    walker.go(4.1)
+    if fault == 'none':
+        # In a step the targets would be 7 times too fast, and beyond the limits of the ankles.
+        assert pattern.held and not pattern.falls
+    walker.blind, walker.turned = fault == 'blind', 1.5 if fault == 'tilted' else 0.0
+    if fault == 'switched off':
+        pattern.balance = None
+    walker.go(1.5)
+    assert pattern.balancing == (fault == 'none')
 
 
 def test_without_feedback_it_is_the_open_loop_pattern(walker):

@@ -16,12 +16,14 @@
 
 import math
 
+from cpg_ros.feedback.biped.arms import Arms
 from cpg_ros.feedback.biped.feedback import BipedFeedback
 from cpg_ros.feedback.biped.memory import WALK
 from cpg_ros.feedback.estimate import SensorData
 from cpg_ros.feedback.kinematics import GRAVITY
 from cpg_ros.motion.pattern import Pattern
 from cpg_ros.motion.plan import GaitPlan
+from cpg_ros.motion.readout import confine
 from cpg_ros.motion.strides import Drive
 from cpg_ros.motion.track import Track
 import numpy as np
@@ -34,7 +36,7 @@ LEANS, LOW = 1.0, 0.6
 UPRIGHT, NEAR, BORNE, STEADY = 0.2, 0.35, 0.4, 0.04
 #: Joints that move further than this from tick to tick, rad and rad/s, were moved by somebody.
 JUMP, FASTEST = 0.15, 40.0
-#: From the stand's angles to those of the feedback, s.
+#: From the angles that are held to those of the feedback, s.
 TAKEOVER = 0.1
 #: Fastest sideways, m/s, and fastest turn, rad/s.
 ASIDE, TURN = 0.2, 0.5
@@ -45,7 +47,9 @@ class BalancedPattern(Pattern):
 
     Without feedback it is the open-loop pattern. With it, it holds the stand's angles until the
     robot stands on its feet, then balances: it stands while disabled, and walks as wished while
-    enabled. After a fall it holds the stand until somebody has put the robot on its feet.
+    enabled. After a fall it holds the stand until somebody has put the robot on its feet. Limits
+    of positions and speeds hold throughout; where the feedback begins or ends, the joints move on
+    from where they are.
 
     Attributes:
         balance: the feedback, None for the open-loop pattern.
@@ -66,10 +70,13 @@ class BalancedPattern(Pattern):
         self.wish = 0.0, 0.0, 0.0
         self.balancing, self.fallen, self.falls = False, False, 0
         self._stood, self._share = 0.0, 0.0
+        self._held, self._still = False, np.zeros_like(self._offset)
+        self._start = self._offset.copy()
         self._before: np.ndarray | None = None
         self._places = self.robot.places
         self._stand = self._offset[self._places]
         self._rest = np.array(list(self.robot.held.values()))
+        self._arms: Arms | None = None
 
     def steer(self, stride: np.ndarray, pace: float) -> None:
         """Do nothing: feet are placed for the wished speed."""
@@ -101,9 +108,7 @@ class BalancedPattern(Pattern):
     @property
     def held_angles(self) -> np.ndarray:
         """Where joints of no leg are to be driven, rad, in the order of ``robot.held``."""
-        if self.balance is None:
-            return self._rest
-        return self.balance.arms.positions if self.balancing else self.balance.arms.rest
+        return self._rest if self._arms is None else self._arms.positions
 
     @property
     def in_transition(self) -> bool:
@@ -123,33 +128,65 @@ class BalancedPattern(Pattern):
         """Advance by dt in s and fill position, velocity and phases."""
         balance, sensors = self.balance, self.sensors
         if balance is None:
+            if self._arms is not None:
+                self._arms.advance(dt, False)
+            if self._held or self.balancing:
+                self._held = self.balancing = False
+                self._wanted[:], self._rate[:] = self.position, 0.0
+                self._absorption.begin()
             super().advance(dt)
             return
+        self._arms = balance.arms
         self._take(balance)
         if sensors is None:
             self.release()
         else:
             self._watch(balance, sensors, dt)
-        self.velocity[:] = 0.0
-        if not self.balancing or sensors is None:
-            self.position[:] = self._offset
-            return
+        wanted = None
+        if self.balancing and sensors is not None:
+            wanted = self._balanced(balance, sensors, dt)
+        if wanted is None:
+            wanted = self._hold(balance, dt)
+        rate = (wanted - self.position) / dt if dt > 0.0 else self._still
+        self.held += confine(wanted, rate, self._limits, dt, self.position, self.velocity,
+                             self._behind) > 0
+
+    def _balanced(self, balance: BipedFeedback, sensors: SensorData, dt: float
+                  ) -> np.ndarray | None:
+        """Return where balance wants the joints, rad; None if the robot has fallen."""
         if self.enabled:
             forward, left, turn = self.wish
             balance.walk(forward, min(max(left, -ASIDE), ASIDE), min(max(turn, -TURN), TURN))
         else:
             balance.stand()
+        if self._held:
+            self._held = False
+            self._start[:] = self.position
         wanted = balance.advance(sensors, dt)
         if not np.isfinite(wanted).all():
             self._fall()
-            self.position[:] = self._offset
-            return
+            return None
         self.faults = balance.faults
         self._share = min(1.0, self._share + dt / TAKEOVER)
-        self.position[self._places] = self._stand + self._share * (wanted - self._stand)
+        start = self._start[self._places]
+        self._wanted[self._places] = start + self._share * (wanted - start)
         height = balance.memory.center[0, 2] - balance.memory.pose.soles[:, 2].min()
         if height < LOW * balance.gains.height:
             self._fall()
+        return self._wanted
+
+    def _hold(self, balance: BipedFeedback, dt: float) -> np.ndarray:
+        """Return the stand's angles, rad, or those on the way to them."""
+        if not self._held:
+            self._held = True
+            self._start[:] = self.position
+            self._absorption.begin()
+        balance.arms.advance(dt, False)
+        if not self._absorption.active:
+            return self._offset
+        self._start[:], _ = self._absorption.smooth(self._offset, self._still, dt,
+                                                    (self._start, self._still))
+        return self._start
 
     def _take(self, balance: BipedFeedback) -> None:
         """Take requests of other threads."""

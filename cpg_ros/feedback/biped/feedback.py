@@ -82,7 +82,8 @@ class BipedFeedback:
         command: speeds forward and to the left, m/s, and rate of turning, rad/s, that the gait in
             force is to have.
         faults: how often the network left its orbit and was put back.
-        torques: wanted of the joints in ``robot.order``, N m, shape (joints,).
+        torques: wanted of the joints in ``robot.order``, N m, within what their servos can,
+            shape (joints,).
         positions: the same as targets of servos, rad.
 
     """
@@ -128,7 +129,8 @@ class BipedFeedback:
         # Their places among the legs' torques.
         chained = (self.links.chains - 1).ravel().tolist()
         self._places = np.array([chained.index(row) for row in self.rows])
-        self._kp = np.array([biped.links[name].kp for name in robot.order])
+        self._kp, self._effort = np.array([
+            (biped.links[name].kp, biped.links[name].effort) for name in robot.order]).T.copy()
         self.torques, self.positions = np.zeros((2, len(robot.order)))
         self._asked, self._walks, self.command = np.zeros(3), False, np.zeros(3)
         self._time = 0.0
@@ -214,6 +216,7 @@ class BipedFeedback:
         # In a run the same swing costs more than it saves.
         self.arms.advance(dt, self.mode == WALK and self.kind == WALKS, self.track.stepper.now[0])
         np.take(memory.torque, self._places, out=self.torques)
+        np.clip(self.torques, -self._effort, self._effort, out=self.torques)
         np.divide(self.torques, self._kp, out=self.positions)
         self.positions += sensors.joint_positions[0, self.rows]
         return self.positions
