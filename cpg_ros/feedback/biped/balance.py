@@ -17,13 +17,16 @@
 import math
 
 from cpg_ros.feedback.biped.arms import Arms
+from cpg_ros.feedback.biped.crouch import crouch_pose
 from cpg_ros.feedback.biped.feedback import BipedFeedback
-from cpg_ros.feedback.biped.memory import WALK
+from cpg_ros.feedback.biped.memory import STAND, WALK
+from cpg_ros.feedback.biped.substitutes import EXTRAPOLATED, JOINTS, Substitutes
 from cpg_ros.feedback.estimate import SensorData
 from cpg_ros.feedback.kinematics import GRAVITY
 from cpg_ros.motion.pattern import Pattern
 from cpg_ros.motion.plan import GaitPlan
 from cpg_ros.motion.readout import confine
+from cpg_ros.motion.smoothstep import smoothstep
 from cpg_ros.motion.strides import Drive
 from cpg_ros.motion.track import Track
 import numpy as np
@@ -31,9 +34,14 @@ import numpy as np
 #: A base that leans more than this, rad, or a centre of mass lower than this share of its height
 #: has fallen.
 LEANS, LOW = 1.0, 0.6
-#: It stands on its feet if the base leans less than this and no joint is further from the stand,
-#: rad, and if the feet bear this share of the weight, all for this time, s.
-UPRIGHT, NEAR, BORNE, STEADY = 0.2, 0.35, 0.4, 0.04
+#: It stands or crouches on its feet if the base leans less than this and no joint is further from
+#: the pose, rad, and if the feet bear this share of the weight, all for this time, s.
+UPRIGHT, CROUCHED, NEAR, BORNE, STEADY = 0.2, 0.5, 0.35, 0.4, 0.04
+#: From where joints are into the stand, and into the crouch, s.
+RETURN, LOWER = 0.3, 0.5
+#: How long it stands before it crouches, and the longest time in which it comes to a stand once
+#: an input has failed, s.
+SETTLED, PATIENCE = 0.3, 4.0
 #: Joints that move further than this from tick to tick, rad and rad/s, were moved by somebody.
 JUMP, FASTEST = 0.15, 40.0
 #: From the angles that are held to those of the feedback, s.
@@ -51,6 +59,10 @@ class BalancedPattern(Pattern):
     of positions and speeds hold throughout; where the feedback begins or ends, the joints move on
     from where they are.
 
+    A stand needs balance, a crouch does not. Where an input fails it stops with what substitutes
+    it, and crouches; without joints, which nothing substitutes, it crouches at once. It stands up
+    and goes on once all inputs are valid. Before the end it crouches, too, see ``lower``.
+
     Attributes:
         balance: the feedback, None for the open-loop pattern.
         sensors: what is measured now, joints in the feedback's order; None if that is not known.
@@ -58,6 +70,9 @@ class BalancedPattern(Pattern):
         balancing: whether the feedback bears the robot now.
         fallen: whether it fell, and has not been put on its feet yet.
         falls: how often it fell.
+        ages: of inertial unit, joints and feet, s, shape (3,): those of the last valid values.
+        failed: whether an input is out.
+        crouching: whether it holds the crouch or is on its way into it.
 
     """
 
@@ -70,11 +85,15 @@ class BalancedPattern(Pattern):
         self.wish = 0.0, 0.0, 0.0
         self.balancing, self.fallen, self.falls = False, False, 0
         self._stood, self._share = 0.0, 0.0
+        self.ages, self.failed, self.crouching = np.zeros(3), False, False
         self._held, self._still = False, np.zeros_like(self._offset)
-        self._start = self._offset.copy()
+        self._start, self._pose = self._offset.copy(), self._offset
+        self._time = self._waited = self._failing = 0.0
+        self._lowers, self._known = False, False
+        self._substitutes: Substitutes | None = None
+        self._crouch, self._depth = self._offset, 0.0
         self._before: np.ndarray | None = None
         self._places = self.robot.places
-        self._stand = self._offset[self._places]
         self._rest = np.array(list(self.robot.held.values()))
         self._arms: Arms | None = None
 
@@ -103,6 +122,8 @@ class BalancedPattern(Pattern):
         """Tell whether it is disabled and has come to a stand."""
         if self.balance is None:
             return super().standing
+        if self._lowers and not self.fallen and (self.balancing or self._time < LOWER + SETTLED):
+            return False
         return not (self.enabled or self.level or self._requests)
 
     @property
@@ -119,6 +140,11 @@ class BalancedPattern(Pattern):
         """Begin anew, from where the joints are."""
         super().restart(ramp, enabled)
         self.balancing, self._stood = False, 0.0
+        self.crouching = self._lowers = False
+
+    def lower(self) -> None:
+        """Go into the crouch once it stands, and stay there: before the end of all commands."""
+        self._lowers = True
 
     def release(self) -> None:
         """Forget the balance, as where the sensors are out: the stand's angles are held."""
@@ -136,12 +162,19 @@ class BalancedPattern(Pattern):
                 self._absorption.begin()
             super().advance(dt)
             return
-        self._arms = balance.arms
+        if self._arms is not balance.arms:
+            self._attach(balance)
         self._take(balance)
-        if sensors is None:
-            self.release()
-        else:
+        if sensors is not None:
+            assert self._substitutes is not None
+            sensors = self._substitutes.fill(sensors, self.ages, balance.memory, dt)
             self._watch(balance, sensors, dt)
+        if self.balancing and self._gives_up(balance, sensors, dt):
+            self.release()
+            self.crouching = True
+        if not self.balancing and not self.fallen and (
+                self._lowers or (self.failed and self._known)):
+            self.crouching = True
         wanted = None
         if self.balancing and sensors is not None:
             wanted = self._balanced(balance, sensors, dt)
@@ -151,10 +184,25 @@ class BalancedPattern(Pattern):
         self.held += confine(wanted, rate, self._limits, dt, self.position, self.velocity,
                              self._behind) > 0
 
+    def _attach(self, balance: BipedFeedback) -> None:
+        self._arms = balance.arms
+        self._substitutes = Substitutes(balance.links)
+        self._crouch, self._depth = crouch_pose(self.robot, balance.links) or (self._offset, 0.0)
+
+    def _gives_up(self, balance: BipedFeedback, sensors: SensorData | None, dt: float) -> bool:
+        """Return whether to crouch now instead of balancing any longer."""
+        self._failing = self._failing + dt if self.failed else 0.0
+        if not (self.failed or self._lowers):
+            self._waited = 0.0
+            return sensors is None
+        self._waited = self._waited + dt if balance.mode == STAND else 0.0
+        return (sensors is None or self._waited > SETTLED or self._failing > PATIENCE
+                or self.ages[JOINTS] > EXTRAPOLATED)
+
     def _balanced(self, balance: BipedFeedback, sensors: SensorData, dt: float
                   ) -> np.ndarray | None:
         """Return where balance wants the joints, rad; None if the robot has fallen."""
-        if self.enabled:
+        if self.enabled and not (self.failed or self._lowers):
             forward, left, turn = self.wish
             balance.walk(forward, min(max(left, -ASIDE), ASIDE), min(max(turn, -TURN), TURN))
         else:
@@ -171,22 +219,19 @@ class BalancedPattern(Pattern):
         start = self._start[self._places]
         self._wanted[self._places] = start + self._share * (wanted - start)
         height = balance.memory.center[0, 2] - balance.memory.pose.soles[:, 2].min()
-        if height < LOW * balance.gains.height:
+        if height < LOW * (balance.gains.height - balance.memory.crouch[0]):
             self._fall()
         return self._wanted
 
     def _hold(self, balance: BipedFeedback, dt: float) -> np.ndarray:
-        """Return the stand's angles, rad, or those on the way to them."""
-        if not self._held:
-            self._held = True
+        """Return the angles of the stand or the crouch, rad, or those on the way to them."""
+        pose, duration = (self._crouch, LOWER) if self.crouching else (self._offset, RETURN)
+        if not self._held or pose is not self._pose:
+            self._held, self._pose, self._time = True, pose, 0.0
             self._start[:] = self.position
-            self._absorption.begin()
+        self._time += dt
         balance.arms.advance(dt, False)
-        if not self._absorption.active:
-            return self._offset
-        self._start[:], _ = self._absorption.smooth(self._offset, self._still, dt,
-                                                    (self._start, self._still))
-        return self._start
+        return self._start + smoothstep(min(self._time / duration, 1.0))[0] * (pose - self._start)
 
     def _take(self, balance: BipedFeedback) -> None:
         """Take requests of other threads."""
@@ -213,15 +258,21 @@ class BalancedPattern(Pattern):
             elif moved:
                 self.release()
             return
-        off = np.abs(joints[balance.rows] - self._stand).max()
+        if self.failed or self._lowers:
+            self._stood = 0.0
+            return
+        off = np.abs(joints[balance.rows] - self._pose[self._places]).max()
         weight = GRAVITY * balance.links.masses.sum()
-        stands = lean < UPRIGHT and off < NEAR and sensors.foot_forces.sum() > BORNE * weight
+        stands = (lean < (CROUCHED if self.crouching else UPRIGHT) and off < NEAR
+                  and sensors.foot_forces.sum() > BORNE * weight)
         self._stood = self._stood + dt if stands and not moved else 0.0
         if self._stood >= STEADY:
-            balance.restart()
-            self.balancing, self.fallen, self._share = True, False, 0.0
+            balance.restart(self._depth if self.crouching else 0.0)
+            self.balancing, self.fallen, self._share, self._known = True, False, 0.0, True
+            self.crouching = False
 
     def _fall(self) -> None:
         self.release()
+        self.crouching = False
         self.falls += 1
         self.fallen = True

@@ -91,8 +91,8 @@ def _step(links, gains, memory, xi, axes, rate):
     x, y = xi[0] - soles[stands, 0], xi[1] - soles[stands, 1]
     wanted = (memory.wanted[0] + gains.speed_integral * memory.integral[0], memory.wanted[1])
     error = placement.capture_error(
-        (c * x + s * y, c * y - s * x), links.sides[swings], clock.time_in_step(phases[swings], gains),
-        rate, wanted, gains)
+        (c * x + s * y, c * y - s * x), links.sides[swings],
+        clock.time_in_step(phases[swings], gains), rate, wanted, gains)
     memory.error[0], memory.error[1] = error
     for leg in range(2):
         if memory.swinging[leg]:
@@ -100,8 +100,8 @@ def _step(links, gains, memory, xi, axes, rate):
                 continue
             memory.clock[0] = placement.speed_up(error, gains)
             forward, left = placement.step(
-                error, links.sides[leg], placement.time_to_touchdown(phases[leg], gains), rate, wanted,
-                gains)
+                error, links.sides[leg], placement.time_to_touchdown(phases[leg], gains), rate,
+                wanted, gains)
             memory.target[leg, 0] = c * forward - s * left
             memory.target[leg, 1] = s * forward + c * left
             memory.target[leg, 2] = 0.0
