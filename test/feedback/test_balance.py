@@ -18,7 +18,7 @@ import math
 
 from cpg_ros.errors import InputError
 from cpg_ros.feedback.biped.balance import BalancedPattern
-from cpg_ros.feedback.biped.feedback import BipedFeedback
+from cpg_ros.feedback.biped.feedback import BipedFeedback, gait_plan
 from cpg_ros.motion.plan import plan
 from cpg_ros.networks.biped import Biped
 from cpg_ros.robots.robot_file import load_robot
@@ -201,6 +201,53 @@ def test_another_frequency_keeps_the_phase(walker):
     assert pattern.balance.gains.frequency == 1.8
     walker.go(4.0)
     assert walker.tilt < 0.2 and not pattern.falls
+
+
+@pytest.mark.parametrize('speed', [math.nan, 0.3])
+def test_before_the_end_it_crouches_and_stays_up_without_commands(walker, speed):
+    pattern = walker.pattern
+    if speed > 0.0:
+        pattern.wish = speed, 0.0, 0.0
+        pattern.enable(True, 1.0)
+    walker.go(3.4)
+    pattern.enable(False, 0.5)
+    assert pattern.lower() and not pattern.standing
+    for _ in range(60):
+        if not pattern.standing:
+            walker.go(0.1)
+    assert pattern.standing and pattern.crouching and not pattern.falls
+    # Servos hold the last targets; nobody commands any more.
+    for _ in range(1500):
+        walker.run.body.step()
+    assert not walker.run.body.fallen
+    assert math.acos(walker.run.body.axes[2, 2]) < 0.5
+
+
+def test_a_run_ends_in_the_crouch_too(walker):
+    pattern = walker.pattern
+    pattern.apply(gait_plan(pattern.robot, 'run'), 0.0)
+    pattern.wish = 1.0, 0.0, 0.0
+    pattern.enable(True, 1.0)
+    walker.go(6.0)
+    pattern.enable(False, 0.5)
+    assert pattern.lower()
+    for _ in range(60):
+        if not pattern.standing:
+            walker.go(0.1)
+    assert pattern.standing and pattern.crouching and not walker.run.body.fallen
+
+
+def test_from_the_crouch_it_stands_up_and_walks(walker):
+    pattern = walker.pattern
+    walker.go(1.0)
+    walker.blind = True
+    walker.go(1.0)
+    assert pattern.crouching and not walker.run.body.fallen
+    walker.blind = False
+    pattern.wish = 0.3, 0.0, 0.0
+    pattern.enable(True, 1.0)
+    walker.go(4.0)
+    assert pattern.balancing and walker.go(2.0) > 0.4 and not pattern.falls
 
 
 def test_a_robot_without_soles_has_no_balance():

@@ -20,7 +20,7 @@ from cpg_ros.feedback.biped.arms import Arms
 from cpg_ros.feedback.biped.crouch import crouch_pose
 from cpg_ros.feedback.biped.feedback import BipedFeedback
 from cpg_ros.feedback.biped.memory import STAND, WALK
-from cpg_ros.feedback.biped.substitutes import EXTRAPOLATED, JOINTS, Substitutes
+from cpg_ros.feedback.biped.substitutes import Substitutes
 from cpg_ros.feedback.estimate import SensorData
 from cpg_ros.feedback.kinematics import GRAVITY
 from cpg_ros.motion.pattern import Pattern
@@ -142,9 +142,15 @@ class BalancedPattern(Pattern):
         self.balancing, self._stood = False, 0.0
         self.crouching = self._lowers = False
 
-    def lower(self) -> None:
-        """Go into the crouch once it stands, and stay there: before the end of all commands."""
-        self._lowers = True
+    def lower(self) -> bool:
+        """Go into the crouch once it stands, and stay there: before the end of all commands.
+
+        Returns:
+            Whether it will: it balances, or did.
+
+        """
+        self._lowers = self.balance is not None and self._known and not self.fallen
+        return self._lowers
 
     def release(self) -> None:
         """Forget the balance, as where the sensors are out: the stand's angles are held."""
@@ -196,8 +202,7 @@ class BalancedPattern(Pattern):
             self._waited = 0.0
             return sensors is None
         self._waited = self._waited + dt if balance.mode == STAND else 0.0
-        return (sensors is None or self._waited > SETTLED or self._failing > PATIENCE
-                or self.ages[JOINTS] > EXTRAPOLATED)
+        return sensors is None or self._waited > SETTLED or self._failing > PATIENCE
 
     def _balanced(self, balance: BipedFeedback, sensors: SensorData, dt: float
                   ) -> np.ndarray | None:

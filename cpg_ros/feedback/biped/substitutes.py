@@ -16,7 +16,8 @@
 
 For a few ticks measured values go on as their rates say. Later the sole that bears more stands for
 the inertial unit: it is level and still, so the joints say how the base leans and turns. Loads on
-the feet are those that the clock gives them. Joints have no substitute: they stay where they were.
+the feet are those that the clock gives them. Joints move as they must for soles that stand to be
+still and those that swing to be on their paths, while the base moves as the inertial unit says.
 """
 
 from cpg_ros.feedback.biped.links import blank_pose, kinematics, Links
@@ -30,6 +31,10 @@ import numpy as np
 IMU, JOINTS, FEET = range(3)
 #: Measurements this old go on as their rates say, s; older ones are replaced.
 EXTRAPOLATED = 0.05
+#: Rate at which a predicted sole approaches its path, 1/s, and damping of the prediction's rates.
+FOLLOWED, DAMPED = 20.0, 1e-3
+#: Largest rate of a predicted joint, rad/s.
+FASTEST = 15.0
 #: Time in which orientation and angular velocity of the sole's come to be used, s.
 ADOPTED = 0.02
 
@@ -47,7 +52,7 @@ class Substitutes:
         joints = len(links.masses) - 1
         self._links, self._pose = links, blank_pose(links)
         self.sensors = SensorData.zeros(1, len(links.chains), joints)
-        self._still = np.zeros(3)
+        self._still, self._angles = np.zeros(3), np.zeros(joints)
         self._center, self._soles, self._weights = np.zeros(6), np.zeros((2, 6)), np.zeros(joints)
         self._kinematics = bound(kinematics, links, self._still, self.sensors.joint_positions[0],
                                  (self._still, self.sensors.joint_velocities[0]), self._pose,
@@ -67,19 +72,36 @@ class Substitutes:
         sensors = self.sensors
         for own, newest in zip(sensors, measured, strict=True):
             own[:] = newest
-        late = np.where(ages > 1.5 * dt, np.minimum(ages, EXTRAPOLATED), 0.0)
+        late = ages > 1.5 * dt
         if late[JOINTS]:
-            sensors.joint_positions[0] += late[JOINTS] * measured.joint_velocities[0]
-        if ages[JOINTS] > EXTRAPOLATED:
-            sensors.joint_velocities[0] = 0.0
+            self._move(memory, dt)
+        else:
+            self._angles[:] = sensors.joint_positions[0]
         if late[IMU]:
-            self._turn(measured, late[IMU])
+            self._turn(measured, min(ages[IMU], EXTRAPOLATED))
         if ages[IMU] > EXTRAPOLATED:
             self._lean_on_sole(memory, min((ages[IMU] - EXTRAPOLATED) / ADOPTED, 1.0))
         if ages[FEET] > EXTRAPOLATED:
             weight = GRAVITY * memory.pose.carried[0]
             sensors.foot_forces[0] = np.where(memory.swinging, 0.0, weight * memory.shares)
         return sensors
+
+    def _move(self, memory: BipedMemory, dt: float) -> None:
+        """Let the joints of the legs go on from where they were for dt in s."""
+        pose, rates = memory.pose, self.sensors.joint_velocities[0]
+        rates[:] = 0.0
+        for leg, chain in enumerate(self._links.chains):
+            sole = pose.soles[leg]
+            columns = np.vstack([np.cross(pose.axes[chain], sole - pose.places[chain]).T,
+                                 pose.axes[chain].T])
+            moved = -np.concatenate([memory.base + np.cross(memory.turning, sole),
+                                     memory.turning])
+            if memory.swinging[leg]:
+                moved[:3] += memory.path[1] + FOLLOWED * (memory.path[0] - sole)
+            rates[chain - 1] = columns.T @ np.linalg.solve(
+                columns @ columns.T + DAMPED * np.eye(6), moved)
+        self._angles += dt * np.clip(rates, -FASTEST, FASTEST)
+        self.sensors.joint_positions[0] = self._angles
 
     def _turn(self, measured: SensorData, time: float) -> None:
         """Let the orientation go on with the angular velocity for a time in s."""
