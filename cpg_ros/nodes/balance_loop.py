@@ -120,6 +120,7 @@ class BalanceLoop:
         sensors.joint_positions[0, self._rows] = measured.joint_positions[0]
         sensors.joint_velocities[0, self._rows] = measured.joint_velocities[0]
         pattern.failed = bool(found)
+        pattern.refused = any(monitor.refused for monitor in inputs.monitors)
         ages = [now - monitor.believed for monitor in inputs.monitors]
         # Of several feet the oldest counts; where efforts are the contacts, there are none.
         pattern.ages[:] = *ages[:FEET], max(ages[FEET:], default=ages[JOINTS])

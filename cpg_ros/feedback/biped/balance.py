@@ -17,10 +17,11 @@
 import math
 
 from cpg_ros.feedback.biped.arms import Arms
+from cpg_ros.feedback.biped.clock import swing_share
 from cpg_ros.feedback.biped.crouch import crouch_pose
 from cpg_ros.feedback.biped.feedback import BipedFeedback
 from cpg_ros.feedback.biped.memory import STAND, WALK
-from cpg_ros.feedback.biped.substitutes import Substitutes
+from cpg_ros.feedback.biped.substitutes import EXTRAPOLATED, IMU, JOINTS, Substitutes
 from cpg_ros.feedback.estimate import SensorData
 from cpg_ros.feedback.kinematics import GRAVITY
 from cpg_ros.motion.pattern import Pattern
@@ -38,10 +39,15 @@ LEANS, LOW = 1.0, 0.6
 #: the pose, rad, and if the feet bear this share of the weight, all for this time, s.
 UPRIGHT, CROUCHED, NEAR, BORNE, STEADY = 0.2, 0.5, 0.35, 0.4, 0.04
 #: From where joints are into the stand, and into the crouch, s.
-RETURN, LOWER = 0.3, 0.5
+RETURN, LOWER = 0.3, 0.45
 #: How long it stands before it crouches, and the longest time in which it comes to a stand once
 #: an input has failed, s.
 SETTLED, PATIENCE = 0.3, 4.0
+#: Shares of a swing between which the body passes over the foot that stands: a walk that crouches
+#: then, and without any sensor, does not fall.
+PASSING = 0.38, 0.6
+#: Inputs that failed count as valid again after this time, s.
+GOOD = 0.3
 #: Joints that move further than this from tick to tick, rad and rad/s, were moved by somebody.
 JUMP, FASTEST = 0.15, 40.0
 #: From the angles that are held to those of the feedback, s.
@@ -60,8 +66,8 @@ class BalancedPattern(Pattern):
     from where they are.
 
     A stand needs balance, a crouch does not. Where an input fails it stops with what substitutes
-    it, and crouches; without joints, which nothing substitutes, it crouches at once. It stands up
-    and goes on once all inputs are valid. Before the end it crouches, too, see ``lower``.
+    it, and crouches; without inertial unit and joints it crouches in the middle of a step. Once
+    all inputs are valid it stands up and goes on. Before the end it crouches, too, see ``lower``.
 
     Attributes:
         balance: the feedback, None for the open-loop pattern.
@@ -72,6 +78,7 @@ class BalancedPattern(Pattern):
         falls: how often it fell.
         ages: of inertial unit, joints and feet, s, shape (3,): those of the last valid values.
         failed: whether an input is out.
+        refused: whether messages arrive, but none of an input has been valid yet.
         crouching: whether it holds the crouch or is on its way into it.
 
     """
@@ -85,7 +92,8 @@ class BalancedPattern(Pattern):
         self.wish = 0.0, 0.0, 0.0
         self.balancing, self.fallen, self.falls = False, False, 0
         self._stood, self._share = 0.0, 0.0
-        self.ages, self.failed, self.crouching = np.zeros(3), False, False
+        self.ages, self.failed, self.refused, self.crouching = np.zeros(3), False, False, False
+        self._good, self._blind = GOOD, False
         self._held, self._still = False, np.zeros_like(self._offset)
         self._start, self._pose = self._offset.copy(), self._offset
         self._time = self._waited = self._failing = 0.0
@@ -171,6 +179,7 @@ class BalancedPattern(Pattern):
         if self._arms is not balance.arms:
             self._attach(balance)
         self._take(balance)
+        self._good = 0.0 if self.failed else self._good + dt
         if sensors is not None:
             assert self._substitutes is not None
             sensors = self._substitutes.fill(sensors, self.ages, balance.memory, dt)
@@ -179,7 +188,7 @@ class BalancedPattern(Pattern):
             self.release()
             self.crouching = True
         if not self.balancing and not self.fallen and (
-                self._lowers or (self.failed and self._known)):
+                self._lowers or (self.failed and (self._known or self.refused))):
             self.crouching = True
         wanted = None
         if self.balancing and sensors is not None:
@@ -197,17 +206,33 @@ class BalancedPattern(Pattern):
 
     def _gives_up(self, balance: BipedFeedback, sensors: SensorData | None, dt: float) -> bool:
         """Return whether to crouch now instead of balancing any longer."""
-        self._failing = self._failing + dt if self.failed else 0.0
-        if not (self.failed or self._lowers):
-            self._waited = 0.0
+        if not (self._stops or self._lowers):
+            self._waited = self._failing = 0.0
+            self._blind = False
             return sensors is None
+        self._failing += dt
         self._waited = self._waited + dt if balance.mode == STAND else 0.0
-        return sensors is None or self._waited > SETTLED or self._failing > PATIENCE
+        self._blind = self._blind or min(self.ages[IMU], self.ages[JOINTS]) > EXTRAPOLATED
+        return (sensors is None or self._waited > SETTLED
+                or (self._stops and self._failing > PATIENCE)
+                or (self._blind and (balance.mode != WALK or self._passes(balance))))
+
+    @property
+    def _stops(self) -> bool:
+        """Whether an input is out, or was lately."""
+        return self._good < GOOD
+
+    @staticmethod
+    def _passes(balance: BipedFeedback) -> bool:
+        """Return whether the body is over the foot that stands."""
+        memory, swing = balance.memory, swing_share(balance.gains)
+        shares = memory.phases[memory.swinging] / swing
+        return bool(((shares > PASSING[0]) & (shares < PASSING[1])).any())
 
     def _balanced(self, balance: BipedFeedback, sensors: SensorData, dt: float
                   ) -> np.ndarray | None:
         """Return where balance wants the joints, rad; None if the robot has fallen."""
-        if self.enabled and not (self.failed or self._lowers):
+        if self.enabled and not (self._stops or self._lowers):
             forward, left, turn = self.wish
             balance.walk(forward, min(max(left, -ASIDE), ASIDE), min(max(turn, -TURN), TURN))
         else:
@@ -263,7 +288,7 @@ class BalancedPattern(Pattern):
             elif moved:
                 self.release()
             return
-        if self.failed or self._lowers:
+        if self._stops or self._lowers:
             self._stood = 0.0
             return
         off = np.abs(joints[balance.rows] - self._pose[self._places]).max()
