@@ -98,6 +98,8 @@ class BalanceLoop:
             return ''
         if self.faults:
             return f'the robot is not balanced any more: {self.faults}'
+        if pattern.crouching:
+            return ''
         if pattern.fallen:
             return 'the robot has fallen: holding the stand until it is on its feet'
         return 'the robot was moved by somebody: standing it up again'

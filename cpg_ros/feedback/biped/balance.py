@@ -171,7 +171,7 @@ class BalancedPattern(Pattern):
             if self._arms is not None:
                 self._arms.advance(dt, False)
             if self._held or self.balancing:
-                self._held = self.balancing = False
+                self._held = self.balancing = self.crouching = False
                 self._wanted[:], self._rate[:] = self.position, 0.0
                 self._absorption.begin()
             super().advance(dt)
@@ -185,8 +185,9 @@ class BalancedPattern(Pattern):
             sensors = self._substitutes.fill(sensors, self.ages, balance.memory, dt)
             self._watch(balance, sensors, dt)
         if self.balancing and self._gives_up(balance, sensors, dt):
+            # First, as another thread may ask whether it has come to rest.
+            self._time, self.crouching = 0.0, True
             self.release()
-            self.crouching = True
         if not self.balancing and not self.fallen and (
                 self._lowers or (self.failed and (self._known or self.refused))):
             self.crouching = True
