@@ -29,10 +29,3 @@ def test_it_goes_on_walking_after(fault):
     humanoid = HumanoidUnderFault(fault, begins=3.0)
     assert humanoid.run(7.0) == 'walk'
     assert not humanoid.crossed and not humanoid.pattern.falls
-
-
-@pytest.mark.parametrize('fault', ['publisher dies 3 s'])
-def test_without_any_sensor_it_crouches(fault):
-    humanoid = HumanoidUnderFault(fault, begins=3.0)
-    assert humanoid.run(5.5) == 'crouch'
-    assert not humanoid.crossed

@@ -43,8 +43,8 @@ RETURN, LOWER = 0.3, 0.45
 #: How long it stands before it crouches, and the longest time in which it comes to a stand once
 #: an input has failed, s.
 SETTLED, PATIENCE = 0.3, 4.0
-#: Shares of a swing between which the body passes over the foot that stands: a walk that crouches
-#: then, and without any sensor, does not fall.
+#: Shares of a swing between which the body passes over the foot that stands: the best time to
+#: crouch without any sensor.
 PASSING = 0.38, 0.6
 #: Inputs that failed count as valid again after this time, s.
 GOOD = 0.3

@@ -81,6 +81,9 @@ class Substitutes:
             self._turn(measured, min(ages[IMU], EXTRAPOLATED))
         if ages[IMU] > EXTRAPOLATED:
             self._lean_on_sole(memory, min((ages[IMU] - EXTRAPOLATED) / ADOPTED, 1.0))
+        if late[IMU] and late[JOINTS]:
+            # Nothing says how the base turns.
+            sensors.angular_velocity[0] *= max(1.0 - ages.min() / EXTRAPOLATED, 0.0)
         if ages[FEET] > EXTRAPOLATED:
             weight = GRAVITY * memory.pose.carried[0]
             sensors.foot_forces[0] = np.where(memory.swinging, 0.0, weight * memory.shares)
@@ -126,4 +129,8 @@ class Substitutes:
         rpy[2] = memory.heading[0]
         turning = -self._soles[leg, 3:]
         sensors.angular_velocity[0] += share * (turning - sensors.angular_velocity[0])
-        sensors.acceleration[0] = GRAVITY * up
+        # Of a body that topples about the middle of the sole.
+        center, sole = memory.center[0], memory.pose.soles[leg]
+        topples = GRAVITY / max(center[2] - sole[2], 0.1) * (center - sole)
+        topples[2] = GRAVITY
+        sensors.acceleration[0] = memory.pose.turns[0].T @ topples
