@@ -20,6 +20,8 @@ import numpy as np
 
 #: From rest to the whole swing, and back, s.
 RISE = 1.0
+#: Largest speed, also where gaits change, rad/s.
+FASTEST = 10.0
 #: Instants at which an orbit is searched for the range of a cell.
 SAMPLES = 256
 
@@ -80,4 +82,5 @@ class Arms:
         self._level = min(max(self._level + (dt if moving else -dt) / RISE, 0.0), 1.0)
         if state is not None:
             self._waves = (state[self._places] - self._middle) / self._half
-        self.positions[:] = self.rest + self._level * self._swings * self._waves
+        wanted = self.rest + self._level * self._swings * self._waves
+        self.positions += np.clip(wanted - self.positions, -FASTEST * dt, FASTEST * dt)
