@@ -45,6 +45,11 @@ class InputMonitor:
         self.believed, self.since = -math.inf, math.nan
         self._changed, self._content, self._wrong = -math.inf, b'', ''
 
+    @property
+    def refused(self) -> bool:
+        """Whether messages have come, none of them valid."""
+        return self.believed == -math.inf and bool(self._wrong)
+
     def gap(self, now: float) -> float:
         """Time since the last valid message, s, at most 1."""
         return min(now - self.believed, 1.0)

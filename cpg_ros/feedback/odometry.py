@@ -46,7 +46,7 @@ HEIGHT = 0.01
 INSTANT = 0.02, 0.02, 0.03
 #: Standard deviation of roll and pitch as IMUs measure them, rad, and of their rates, rad/s.
 TILT, RATE = 0.01, 0.02
-#: Without measurements the position is lost by this much in a second, m/sqrt(s).
+#: Standard deviation of a velocity that is not measured, m/s, beside the last measured speed.
 UNSEEN = 0.5
 #: Components of the state: x, y, heading, slow error forward and to the left, constant share.
 STATES = 6
@@ -123,12 +123,13 @@ class Odometry:
         self._scratch = np.zeros((STATES, STATES))
         self._tilt, self.twist = np.zeros(3), np.zeros(6)
         self._kernel: Callable | None = None
-        self._started = False
+        self._started, self._unseen = False, 0.0
 
     def restart(self) -> None:
         """Start again where the base is now."""
         self.pose[:] = self.covariance[:] = 0.0
-        self._started = False
+        self._started, self._unseen = False, 0.0
+        self.twist[:] = 0.0
 
     def advance(self, sensors: SensorData, velocity: np.ndarray, contact: np.ndarray, dt: float
                 ) -> None:
@@ -141,7 +142,7 @@ class Odometry:
             dt: s.
 
         """
-        rpy = sensors.rpy[0]
+        rpy, self._unseen = sensors.rpy[0], 0.0
         if not self._started:
             self.pose[4], self._started = rpy[2], True
             self.covariance[3, 3] = self.covariance[4, 4] = STILL**2
@@ -156,9 +157,17 @@ class Odometry:
         self.twist[:3], self.twist[3:] = self._velocity, sensors.angular_velocity[0]
 
     def lose(self, dt: float) -> None:
-        """Take a step of dt in s without measurements: the base may go on at UNSEEN."""
+        """Take a step of dt in s without measurements.
+
+        The base may have kept any constant velocity since the last one, of which UNSEEN and the
+        last speed are standard deviations: the error grows with the time, its variance with the
+        square of that.
+        """
+        before = self._unseen
+        self._unseen += dt
+        added = (UNSEEN**2 + self.twist[0]**2 + self.twist[1]**2) * (self._unseen**2 - before**2)
         for k in range(2):
-            self.covariance[k, k] += dt * UNSEEN**2
+            self.covariance[k, k] += added
 
     def orientation(self, out: np.ndarray) -> None:
         """Fill the orientation in the odometry's frame, w x y z."""

@@ -163,7 +163,7 @@ def tick(legs, tables, gains, memory, sensors, planned, step, out):
             uphill_x = turns * slope.shift_ahead(ground[1], singly, gains)
             uphill_y = -turns * slope.shift(ground[0], gains.slope_share, gains)
         wide = (placement.step(off.vx, off.wy, gains.step, gains.step_pitch_rate, gains),
-                placement.step(off.vy, off.wx, gains.step_left, gains.step_roll_rate, gains))
+                placement.step(off.vy, off.wx, gains.step_left, -gains.step_roll_rate, gains))
         yielded = placement.yielding(
             off.vx, off.vy, gains.stiffen and memory.stiff_for[run] > 0.0
             and tables.one_by_one[slot] > 0.0, gains)

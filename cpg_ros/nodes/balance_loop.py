@@ -16,6 +16,7 @@
 
 from cpg_ros.feedback.biped.balance import BalancedPattern
 from cpg_ros.feedback.biped.feedback import BipedFeedback
+from cpg_ros.feedback.biped.substitutes import FEET, JOINTS
 from cpg_ros.motion.plan import GaitPlan
 from cpg_ros.nodes.feedback_loop import Motion
 from cpg_ros.nodes.sensor_input import SensorInput
@@ -83,7 +84,9 @@ class BalanceLoop:
         """What it is doing, as text."""
         pattern = self._pattern
         if pattern.balancing:
-            return 'on'
+            return f'coming to a stand: {self.faults}' if self.faults else 'on'
+        if pattern.crouching and not pattern.fallen:
+            return 'crouching' + (f': {self.faults}' if self.faults else '')
         return ('the robot has fallen: put it on its feet' if pattern.fallen else
                 'holding the stand until the robot stands on its feet')
 
@@ -95,6 +98,8 @@ class BalanceLoop:
             return ''
         if self.faults:
             return f'the robot is not balanced any more: {self.faults}'
+        if pattern.crouching:
+            return ''
         if pattern.fallen:
             return 'the robot has fallen: holding the stand until it is on its feet'
         return 'the robot was moved by somebody: standing it up again'
@@ -116,6 +121,11 @@ class BalanceLoop:
         measured, sensors = inputs.sensor_data, self._sensors
         sensors.joint_positions[0, self._rows] = measured.joint_positions[0]
         sensors.joint_velocities[0, self._rows] = measured.joint_velocities[0]
-        pattern.sensors = None if found else sensors
+        pattern.failed = bool(found)
+        pattern.refused = any(monitor.refused for monitor in inputs.monitors)
+        ages = [now - monitor.believed for monitor in inputs.monitors]
+        # Of several feet the oldest counts; where efforts are the contacts, there are none.
+        pattern.ages[:] = *ages[:FEET], max(ages[FEET:], default=ages[JOINTS])
+        pattern.sensors = None if self.waiting else sensors
         pattern.wish = self._motion()
         pattern.balance = self.feedback

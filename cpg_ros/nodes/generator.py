@@ -65,6 +65,8 @@ from std_srvs.srv import SetBool
 NAME = 'cpg_generator'
 #: When a signal ends the node, the ramp takes this long, and the node ends by the later time, s.
 LAST_RAMP, LAST_DEADLINE = 0.5, 0.95
+#: A biped that balances slows down, stands and crouches first: by this time, s.
+LAST_CROUCH = 8.0
 #: Two nodes know of one another this long after the later one joined the graph, s: they are
 #: announced every 3 s, and the first announcements of a busy machine are lost at times.
 DISCOVERY = 3.5
@@ -394,16 +396,30 @@ class Generator(StartedNode):
             self.get_logger().info(f'publishing nothing until ~/enable, then {at}')
 
     def finish(self) -> None:
-        """Ramp down to the stand, then stop publishing, within LAST_DEADLINE."""
+        """Ramp down to the stand, then stop publishing, within LAST_DEADLINE.
+
+        A biped that balances goes into a crouch instead, within LAST_CROUCH; a second signal that
+        comes later than LAST_DEADLINE ends that at once.
+        """
         began = time.monotonic()
+        crouches = isinstance(self.pattern, BalancedPattern) and self.pattern.lower()
+        deadline = began + (LAST_CROUCH if crouches else LAST_DEADLINE)
         if self.failure is None and self.ticker.ticks and not self.pattern.standing:
-            self.get_logger().info(f'ramping down over {LAST_RAMP:g} s before the end')
+            self.get_logger().info('coming to a stand and crouching before the end' if crouches
+                                   else f'ramping down over {LAST_RAMP:g} s before the end')
             if self._cmd_vel:
                 self._cmd_vel.end()
             self.pattern.enable(False, LAST_RAMP)
             self.ticker.stop_moving()
-            while not self.pattern.standing and time.monotonic() < began + LAST_DEADLINE:
+            early = 0
+            while not self.pattern.standing and time.monotonic() < deadline:
                 time.sleep(0.005)
+                # Launched from a terminal, a process gets the same Ctrl-C twice.
+                if time.monotonic() < began + LAST_DEADLINE:
+                    early = len(self.signals)
+                elif len(self.signals) > early:
+                    self.get_logger().warning('a second signal: ending at once')
+                    break
             time.sleep(min(0.05, 1.0 / self.ticker.rate))
         self.ticker.end()
         if self.ticker.is_alive():

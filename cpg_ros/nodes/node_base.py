@@ -57,6 +57,7 @@ class StartedNode(Node):
 
     Attributes:
         stop: set to end the node.
+        signals: that have come to end it, by their numbers.
         failure: exception that ended the thread, or None.
         thread: one that may still be at work when the node ends, or None.
         parameter_service: services of the parameters, which have a thread of their own.
@@ -77,6 +78,7 @@ class StartedNode(Node):
         self.failure: BaseException | None = None
         self.thread: threading.Thread | None = None
         self.stop = threading.Event()
+        self.signals: list[int] = []
 
     def _declare(self, specs: Mapping[str, Spec]) -> None:
         """Declare parameters by name.
@@ -272,6 +274,7 @@ def run(make: Callable[[], StartedNode], name: str, text: str, known: Mapping[st
     # another one sets it, would wait for ever for the lock that its own thread holds.
     for number in ending:
         signal.signal(number, lambda number, _: signals.append(number))
+    node.signals = signals
     executor = SingleThreadedExecutor()
     executor.add_node(node)
     serving = threading.Thread(target=_spin, args=(executor, node), name='executor', daemon=True)

@@ -20,6 +20,7 @@ import math
 from cpg_ros.feedback.biped.feedback import BipedFeedback, gait_plan
 from cpg_ros.feedback.estimate import SensorData
 from cpg_ros.feedback.kinematics import GRAVITY
+from cpg_ros.motion.readout import confine
 from cpg_ros.motion.track import Track
 from cpg_ros.robots.robot import Robot
 from cpg_ros.short_repr import ShortRepr
@@ -62,7 +63,11 @@ class BipedOutcome(ShortRepr):
 
 
 class BipedRun:
-    """One simulated biped whose servos follow its feedback at every step of the physics."""
+    """One simulated biped whose servos follow its feedback at every step of the physics.
+
+    Targets keep to the joints' limits of position and speed, as those of a `BalancedPattern` do.
+
+    """
 
     def __init__(self, model: str, robot: Robot, noise: SensorNoise | None = None,
                  friction: float = 0.6, timestep: float = 0.002,
@@ -90,6 +95,10 @@ class BipedRun:
         self._speeds = self.body.model.jnt_dofadr[joints]
         self.senses = SensorData.zeros(1, 2, len(order))
         self._velocity = np.zeros((1, 3))
+        self._limits = np.stack([robot.column(name)[robot.places]
+                                 for name in ('lower', 'upper', 'velocity')])
+        self._target, self._rate = np.zeros((2, len(robot.order)))
+        self._behind = np.zeros(len(robot.order), dtype=bool)
 
     def measure(self, before: np.ndarray) -> SensorData:
         """Return what is true now; before is the base's motion a step ago, shape (1, 6)."""
@@ -100,6 +109,11 @@ class BipedRun:
         fill_sensor_data(senses, body.quaternion[None], body.rates[None], before, self.dt,
                          self._velocity)
         return senses
+
+    def _command(self, wanted: np.ndarray) -> None:
+        confine(wanted, (wanted - self._target) / self.dt, self._limits, self.dt, self._target,
+                self._rate, self._behind)
+        self.body.command(self._target)
 
     def run(self, duration: float, commands: tuple[tuple[float, float, float, float], ...] = (),
             pushes: tuple[tuple[float, float, float], ...] = (),
@@ -118,6 +132,7 @@ class BipedRun:
         """
         body, dt = self.body, self.dt
         body.reset()
+        self._target[:] = body.stand
         feedback = feedback or BipedFeedback(self.robot)
         senses = NoisySenses(SensorNoise(**{**vars(self.noise), 'seed': seed}), 1, 2, dt)
         before, outcome = body.rates[None].copy(), BipedOutcome()
@@ -142,7 +157,7 @@ class BipedRun:
                 body.push(np.array([*forces.pop(0)[1:], 0.0]), PUSH)
             true = self.measure(before)
             before[0] = body.rates
-            body.command(feedback.advance(senses(true), dt))
+            self._command(feedback.advance(senses(true), dt))
             body.hold(feedback.arms.positions)
             body.step()
             outcome.steps += int((was & ~feedback.memory.swinging).sum())

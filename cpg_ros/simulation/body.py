@@ -40,7 +40,7 @@ def add_payload(model: Any, base: int, mass: float) -> None:
 
 
 class Body:
-    """One robot on a floor; joints in ``robot.order``, legs in the order of its network.
+    """One robot on a floor; joints in ``robot.order``, legs in that of its file.
 
     Arrays that properties return are the body's own: read them, or copy what is to be kept.
 

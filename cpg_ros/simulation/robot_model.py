@@ -28,7 +28,6 @@ from typing import Any
 from cpg_ros.errors import CpgError
 from cpg_ros.files import regular_file
 from cpg_ros.files.shared_resources import share
-from cpg_ros.networks.registry import NETWORKS
 from cpg_ros.robots.description import DescriptionError
 from cpg_ros.robots.mesh_files import merged, Mesh
 from cpg_ros.robots.robot import Robot
@@ -112,8 +111,8 @@ def _of_mjlab(name: str) -> Path:
 
 
 def legs(robot: Robot) -> tuple[str, ...]:
-    """Return a robot's legs in the order of its network, such as LH RH LF RF."""
-    return tuple(NETWORKS[robot.networks[0]].legs[robot.assignment])
+    """Return a robot's legs in the order of its file, as sensor data have them."""
+    return tuple(robot.legs)
 
 
 def load(name: str, robot: Robot, kp: float | None = None, kd: float | None = None,

@@ -18,7 +18,7 @@ import math
 
 from cpg_ros.errors import InputError
 from cpg_ros.feedback.biped.balance import BalancedPattern
-from cpg_ros.feedback.biped.feedback import BipedFeedback
+from cpg_ros.feedback.biped.feedback import BipedFeedback, gait_plan
 from cpg_ros.motion.plan import plan
 from cpg_ros.networks.biped import Biped
 from cpg_ros.robots.robot_file import load_robot
@@ -43,7 +43,13 @@ class Walker:
         self.pattern = BalancedPattern(program, 1.0, enabled=False)
         self.pattern.balance = BipedFeedback(robot, program=program)
         self.before = self.run.body.rates[None].copy()
-        self.blind, self.tilt = False, 0.0
+        self.blind, self.tilt, self.turned = False, 0.0, 0.0
+        self.lower, self.upper, self.fastest = (robot.column(name) for name in (
+            'lower', 'upper', 'velocity'))
+        servos = [robot.biped.links[name] for name in robot.order]
+        self.kp, self.effort = np.array([(one.kp, one.effort) for one in servos]).T
+        self.crossed, self.last = [], self.pattern.position.copy()
+        self.held = self.pattern.held_angles.copy()
 
     def go(self, seconds):
         """Go on; return by how much the base moved forward, m."""
@@ -52,17 +58,40 @@ class Walker:
         for _ in range(round(seconds / DT)):
             sensors = self.run.measure(self.before)
             self.before[0] = body.rates
+            sensors.rpy[0, 1] += self.turned
             pattern.sensors = None if self.blind else sensors
             pattern.advance(DT)
+            self.check()
             body.command(pattern.position[pattern.robot.places])
             body.step()
+            body.hold(self.held)
             self.tilt = max(self.tilt, math.acos(min(body.axes[2, 2], 1.0)))
         return body.base[0] - start
+
+    def check(self):
+        """Note limits that are crossed, and published speeds that are not those of the joints."""
+        pattern = self.pattern
+        position, step = pattern.position, (pattern.position - self.last) / DT
+        if (position < self.lower - 1e-9).any() or (position > self.upper + 1e-9).any():
+            self.crossed.append('position')
+        if (np.abs(step) > self.fastest * (1.0 + 1e-6)).any():
+            self.crossed.append('speed')
+        if pattern.balance is not None and np.abs(step - pattern.velocity).max() > 1e-6:
+            self.crossed.append('published speed')
+        pull = self.kp * np.abs(position[pattern.robot.places] - self.run.body.position)
+        if pattern.balancing and (pull > 1.02 * self.effort).any():
+            self.crossed.append('torque')
+        held = pattern.held_angles
+        if np.abs(held - self.held).max() > 20.0 * DT:
+            self.crossed.append('held joint')
+        self.last, self.held = position.copy(), held.copy()
 
 
 @pytest.fixture
 def walker():
-    return Walker()
+    made = Walker()
+    yield made
+    assert not made.crossed
 
 
 def test_it_stands_walks_as_wished_and_stops(walker):
@@ -128,6 +157,22 @@ def test_without_sensors_it_holds_the_stand(walker):
     assert pattern.balancing and walker.tilt < 0.1
 
 
+@pytest.mark.parametrize('fault', ['none', 'blind', 'tilted', 'switched off'])
+def test_limits_hold_in_a_walk_and_at_its_end(walker, fault):
+    pattern = walker.pattern
+    pattern.wish = 0.5, 0.0, 0.0
+    pattern.enable(True, 1.0)
+    walker.go(4.1)
+    if fault == 'none':
+        # In a step the targets would be 7 times too fast, and beyond the limits of the ankles.
+        assert pattern.held and not pattern.falls
+    walker.blind, walker.turned = fault == 'blind', 1.5 if fault == 'tilted' else 0.0
+    if fault == 'switched off':
+        pattern.balance = None
+    walker.go(1.5)
+    assert pattern.balancing == (fault == 'none')
+
+
 def test_without_feedback_it_is_the_open_loop_pattern(walker):
     pattern = walker.pattern
     pattern.balance = None
@@ -156,6 +201,53 @@ def test_another_frequency_keeps_the_phase(walker):
     assert pattern.balance.gains.frequency == 1.8
     walker.go(4.0)
     assert walker.tilt < 0.2 and not pattern.falls
+
+
+@pytest.mark.parametrize('speed', [math.nan, 0.3])
+def test_before_the_end_it_crouches_and_stays_up_without_commands(walker, speed):
+    pattern = walker.pattern
+    if speed > 0.0:
+        pattern.wish = speed, 0.0, 0.0
+        pattern.enable(True, 1.0)
+    walker.go(3.4)
+    pattern.enable(False, 0.5)
+    assert pattern.lower() and not pattern.standing
+    for _ in range(60):
+        if not pattern.standing:
+            walker.go(0.1)
+    assert pattern.standing and pattern.crouching and not pattern.falls
+    # Servos hold the last targets; nobody commands any more.
+    for _ in range(1500):
+        walker.run.body.step()
+    assert not walker.run.body.fallen
+    assert math.acos(walker.run.body.axes[2, 2]) < 0.5
+
+
+def test_a_run_ends_in_the_crouch_too(walker):
+    pattern = walker.pattern
+    pattern.apply(gait_plan(pattern.robot, 'run'), 0.0)
+    pattern.wish = 1.0, 0.0, 0.0
+    pattern.enable(True, 1.0)
+    walker.go(6.0)
+    pattern.enable(False, 0.5)
+    assert pattern.lower()
+    for _ in range(60):
+        if not pattern.standing:
+            walker.go(0.1)
+    assert pattern.standing and pattern.crouching and not walker.run.body.fallen
+
+
+def test_from_the_crouch_it_stands_up_and_walks(walker):
+    pattern = walker.pattern
+    walker.go(1.0)
+    walker.blind = True
+    walker.go(1.0)
+    assert pattern.crouching and not walker.run.body.fallen
+    walker.blind = False
+    pattern.wish = 0.3, 0.0, 0.0
+    pattern.enable(True, 1.0)
+    walker.go(4.0)
+    assert pattern.balancing and walker.go(2.0) > 0.4 and not pattern.falls
 
 
 def test_a_robot_without_soles_has_no_balance():

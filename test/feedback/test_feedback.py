@@ -212,6 +212,24 @@ def close(pattern, feedback, measure, velocity, heading):
     pattern.correct = correct
 
 
+def test_a_body_that_rolls_to_the_right_steps_to_the_right(loop):
+    """A positive rate of roll falls to the right, where y is negative."""
+    gains = Gains()._replace(step_roll_rate=0.1, step=0.0, step_left=0.0, step_pitch_rate=0.0,
+                             give=0.0, give_left=0.0)
+    made, feedback = program('trot'), Feedback(loop.geometry, gains)
+    feedback.learn(made)
+    rolling = standing([0.0] * 4)
+    rolling.angular_velocity[0, 0] = 1.0
+    angles, still, phase = GO2.column('offset')[None], np.zeros(1), np.zeros(1)
+    planned = PlannedMotion(angles, phase, np.zeros((1, 2), dtype=np.int64), still,
+                            np.zeros((1, 2)), still, still)
+    moved = []
+    for phase[0] in np.arange(0.0, 1.0, 0.01):
+        feedback.advance(rolling, planned, DT, 1.0, 1.0)
+        moved.append(feedback.memory.placement_displacement[0, :, 1].copy())
+    assert np.min(moved, axis=0) == pytest.approx(-0.1, abs=0.05) and np.max(moved) < 0.01
+
+
 def patterns(loop, expected, gains, steps=1500):
     """Return angles and speeds told, ticks held by a limit and the place, m, of a real pattern."""
     made = program('trot')

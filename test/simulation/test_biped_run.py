@@ -166,6 +166,16 @@ def test_arms_swing_by_the_cells_and_take_yaw_from_the_walk():
     assert found['swinging'][1].std() < 0.9 * found['still'][1].std()
 
 
+def test_a_robot_file_that_begins_with_the_right_leg_walks_as_well():
+    robot = load_robot('humanoid')
+    other = replace(robot, legs=dict(reversed(list(robot.legs.items()))))
+    run = BipedRun('humanoid', other, NOISE)
+    commands = ((1.0, 0.3, 0.0, 0.0), (8.0, 0.2, 0.1, 0.2))
+    found = run.run(14.0, commands, (impulse(5.0, 0.0, 15.0),), seed=16)
+    assert math.isinf(found.fell) and found.tilt < 0.3
+    assert found.speed[0] == pytest.approx(0.25, abs=0.05)
+
+
 @pytest.mark.parametrize('number', [0, 1, *in_depth(2, 3)])
 def test_it_survives_pushes_by_placing_its_feet(number):
     push = impulse(6.0, *(20.0 * np.array(DIRECTIONS[number])))

@@ -14,6 +14,7 @@
 
 """A body in MuJoCo against the laws it has to obey, and models that cannot be used."""
 
+from dataclasses import replace
 import importlib.util
 import math
 from pathlib import Path
@@ -74,11 +75,14 @@ def test_standing_feet_bear_the_weight(body):
     assert body.base[2] == pytest.approx(0.27, abs=0.02)
 
 
-def test_feet_are_in_the_order_of_the_legs(body):
+@pytest.mark.parametrize('order', [('lh', 'rh', 'lf', 'rf'), ('rf', 'lf', 'rh', 'lh')])
+def test_feet_are_in_the_order_of_the_robot_files_legs(order):
+    body = Body('go2', replace(ROBOT, legs={leg: ROBOT.legs[leg] for leg in order}))
     stood(body)
     at_rest = body.feet.copy()
     # Pushed down at its head, it leans on its front legs; to its left, on the left ones.
-    for turn, heavy in (([0, 8, 0], (2, 3)), ([-8, 0, 0], (0, 2))):
+    for turn, legs_below in (([0, 8, 0], ('lf', 'rf')), ([-8, 0, 0], ('lh', 'lf'))):
+        heavy = map(order.index, legs_below)
         body.reset()
         body.data.xfrc_applied[body.model.body('base').id, 3:] = turn
         stood(body)

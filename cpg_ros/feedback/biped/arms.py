@@ -20,6 +20,8 @@ import numpy as np
 
 #: From rest to the whole swing, and back, s.
 RISE = 1.0
+#: Largest speed, also where gaits change, rad/s.
+FASTEST = 10.0
 #: Instants at which an orbit is searched for the range of a cell.
 SAMPLES = 256
 
@@ -52,7 +54,7 @@ class Arms:
         # Of each joint's cell in the network's state.
         self._places = self._cells
         self.swing = bool(self._swings.any())
-        self._level = 0.0
+        self._level, self._waves = 0.0, np.zeros(len(self.names))
         self._middle, self._half = np.zeros(len(self.names)), np.ones(len(self.names))
 
     def follow(self, program: GaitPlan) -> None:
@@ -66,10 +68,19 @@ class Arms:
         low, high = waves.min(axis=0), waves.max(axis=0)
         self._middle, self._half = 0.5 * (low + high), 0.5 * (high - low)
 
-    def advance(self, dt: float, moving: bool, state: np.ndarray) -> None:
-        """Fill the positions dt in s later, by the network's state, shape (components,)."""
+    def advance(self, dt: float, moving: bool, state: np.ndarray | None = None) -> None:
+        """Fill the positions dt in s later.
+
+        Args:
+            dt: s.
+            moving: whether arms are to swing; where they are not, they return to rest.
+            state: of the network, shape (components,); None where it does not move.
+
+        """
         if not self.swing:
             return
         self._level = min(max(self._level + (dt if moving else -dt) / RISE, 0.0), 1.0)
-        waves = (state[self._places] - self._middle) / self._half
-        self.positions[:] = self.rest + self._level * self._swings * waves
+        if state is not None:
+            self._waves = (state[self._places] - self._middle) / self._half
+        wanted = self.rest + self._level * self._swings * self._waves
+        self.positions += np.clip(wanted - self.positions, -FASTEST * dt, FASTEST * dt)

@@ -32,8 +32,10 @@ from cpg_ros.networks.registry import NETWORKS
 from cpg_ros.robots.robot import Robot
 import numpy as np
 
-#: Time in which the weight goes to the right foot before the first step, and until that, s.
+#: Time in which the weight goes to the second foot before the first step, and until that, s.
 SHIFTING, FIRST_STEP = 0.8, 1.0
+#: With which a crouching robot stands up, m/s.
+RISING = 0.2
 #: At most this fast, m/s, and with this error of the capture point, m, a walk ends on two feet.
 STILL, CAUGHT = 0.15, 0.05
 #: A run slows down to this multiple of the fastest walk before it becomes one.
@@ -41,7 +43,7 @@ SLOWED = 1.2
 #: How the legs go in the gaits that there are laws for.
 KINDS = {'walk': WALKS, 'run': RUNS, 'two_legged_hop': HOPS, 'two_legged_jump': HOPS}
 WALK_GAIT = 'walk'
-#: Phase of the left flexor, cycles, with which each kind begins.
+#: Phase of the first leg's flexor, cycles, with which each kind begins.
 STARTS = {WALKS: 0.75, RUNS: 0.0, HOPS: 0.5}
 
 
@@ -82,7 +84,8 @@ class BipedFeedback:
         command: speeds forward and to the left, m/s, and rate of turning, rad/s, that the gait in
             force is to have.
         faults: how often the network left its orbit and was put back.
-        torques: wanted of the joints in ``robot.order``, N m, shape (joints,).
+        torques: wanted of the joints in ``robot.order``, N m, within what their servos can,
+            shape (joints,).
         positions: the same as targets of servos, rad.
 
     """
@@ -128,7 +131,8 @@ class BipedFeedback:
         # Their places among the legs' torques.
         chained = (self.links.chains - 1).ravel().tolist()
         self._places = np.array([chained.index(row) for row in self.rows])
-        self._kp = np.array([biped.links[name].kp for name in robot.order])
+        self._kp, self._effort = np.array([
+            (biped.links[name].kp, biped.links[name].effort) for name in robot.order]).T.copy()
         self.torques, self.positions = np.zeros((2, len(robot.order)))
         self._asked, self._walks, self.command = np.zeros(3), False, np.zeros(3)
         self._time = 0.0
@@ -152,9 +156,15 @@ class BipedFeedback:
         """Whether another gait than that in force is wanted."""
         return self.track is not self._goal
 
-    def restart(self) -> None:
-        """Stand, and know nothing of what has been, as after a fall."""
+    def restart(self, crouch: float = 0.0) -> None:
+        """Stand, and know nothing of what has been, as after a fall.
+
+        Args:
+            crouch: how much lower the centre of mass is now, m; it rises from there.
+
+        """
         self.memory, self.mode = BipedMemory.empty(self.links), STAND
+        self.memory.crouch[0] = crouch
         self._time, self._ready = 0.0, False
 
     def walk(self, forward: float, left: float = 0.0, turn: float = 0.0) -> None:
@@ -214,6 +224,7 @@ class BipedFeedback:
         # In a run the same swing costs more than it saves.
         self.arms.advance(dt, self.mode == WALK and self.kind == WALKS, self.track.stepper.now[0])
         np.take(memory.torque, self._places, out=self.torques)
+        np.clip(self.torques, -self._effort, self._effort, out=self.torques)
         np.divide(self.torques, self._kp, out=self.positions)
         self.positions += sensors.joint_positions[0, self.rows]
         return self.positions
@@ -255,12 +266,15 @@ class BipedFeedback:
                 self._change(half)
             return
         self._time += dt
+        crouch = memory.crouch
+        crouch[0] = max(0.0, crouch[0] - RISING * dt)
         if self.mode == STAND and self.changing:
             self._adopt(self._goal)
         if not self._walks:
             self.mode, self._time = STAND, 0.0
         elif self.mode == STAND:
-            self.mode, self._time = SHIFT, 0.0
+            if not crouch[0]:
+                self.mode, self._time = SHIFT, 0.0
         elif self._time >= FIRST_STEP:
             self._start()
 
@@ -302,8 +316,8 @@ class BipedFeedback:
     def _start(self) -> None:
         """Start the clock.
 
-        A walk begins in the middle of both feet's stance, before the left one lifts off, a run
-        in the middle of the right foot's, a hop in that of both.
+        A walk begins in the middle of both feet's stance, before the first one lifts off, a run
+        in the middle of the second foot's, a hop in that of both.
         """
         memory, self.mode = self.memory, WALK
         memory.wanted[:] = memory.integral[:] = 0.0

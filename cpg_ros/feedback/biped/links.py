@@ -41,6 +41,7 @@ class Links(NamedTuple):
         chains: rows of each leg's joints from the base outwards, shape (legs, joints of a leg).
         soles: middle of each sole, m, shape (legs, 3).
         half: half the length and the width of a sole, m, shape (2,).
+        sides: 1 for a leg on the left, -1 for one on the right, shape (legs,).
 
     """
 
@@ -52,6 +53,7 @@ class Links(NamedTuple):
     chains: np.ndarray
     soles: np.ndarray
     half: np.ndarray
+    sides: np.ndarray
 
 
 class Pose(NamedTuple):
@@ -104,7 +106,7 @@ def links_of(robot: Robot) -> Links:
                  np.array([body.mass, *(link.mass for link in links)]),
                  np.array([body.center, *(link.center for link in links)]),
                  np.array(chains), np.array([body.soles[leg] for leg in robot.legs]),
-                 0.5 * np.array(body.sole_size))
+                 0.5 * np.array(body.sole_size), np.where(robot.left, 1.0, -1.0))
 
 
 def blank_pose(links: Links) -> Pose:

@@ -19,7 +19,7 @@ from typing import NamedTuple
 from cpg_ros.feedback.biped.links import blank_pose, Links, Pose
 import numpy as np
 
-#: Modes: standing on both legs, shifting the weight to the right foot, following the clock.
+#: Modes: standing on both legs, shifting the weight to the second foot, following the clock.
 STAND, SHIFT, WALK = 0, 1, 2
 
 
@@ -48,6 +48,7 @@ class BipedMemory(NamedTuple):
         reaction: moment that the swing leg takes, N m, shape (3,).
         path: of a swinging foot, scratch, shape (3, 3).
         clock: factor of the clock, and by how much it is to leap, cycles, shape (2,).
+        crouch: how much lower than usual the centre of mass is to be, m, shape (1,).
         torque: of the legs' joints, N m, shape (2, joints of a leg).
 
     """
@@ -72,6 +73,7 @@ class BipedMemory(NamedTuple):
     reaction: np.ndarray
     path: np.ndarray
     clock: np.ndarray
+    crouch: np.ndarray
     torque: np.ndarray
 
     @classmethod
@@ -82,4 +84,5 @@ class BipedMemory(NamedTuple):
                    np.zeros(2), np.zeros(2, dtype=bool), np.zeros(2, dtype=bool),
                    np.zeros((2, 3)), np.zeros((2, 3)), np.zeros(1), np.full(2, 0.5), np.zeros(2),
                    np.zeros(3), np.zeros((3, 3)), np.array([1.0, 0.0]),
+                   np.zeros(1),
                    np.zeros((2, links.chains.shape[1])))

@@ -34,11 +34,6 @@ KEPT = 0.02
 
 
 @jit
-def _side(leg):
-    return 1.0 - 2.0 * leg
-
-
-@jit
 def _sense(links, gains, memory, sensors, dt):
     """Fill pose, velocities and loads from what is measured."""
     pose, rates, weight = memory.pose, sensors.joint_velocities[0], GRAVITY
@@ -88,7 +83,7 @@ def _follow_clock(gains, memory, kind):
 
 
 @jit
-def _step(gains, memory, xi, axes, rate):
+def _step(links, gains, memory, xi, axes, rate):
     """Fill the capture point's error, the clock's factor and the target of a swinging foot."""
     soles, phases, (c, s) = memory.pose.soles, memory.phases, axes
     stands = 0 if memory.shares[0] > memory.shares[1] else 1
@@ -96,8 +91,8 @@ def _step(gains, memory, xi, axes, rate):
     x, y = xi[0] - soles[stands, 0], xi[1] - soles[stands, 1]
     wanted = (memory.wanted[0] + gains.speed_integral * memory.integral[0], memory.wanted[1])
     error = placement.capture_error(
-        (c * x + s * y, c * y - s * x), _side(swings), clock.time_in_step(phases[swings], gains),
-        rate, wanted, gains)
+        (c * x + s * y, c * y - s * x), links.sides[swings],
+        clock.time_in_step(phases[swings], gains), rate, wanted, gains)
     memory.error[0], memory.error[1] = error
     for leg in range(2):
         if memory.swinging[leg]:
@@ -105,31 +100,31 @@ def _step(gains, memory, xi, axes, rate):
                 continue
             memory.clock[0] = placement.speed_up(error, gains)
             forward, left = placement.step(
-                error, _side(leg), placement.time_to_touchdown(phases[leg], gains), rate, wanted,
-                gains)
+                error, links.sides[leg], placement.time_to_touchdown(phases[leg], gains), rate,
+                wanted, gains)
             memory.target[leg, 0] = c * forward - s * left
             memory.target[leg, 1] = s * forward + c * left
             memory.target[leg, 2] = 0.0
 
 
 @jit
-def _stand(gains, memory, xi, axes, rate, shifted):
+def _stand(links, gains, memory, xi, axes, rate, shifted):
     """Fill the legs' shares of the weight, and the error of the capture point forward."""
     soles, (c, s) = memory.pose.soles, axes
-    left = c * soles[0, 1] - s * soles[0, 0]
-    right = c * soles[1, 1] - s * soles[1, 0]
+    first = c * soles[0, 1] - s * soles[0, 0]
+    second = c * soles[1, 1] - s * soles[1, 0]
     _, inward, _ = placement.offsets(0.0, 0.0, rate, gains)
-    middle = 0.5 * (left + right)
-    goal, now = middle + shifted * (right + inward - middle), -s * xi[0] + c * xi[1]
+    middle, now = 0.5 * (first + second), -s * xi[0] + c * xi[1]
+    goal = middle + shifted * (second - links.sides[1] * inward - middle)
     pressure = now + (gains.stand - 1.0) * (now - goal)
-    memory.shares[0] = min(max((pressure - right) / (left - right), KEPT), 1.0 - KEPT)
+    memory.shares[0] = min(max((pressure - second) / (first - second), KEPT), 1.0 - KEPT)
     memory.shares[1] = 1.0 - memory.shares[0]
     ahead = 0.5 * (c * (soles[0, 0] + soles[1, 0]) + s * (soles[0, 1] + soles[1, 1]))
     memory.error[0], memory.error[1] = c * xi[0] + s * xi[1] - ahead, 0.0
 
 
 @jit
-def _fly(gains, memory, axes, kind, dt):
+def _fly(links, gains, memory, axes, kind, dt):
     """Fill shares, ground and targets of feet that swing, in a gait with flight."""
     soles, base, phases, (c, s) = memory.pose.soles, memory.base, memory.phases, axes
     center, velocity, shares = memory.center[0], memory.center[1], memory.shares
@@ -151,7 +146,8 @@ def _fly(gains, memory, axes, kind, dt):
             for k in range(3):
                 memory.lift_off[leg, k] -= dt * base[k]
             remaining = (clock.swing_share(gains) - phases[leg]) / gains.frequency
-            ahead, left = flight.foothold(speed, wanted, _side(leg), remaining, gains)
+            ahead, left = flight.foothold(speed, wanted, links.sides[leg], remaining,
+                                            gains)
             memory.target[leg, 0] = center[0] + c * ahead - s * left
             memory.target[leg, 1] = center[1] + s * ahead + c * left
             memory.target[leg, 2] = memory.lift_off[leg, 2]
@@ -162,7 +158,7 @@ def _upward(gains, memory, mass, mode, kind, level):
     """Return the upward force on all legs, N; level of the soles that bear."""
     center, rise, shares = memory.center[0, 2], memory.center[1, 2], memory.shares
     if kind == flight.WALKS or mode != WALK:
-        wanted = gains.height
+        wanted = gains.height - memory.crouch[0]
         if mode == SHIFT and kind != flight.WALKS:
             # The body begins in the middle of a stance.
             wanted = flight.course(0.5, kind, gains)[0]
@@ -259,15 +255,15 @@ def tick(links, gains, memory, sensors, command, mode, step):
         _approach(gains, memory, command, dt)
         _follow_clock(gains, memory, kind)
         if kind == flight.WALKS:
-            _step(gains, memory, xi, axes, rate)
+            _step(links, gains, memory, xi, axes, rate)
         else:
-            _fly(gains, memory, axes, kind, dt)
+            _fly(links, gains, memory, axes, kind, dt)
         ahead = axes[0] * center[1, 0] + axes[1] * center[1, 1]
         memory.integral[0] = placement.integrate(memory.integral[0], memory.wanted[0] - ahead, dt)
         shift = (stance.pressure_shift(memory.error, links.half, gains) if kind == flight.WALKS
                  else (0.0, 0.0))
     else:
-        _stand(gains, memory, xi, axes, rate,
+        _stand(links, gains, memory, xi, axes, rate,
                shifted if mode == SHIFT and kind != flight.HOPS else 0.0)
         reach = links.half[0]
         shift = (min(max(gains.stand * memory.error[0], -reach), reach), 0.0)

@@ -1,0 +1,107 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""The crouch of a biped: a pose in which servos alone hold it up, without any balance.
+
+A stand on servos falls: the ankles would have to be stiffer than the weight topples. In the crouch
+knees and ankles are at the ends of their ranges, so the ankles cannot give way forward, and the
+centre of mass is low and above the middle of the soles.
+"""
+
+from cpg_ros.feedback.biped.links import blank_pose, kinematics, Links
+from cpg_ros.robots.robot import Robot
+import numpy as np
+
+#: Joints whose axis is this close to the lateral one, as a cosine, pitch a leg.
+LATERAL = 0.9
+#: Bisections of the range of the hips: to 1e-6 rad.
+HALVINGS = 22
+#: Shares of the knees' range, the most bent first, that are tried.
+BENT = np.arange(1.0, 0.4, -0.05)
+
+
+def crouch_pose(robot: Robot, links: Links) -> tuple[np.ndarray, float] | None:
+    """Return the angles of the crouch and how much lower the centre of mass is, or None.
+
+    Args:
+        robot: whose legs each have three joints that pitch: hip, knee and ankle.
+        links: of the robot.
+
+    Returns:
+        Angles of the joints of the legs, leg by leg, rad, shape (joints,), and by how much the
+        centre of mass is lower than in the stand, m. None if a leg has other joints, or if the
+        hips cannot bring the centre of mass above the soles.
+
+    """
+    assert robot.biped is not None
+    names, joints = list(robot.biped.links), {joint.name: joint for joint in robot.joints}
+    angles = np.array([joints[name].offset if name in joints else robot.held[name]
+                       for name in names])
+    ahead_of_soles = _Ahead(links)
+    stand, legs = ahead_of_soles.height(angles), []
+    for chain in links.chains:
+        pitching = [row - 1 for row in chain if abs(links.axes[row, 1]) > LATERAL]
+        if len(pitching) != 3:
+            return None
+        legs.append(pitching)
+    hips, knees, ankles = np.array(legs).T
+    lower, upper = (np.array([getattr(joints[name], key) if name in joints else 0.0
+                              for name in names]) for key in ('lower', 'upper'))
+    bent, high = angles[knees] > 0.0, angles[hips].min()
+    angles[ankles] = np.where(bent, lower[ankles], upper[ankles])
+    for share in BENT:
+        angles[knees] = share * np.where(bent, upper[knees], lower[knees])
+        if _centre(ahead_of_soles, angles, hips, lower[hips].max(), high):
+            order = [names.index(joint.name) for joint in robot.joints]
+            return angles[order], stand - ahead_of_soles.height(angles)
+    return None
+
+
+def _centre(ahead_of_soles: '_Ahead', angles: np.ndarray, hips: np.ndarray, low: float,
+            high: float) -> bool:
+    """Turn the hips so that the centre of mass is above the soles; return whether they can."""
+    angles[hips] = low
+    first = ahead_of_soles(angles)
+    angles[hips] = high
+    if first * ahead_of_soles(angles) > 0.0:
+        return False
+    for _ in range(HALVINGS):
+        angles[hips] = middle = 0.5 * (low + high)
+        low, high = (middle, high) if first * ahead_of_soles(angles) > 0.0 else (low, middle)
+    return True
+
+
+class _Ahead:
+    """How far the centre of mass is ahead of the middle of the soles, soles level, m."""
+
+    def __init__(self, links: Links) -> None:
+        self._links, self._pose = links, blank_pose(links)
+        self._chain = [row for row in links.chains[0] if abs(links.axes[row, 1]) > LATERAL]
+        self._center, self._soles = np.zeros(6), np.zeros((2, 6))
+        self._still = np.zeros(3), np.zeros(len(links.masses) - 1)
+        self._weights = np.zeros(len(links.masses) - 1)
+
+    def __call__(self, angles: np.ndarray) -> float:
+        self._place(angles)
+        return float(self._center[0] - self._pose.soles[:, 0].mean())
+
+    def height(self, angles: np.ndarray) -> float:
+        """Return the height of the centre of mass above the soles, m."""
+        self._place(angles)
+        return float(self._center[2] - self._pose.soles[:, 2].mean())
+
+    def _place(self, angles: np.ndarray) -> None:
+        lean = -sum(self._links.axes[row, 1] * angles[row - 1] for row in self._chain)
+        kinematics(self._links, np.array([0.0, lean, 0.0]), angles, self._still, self._pose,
+                   self._center, self._soles, self._weights)

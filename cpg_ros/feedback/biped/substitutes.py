@@ -1,0 +1,136 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""What a biped takes for a measurement that does not arrive, for as long as it needs to stop.
+
+For a few ticks measured values go on as their rates say. Later the sole that bears more stands for
+the inertial unit: it is level and still, so the joints say how the base leans and turns. Loads on
+the feet are those that the clock gives them. Joints move as they must for soles that stand to be
+still and those that swing to be on their paths, while the base moves as the inertial unit says.
+"""
+
+from cpg_ros.feedback.biped.links import blank_pose, kinematics, Links
+from cpg_ros.feedback.biped.memory import BipedMemory
+from cpg_ros.feedback.estimate import SensorData
+from cpg_ros.feedback.kinematics import GRAVITY
+from cpg_ros.integration.jit import bound
+import numpy as np
+
+#: Inputs in the order of their ages.
+IMU, JOINTS, FEET = range(3)
+#: Measurements this old go on as their rates say, s; older ones are replaced.
+EXTRAPOLATED = 0.05
+#: Rate at which a predicted sole approaches its path, 1/s, and damping of the prediction's rates.
+FOLLOWED, DAMPED = 20.0, 1e-3
+#: Largest rate of a predicted joint, rad/s.
+FASTEST = 15.0
+#: Time in which orientation and angular velocity of the sole's come to be used, s.
+ADOPTED = 0.02
+
+
+class Substitutes:
+    """Fills the gaps in the measurements of one biped; a tick allocates little.
+
+    Attributes:
+        sensors: measurements with the gaps filled, overwritten by ``fill``.
+
+    """
+
+    def __init__(self, links: Links) -> None:
+        """Prepare for a robot's links."""
+        joints = len(links.masses) - 1
+        self._links, self._pose = links, blank_pose(links)
+        self.sensors = SensorData.zeros(1, len(links.chains), joints)
+        self._still, self._angles = np.zeros(3), np.zeros(joints)
+        self._center, self._soles, self._weights = np.zeros(6), np.zeros((2, 6)), np.zeros(joints)
+        self._kinematics = bound(kinematics, links, self._still, self.sensors.joint_positions[0],
+                                 (self._still, self.sensors.joint_velocities[0]), self._pose,
+                                 self._center, self._soles, self._weights)
+
+    def fill(self, measured: SensorData, ages: np.ndarray, memory: BipedMemory, dt: float
+             ) -> SensorData:
+        """Return the measurements of now.
+
+        Args:
+            measured: the last valid ones.
+            ages: of inertial unit, joints and feet, s, shape (3,).
+            memory: of the feedback at its last tick.
+            dt: of a tick, s; younger measurements are taken as they are.
+
+        """
+        sensors = self.sensors
+        for own, newest in zip(sensors, measured, strict=True):
+            own[:] = newest
+        late = ages > 1.5 * dt
+        if late[JOINTS]:
+            self._move(memory, dt)
+        else:
+            self._angles[:] = sensors.joint_positions[0]
+        if late[IMU]:
+            self._turn(measured, min(ages[IMU], EXTRAPOLATED))
+        if ages[IMU] > EXTRAPOLATED:
+            self._lean_on_sole(memory, min((ages[IMU] - EXTRAPOLATED) / ADOPTED, 1.0))
+        if late[IMU] and late[JOINTS]:
+            # Nothing says how the base turns.
+            sensors.angular_velocity[0] *= max(1.0 - ages.min() / EXTRAPOLATED, 0.0)
+        if ages[FEET] > EXTRAPOLATED:
+            weight = GRAVITY * memory.pose.carried[0]
+            sensors.foot_forces[0] = np.where(memory.swinging, 0.0, weight * memory.shares)
+        return sensors
+
+    def _move(self, memory: BipedMemory, dt: float) -> None:
+        """Let the joints of the legs go on from where they were for dt in s."""
+        pose, rates = memory.pose, self.sensors.joint_velocities[0]
+        rates[:] = 0.0
+        for leg, chain in enumerate(self._links.chains):
+            sole = pose.soles[leg]
+            columns = np.vstack([np.cross(pose.axes[chain], sole - pose.places[chain]).T,
+                                 pose.axes[chain].T])
+            moved = -np.concatenate([memory.base + np.cross(memory.turning, sole),
+                                     memory.turning])
+            if memory.swinging[leg]:
+                moved[:3] += memory.path[1] + FOLLOWED * (memory.path[0] - sole)
+            rates[chain - 1] = columns.T @ np.linalg.solve(
+                columns @ columns.T + DAMPED * np.eye(6), moved)
+        self._angles += dt * np.clip(rates, -FASTEST, FASTEST)
+        self.sensors.joint_positions[0] = self._angles
+
+    def _turn(self, measured: SensorData, time: float) -> None:
+        """Let the orientation go on with the angular velocity for a time in s."""
+        roll, pitch, _ = measured.rpy[0]
+        x, y, z = measured.angular_velocity[0]
+        c, s, cosine = np.cos(roll), np.sin(roll), max(np.cos(pitch), 0.1)
+        about = (s * y + c * z) / cosine
+        self.sensors.rpy[0] += time * np.array([x + np.sin(pitch) * about, c * y - s * z, about])
+
+    def _lean_on_sole(self, memory: BipedMemory, share: float) -> None:
+        """Take the base to lean and turn as the joints of the leg that bears more say."""
+        sensors, pose = self.sensors, self._pose
+        self._kinematics(self._links, self._still, sensors.joint_positions[0],
+                         (self._still, sensors.joint_velocities[0]), pose, self._center,
+                         self._soles, self._weights)
+        leg = int(memory.shares[1] > memory.shares[0])
+        # The base seen from the sole: the sole's rotation from the base, transposed.
+        up = pose.turns[self._links.chains[leg, -1]][:, 2]
+        lean = np.array([np.arctan2(up[1], up[2]), np.arcsin(-np.clip(up[0], -1.0, 1.0))])
+        rpy = sensors.rpy[0]
+        rpy[:2] += share * (lean - rpy[:2])
+        rpy[2] = memory.heading[0]
+        turning = -self._soles[leg, 3:]
+        sensors.angular_velocity[0] += share * (turning - sensors.angular_velocity[0])
+        # Of a body that topples about the middle of the sole.
+        center, sole = memory.center[0], memory.pose.soles[leg]
+        topples = GRAVITY / max(center[2] - sole[2], 0.1) * (center - sole)
+        topples[2] = GRAVITY
+        sensors.acceleration[0] = memory.pose.turns[0].T @ topples
