@@ -53,7 +53,7 @@ class Body(FeedbackTrial):
         self.draws.append(found)
         return found
 
-    def run(self, scenarios, duration, gains=None):
+    def run(self, scenarios, duration, gains=None, noise=None):
         off = 0.0 if gains is None or self.flat else math.log(gains.step / BEST)
         share = self.alone if gains is None else math.exp(-2.0 * off * off)
         upright = [one < share if isinstance(one, float) else
