@@ -22,6 +22,7 @@ from cpg_ros.feedback.feedback import Feedback
 from cpg_ros.feedback.gait_tables import SLOTS
 from cpg_ros.feedback.input_monitor import Fade
 from cpg_ros.feedback.kinematics import Geometry
+from cpg_ros.feedback.leg_rates import RatesCheck
 from cpg_ros.feedback.odometry import Odometry
 from cpg_ros.feedback.plausibility import agreement
 from cpg_ros.feedback.tick import PlannedMotion
@@ -75,6 +76,7 @@ class FeedbackLoop:
         self._pattern, self._geometry, self._motion = pattern, geometry, motion
         self._inputs = inputs
         self.feedback = Feedback(geometry, joints=len(pattern.robot.joints))
+        self._rates = RatesCheck(geometry)
         self._known: list[tuple[GaitPlan, Timetable]] = []
         self._least = TOUCH * geometry.weight
         self._planned = PlannedMotion(np.zeros((1, len(pattern.robot.joints))), np.zeros(1),
@@ -93,6 +95,7 @@ class FeedbackLoop:
         self._dt, self._agrees, self.delay = 0.0, 1.0, math.inf
         self.feedback.reset()
         self._inputs.restart()
+        self._rates.restart()
         if self.odometry is not None:
             self.odometry.restart()
         self._release()
@@ -106,6 +109,10 @@ class FeedbackLoop:
     def ages(self, now: float) -> dict[str, float]:
         """Return name -> time since the last plausible message, s; inf for none."""
         return self._inputs.ages(now)
+
+    def latencies(self) -> dict[str, float]:
+        """Return name -> age of its measurements when they are used, low-passed, s."""
+        return self._inputs.latencies()
 
     def sense(self, dt: float, now: float) -> None:
         """Read the sensors and correct the coming tick by them; dt and now in s."""
@@ -136,6 +143,10 @@ class FeedbackLoop:
         """Find out what interrupts the feedback."""
         inputs = self._inputs
         found, self.waiting = inputs.faults(now)
+        if not found and (mounted := self._rates.verdict(inputs.sensor_data, self._dt)):
+            found.append(f'{inputs.monitors[0].name}: its angular velocity is not that of the '
+                         f'legs on the ground: it seems to be mounted {mounted} '
+                         '(feedback.imu_mount)')
         pattern = self._pattern
         program = pattern.program
         if program.motion.efference is None:
