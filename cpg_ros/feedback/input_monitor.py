@@ -105,7 +105,11 @@ class InputMonitor:
 
     def fault(self, now: float) -> str:
         """Say why the input is out, or ''."""
-        late, stale = self._is_late(now), now - self.believed > STALE
+        stale = now - self.believed > STALE
+        late = not stale and self._is_late(now)
+        if stale:
+            # What comes after a gap is as old as it is, whatever was before.
+            self.age, self._late = math.nan, False
         if not (late or stale):
             self.since = math.nan
             return ''

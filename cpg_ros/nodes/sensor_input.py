@@ -71,7 +71,7 @@ class SensorInput:
             leg by leg, then those that the robot file holds.
         monitors: of the inputs.
         feet: name of the source of the contacts.
-        measured: when the joints were at their angles, by the message's stamp, s; -inf at first.
+        joints: the monitor of the measured joints.
 
     """
 
@@ -124,12 +124,11 @@ class SensorInput:
             self._inputs += [_Input(node, WrenchStamped, f'{leg}/{feet}',
                                     partial(self._read_wrench, k), latest)
                              for k, leg in enumerate(self._legs)]
-        self.measured = -math.inf
         self._layout: JointLayout | None = None
         self._order, self._length = np.arange(len(self._legs)), 0
         self._memory, self._now, self._moving = np.zeros(IMU_MEMORY), 0.0, False
         turned = np.zeros(4)
-        fill_quaternion(*mount, turned)
+        fill_quaternion(mount[0], mount[1], mount[2], turned)
         self._mount = np.roll(turned, -1)
         self._heavy = np.zeros((len(self._legs), 1))
         # Types of the numbers in messages; inspecting them at every call would dominate the cost.
@@ -141,10 +140,10 @@ class SensorInput:
         self._judge_loads = bound(judge_loads, told, self._order, 0.1, 0.1, self._heavy[0],
                                   self._felt)
         self.monitors: Sequence[InputMonitor] = [one.monitor for one in self._inputs]
+        self.joints = self.monitors[1]
 
     def restart(self) -> None:
         """Forget when messages came, as where simulated time jumps back."""
-        self.measured = -math.inf
         self._memory[:] = 0.0
         for monitor in self.monitors:
             monitor.restart()
@@ -214,9 +213,6 @@ class SensorInput:
         verdict = self._judge_joints(numbers_at(data, layout.position, layout.count),
                                      numbers_at(data, layout.velocity, layout.count),
                                      layout.places, *self._limits, self._angles, self._rates)
-        if not verdict:
-            stamp = stamp_of(data)
-            self.measured = -math.inf if stamp is None else stamp
         if self._contacts == 'efforts' and not verdict:
             assert layout.effort is not None
             np.take(numbers_at(data, layout.effort, layout.count), layout.places,
