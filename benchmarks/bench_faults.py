@@ -62,7 +62,7 @@ FAULTS = {
                  'test_a_panel_that_was_stopped_publishes_zero_first',
                  'test_stop_works_from_any_page')}
 TARGETS = {'failed': 0, 'skipped': 0}
-#: Faults of sensors that stop the legs, too: the servos keep the pose of an instant in mid-trot.
+#: Faults that stop the legs, too: the servos keep the pose of an instant in mid-trot.
 LEGS_STOP = 'stalled'
 SENSOR_TARGETS = {'fell': 0, 'crossed': 0}
 #: A run goes on for so long after a fault that ends, and takes so long with one that lasts, s.
