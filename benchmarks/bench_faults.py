@@ -17,11 +17,16 @@
 The attacks are the live tests of them, which hold each message against the limits and end with the
 robot at its stand, sitting or damped; here each is repeated, on processes of its own every time.
 
-usage: bench_faults.py [--times 20] [--only NAME]
+With --sensors the faults are those of the sensors of a simulated Go2 that trots, in this process:
+each row of ``test/support/sensor_faults.py`` with some seeds. A seed draws the noise and the time
+at which the fault begins.
+
+usage: bench_faults.py [--times 20] [--only NAME] [--sensors] [--seeds 5]
 """
 
 import argparse
 from collections import Counter
+import math
 from pathlib import Path
 import subprocess
 import sys
@@ -30,6 +35,8 @@ from xml.etree import ElementTree
 
 from common import emit, log, ROOT
 from processes import enter_workspace
+
+sys.path.append(str(ROOT / 'test' / 'support'))
 
 #: Attack -> the file of its tests, and their names.
 FAULTS = {
@@ -55,6 +62,11 @@ FAULTS = {
                  'test_a_panel_that_was_stopped_publishes_zero_first',
                  'test_stop_works_from_any_page')}
 TARGETS = {'failed': 0, 'skipped': 0}
+#: Faults that stop the legs, too: the servos keep the pose of an instant in mid-trot.
+LEGS_STOP = 'stalled'
+SENSOR_TARGETS = {'fell': 0, 'crossed': 0}
+#: A run goes on for so long after a fault that ends, and takes so long with one that lasts, s.
+AFTER, LASTS = 1.5, 5.0
 
 
 def repeat(file: str, tests: list[str], times: int) -> dict[str, object]:
@@ -77,12 +89,47 @@ def repeat(file: str, tests: list[str], times: int) -> dict[str, object]:
             'first failures': reasons[:3]}
 
 
+def sensor_fault(fault: str, seeds: int) -> dict[str, object]:
+    """Let a Go2 trot with a fault of its sensors; return how many runs ended how."""
+    from faulty_go2 import FaultyGo2
+    outcomes = []
+    for seed in range(seeds):
+        robot = FaultyGo2(fault, seed)
+        ends = robot.sensors.ends
+        outcomes.append(robot.run(LASTS if math.isinf(ends) else ends + AFTER))
+    reasons = Counter(reason for one in outcomes for reason in one.faults)
+    return {'runs': seeds, 'fell': sum(one.fell for one in outcomes),
+            'crossed': sum(one.crossed for one in outcomes),
+            'without feedback at the end': sum(float(one.shares[-1]) == 0.0 for one in outcomes),
+            'reasons': [reason for reason, _ in reasons.most_common(3)]}
+
+
+def sensor_table(seeds: int, only: str) -> None:
+    """Run the table of faults of sensors."""
+    from sensor_faults import FAULTS as ROWS
+    found = {}
+    for fault in ROWS:
+        if only in fault:
+            found[fault] = sensor_fault(fault, seeds)
+            log(f'{fault}: {found[fault]}')
+    emit(benchmark='sensor_faults', robot='unitree_go2', seeds=seeds, **found,
+         targets=SENSOR_TARGETS, passed=all(
+             one[key] == target for fault, one in found.items()
+             for key, target in SENSOR_TARGETS.items()
+             if key == 'crossed' or not fault.startswith(LEGS_STOP)))
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument('--times', type=int, default=20, help='repetitions of each test')
     parser.add_argument('--only', default='', help='attacks with this in their names')
+    parser.add_argument('--sensors', action='store_true', help='faults of the sensors instead')
+    parser.add_argument('--seeds', type=int, default=5, help='of each fault of the sensors')
     given = parser.parse_args()
     enter_workspace()
+    if given.sensors:
+        sensor_table(given.seeds, given.only)
+        return
     found = {}
     for fault, (file, *tests) in FAULTS.items():
         if given.only in fault:

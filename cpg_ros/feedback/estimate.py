@@ -34,6 +34,9 @@ TOUCH, LEAVE = 0.10, 0.04
 PULL = 0.02
 #: Legs whose velocity is this far from the one expected, m/s, count half: they slip.
 SLIP = 0.25
+#: Where the legs on the ground have disagreed for longer than this, s, the estimate is wrong, not
+#: the legs: from then on SLIP grows by its own size in each time of the second, s.
+DISAGREE, WIDENS = 0.2, 0.05
 
 
 class SensorData(NamedTuple):
@@ -112,11 +115,11 @@ def velocity_by_leg(leg, joints, rates, slopes, turning, up, radius, out):
 
 
 @jit
-def update(legs, sensors, run, dt, velocity, contact, leg_velocities, scratch):
+def update(legs, sensors, run, dt, velocity, contact, doubt, leg_velocities, scratch):
     """Update the estimate of one run: velocity (3,) and contact (legs,), in place.
 
-    Scratch are leg_velocities, shape (legs, 4), each leg's estimate and its weight, and scratch,
-    shape (4, 3).
+    Of doubt, shape (runs,), that of the run is how long the legs have disagreed, s. Scratch are
+    leg_velocities, shape (legs, 4), each leg's estimate and its weight, and scratch, shape (4, 3).
     """
     rows, columns = legs.rows, legs.columns
     angles, rates = sensors.joint_positions[run], sensors.joint_velocities[run]
@@ -127,7 +130,8 @@ def update(legs, sensors, run, dt, velocity, contact, leg_velocities, scratch):
     velocity[0] += dt * (acceleration[0] - GRAVITY * up[0] - (turning[1] * vz - turning[2] * vy))
     velocity[1] += dt * (acceleration[1] - GRAVITY * up[1] - (turning[2] * vx - turning[0] * vz))
     velocity[2] += dt * (acceleration[2] - GRAVITY * up[2] - (turning[0] * vy - turning[1] * vx))
-    total = 0.0
+    total, loaded, apart = 0.0, 0.0, 0.0
+    slip = SLIP * (1.0 + max(doubt[run] - DISAGREE, 0.0) / WIDENS)
     for leg in range(rows.shape[0]):
         share, seen = max(forces[leg], 0.0) / legs.weight, leg_velocities[leg]
         contact[leg] = share > (LEAVE if contact[leg] else TOUCH)
@@ -142,8 +146,12 @@ def update(legs, sensors, run, dt, velocity, contact, leg_velocities, scratch):
         for k in range(3):
             off += (seen[k] - velocity[k])**2
         # Even where all legs slip, they count a little: integrated accelerations drift.
-        seen[3] = min(dt / PULL * share / (1.0 + off / SLIP**2), 0.5)
+        seen[3] = min(dt / PULL * share / (1.0 + off / slip**2), 0.5)
         total += seen[3]
+        loaded, apart = loaded + share, apart + (share if off > (2.0 * SLIP)**2 else 0.0)
+    if loaded > 0.0:
+        # In flight nothing is known.
+        doubt[run] = min(max(doubt[run] + (dt if apart > 0.5 * loaded else -2.0 * dt), 0.0), 1.0)
     scale = min(total, 0.9) / max(total, 1e-9)
     vx, vy, vz = velocity[0], velocity[1], velocity[2]
     for leg in range(rows.shape[0]):
@@ -155,9 +163,10 @@ def update(legs, sensors, run, dt, velocity, contact, leg_velocities, scratch):
 
 
 @entry
-def _update_all(legs, sensors, dt, velocity, contact, leg_velocities, scratch):
+def _update_all(legs, sensors, dt, velocity, contact, doubt, leg_velocities, scratch):
     for run in range(velocity.shape[0]):
-        update(legs, sensors, run, dt, velocity[run], contact[run], leg_velocities, scratch)
+        update(legs, sensors, run, dt, velocity[run], contact[run], doubt, leg_velocities,
+               scratch)
 
 
 class BodyState:
@@ -174,9 +183,10 @@ class BodyState:
         legs = len(geometry.hips)
         self.velocity = np.zeros((runs, 3))
         self.contact = np.zeros((runs, legs), dtype=bool)
+        self._doubt = np.zeros(runs)
         self.scratch = np.zeros((legs, 4)), np.zeros((4, 3))
 
     def update(self, sensors: SensorData, dt: float) -> None:
         """Update the estimate with what is measured, dt in s after the last time."""
         _update_all(self.geometry.arrays, sensors, dt, self.velocity, self.contact,
-                    *self.scratch)
+                    self._doubt, *self.scratch)

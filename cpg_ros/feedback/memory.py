@@ -25,6 +25,8 @@ import numpy as np
 COMMON = {
     'velocity': StateVariable('of the base in its own frame [m/s]', (3,)),
     'contact': StateVariable('whether each foot is on the ground', ('legs',), False),
+    'doubt': StateVariable('for how long the legs on the ground have disagreed with the velocity '
+                           '[s]'),
     'displacement': StateVariable('of each foot, smoothed [m]', ('legs', 3)),
     'stride': StateVariable("to be added to each leg's stride", ('legs',)),
     'frequency_scale': StateVariable('factor of the stride frequency', (), 1.0),

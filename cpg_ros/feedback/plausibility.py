@@ -21,7 +21,7 @@ longer than a stumble does.
 import math
 
 from cpg_ros.feedback.kinematics import GRAVITY
-from cpg_ros.integration.jit import entry
+from cpg_ros.integration.jit import entry, jit
 
 #: What is wrong with a message, by the number that the checks return.
 VERDICTS = ('', 'numbers that are not finite', 'an orientation whose length is not 1',
@@ -29,34 +29,106 @@ VERDICTS = ('', 'numbers that are not finite', 'an orientation whose length is n
             'an impossible acceleration',
             'an orientation and an angular velocity that contradict each other',
             'a joint far beyond its limits', 'an impossible speed of a joint',
-            'impossible loads on the feet')
+            'impossible loads on the feet',
+            'an acceleration that does not show gravity, 9.81 m/s^2 upward along the stated '
+            'vertical, as an IMU at rest does: wrong units, signs or mounting, or gravity removed')
 #: Length of an orientation, from 1; rad/s; m/s^2 within TELLING, in s.
 UNIT, FASTEST, HARDEST, TELLING = 0.1, 35.0, 4.0 * GRAVITY, 0.05
 #: How far orientation and the sum of angular velocities may part, rad, within a time in s, and
 #: the longest gap between messages over which they are compared, s.
 APART, FORGET, GAP = 0.15, 0.2, 0.05
+#: Orientation and angular velocity contradict each other where this share of their motion differs,
+#: until it is below the second one, averaged over a time in s, and where they move, rad.
+DIFFERS, AGREE, COMPARED, MOVES = 0.6, 0.2, 0.5, 0.01
+#: Mean acceleration may be off gravity by so much while the robot stands and while it walks, and
+#: counts as right again below the last, m/s^2.
+STANDING_OFF, WALKING_OFF, RIGHT = 2.5, 6.0, 2.0
+#: Times over which it is averaged while the robot stands and walks, and from which on it is
+#: judged, s.
+STANDING_MEAN, WALKING_MEAN, JUDGED = 0.3, 1.0, 0.25
 #: Joints beyond their limits, rad, and by how much they outrun their largest speeds.
 BEYOND, OUTRUN = 0.3, 3.0
 #: Loads of all feet within TELLING, and drawn by one, in weights.
 HEAVIEST, DRAWN = 4.0, -0.5
 #: Numbers of a sensor_msgs/Imu, and of the memory of its check: acceleration (3), vertical (3),
-#: drift of the vertical from the integrated angular velocity (3), whether there is a last message.
-IMU, IMU_MEMORY = 37, 10
+#: its recent change as the orientation (3) and as the angular velocity (3) have it, mean squares
+#: of their difference and of both, what the mean acceleration is off gravity (3), time so far,
+#: whether that is too far, whether orientation and angular velocity contradict each other, and the
+#: time since the vertical last changed.
+IMU, IMU_MEMORY = 37, 21
+
+
+@jit
+def turned_by(mount, x, y, z):
+    """Return a vector turned by a quaternion, x y z w."""
+    a, b, c, w = mount[0], mount[1], mount[2], mount[3]
+    d, e, f = 2.0 * (b * z - c * y), 2.0 * (c * x - a * z), 2.0 * (a * y - b * x)
+    return (x + w * d + b * f - c * e, y + w * e + c * d - a * f, z + w * f + a * e - b * d)
+
+
+@jit
+def _contradicts(up, turning, memory):
+    """Tell whether the vertical, in the base's frame, moves otherwise than it turns, rad/s."""
+    if up[0] == memory[3] and up[1] == memory[4] and up[2] == memory[5]:
+        # A driver may repeat an orientation, or its last message.
+        return memory[19] > 0.0
+    dt, memory[20] = memory[20], 0.0
+    # What stands still in the world turns the other way in the base's frame.
+    turned = (up[1] * turning[2] - up[2] * turning[1], up[2] * turning[0] - up[0] * turning[2],
+              up[0] * turning[1] - up[1] * turning[0])
+    known, parted, moved = memory[17] > 0.0 and dt < GAP, 0.0, 0.0
+    stays = 1.0 - min(dt / FORGET, 1.0)
+    for k in range(3):
+        stated = stays * memory[6 + k] + up[k] - memory[3 + k]
+        measured = stays * memory[9 + k] + dt * turned[k]
+        memory[3 + k] = up[k]
+        memory[6 + k], memory[9 + k] = (stated, measured) if known else (0.0, 0.0)
+        parted += (memory[6 + k] - memory[9 + k])**2
+        moved += memory[6 + k]**2 + memory[9 + k]**2
+    share = min(dt / COMPARED, 1.0)
+    memory[12] += share * (parted - memory[12])
+    memory[13] += share * (moved - memory[13])
+    if memory[13] > MOVES**2:
+        if memory[12] > DIFFERS * memory[13]:
+            memory[19] = 1.0
+        elif memory[12] < AGREE * memory[13]:
+            memory[19] = 0.0
+    return memory[19] > 0.0 or math.sqrt(parted) > APART
+
+
+@jit
+def _is_off_gravity(up, acceleration, moving, dt, memory):
+    """Tell whether the mean acceleration, m/s^2, is far from gravity along the vertical."""
+    memory[17] += dt
+    share = min(dt / min(WALKING_MEAN if moving else STANDING_MEAN, memory[17]), 1.0)
+    square = 0.0
+    for k in range(3):
+        memory[14 + k] += share * (acceleration[k] - GRAVITY * up[k] - memory[14 + k])
+        square += memory[14 + k]**2
+    off = math.sqrt(square)
+    if memory[17] > JUDGED and off > (WALKING_OFF if moving else STANDING_OFF):
+        memory[18] = 1.0
+    elif off < RIGHT:
+        memory[18] = 0.0
+    return memory[18] > 0.0
 
 
 @entry
-def judge_imu(values, dt, memory, rpy, angular_velocity, acceleration):
+def judge_imu(values, dt, moving, mount, memory, rpy, angular_velocity, acceleration):
     """Fill the last three if the message is plausible; return an index into VERDICTS, 0 for good.
 
     Args:
         values: the numbers of a sensor_msgs/Imu in its order, shape (IMU,).
         dt: since the last one, s.
+        moving: whether the robot walks.
+        mount: orientation of the IMU in the base's frame, x y z w, shape (4,).
         memory: shape (IMU_MEMORY,), zeros at first; overwritten.
-        rpy: roll, pitch and yaw, rad, shape (3,).
-        angular_velocity: of the base, rad/s, shape (3,).
-        acceleration: what the accelerometer shows, m/s^2, shape (3,).
+        rpy: roll, pitch and yaw of the base, rad, shape (3,).
+        angular_velocity: of the base in its own frame, rad/s, shape (3,).
+        acceleration: what the accelerometer shows, base's frame, m/s^2, shape (3,).
 
     """
+    memory[20] += dt
     for k in (0, 1, 2, 3, 13, 14, 15, 25, 26, 27):
         if not math.isfinite(values[k]):
             return 1
@@ -65,31 +137,31 @@ def judge_imu(values, dt, memory, rpy, angular_velocity, acceleration):
     x, y, z, w = values[0], values[1], values[2], values[3]
     if abs(math.sqrt(x * x + y * y + z * z + w * w) - 1.0) > UNIT:
         return 2
-    wx, wy, wz = values[13], values[14], values[15]
-    if math.sqrt(wx * wx + wy * wy + wz * wz) > FASTEST:
+    # The base's orientation is the IMU's after the inverse of the mount.
+    a, b, c, d = -mount[0], -mount[1], -mount[2], mount[3]
+    x, y, z, w = (w * a + x * d + y * c - z * b, w * b - x * c + y * d + z * a,
+                  w * c + x * b - y * a + z * d, w * d - x * a - y * b - z * c)
+    turning = turned_by(mount, values[13], values[14], values[15])
+    felt = turned_by(mount, values[25], values[26], values[27])
+    if math.sqrt(turning[0]**2 + turning[1]**2 + turning[2]**2) > FASTEST:
         return 4
     hard = 0.0
     for k in range(3):
-        memory[k] += min(dt / TELLING, 1.0) * (values[25 + k] - memory[k])
+        memory[k] += min(dt / TELLING, 1.0) * (felt[k] - memory[k])
         hard += memory[k] * memory[k]
     if math.sqrt(hard) > HARDEST:
         return 5
     up = (2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y))
-    # What stands still in the world turns the other way in the base's frame.
-    turned = (up[1] * wz - up[2] * wy, up[2] * wx - up[0] * wz, up[0] * wy - up[1] * wx)
-    known, parted = memory[9] > 0.0 and dt < GAP, 0.0
-    for k in range(3):
-        off = (1.0 - dt / FORGET) * memory[6 + k] + up[k] - memory[3 + k] - dt * turned[k]
-        memory[6 + k], memory[3 + k] = off if known else 0.0, up[k]
-        parted += memory[6 + k]**2
-    memory[9] = 1.0
-    if math.sqrt(parted) > APART:
+    contradicts = _contradicts(up, turning, memory)
+    if _is_off_gravity(up, felt, moving, dt, memory):
+        return 10
+    if contradicts:
         return 6
     rpy[0] = math.atan2(up[1], up[2])
     rpy[1] = math.asin(min(max(-up[0], -1.0), 1.0))
     rpy[2] = math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
     for k in range(3):
-        angular_velocity[k], acceleration[k] = values[13 + k], values[25 + k]
+        angular_velocity[k], acceleration[k] = turning[k], felt[k]
     return 0
 
 

@@ -140,7 +140,7 @@ def tick(legs, tables, gains, memory, sensors, planned, step, out):
     foot, feet = memory.scratch[0], memory.leg_velocities
     for run in range(out.shape[0]):
         memory.previous_contact[:] = memory.contact[run]
-        update(legs, sensors, run, dt, memory.velocity[run], memory.contact[run],
+        update(legs, sensors, run, dt, memory.velocity[run], memory.contact[run], memory.doubt,
                memory.leg_velocities, memory.scratch)
         wanted, velocity = memory.wanted_velocity[run], planned.velocity[run]
         # The wanted velocity is approached as strides are.

@@ -18,6 +18,7 @@ from cpg_ros.feedback.estimate import SensorData
 from cpg_ros.feedback.feedback import Feedback
 from cpg_ros.feedback.foot_force import loads_of
 from cpg_ros.feedback.kinematics import Geometry
+from cpg_ros.feedback.leg_rates import RatesCheck
 from cpg_ros.feedback.odometry import Odometry
 from cpg_ros.feedback.plausibility import (
     agreement,
@@ -37,8 +38,9 @@ def warm_up_judges(legs: int, joints: int) -> None:
     places = np.arange(joints)
     # As they come in messages: not to be written to.
     message = np.frombuffer(bytes(8 * max(IMU, joints)))
-    judge_imu(message, 0.1, np.zeros(IMU_MEMORY), sensors.rpy[0], sensors.angular_velocity[0],
-              sensors.acceleration[0])
+    judge_imu(message, 0.1, True, np.zeros(4), np.zeros(IMU_MEMORY), sensors.rpy[0],
+              sensors.angular_velocity[0], sensors.acceleration[0])
+    RatesCheck(geometry).verdict(sensors, 0.002)
     judge_joints(message, message, places, some, some, some, some, some)
     judge_loads(message, places[:legs], 1.0, 0.1, np.zeros(1), load)
 

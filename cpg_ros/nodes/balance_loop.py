@@ -79,6 +79,10 @@ class BalanceLoop:
         """Return name -> time since the last plausible message, s; inf for none."""
         return self._inputs.ages(now)
 
+    def latencies(self) -> dict[str, float]:
+        """Return name -> age of its measurements when they are used, low-passed, s."""
+        return self._inputs.latencies()
+
     @property
     def state(self) -> str:
         """What it is doing, as text."""

@@ -22,6 +22,7 @@ from cpg_ros.feedback.feedback import Feedback
 from cpg_ros.feedback.gait_tables import SLOTS
 from cpg_ros.feedback.input_monitor import Fade
 from cpg_ros.feedback.kinematics import Geometry
+from cpg_ros.feedback.leg_rates import RatesCheck
 from cpg_ros.feedback.odometry import Odometry
 from cpg_ros.feedback.plausibility import agreement
 from cpg_ros.feedback.tick import PlannedMotion
@@ -38,8 +39,6 @@ FURTHEST = 0.5
 DIES_OUT = 0.3
 #: Share of a stride, on average, in which the contacts must agree with the gait.
 AGREES = 0.5
-#: Time constant with which the age of the measured angles is low-passed, s.
-AGE_MEMORY = 0.1
 #: Wanted speeds forward and to the left, m/s, and wanted yaw rate, rad/s.
 Motion = Callable[[], tuple[float, float, float]]
 
@@ -55,7 +54,6 @@ class FeedbackLoop:
         faults: what interrupts it, such as 'imu: no messages for 3.2 s'; empty while it is active.
         waiting: whether an input has never arrived.
         share: of all corrections, 0 to 1.
-        delay: age of the measured angles when they are used, low-passed, s.
         kp_scale: factor of the servos' proportional gain.
         odometry: of the base, where it is wanted; it goes on as long as gaits are corrected.
 
@@ -75,6 +73,7 @@ class FeedbackLoop:
         self._pattern, self._geometry, self._motion = pattern, geometry, motion
         self._inputs = inputs
         self.feedback = Feedback(geometry, joints=len(pattern.robot.joints))
+        self._rates = RatesCheck(geometry)
         self._known: list[tuple[GaitPlan, Timetable]] = []
         self._least = TOUCH * geometry.weight
         self._planned = PlannedMotion(np.zeros((1, len(pattern.robot.joints))), np.zeros(1),
@@ -90,9 +89,10 @@ class FeedbackLoop:
     def restart(self) -> None:
         """Start again, as where simulated time jumps back."""
         self._fade, self.share, self._spent = Fade(), 0.0, math.inf
-        self._dt, self._agrees, self.delay = 0.0, 1.0, math.inf
+        self._dt, self._agrees = 0.0, 1.0
         self.feedback.reset()
         self._inputs.restart()
+        self._rates.restart()
         if self.odometry is not None:
             self.odometry.restart()
         self._release()
@@ -107,6 +107,16 @@ class FeedbackLoop:
         """Return name -> time since the last plausible message, s; inf for none."""
         return self._inputs.ages(now)
 
+    @property
+    def delay(self) -> float:
+        """Age of the measured angles when they are used, low-passed, s; inf if not known."""
+        age = self._inputs.joints.age
+        return math.inf if math.isnan(age) else age
+
+    def latencies(self) -> dict[str, float]:
+        """Return name -> age of its measurements when they are used, low-passed, s."""
+        return self._inputs.latencies()
+
     def sense(self, dt: float, now: float) -> None:
         """Read the sensors and correct the coming tick by them; dt and now in s."""
         inputs, pattern = self._inputs, self._pattern
@@ -116,9 +126,6 @@ class FeedbackLoop:
             return
         self._dt = dt
         inputs.take(now, pattern.level > 0.0)
-        age = now - inputs.measured
-        self.delay = (age if math.isinf(self.delay) else
-                      self.delay + min(dt / AGE_MEMORY, 1.0) * (age - self.delay))
         self._judge(now)
         self.share = self._fade.advance(self.wanted and not self.faults, dt)
         self._spent = 0.0 if self.share else self._spent + dt
@@ -136,6 +143,10 @@ class FeedbackLoop:
         """Find out what interrupts the feedback."""
         inputs = self._inputs
         found, self.waiting = inputs.faults(now)
+        if not found and (mounted := self._rates.verdict(inputs.sensor_data, self._dt)):
+            found.append(f'{inputs.monitors[0].name}: its angular velocity is not that of the '
+                         f'legs on the ground: it seems to be mounted {mounted} '
+                         '(feedback.imu_mount)')
         pattern = self._pattern
         program = pattern.program
         if program.motion.efference is None:

@@ -23,6 +23,7 @@ from cpg_ros.feedback.biped.gains import GAINS as BIPED_GAIN_OF
 from cpg_ros.feedback.froude_scaling import robot_gains
 from cpg_ros.feedback.gains import GAINS as GAIN_OF
 from cpg_ros.feedback.gains import Gains, LAWS
+from cpg_ros.feedback.input_monitor import DELAYED, LATE, LATE_BALANCE
 from cpg_ros.feedback.odometry import SCALE
 from cpg_ros.nodes.parameter_spec import fixed, one_of, Spec
 from cpg_ros.nodes.sensor_input import CONTACTS
@@ -49,6 +50,13 @@ TOPICS = fixed({
     f'{PREFIX}contacts_topic': Spec('foot_contacts', 'topic of the std_msgs/Float64MultiArray '
                                     'with the loads on the feet in N; with wrenches, the name of '
                                     "each leg's own topic, as in lh/foot_contacts"),
+    f'{PREFIX}imu_mount': Spec([0.0, 0.0, 0.0], "roll, pitch and yaw of the IMU's frame in that "
+                               'of the base [rad], as in the origin of its URDF joint; by default '
+                               'that of the robot file'),
+    f'{PREFIX}max_delay': Spec(LATE, 'largest age of measurements when they are used, by their '
+                               'stamps, low-passed over 0.1 s [s]: feedback fades out above it; '
+                               f'by default {LATE:g}, and {LATE_BALANCE:g} for a robot with soles',
+                               0.001, DELAYED),
     f'{PREFIX}odometry_topic': Spec('', 'topic of the nav_msgs/Odometry, where the base is by the '
                                     "robot's legs and IMU, such as odom; none by default"),
     f'{PREFIX}odometry_scale': Spec(1.0, 'true way over the way by odometry, of the robot and its '
@@ -87,10 +95,15 @@ def specs(robot: Robot) -> dict[str, Spec]:
         InputError: the robot file has gains of a biped that cannot be used.
 
     """
+    mount = robot.feedback.imu_mount if robot.feedback is not None else ()
+    balanced = robot.biped is not None
+    topics = {**TOPICS, **{f'{PREFIX}{name}': replace(TOPICS[f'{PREFIX}{name}'], default=value)
+                           for name, value in (('imu_mount', list(mount) or [0.0] * 3),
+                                               ('max_delay', LATE_BALANCE if balanced else LATE))}}
     if robot.biped is None:
-        return {**TOPICS, **of_gains(robot_gains(robot))}
+        return {**topics, **of_gains(robot_gains(robot))}
     own = BipedGains.of_body(robot.biped)
-    return {**TOPICS, **{name: replace(spec, default=getattr(own, name.removeprefix(PREFIX)))
+    return {**topics, **{name: replace(spec, default=getattr(own, name.removeprefix(PREFIX)))
                          for name, spec in BIPED_GAINS.items()}}
 
 

@@ -106,6 +106,7 @@ class FeedbackSwitch:
         """
         self._node, self._pattern, self._motion, self._own = node, pattern, motion, own
         self.loop: Any = None
+        self._delays_logged = False
         self._odometry: OdometryPublisher | None = None
         if refusal := self.judge([node.get_parameter(ENABLED)]):
             raise StartError(refusal)
@@ -179,8 +180,13 @@ class FeedbackSwitch:
         return loop
 
     def _inputs(self, geometry: Geometry | float) -> SensorInput:
+        mount = self._value('imu_mount')
+        if len(mount) != 3 or not np.isfinite(mount).all():
+            raise StartError(f'feedback.imu_mount is {list(mount)}: it must be roll, pitch and '
+                             'yaw in rad')
         return SensorInput(self._node, self._pattern.robot, geometry, *map(self._value, (
-            'imu_topic', 'joint_states_topic', 'contacts', 'contacts_topic')))
+            'imu_topic', 'joint_states_topic', 'contacts', 'contacts_topic', 'imu_mount',
+            'max_delay')))
 
     def _set_gains(self) -> None:
         self.loop.feedback.gains = feedback_parameters.gains(self._value)
@@ -194,6 +200,16 @@ class FeedbackSwitch:
         """Correct the coming tick by the sensors; dt in s, stamp in ns."""
         if self.loop is not None:
             self.loop.sense(dt, 1e-9 * stamp)
+            if self.loop.share > 0.0 and not self._delays_logged:
+                self._delays_logged = True
+                self._log_delays()
+
+    def _log_delays(self) -> None:
+        delays = [f'{name} {1e3 * delay:.1f} ms' for name, delay in self.loop.latencies().items()]
+        self._node.get_logger().info(
+            'feedback: age of the measurements when they are used: '
+            f'{", ".join(delays) or "unknown, messages have no stamps"} '
+            f'(feedback.max_delay {1e3 * self._value("max_delay"):.0f} ms)')
 
     def targets(self, position: np.ndarray) -> np.ndarray:
         """Return what to send to joints that are wanted at angles, rad, shape (joints,)."""
@@ -234,6 +250,11 @@ class FeedbackSwitch:
             text = f'{"waiting" if loop.waiting else "out"}: {loop.faults}'
         else:
             text = self._text()
-        ages = {} if loop is None else loop.ages(now)
-        return {'feedback': text, **{f'age of {name} [ms]': f'{1e3 * age:.1f}'
-                                     for name, age in ages.items()}}
+        if loop is None:
+            return {'feedback': text}
+        return {'feedback': text,
+                **{f'age of {name} [ms]': f'{1e3 * age:.1f}'
+                   for name, age in loop.ages(now).items()},
+                **{f'delay of {name} [ms]': f'{1e3 * delay:.1f}'
+                   for name, delay in loop.latencies().items()},
+                'largest delay [ms]': f'{1e3 * self._value("max_delay"):.1f}'}

@@ -18,7 +18,7 @@ from collections.abc import Callable, Sequence
 from functools import partial
 import math
 
-from cpg_ros.feedback.estimate import SensorData
+from cpg_ros.feedback.estimate import fill_quaternion, SensorData
 from cpg_ros.feedback.foot_force import loads_of
 from cpg_ros.feedback.input_monitor import InputMonitor
 from cpg_ros.feedback.kinematics import Geometry
@@ -56,10 +56,10 @@ Reader = Callable[[bytes, float], tuple[str, bytes, bool]]
 class _Input:
     """One topic: its newest message, what reads it, and its monitor."""
 
-    def __init__(self, node: Node, kind: type, topic: str, read: Reader) -> None:
+    def __init__(self, node: Node, kind: type, topic: str, read: Reader, latest: float) -> None:
         self.read = read
         self.messages = PolledSubscription(node, kind, topic, raw=True)
-        self.monitor = InputMonitor(topic)
+        self.monitor = InputMonitor(topic, latest)
         self.stamped = hasattr(kind, 'header')
 
 
@@ -71,12 +71,13 @@ class SensorInput:
             leg by leg, then those that the robot file holds.
         monitors: of the inputs.
         feet: name of the source of the contacts.
-        measured: when the joints were at their angles, by the message's stamp, s; -inf at first.
+        joints: the monitor of the measured joints.
 
     """
 
     def __init__(self, node: Node, robot: Robot, geometry: Geometry | float, imu: str,
-                 joints: str, contacts: str, feet: str) -> None:
+                 joints: str, contacts: str, feet: str,
+                 mount: Sequence[float] = (0.0, 0.0, 0.0), latest: float = math.inf) -> None:
         """Subscribe.
 
         Args:
@@ -88,6 +89,8 @@ class SensorInput:
             contacts: one of CONTACTS.
             feet: topic of the Float64MultiArray, or the name below each leg's of its
                 WrenchStamped.
+            mount: roll, pitch and yaw of the IMU in the base's frame, rad.
+            latest: largest age of stamped measurements when they are used, s.
 
         """
         if isinstance(geometry, Geometry):
@@ -112,38 +115,47 @@ class SensorInput:
         self._turning, self._push = senses.angular_velocity[0], senses.acceleration[0]
         self._loads = np.zeros(len(self._legs))
         self._contacts, self.feet = contacts, joints if contacts == 'efforts' else feet
-        self._inputs = [_Input(node, Imu, imu, self._read_imu),
-                        _Input(node, JointState, joints, self._read_joints)]
+        self._inputs = [_Input(node, Imu, imu, self._read_imu, latest),
+                        _Input(node, JointState, joints, self._read_joints, latest)]
         if contacts == 'foot_contacts':
-            self._inputs.append(_Input(node, Float64MultiArray, feet, self._read_loads))
+            self._inputs.append(_Input(node, Float64MultiArray, feet, self._read_loads,
+                                       latest))
         elif contacts == 'wrenches':
             self._inputs += [_Input(node, WrenchStamped, f'{leg}/{feet}',
-                                    partial(self._read_wrench, k))
+                                    partial(self._read_wrench, k), latest)
                              for k, leg in enumerate(self._legs)]
-        self.measured = -math.inf
         self._layout: JointLayout | None = None
         self._order, self._length = np.arange(len(self._legs)), 0
-        self._memory = np.zeros(IMU_MEMORY)
+        self._memory, self._now, self._moving = np.zeros(IMU_MEMORY), 0.0, False
+        turned = np.zeros(4)
+        fill_quaternion(mount[0], mount[1], mount[2], turned)
+        self._mount = np.roll(turned, -1)
         self._heavy = np.zeros((len(self._legs), 1))
         # Types of the numbers in messages; inspecting them at every call would dominate the cost.
         told = np.frombuffer(bytes(8))
-        self._judge_imu = bound(judge_imu, told, 0.1, self._memory, self._lean, self._turning,
-                                self._push)
+        self._judge_imu = bound(judge_imu, told, 0.1, True, self._mount, self._memory, self._lean,
+                                self._turning, self._push)
         self._judge_joints = bound(judge_joints, told, told, self._order, *self._limits,
                                    self._angles, self._rates)
         self._judge_loads = bound(judge_loads, told, self._order, 0.1, 0.1, self._heavy[0],
                                   self._felt)
         self.monitors: Sequence[InputMonitor] = [one.monitor for one in self._inputs]
+        self.joints = self.monitors[1]
 
     def restart(self) -> None:
         """Forget when messages came, as where simulated time jumps back."""
-        self.measured = -math.inf
+        self._memory[:] = 0.0
         for monitor in self.monitors:
             monitor.restart()
 
     def ages(self, now: float) -> dict[str, float]:
         """Return name -> time since the last plausible message, s; inf for none."""
         return {monitor.name: now - monitor.believed for monitor in self.monitors}
+
+    def latencies(self) -> dict[str, float]:
+        """Return name -> age of its measurements when they are used, low-passed, s."""
+        return {monitor.name: monitor.age for monitor in self.monitors
+                if not math.isnan(monitor.age)}
 
     def faults(self, now: float) -> tuple[list[str], bool]:
         """Return what is wrong with inputs, and whether a faulty one has never arrived."""
@@ -163,6 +175,7 @@ class SensorInput:
 
         """
         patience = 0.0 if moving else math.inf
+        self._now, self._moving = now, moving
         for one in self._inputs:
             self._take(one, now, patience)
 
@@ -179,8 +192,10 @@ class SensorInput:
             patience = FLIGHT
         monitor.note(now, stamp_of(data) if one.stamped else None, content, wrong, patience)
 
-    def _read_imu(self, data: bytes, gap: float) -> tuple[str, bytes, bool]:
-        verdict = self._judge_imu(last_numbers(data, IMU), gap, self._memory, self._lean,
+    def _read_imu(self, data: bytes, _: float) -> tuple[str, bytes, bool]:
+        # Means go on while messages are refused.
+        verdict = self._judge_imu(last_numbers(data, IMU), self.monitors[0].interval(self._now),
+                                  self._moving, self._mount, self._memory, self._lean,
                                   self._turning, self._push)
         return VERDICTS[verdict], data[-8 * IMU:], False
 
@@ -198,9 +213,6 @@ class SensorInput:
         verdict = self._judge_joints(numbers_at(data, layout.position, layout.count),
                                      numbers_at(data, layout.velocity, layout.count),
                                      layout.places, *self._limits, self._angles, self._rates)
-        if not verdict:
-            stamp = stamp_of(data)
-            self.measured = -math.inf if stamp is None else stamp
         if self._contacts == 'efforts' and not verdict:
             assert layout.effort is not None
             np.take(numbers_at(data, layout.effort, layout.count), layout.places,

@@ -34,6 +34,7 @@ class OwnFeedback(ShortRepr):
         laws: whether laws are on, by name.
         gains: by name, dimensionless: lengths as shares of the legs' length l, times of
             sqrt(l/g).
+        imu_mount: roll, pitch and yaw of the IMU's frame in the base's, rad; empty for the same.
 
     """
 
@@ -41,11 +42,13 @@ class OwnFeedback(ShortRepr):
     made: str = ''
     laws: dict[str, bool] = field(default_factory=dict)
     gains: dict[str, float] = field(default_factory=dict)
+    imu_mount: tuple[float, ...] = ()
 
 
 def read_feedback(reader: YamlReader, tree: Any) -> OwnFeedback:
     """Take the part ``feedback``; who uses laws and gains knows their names."""
-    tree = reader.keys(tree, 'feedback', set(), {'enabled', 'made', 'laws', 'gains'})
+    tree = reader.keys(tree, 'feedback', set(), {'enabled', 'made', 'laws', 'gains',
+                                                     'imu_mount'})
 
     def switch(value: Any, where: str) -> bool:
         if not isinstance(value, bool):
@@ -59,10 +62,15 @@ def read_feedback(reader: YamlReader, tree: Any) -> OwnFeedback:
         return {name: read(value, f'feedback.{key}.{name}') for name, value in own.items()}
 
     made = reader.text(tree['made'], 'feedback.made') if 'made' in tree else ''
+    mount = tree.get('imu_mount', [])
+    if not isinstance(mount, list) or len(mount) not in (0, 3):
+        raise reader.fail('feedback.imu_mount', 'must be a list of roll, pitch and yaw in rad')
     return OwnFeedback(switch(tree.get('enabled', True), 'feedback.enabled'), made,
-                       listed('laws', switch), listed('gains', reader.number))
+                       listed('laws', switch), listed('gains', reader.number),
+                       tuple(reader.number(angle, 'feedback.imu_mount') for angle in mount))
 
 
 def feedback_tree(own: OwnFeedback) -> dict[str, Any]:
     """Return what ``read_feedback`` reads back."""
-    return {key: value for key, value in vars(own).items() if value not in ('', {})}
+    tree = {key: value for key, value in vars(own).items() if value not in ('', {}, ())}
+    return {**tree, 'imu_mount': list(own.imu_mount)} if own.imu_mount else tree

@@ -31,7 +31,7 @@ from cpg_ros.feedback.kinematics import GRAVITY
 from cpg_ros.robots.biped_keys import BipedBody
 from cpg_ros.robots.robot import Robot
 from cpg_ros.simulation.biped_run import BipedOutcome, BipedRun
-from cpg_ros.simulation.feedback_tuning import more_than_chance
+from cpg_ros.simulation.feedback_benefit import more_than_chance
 from cpg_ros.simulation.scenario import impulse, SensorNoise
 from cpg_ros.simulation.terrain import Terrain
 from cpg_ros.simulation.tuning import cma_es

@@ -12,7 +12,11 @@
 # See the License for the specific language governing permissions and
 # limitations under the License.
 
-"""Whether feedback helps a robot in simulation: pushes survived with it and without it."""
+"""Whether feedback helps a robot in simulation: pushes survived with it and without it.
+
+Both meet the same pushes; sensors have noise, bias and delay, as real ones have. A paired test
+says whether what differs is more than chance.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -27,8 +31,9 @@ from cpg_ros.networks.registry import NETWORKS
 from cpg_ros.robots.feedback_keys import OwnFeedback
 from cpg_ros.robots.robot import Robot
 from cpg_ros.simulation.closed_loop import ClosedLoop
-from cpg_ros.simulation.scenario import impulse, Scenario
+from cpg_ros.simulation.scenario import impulse, Scenario, SensorNoise
 import numpy as np
+from scipy.stats import binomtest
 
 #: Impulses of pushes, as shares of m sqrt(g l) with the legs' length l.
 IMPULSES = (0.2, 0.4, 0.6)
@@ -37,8 +42,19 @@ PUSHES, UNDISTURBED, WALKED = 8, 4, 5.0
 PUSHED, WATCHED = 1.6, 3.4
 #: Froude number, v / sqrt(g l), of the speed that is asked for, and share of the fastest speed.
 FROUDE, SHARE = 0.2, 0.8
+#: Delays of the sensors, s, by turns from run to run, and what else is wrong with them.
+DELAYS = (0.01, 0.02)
+SENSORS = SensorNoise(force_bias=0.2, force_noise=0.2, orientation_bias=0.01,
+                      gyroscope_noise=0.02, gyroscope_bias=0.01, accelerometer_noise=0.3,
+                      accelerometer_bias=0.1)
 #: Laws that robots with slow joints or feet that drag are tried without, one set after the other.
 WITHOUT: Sequence[tuple[str, ...]] = ((), ('reflexes',), ('reflexes', 'posture'))
+
+
+def more_than_chance(won: int, lost: int) -> bool:
+    """Whether of runs that end in two ways more are won than lost (p < 0.05, sign test)."""
+    changed = won + lost
+    return changed > 0 and bool(binomtest(won, changed, alternative='greater').pvalue < 0.05)
 
 
 @dataclass(frozen=True)
@@ -50,6 +66,7 @@ class Benefit:
         upright: undisturbed runs with feedback that did not fall, of UNDISTURBED.
         survived: pushes with feedback, of all.
         without: the same without feedback.
+        lost: those survived without feedback only.
 
     """
 
@@ -57,16 +74,28 @@ class Benefit:
     upright: int
     survived: int
     without: int
+    lost: int
+
+    @property
+    def won(self) -> int:
+        """Pushes survived with feedback only."""
+        return self.survived - self.without + self.lost
 
     @property
     def helps(self) -> bool:
-        """Whether it fells no undisturbed robot, and saves more pushed ones than it fells."""
-        return self.upright == UNDISTURBED and self.survived > self.without
+        """Whether it fells no undisturbed robot, and more of the same pushes are survived.
+
+        More than chance would have it (p < 0.05, one-sided sign test of the pushes that end in
+        two ways: the exact form of McNemar's test).
+        """
+        return self.upright == UNDISTURBED and more_than_chance(self.won, self.lost)
 
     def __str__(self) -> str:
         pushes = PUSHES * len(IMPULSES)
         return (f'{self.gait}: {self.survived} of {pushes} pushes survived (without feedback '
-                f'{self.without}), {self.upright} of {UNDISTURBED} undisturbed runs')
+                f'{self.without}; {self.won} with it only, {self.lost} without it only), '
+                f'{self.upright} of {UNDISTURBED} undisturbed runs, sensors '
+                f'{" and ".join(f"{1e3 * delay:g}" for delay in DELAYS)} ms late')
 
 
 def program_of(robot: Robot, gait: str) -> GaitPlan:
@@ -132,11 +161,20 @@ class FeedbackTrial:
 
     def survived(self, gains: Gains | None, pushed: Sequence[Scenario]) -> np.ndarray:
         """Return which runs with pushes are survived; None for no feedback."""
-        return np.asarray(self.loop.run(pushed, WATCHED, gains).upright)
+        return self._upright(gains, pushed, WATCHED)
 
     def upright(self, gains: Gains | None) -> int:
         """Return how many undisturbed runs do not fall."""
-        return int(self.loop.run(self.calm(), WALKED, gains).upright.sum())
+        return int(self._upright(gains, self.calm(), WALKED).sum())
+
+    def _upright(self, gains: Gains | None, scenarios: Sequence[Scenario], duration: float
+                 ) -> np.ndarray:
+        found = np.zeros(len(scenarios), dtype=bool)
+        for k, delay in enumerate(DELAYS):
+            some = slice(k, None, len(DELAYS))
+            found[some] = self.loop.run(scenarios[some], duration, gains,
+                                        noise=replace(SENSORS, delay=delay)).upright
+        return found
 
 
 def judge_feedback(robot: Robot, model: str, gaits: Sequence[str], kp: float | None = None,
@@ -162,17 +200,17 @@ def judge_feedback(robot: Robot, model: str, gaits: Sequence[str], kp: float | N
     trials = {gait: FeedbackTrial(robot, model, gait, kp, kd) for gait in gaits}
     pushed = {gait: trial.pushed(np.random.default_rng(seed), PUSHES, IMPULSES)
               for gait, trial in trials.items()}
-    before = {gait: int(trial.survived(None, pushed[gait]).sum())
-              for gait, trial in trials.items()}
+    before = {gait: trial.survived(None, pushed[gait]) for gait, trial in trials.items()}
     first: list[Benefit] = []
     for without in WITHOUT:
         tried = replace(own, enabled=True, laws={**own.laws, **dict.fromkeys(without, False)})
         gains, found = robot_gains(replace(robot, feedback=tried)), []
         for gait, trial in trials.items():
-            upright = trial.upright(gains)
-            survived = (int(trial.survived(gains, pushed[gait]).sum())
-                        if upright == UNDISTURBED else 0)
-            found.append(Benefit(gait, upright, survived, before[gait]))
+            upright, old = trial.upright(gains), before[gait]
+            new = (trial.survived(gains, pushed[gait]) if upright == UNDISTURBED
+                   else np.zeros_like(old))
+            found.append(Benefit(gait, upright, int(new.sum()), int(old.sum()),
+                                 int((old & ~new).sum())))
             if not found[-1].helps:
                 break
         first = first or found

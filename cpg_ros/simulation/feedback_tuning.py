@@ -31,6 +31,7 @@ from cpg_ros.robots.robot import Robot
 from cpg_ros.simulation.feedback_benefit import (
     FeedbackTrial,
     judge_feedback,
+    more_than_chance,
     UNDISTURBED,
     WALKED,
     WATCHED,
@@ -107,12 +108,6 @@ def prices(job: PriceJob) -> list[float]:
             found[k] += (PUSH * (~after.upright).mean() + CALM * falls[:UNDISTURBED].mean()
                          + GROUND * falls[UNDISTURBED:].mean() + SPEED * error + COST * dearer)
     return (found / len(job.gaits)).tolist()
-
-
-def more_than_chance(won: int, lost: int) -> bool:
-    """Whether of runs that end in two ways more are won than lost (p < 0.05, sign test)."""
-    changed = won + lost
-    return changed > 0 and bool(binomtest(won, changed, alternative='greater').pvalue < 0.05)
 
 
 @dataclass(frozen=True)

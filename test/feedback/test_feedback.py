@@ -166,6 +166,16 @@ def test_a_foot_that_slips_is_not_believed(loop):
     assert abs(estimate.velocity[0, 0]) < 0.05
 
 
+@pytest.mark.parametrize('error', [5.0, 10.0])
+def test_an_estimate_that_ran_away_comes_back_within_a_second(loop, error):
+    """All feet stand still, whatever was integrated."""
+    estimate = BodyState(loop.geometry)
+    estimate.velocity[0] = error, -error, 0.0
+    for _ in range(round(1.0 / DT)):
+        estimate.update(standing([0.25 * loop.geometry.weight] * 4), DT)
+    assert np.abs(estimate.velocity).max() < 0.1
+
+
 # -- efference copy -----------------------------------------------------------------------------
 
 def expected_at(copy, phases, speed):

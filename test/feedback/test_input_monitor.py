@@ -14,7 +14,7 @@
 
 """Measurements that are believed, and those that are not."""
 
-from cpg_ros.feedback.input_monitor import DELAYED, InputMonitor, STALE
+from cpg_ros.feedback.input_monitor import DELAYED, InputMonitor, LATE, STALE
 from cpg_ros.feedback.plausibility import judge_joints, VERDICTS
 import numpy as np
 import pytest
@@ -66,3 +66,27 @@ def test_joints_are_where_and_as_fast_as_they_can_be(angles, speeds, why):
                            np.full(2, -1.0), np.full(2, 1.0), FASTEST, *found)
     assert VERDICTS[verdict] == why
     assert (found == ([angles, speeds] if not why else 7.0)).all()
+
+
+def late_monitor(delay, now):
+    monitor = InputMonitor('imu', latest=LATE)
+    for k in range(100):
+        now += 0.005
+        monitor.note(now, now - delay, b'%d' % k)
+        monitor.fault(now)
+    return monitor, now
+
+
+@pytest.mark.parametrize(('delay', 'late'), [(0.02, False), (0.05, True), (0.09, True)])
+def test_measurements_that_are_old_when_they_are_used_are_out(delay, late):
+    monitor, now = late_monitor(delay, 1.0)
+    assert monitor.age == pytest.approx(delay)
+    assert ('ms old when it is used, more than feedback.max_delay, 30 ms' in monitor.fault(now)
+            ) is late
+
+
+def test_the_age_before_a_gap_does_not_count_after_it():
+    monitor, now = late_monitor(0.02, 1.0)
+    assert monitor.fault(now + 1.0) == 'no messages' and np.isnan(monitor.age)
+    monitor.note(now + 1.0, now + 1.0, b'again')
+    assert not monitor.fault(now + 1.0) and monitor.age == 0.0

@@ -25,7 +25,8 @@ GO2 = load_robot('unitree_go2')
 
 
 @pytest.mark.parametrize('own', [
-    None, OwnFeedback(), OwnFeedback(False, 'by hand', {'reflexes': False}, {'step': 0.5})])
+    None, OwnFeedback(), OwnFeedback(False, 'by hand', {'reflexes': False}, {'step': 0.5},
+                                      (0.0, 0.0, 1.5708))])
 def test_what_is_written_is_read_back(tmp_path, own):
     write_robot(tmp_path / 'my.yaml', replace(GO2, feedback=own))
     assert read_robot(tmp_path / 'my.yaml').feedback == own
@@ -36,6 +37,7 @@ def test_what_is_written_is_read_back(tmp_path, own):
     ({'laws': {'reflexes': 1}}, 'feedback.laws.reflexes: must be true or false, not 1'),
     ({'gains': {'step': 'long'}}, 'feedback.gains.step'),
     ({'gains': [1.0]}, 'feedback.gains'), ({'made': 1}, 'feedback.made'),
+    ({'imu_mount': [1.57]}, 'feedback.imu_mount: must be a list of roll, pitch and yaw'),
     ({'on': True}, 'feedback.on: unknown key')])
 def test_what_is_wrong_is_said_with_its_place(tmp_path, tree, words):
     write_robot(tmp_path / 'my.yaml', GO2)

@@ -25,12 +25,12 @@ if any(importlib.util.find_spec(name) is None for name in ('mujoco', 'gym_quadru
     pytest.skip('the extra [sim] is not installed', allow_module_level=True)
 
 from cpg_ros.simulation import feedback_benefit  # noqa: I100
-from cpg_ros.simulation.feedback_benefit import judge_feedback
+from cpg_ros.simulation.feedback_benefit import Benefit, judge_feedback
 
 
 @pytest.fixture
 def quick(monkeypatch):
-    monkeypatch.setattr(feedback_benefit, 'PUSHES', 4)
+    monkeypatch.setattr(feedback_benefit, 'PUSHES', 8)
     monkeypatch.setattr(feedback_benefit, 'IMPULSES', (0.6,))
     monkeypatch.setattr(feedback_benefit, 'WALKED', 3.0)
 
@@ -38,9 +38,10 @@ def quick(monkeypatch):
 def test_feedback_that_saves_a_robot_is_on(quick):
     robot, (one,) = judge_feedback(replace(GO2, feedback=None), 'go2', ['trot'], seed=4)
     assert one.helps and one.upright == 4 and one.survived > one.without
+    assert one.won - one.lost == one.survived - one.without
     assert robot.feedback.enabled and not robot.feedback.laws
     assert robot.feedback.made == f'in simulation, {one}'
-    assert f'{one.survived} of 4 pushes survived (without feedback {one.without})' in str(one)
+    assert f'{one.survived} of 8 pushes survived (without feedback {one.without};' in str(one)
     assert replace(robot, feedback=None) == replace(GO2, feedback=None)
 
 
@@ -51,3 +52,25 @@ def test_feedback_that_fells_a_robot_is_off_and_its_own_gains_stay(quick, monkey
     robot, (one,) = judge_feedback(replace(GO2, feedback=own), 'go2', ['trot'], seed=4)
     assert not one.helps
     assert robot.feedback == replace(own, enabled=False, made=f'in simulation, {one}')
+
+
+@pytest.mark.parametrize(('survived', 'without', 'lost', 'helps'), [
+    (12, 11, 0, False), (12, 7, 0, True), (12, 7, 3, False), (24, 24, 0, False)])
+def test_one_survivor_more_does_not_say_that_it_helps(survived, without, lost, helps):
+    assert Benefit('trot', 4, survived, without, lost).helps is helps
+
+
+def test_it_is_judged_on_late_and_noisy_sensors(quick, monkeypatch):
+    seen = []
+    run = feedback_benefit.ClosedLoop.run
+
+    def record(self, *arguments, noise=None, **options):
+        seen.append(noise)
+        return run(self, *arguments, noise=noise, **options)
+
+    monkeypatch.setattr(feedback_benefit.ClosedLoop, 'run', record)
+    monkeypatch.setattr(feedback_benefit, 'WALKED', 0.5)
+    monkeypatch.setattr(feedback_benefit, 'WATCHED', 0.5)
+    judge_feedback(replace(GO2, feedback=None), 'go2', ['trot'], seed=4)
+    assert {one.delay for one in seen} == {0.01, 0.02}
+    assert all(one.gyroscope_noise and one.accelerometer_noise and one.force_noise for one in seen)

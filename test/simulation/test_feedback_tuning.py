@@ -53,7 +53,7 @@ class Body(FeedbackTrial):
         self.draws.append(found)
         return found
 
-    def run(self, scenarios, duration, gains=None):
+    def run(self, scenarios, duration, gains=None, noise=None):
         off = 0.0 if gains is None or self.flat else math.log(gains.step / BEST)
         share = self.alone if gains is None else math.exp(-2.0 * off * off)
         upright = [one < share if isinstance(one, float) else
@@ -112,7 +112,7 @@ def test_better_gains_of_a_feedback_that_does_not_help_leave_it_off(body, monkey
     monkeypatch.setattr(body, 'alone', 1.0)
     robot, found = tune_feedback(ROBOT, 'go2', ['trot'], 160, 5)
     assert found.better and 'step' in robot.feedback.gains and not robot.feedback.enabled
-    assert '(without feedback 24)' in robot.feedback.made
+    assert '(without feedback 24; 0 with it only' in robot.feedback.made
 
 
 @pytest.mark.parametrize('after, lost, fell, better', [

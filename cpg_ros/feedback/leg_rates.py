@@ -1,0 +1,137 @@
+# Copyright 2026 cpg_ros maintainers
+#
+# Licensed under the Apache License, Version 2.0 (the "License");
+# you may not use this file except in compliance with the License.
+# You may obtain a copy of the License at
+#
+#     http://www.apache.org/licenses/LICENSE-2.0
+#
+# Unless required by applicable law or agreed to in writing, software
+# distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied.
+# See the License for the specific language governing permissions and
+# limitations under the License.
+
+"""Comparison of the measured angular velocity with the motion of the legs on the ground.
+
+Two feet that stand keep their distance and its direction in the world, so the legs' kinematics
+show how the base turns about every axis but the line from one foot to the other. An IMU that is
+mounted turned about the vertical contradicts nothing but this.
+"""
+
+from collections.abc import Callable
+
+from cpg_ros.feedback.estimate import SensorData, TOUCH, velocity_by_leg
+from cpg_ros.feedback.kinematics import foot_of, Geometry
+from cpg_ros.integration.jit import bound, entry, jit
+import numpy as np
+
+#: Ways of mounting the IMU, each with the measured x and y axis in the base's frame: as it should
+#: be, turned by quarters about z, and the same with its pitch mirrored.
+MOUNTS = np.array([[1.0, 0.0, 0.0, 1.0], [0.0, 1.0, -1.0, 0.0], [-1.0, 0.0, 0.0, -1.0],
+                   [0.0, -1.0, 1.0, 0.0], [1.0, 0.0, 0.0, -1.0], [0.0, 1.0, 1.0, 0.0],
+                   [-1.0, 0.0, 0.0, 1.0], [0.0, -1.0, -1.0, 0.0]])
+#: What each of MOUNTS means for a user.
+MOUNTED = ('', 'turned by 90 degrees about z', 'turned by 180 degrees about z',
+           'turned by -90 degrees about z', *['with a wrong sign of an axis'] * 4)
+#: Numbers of the memory: for each of MOUNTS the mean square of the part of the feet's relative
+#: motion that it leaves unexplained, (rad/s)^2; the time with two feet on the ground, s; the
+#: verdict.
+RATES_MEMORY = len(MOUNTS) + 2
+#: Time on two feet over which the squares are averaged, s, and from which on they are judged, s.
+MEAN, LEAST = 1.0, 0.15
+#: Feet that slip: their samples count half from this mismatch on, rad/s.
+SLIPS = 0.2
+#: A mount is judged wrong if another one leaves less than this share unexplained, and more than
+#: this is unexplained, (rad/s)^2.
+BETTER, MOVES = 0.5, 0.0025
+
+
+@jit
+def _add(leg, other, turning, dt, memory):
+    """Add a pair of feet that stand, each with its velocity at rest and its place, shape (6,)."""
+    count, least = len(MOUNTS), np.inf
+    ax, ay, az = leg[3] - other[3], leg[4] - other[4], leg[5] - other[5]
+    square = ax * ax + ay * ay + az * az
+    off = np.empty(count)
+    for k in range(count):
+        mount = MOUNTS[k]
+        x = mount[0] * turning[0] + mount[2] * turning[1]
+        y = mount[1] * turning[0] + mount[3] * turning[1]
+        z = turning[2]
+        ex = leg[0] - other[0] - (y * az - z * ay)
+        ey = leg[1] - other[1] - (z * ax - x * az)
+        ez = leg[2] - other[2] - (x * ay - y * ax)
+        along = ex * ax + ey * ay + ez * az
+        off[k] = (ex * ex + ey * ey + ez * ez - along * along / square) / square
+        least = min(least, off[k])
+    memory[count] += dt
+    share = min(dt / min(MEAN, memory[count]), 1.0) / (1.0 + least / SLIPS**2)
+    for k in range(count):
+        memory[k] += share * (off[k] - memory[k])
+
+
+@entry
+def compare_rates(legs, sensors, dt, memory, seen, scratch):
+    """Update memory with what is measured now; return an index into MOUNTED, 0 for good.
+
+    Args:
+        legs: LegArrays of the robot.
+        sensors: SensorData of one run.
+        dt: since the last time, s.
+        memory: shape (RATES_MEMORY,), zeros at first; overwritten.
+        seen: scratch, shape (legs, 6).
+        scratch: shape (4, 3).
+
+    """
+    rows, columns, forces = legs.rows, legs.columns, sensors.foot_forces[0]
+    angles, rates, turning = (sensors.joint_positions[0], sensors.joint_velocities[0],
+                              sensors.angular_velocity[0])
+    load, slopes, now = 2.0 * TOUCH * legs.weight, scratch[:3], scratch[3]
+    count = len(MOUNTS)
+    for leg in range(rows.shape[0]):
+        if forces[leg] < load or rows[leg, 1] == 0.0:
+            continue
+        one, two, three = columns[leg, 0], columns[leg, 1], columns[leg, 2]
+        now[0], now[1], now[2] = angles[one], angles[two], angles[three]
+        velocity_by_leg(rows[leg], now, (rates[one], rates[two], rates[three]), slopes,
+                        (0.0, 0.0, 0.0), (0.0, 0.0, 1.0), legs.radius, seen[leg])
+        seen[leg, 3], seen[leg, 4], seen[leg, 5] = foot_of(rows[leg], now[0], now[1], now[2])
+        for other in range(leg):
+            if forces[other] >= load and rows[other, 1] != 0.0:
+                _add(seen[leg], seen[other], turning, dt, memory)
+    best = 0
+    for k in range(1, count):
+        best = k if memory[k] < memory[best] else best
+    if memory[count] > LEAST:
+        if best and memory[0] > MOVES and memory[best] < BETTER * memory[0]:
+            memory[count + 1] = best
+        elif best == 0:
+            memory[count + 1] = 0.0
+    return int(memory[count + 1])
+
+
+class RatesCheck:
+    """Comparison of the angular velocity of one robot's IMU with the motion of its legs."""
+
+    def __init__(self, geometry: Geometry) -> None:
+        self._legs, self._memory = geometry.arrays, np.zeros(RATES_MEMORY)
+        self._scratch = np.zeros((len(geometry.hips), 6)), np.zeros((4, 3))
+        self._kernel: Callable | None = None
+
+    def restart(self) -> None:
+        """Forget what was measured."""
+        self._memory[:] = 0.0
+
+    def verdict(self, sensors: SensorData, dt: float) -> str:
+        """Return how the IMU is mounted wrong according to what is measured now, or ''.
+
+        Args:
+            sensors: of one run.
+            dt: since the last time, s.
+
+        """
+        arguments = self._legs, sensors, dt, self._memory, *self._scratch
+        if self._kernel is None:
+            self._kernel = bound(compare_rates, *arguments)
+        return MOUNTED[self._kernel(*arguments)]
