@@ -122,7 +122,8 @@ def robot_of(stretches: Sequence[StretchFit], robot: Robot | None) -> Robot:
                                      velocity=max(known.velocity, joint.velocity))
     motions = {gait: Motion(float(fit.stride.frequency), {
         name: JointMotion(offset, tuple(weights)) for name, (offset, weights)
-        in fit.fit.readouts.items()}) for gait, fit in longest.items()}
+        in fit.fit.readouts.items()}, duty=fit.fit.duty, stance=fit.fit.stance)
+        for gait, fit in longest.items()}
     legs = {leg: tuple(bounds[joint.name] for joint in joints)
             for leg, joints in made[0].legs.items()}
     return replace(made[0], legs=legs, motions=motions)

@@ -56,7 +56,7 @@ def fitted_robot(found: RecordingFit, robot: Robot | None) -> Robot:
     """
     fit = found.fit
     # Without its frequency the gait would run at the generator's usual one.
-    motions = {fit.gait: Motion(float(found.stride.frequency))}
+    motions = {fit.gait: Motion(float(found.stride.frequency), duty=fit.duty, stance=fit.stance)}
     if robot is not None:
         legs = {leg: tuple(_moved(joint, found) for joint in joints)
                 for leg, joints in robot.legs.items()}
@@ -116,10 +116,11 @@ def running_parameters(found: RecordingFit, robot: Robot | None = None) -> dict[
     if robot is None:
         return wanted
     motion = robot.motion(fit.gait, fit.gait)
-    # What was fitted is not retimed: the legs stand for as long as they do by themselves.
+    # What was fitted without a duty has legs stand for as long as they do by themselves.
     own = (standing(fit.orbit, robot.leg_cells, fit.harmonics)[1].mean() if motion.stance is None
            else motion.stance[1])
-    return {**wanted, 'amplitude': 1.0, 'duty': 0.0 if motion.duty is None else float(own),
+    duty = fit.duty or (0.0 if motion.duty is None else float(own))
+    return {**wanted, 'amplitude': 1.0, 'duty': duty,
             **{READOUT + name: [float(offset), *map(float, weights)]
                for name, (offset, weights) in fit.readouts.items()}}
 
