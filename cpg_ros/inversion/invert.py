@@ -111,8 +111,8 @@ def invert(cycle: MeanCycle, cells: Mapping[str, int], network: Network, gait: s
     if best.why:
         raise NoOrbit(trials[0].why)
     with suppress(NoOrbit):
-        if not starts and (turned := upside_down(problem, best.values)) is not None:
-            trials.append(_trial(problem, turned, weigh=False))
+        if not starts and (other := upside_down(problem, best.values)) is not None:
+            trials.append(_trial(problem, other, weigh=False))
     values = _weighed(problem, best.values)
     problem.hold(values)
     values, others, turned = _preferred(problem, values, trials)

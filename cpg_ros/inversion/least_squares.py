@@ -185,7 +185,7 @@ class CycleProblem:
                           self.readout.stance)
 
     def _retimed(self, orbit: Orbit, seen: Signals, cell: int, lead: int, values: np.ndarray
-                 ) -> tuple[np.ndarray, float, np.ndarray, np.ndarray] | None:
+                 ) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
         """Return what the gait's duty makes of the phases of a cell, or None if there is none.
 
         Phases at which joints are read on theta, cycles, and their derivatives as of

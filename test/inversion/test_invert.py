@@ -269,7 +269,7 @@ def test_cells_come_from_legs_or_a_robot():
 
 @pytest.mark.parametrize(('change', 'message'), [
     ({'order': 4}, 'order 4'), ({'free': ('q',)}, "'q' is not one of"),
-    ({'free': ('c', 'c')}, "'c, c'"), ({'starts': ()}, 'no start'),
+    ({'free': ('c', 'c')}, "'c, c'"),
     ({'starts': [{'tau': 0.4}]}, "'tau' is not free"),
     ({'starts': [{'c': 50.0}]}, 'c 50 to start'),
     ({'bounds': {'tau': (0.1, 1.0)}}, "'tau' has bounds"), ({'bounds': {'c': (7.0, 6.0)}}, 'c: '),
