@@ -39,10 +39,10 @@ from cpg_ros.inversion.fit_data import joints_of  # noqa: E402
 from cpg_ros.inversion.free_parameters import free_numbers  # noqa: E402
 from cpg_ros.inversion.invert import invert, TOLERANCE  # noqa: E402
 from cpg_ros.inversion.least_squares import CycleProblem  # noqa: E402
+from cpg_ros.inversion.leg_duty import GaitReadout  # noqa: E402
 from cpg_ros.inversion.trust_region import minimise  # noqa: E402
 from cpg_ros.motion.joint_polynomial import monomials, TURN  # noqa: E402
 from cpg_ros.networks.delayed import Delayed, PRESETS  # noqa: E402
-from cpg_ros.robots.robot import HARMONICS  # noqa: E402
 from made_up import record, weights_of  # noqa: E402
 
 CELLS = (1, 1, 7, 2, 2, 8, 3, 3, 5, 4, 4, 6)
@@ -132,7 +132,7 @@ def main() -> None:
     high = np.array([*(one.high for one in numbers), np.inf])
 
     def posed() -> CycleProblem:
-        return CycleProblem(joints, joints.stated, start, GAIT, numbers, 3, HARMONICS)
+        return CycleProblem(joints, joints.stated, start, GAIT, numbers, 3, GaitReadout())
 
     def begun(problem: CycleProblem) -> np.ndarray:
         values = np.array([*START.values(), 0.0])

@@ -40,7 +40,6 @@ def warm_up_judges(legs: int, joints: int) -> None:
     message = np.frombuffer(bytes(8 * max(IMU, joints)))
     judge_imu(message, 0.1, True, np.zeros(4), np.zeros(IMU_MEMORY), sensors.rpy[0],
               sensors.angular_velocity[0], sensors.acceleration[0])
-    RatesCheck(geometry).verdict(sensors, 0.002)
     judge_joints(message, message, places, some, some, some, some, some)
     judge_loads(message, places[:legs], 1.0, 0.1, np.zeros(1), load)
 
@@ -51,6 +50,7 @@ def warm_up(geometry: Geometry, joints: int) -> None:
     warm_up_judges(legs, joints)
     sensors, some, load = SensorData.zeros(1, legs, joints), np.zeros(joints), np.zeros(legs)
     one = np.zeros(1)
+    RatesCheck(geometry).verdict(sensors, 0.002)
     loads_of(geometry.rows, geometry.columns, some, some, 0.0, 0.0, load)
     agreement(load, 1.0, np.zeros(legs, dtype=bool), 0.1, 1.0)
     planned = PlannedMotion(some[None], one, np.zeros((1, 2), dtype=np.int64), one.copy(),

@@ -44,7 +44,7 @@ class FitSettings:
     preset: str = ''
     free: tuple[str, ...] = ()
     order: int = 3
-    starts: tuple[Mapping[str, float], ...] = ({},)
+    starts: tuple[Mapping[str, float], ...] = ()
     #: As of read_recording; each is for those recordings whose format has it.
     reading: Mapping[str, Any] = field(default_factory=dict)
 

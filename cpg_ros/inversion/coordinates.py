@@ -41,19 +41,24 @@ class Coordinates:
 
     The phase, which comes last, and all numbers but a free delay are their own coordinates. A
     delay with bounds of its own is, too.
+
+    Attributes:
+        free: the free numbers.
+        delay: index of the one that is measured by its critical value, -1 for none.
+
     """
 
     def __init__(self, network: Network, gait: str, free: Sequence[Free]) -> None:
         self._network, self._gait, self.free = network, gait, tuple(free)
         whole = network.ranges.get(network.delay_parameter)
-        self._delay = next((k for k, one in enumerate(free) if whole
+        self.delay = next((k for k, one in enumerate(free) if whole
                             and one.name == network.delay_parameter
                             and (one.low, one.high) == (whole.low, whole.high)), -1)
 
     @property
     def straight(self) -> bool:
         """Whether all numbers are their own coordinates."""
-        return self._delay < 0
+        return self.delay < 0
 
     def _onset(self, values: np.ndarray) -> HopfPoint:
         there = with_values(self._network, self.free, values[:len(self.free)])
@@ -68,17 +73,17 @@ class Coordinates:
         """Coordinates of values; NoOrbit where the gait is born at no delay."""
         found = np.array(values, dtype=float)
         if not self.straight:
-            found[self._delay] /= self._onset(found).value
+            found[self.delay] /= self._onset(found).value
         return found
 
     def values(self, coordinates: np.ndarray) -> np.ndarray:
         """Values at coordinates; NoOrbit as in of, or where the delay leaves its range."""
         found = np.array(coordinates, dtype=float)
         if not self.straight:
-            found[self._delay] *= self._onset(found).value
-            one = self.free[self._delay]
-            if not one.low <= found[self._delay] <= one.high:
-                raise NoOrbit(f'{one.name} {found[self._delay]:g} is not within {one.low:g} to '
+            found[self.delay] *= self._onset(found).value
+            one = self.free[self.delay]
+            if not one.low <= found[self.delay] <= one.high:
+                raise NoOrbit(f'{one.name} {found[self.delay]:g} is not within {one.low:g} to '
                               f'{one.high:g}')
         return found
 
@@ -86,7 +91,7 @@ class Coordinates:
         """Return the derivatives of the values by the coordinates, shape (n, n)."""
         found = np.eye(coordinates.size)
         if not self.straight:
-            point, k = self._onset(coordinates), self._delay
+            point, k = self._onset(coordinates), self.delay
             slopes = point.slopes
             for j, one in enumerate(self.free):
                 found[k, j] = coordinates[k] * slopes.get(one.name, 0.0)
@@ -108,11 +113,11 @@ class Coordinates:
             return []
         here, found = self.of(values), []
         low, high = self._bounds(values)
-        others = [j for j in range(len(self.free)) if j != self._delay]
-        for late in LATE if not others else (NEAR, here[self._delay]):
+        others = [j for j, one in enumerate(self.free) if j != self.delay and one.members]
+        for late in LATE if not others else (NEAR, here[self.delay]):
             for j, factor in [(j, factor) for j in others for factor in FACTORS] or [(-1, 1.0)]:
                 there = here.copy()
-                there[self._delay] = late
+                there[self.delay] = late
                 there[j] *= factor
                 with suppress(NoOrbit):
                     found.append(self.values(np.clip(there, low, high)))
@@ -121,13 +126,13 @@ class Coordinates:
     def _bounds(self, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Bounds of the coordinates; a single number's are those of its Hopf set, too."""
         free = self.free
-        if len(free) == 1 and self.straight:
+        if len(free) == 1 and self.straight and free[0].members:
             there = with_values(self._network, free, values[:1])
             free = (within_hopf_set(there, self._gait, free[0]),)
         low = np.array([*(one.low for one in free), -np.inf])
         high = np.array([*(one.high for one in free), np.inf])
         if not self.straight:
-            low[self._delay], high[self._delay] = 1.0 + ABOVE, np.inf
+            low[self.delay], high[self.delay] = 1.0 + ABOVE, np.inf
         return low, high
 
     def descend(self, evaluate: Evaluate, start: np.ndarray, tolerance: float, most: int = 100

@@ -25,12 +25,16 @@ from cpg_ros.dynamics.periodic import NoOrbit
 from cpg_ros.inversion.fit_data import MeanCycle
 from cpg_ros.inversion.gait_fit import Fit
 from cpg_ros.inversion.invert import invert
+from cpg_ros.inversion.leg_duty import GAIT_DUTY, GaitReadout
 from cpg_ros.motion.plan import refusal
 from cpg_ros.networks.network import Network
 import numpy as np
 
 #: Half the range of a parameter that keeps its value, over that value.
 STAYS = 1e-9
+#: A duty that no robot file states is one of the recording's where legs that stand as the cells
+#: do fit worse by this many standard errors, or where it is known to this standard error.
+ASKED, KNOWN = 3.3, 0.03
 #: Names, order and starts of a fit, and what they are in words.
 Way = tuple[tuple[str, ...], int, Sequence[Mapping[str, float]], str]
 
@@ -38,19 +42,24 @@ Way = tuple[tuple[str, ...], int, Sequence[Mapping[str, float]], str]
 def _ways(names: tuple[str, ...], order: int, starts: Sequence[Mapping[str, float]]
           ) -> Iterator[Way]:
     yield names, order, starts, ''
-    if any(starts):
-        yield names, order, ({},), 'fitted from the start of the preset'
+    if starts:
+        yield names, order, (), 'fitted from the start of the preset'
     for lower in range(order - 1, 0, -1):
-        yield names, lower, ({},), f'fitted with readouts of order {lower}'
+        yield names, lower, (), f'fitted with readouts of order {lower}'
     for name in names if len(names) > 1 else ():
-        yield (name,), order, ({},), f'fitted with {name} free alone'
+        yield (name,), order, (), f'fitted with {name} free alone'
 
 
 def fit_with_fallbacks(cycle: MeanCycle, cells: Mapping[str, int], network: Network, gait: str,
-                       free: Sequence[str], order: int, starts: Sequence[Mapping[str, float]],
+                       free: Sequence[str] = (), order: int = 3,
+                       starts: Sequence[Mapping[str, float]] = (),
+                       readout: GaitReadout | None = None,
                        done: Callable[[float], None] = lambda share: None
                        ) -> tuple[Fit, tuple[str, ...]]:
     """Fit with these names and this order, or as near to them as the generator runs.
+
+    Without names, the usual ones and the duty of the gait are fitted; the duty only if the readout
+    has one, or else if the recording tells it from that of the network's cells.
 
     Args: as of invert.
 
@@ -62,36 +71,68 @@ def fit_with_fallbacks(cycle: MeanCycle, cells: Mapping[str, int], network: Netw
         NoOrbit: not even the parameters given have an orbit that the generator runs.
 
     """
-    if not (free or network.free):
-        # Phases are known beforehand, and no other parameter shows.
-        return _as_it_is(cycle, cells, network, gait, order, done), ()
-    first = ''
-    for names, lower, begins, relaxation in _ways(tuple(free or network.free), order, starts):
+    readout = readout or GaitReadout.of(type(network), gait)
+    first, known = '', tuple(free) or network.free
+
+    def fitted(names: tuple[str, ...], lower: int, begins: Sequence[Mapping[str, float]]
+               ) -> tuple[Fit, tuple[str, ...]]:
+        if not names:
+            # Phases are known beforehand, and no other parameter shows.
+            return _as_it_is(cycle, cells, network, gait, lower, readout, done), ()
+        return invert(cycle, cells, network, gait, names, lower, begins, readout=readout,
+                      done=done), ()
+
+    for names, lower, begins, relaxation in _ways(known, order, starts):
         try:
-            fit = invert(cycle, cells, network, gait, names, lower, begins, done=done)
+            if free or begins:
+                fit, notes = fitted(names, lower, begins)
+            elif readout.duty is not None:
+                fit, notes = fitted((*names, GAIT_DUTY), lower, begins)
+            else:
+                fit, notes = _with_duty_if_told(names, lower, fitted)
         except NoOrbit as error:
             first = first or str(error)
             continue
         flaw = refusal(fit.orbit, gait, fit.harmonics)
         if not flaw:
-            return fit, (f'not fitted as asked for: {first}; {relaxation} instead',
-                         ) if relaxation else ()
+            return fit, (*notes, *((f'not fitted as asked for: {first}; {relaxation} instead',)
+                                   if relaxation else ()))
         first = first or f'the generator would refuse the {gait} that fits best: {flaw}'
-    fit = _as_it_is(cycle, cells, network, gait, order, done)
+    fit = _as_it_is(cycle, cells, network, gait, order, readout, done)
     if flaw := refusal(fit.orbit, gait, fit.harmonics):
         raise NoOrbit(f'{first}; nor does the generator run the parameters given: {flaw}')
     return fit, (f'not fitted as asked for: {first}; the parameters stay those of the preset, '
                  'only the readouts are fitted',)
 
 
+def _with_duty_if_told(names: tuple[str, ...], order: int,
+                       fitted: Callable[..., tuple[Fit, tuple[str, ...]]]
+                       ) -> tuple[Fit, tuple[str, ...]]:
+    """Fit with legs that stand as the cells do, unless the recording tells another duty."""
+    try:
+        other, _ = fitted((*names, GAIT_DUTY), order, ())
+    except NoOrbit:
+        return fitted(names, order, ())
+    own, _ = fitted(names, order, [{}, *(dict(zip(names, one.values.tolist(), strict=False))
+                                         for one in other.minima)])
+    sizes = np.array(list(other.sizes.values()))[:, None]
+    rise = 0.5 * float(np.sum((own.errors / sizes)**2)) - other.cost
+    if rise > 0.5 * ASKED**2 * other.sharing:
+        return other, ()
+    error = other.parameters[GAIT_DUTY].stderr
+    return own, () if error < KNOWN else (
+        'the recording does not tell how long legs stand: they are taken to stand as the cells of '
+        'the network do, and the intervals hold for that alone',)
+
+
 def _as_it_is(cycle: MeanCycle, cells: Mapping[str, int], network: Network, gait: str, order: int,
-              done: Callable[[float], None]) -> Fit:
+              readout: GaitReadout, done: Callable[[float], None]) -> Fit:
     """Fit readouts to the gait of a network whose parameters stay."""
     name = next(iter(network.parameters()))
     value, kind = float(network.as_dict()[name]), network.ranges[name]
     room = STAYS * max(abs(value), 1.0)
     bounds = {name: (max(kind.low, value - room), min(kind.high, value + room))}
-    fit = invert(cycle, cells, network, gait, (name,), order, bounds=bounds, profiles=False,
-                 done=done)
+    fit = invert(cycle, cells, network, gait, (name,), order, ({},), readout=readout,
+                 bounds=bounds, profiles=False, done=done)
     # The parameter was never fitted: an interval would claim what is not known.
     return replace(fit, parameters={}, correlation=np.empty((0, 0)), warnings=())

@@ -153,7 +153,7 @@ def stretch(found: RecordingFit) -> Figure:
 
 def convergence(found: RecordingFit) -> Figure:
     """Objective and parameters over the iterations of each start."""
-    names = list(found.fit.parameters)
+    names = found.fit.free
     trials = [trial for trial in found.fit.starts if len(trial.path)]
     figure = Figure((3.4 * (1 + len(names)), 2.6), layout='constrained')
     grid = figure.subplots(1, 1 + len(names), squeeze=False)

@@ -70,7 +70,7 @@ def joints(found: RecordingFit) -> list[tuple[str, ...]]:
 
 def starts(found: RecordingFit) -> list[tuple[str, ...]]:
     """Rows of the starts as in Liu & Zhang's Tables 1 and 2, with a head."""
-    names = list(found.fit.parameters)
+    names = found.fit.free
     rows: list[tuple[str, ...]] = [('start', 'iterations', 'half the sum of squares', 'end')]
     for trial in found.fit.starts:
         begin, end = (', '.join(f'{name} {value:.4f}' for name, value
@@ -78,6 +78,14 @@ def starts(found: RecordingFit) -> list[tuple[str, ...]]:
                       for values in (trial.start, trial.values))
         rows.append((begin, str(trial.iterations), f'{trial.cost:.6g}', trial.why or end))
     return rows
+
+
+def _minima(found: RecordingFit) -> str:
+    fit = found.fit
+    return 'Distinct minima of the starts: ' + '; '.join(
+        ', '.join(f'{name} {value:.4g}' for name, value in
+                  zip(fit.free, trial.values, strict=False)) + f' ({trial.cost:.6g})'
+        for trial in fit.minima) + '.'
 
 
 def _judged(found: RecordingFit) -> list[str]:
@@ -108,7 +116,7 @@ def as_text(found: RecordingFit) -> str:
     lines = [*_stride(found), '', *table(parameters(found), '<>>'), '',
              *table(joints(found), '<>>>'), _shares(found), '']
     if len(found.fit.starts) > 1:
-        lines += [*table(starts(found), '<>>'), '']
+        lines += [*table(starts(found), '<>>'), _minima(found), '']
     lines += [*_judged(found), *(f'note: {note}' for note in notes),
               *(f'warning: {warning}' for warning in found.warnings)]
     return '\n'.join(lines)
@@ -184,7 +192,7 @@ def as_html(found: RecordingFit) -> str:
     parts += _strides(found)
     for name, draw in FIGURES:
         parts += [f'<h2>{escape(name)}</h2>', _image(draw(found), name)]
-    parts += ['<h2>Starts</h2>', _html_table(starts(found))]
+    parts += ['<h2>Starts</h2>', _html_table(starts(found)), paragraphs([_minima(found)])]
     notes = [*found.recording.notes, *found.stride.notes]
     if notes:
         parts += ['<h2>Notes</h2>', paragraphs(notes)]

@@ -35,7 +35,8 @@ class Free:
 
     Attributes:
         name: of a parameter, or of a group of them.
-        members: parameters that take its value: those that the gait's symmetry needs equal.
+        members: parameters that take its value: those that the gait's symmetry needs equal; none
+            if it is not the network's.
         low, high: bounds.
 
     """

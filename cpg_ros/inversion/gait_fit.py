@@ -20,18 +20,29 @@ from functools import cached_property
 from cpg_ros.dynamics.gait_assessment import GaitAssessment
 from cpg_ros.dynamics.hopf_point import first_hopf, HopfPoint
 from cpg_ros.dynamics.periodic import Orbit
+from cpg_ros.inversion.fit_starts import distinct
 from cpg_ros.inversion.identifiability import Estimate
 from cpg_ros.inversion.trust_region import Minimisation
-from cpg_ros.inversion.variable_projection import basis
-from cpg_ros.inversion.waveform_harmonics import signals
 from cpg_ros.networks.network import Network
 from cpg_ros.short_repr import ShortRepr, shown
 import numpy as np
 
-#: Phases between recording and orbit that are tried.
-SHIFTS = 120
 #: A joint whose mean cycle has a smaller range stands (rad).
 STANDS = 0.01
+
+
+def mean_share(recorded: np.ndarray, errors: np.ndarray) -> float:
+    """Return the mean of RMS error over range over the joints that move; 0 if none does.
+
+    Args:
+        recorded: rad, shape (joints, m).
+        errors: fitted minus recorded, rad, the same.
+
+    """
+    spans = np.ptp(recorded, axis=1)
+    moving = spans > STANDS
+    shares = np.sqrt(np.mean(errors[moving]**2, axis=1)) / spans[moving]
+    return float(shares.sum() / max(shares.size, 1))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -43,8 +54,12 @@ class Fit(ShortRepr):
         gait: one of its gaits.
         orbit: the gait's.
         order: of the readouts.
+        shares: order of the readout -> mean RMS error over range with that, the parameters kept.
         harmonics: of a Morris-Lecar cell's waveform that joints follow.
-        parameters: free number -> estimate.
+        duty: share of the stride that legs are to stand; None for what the network's cells do.
+        stance: phase at which legs begin to stand by themselves, and for which share, as in a
+            robot file; None if they stand while their cells fall.
+        parameters: free number -> estimate; then those that were read off the legs' phases.
         correlation: of the free numbers, in their order; nan where the data do not separate one
             from others.
         cells: joint -> the cell behind it, from 1.
@@ -67,7 +82,10 @@ class Fit(ShortRepr):
     gait: str
     orbit: Orbit
     order: int
+    shares: dict[int, float]
     harmonics: int
+    duty: float | None
+    stance: tuple[float, float] | None
     parameters: dict[str, Estimate]
     correlation: np.ndarray
     cells: dict[str, int]
@@ -99,6 +117,21 @@ class Fit(ShortRepr):
         return self.recorded + self.errors
 
     @property
+    def free(self) -> tuple[str, ...]:
+        """Names of the parameters that the starts began and ended with."""
+        return tuple(self.parameters)[:len(self.correlation)]
+
+    @property
+    def minima(self) -> list[Minimisation]:
+        """Where the starts ended, each place once, the least cost first."""
+        found: list[Minimisation] = []
+        for trial in sorted(self.starts, key=lambda one: one.cost):
+            if not trial.why and all(distinct(trial.values[:-1], one.values[:-1])
+                                     for one in found):
+                found.append(trial)
+        return found
+
+    @property
     def rms(self) -> dict[str, float]:
         """Root mean square error of each joint, rad."""
         return dict(zip(self.readouts, np.sqrt(np.mean(self.errors**2, axis=1)).tolist(),
@@ -114,26 +147,7 @@ class Fit(ShortRepr):
     @property
     def mean_rms_share(self) -> float:
         """Mean over the joints that move; 0 if none does."""
-        moving = np.ptp(self.recorded, axis=1) > STANDS
-        return float(np.sum(list(self.rms_share.values())) / max(np.count_nonzero(moving), 1))
-
-    def share_at(self, order: int) -> float:
-        """Mean RMS error over range with readouts of another order, the parameters kept."""
-        if order == self.order:
-            return self.mean_rms_share
-        seen, shifts = signals(self.orbit, self.harmonics), np.arange(SHIFTS) / SHIFTS
-        spans = np.ptp(self.recorded, axis=1)
-        shares = np.zeros((len(self.recorded), SHIFTS))
-        for j, name in enumerate(self.joints):
-            cell = self.cells[name] - 1
-            psi = basis(order, *seen.values(self.theta, self.orbit.phases[cell] + shifts,
-                                            int(self.orbit.waves[cell])))[0]
-            columns = psi.transpose(1, 0, 2)
-            weights = np.linalg.pinv(columns) @ self.recorded[j][:, None]
-            left = (columns @ weights)[..., 0] - self.recorded[j]
-            shares[j] = np.sqrt(np.mean(left**2, axis=1)) / max(spans[j], 1e-300)
-        moving = spans > STANDS
-        return float(shares[moving].mean(axis=0).min()) if moving.any() else 0.0
+        return mean_share(self.recorded, self.errors)
 
     def synchronisation(self, points: int = 20) -> tuple[np.ndarray, np.ndarray]:
         """Errors at even instants, as in Liu & Zhang's Figures 5, 6, 8 and 9.

@@ -27,17 +27,21 @@ from cpg_ros.dynamics.periodic import NoOrbit
 from cpg_ros.errors import InputError
 from cpg_ros.inversion.caveats import findings
 from cpg_ros.inversion.fit_data import joints_of, MeanCycle
+from cpg_ros.inversion.fit_starts import best_starts, distinct, upside_down
 from cpg_ros.inversion.free_parameters import Free, free_numbers
-from cpg_ros.inversion.gait_fit import Fit
-from cpg_ros.inversion.identifiability import correlation_length, Optimum, spread
+from cpg_ros.inversion.gait_fit import Fit, mean_share
+from cpg_ros.inversion.identifiability import correlation_length, Optimum, QUANTILE, spread
 from cpg_ros.inversion.least_squares import CycleProblem, Period
+from cpg_ros.inversion.leg_duty import GAIT_DUTY, GaitReadout
 from cpg_ros.inversion.trust_region import Minimisation
 from cpg_ros.inversion.variable_projection import WEIGHTS
+from cpg_ros.motion.duty import LEAST, MOST
 from cpg_ros.motion.plan import refusal
 from cpg_ros.networks.network import Network
-from cpg_ros.robots.robot import HARMONICS
 import numpy as np
 
+#: Share of a stride that legs stand which stand as long as they swing.
+EVEN = 0.5
 #: A frequency is never known better than to this share.
 KNOWN_FREQUENCY = 1e-4
 #: Relative change at which a trust region stops, and at which the last one does.
@@ -50,8 +54,8 @@ HALVINGS = 6
 
 def invert(cycle: MeanCycle, cells: Mapping[str, int], network: Network, gait: str,
            free: Sequence[str] = (), order: int = 3,
-           starts: Sequence[Mapping[str, float]] = ({},), *,
-           bounds: Mapping[str, tuple[float, float]] | None = None, harmonics: int = HARMONICS,
+           starts: Sequence[Mapping[str, float]] = (), *, readout: GaitReadout | None = None,
+           bounds: Mapping[str, tuple[float, float]] | None = None,
            time_scale: float = 0.0, profiles: bool = True,
            done: Callable[[float], None] = lambda share: None) -> Fit:
     """Fit free numbers of a network, and readouts, to the mean cycle of a recorded gait.
@@ -62,10 +66,12 @@ def invert(cycle: MeanCycle, cells: Mapping[str, int], network: Network, gait: s
         network: parameters; those that are not free keep their values.
         gait: one of its gaits.
         free: names of parameters to fit, or of groups of them; the usual ones by default.
+            GAIT_DUTY is the share of the stride that legs stand.
         order: of the readouts, 1 to 3.
-        starts: free number -> value to start from; {} starts from the network's own values.
+        starts: free number -> value to start from; {} starts from the network's own values. By
+            default from these, and from the best of many values all over the ranges.
+        readout: how the generator reads the gait; by default legs stand as the cells do.
         bounds: free number -> lower and upper bound, where narrower than the range.
-        harmonics: of a Morris-Lecar cell's waveform that joints follow.
         time_scale: seconds in a unit of model time, to fit the period, too; 0 leaves it free,
             as the generator's frequency does.
         profiles: whether intervals are those of the profile likelihood where the cost is not
@@ -74,16 +80,15 @@ def invert(cycle: MeanCycle, cells: Mapping[str, int], network: Network, gait: s
 
     Raises:
         InputError: names, bounds or starts cannot be used.
-        ValueError: shapes do not fit, or there is no start.
+        ValueError: shapes do not fit.
         NoOrbit: no start has such a gait; the message is that of the first.
 
     """
     if order not in WEIGHTS:
         raise ValueError(f'order {order} is not 1, 2 or 3')
-    if not starts:
-        raise ValueError('there is no start')
     joints = joints_of(cycle, cells, network)
-    numbers = free_numbers(network, gait, free or network.free, bounds)
+    readout = readout or GaitReadout.of(type(network), gait)
+    numbers = _numbers(network, gait, free or network.free, bounds)
     taken = len(joints.names) * (1 + WEIGHTS[order]) + len(numbers) + 1
     if joints.theta.size < 2 * (1 + WEIGHTS[order]) or joints.data.size <= taken:
         raise InputError(f'{joints.theta.size} instants of {len(joints.names)} joints do not '
@@ -93,9 +98,10 @@ def invert(cycle: MeanCycle, cells: Mapping[str, int], network: Network, gait: s
         value = 1.0 / (cycle.frequency * time_scale)
         share = max(cycle.frequency_error / cycle.frequency, KNOWN_FREQUENCY)
         period = Period(value, value * share)
-    begins = [_begin(network, numbers, start) for start in starts]
-
-    problem = CycleProblem(joints, joints.stated, network, gait, numbers, order, harmonics, period)
+    problem = CycleProblem(joints, joints.stated, network, gait, numbers, order, readout, period)
+    begins = [np.append(_begin(problem, start), 0.0) for start in starts or ({},)]
+    if not starts:
+        begins = best_starts(problem, begins[0])
     trials: list[Minimisation] = []
     for begin in begins:
         done(0.5 * len(trials) / len(begins))
@@ -104,31 +110,51 @@ def invert(cycle: MeanCycle, cells: Mapping[str, int], network: Network, gait: s
     best = min(trials, key=lambda trial: trial.cost)
     if best.why:
         raise NoOrbit(trials[0].why)
+    with suppress(NoOrbit):
+        if not starts and (other := upside_down(problem, best.values)) is not None:
+            trials.append(_trial(problem, other, weigh=False))
     values = _weighed(problem, best.values)
     problem.hold(values)
-    others = [trial.values for trial in (_along_the_valley(problem, values) if profiles else [])]
+    values, others, turned = _preferred(problem, values, trials)
+    if profiles:
+        others += [trial.values for trial in _along_the_valley(problem, values)]
     by_cost = sorted([values, *others], key=problem.cost)
-    if by_cost[0] is not values:
+    if others and problem.cost(by_cost[0]) < problem.cost(values) - _as_good(problem, values):
         by_cost[0] = _weighed(problem, by_cost[0])
         problem.hold(by_cost[0])
+    else:
+        by_cost = [values, *(one for one in by_cost if one is not values)]
     runs, flaw = _that_runs(problem, by_cost, best.path[:, 1:])
-    warnings = []
+    warnings = [] if problem.readout.weights else [
+        'without a robot file, the recording does not tell stance from swing: ' + ', '.join(
+            f'{free.name} {value:.4g}' for free, value in zip(problem.free, one, strict=False))
+        + ' fits as well, all joints reversed' for one in turned]
     if flaw:
-        warnings = [f'the generator would refuse the {gait} that fits best: {flaw}' + (
+        warnings += [f'the generator would refuse the {gait} that fits best: {flaw}' + (
             '' if runs is None else '; this is the best one on the way there that it runs')]
     # The cost is not least there, so that there is no profile to follow.
     return _judged(problem, trials, others, by_cost[0] if runs is None else runs,
                    profiles and not flaw, warnings, done)
 
 
-def _begin(network: Network, numbers: Sequence[Free], start: Mapping[str, float]) -> np.ndarray:
+def _numbers(network: Network, gait: str, names: Sequence[str],
+             bounds: Mapping[str, tuple[float, float]] | None) -> tuple[Free, ...]:
+    """Return the free numbers, the gait's duty last."""
+    own = [name for name in names if name != GAIT_DUTY]
+    duty = (Free(GAIT_DUTY, (), LEAST, MOST),) if GAIT_DUTY in names else ()
+    return (free_numbers(network, gait, own, bounds) if own or not duty else ()) + duty
+
+
+def _begin(problem: CycleProblem, start: Mapping[str, float]) -> np.ndarray:
     """Values of a start, checked."""
-    known = {one.name: one.value(network) for one in numbers}
+    duty = problem.readout.duty or EVEN
+    known = {one.name: one.value(problem.network) if one.members else duty
+             for one in problem.free}
     for name, value in start.items():
         if name not in known:
             raise InputError(f"start: '{name}' is not free")
         known[name] = float(value)
-    for one in numbers:
+    for one in problem.free:
         if not one.low <= known[one.name] <= one.high:
             raise InputError(f'{one.name} {known[one.name]:g} to start from is not within '
                              f'{one.low:g} to {one.high:g}')
@@ -141,9 +167,9 @@ def _left(problem: CycleProblem, values: np.ndarray) -> np.ndarray:
     return np.sqrt(np.sum(residual**2, axis=0) / (len(residual) - problem.weights))
 
 
-def _trial(problem: CycleProblem, begin: np.ndarray, weigh: bool) -> Minimisation:
+def _trial(problem: CycleProblem, values: np.ndarray, weigh: bool) -> Minimisation:
     """Go down from one start; the first one that has an orbit sets the joints' weights."""
-    values = np.append(begin, 0.0)
+    values = values.copy()
     try:
         problem.begin(values)
         values[-1] = problem.first_phase(values)
@@ -165,6 +191,42 @@ def _weighed(problem: CycleProblem, values: np.ndarray) -> np.ndarray:
     return values
 
 
+def _as_good(problem: CycleProblem, values: np.ndarray) -> float:
+    """Return by how much more a cost is as good as that at values."""
+    residual = problem.best_readouts(values).residual / problem.sizes
+    return 0.5 * QUANTILE**2 * correlation_length(residual)
+
+
+def _preferred(problem: CycleProblem, values: np.ndarray, trials: Sequence[Minimisation]
+               ) -> tuple[np.ndarray, list[np.ndarray], list[np.ndarray]]:
+    """Return the values of the minimum that is meant, other minima, and those upside down.
+
+    With a free readout, the waveform of other parameters may be the same upside down. Of minima
+    that are as good as the best, it is the one whose joints move as in the robot file; without
+    one, legs stand for the larger part of the stride.
+    """
+    def readouts(there: np.ndarray) -> np.ndarray:
+        return problem.best_readouts(there).weights[1:3]
+
+    def meant(there: np.ndarray) -> float:
+        agrees = problem.readout.agreement(problem.joints.names, readouts(there))
+        return agrees or problem.stance_share(there)
+
+    found = [values]
+    for trial in trials:
+        if not trial.why and all(distinct(trial.values[:-1], one[:-1]) for one in found):
+            found.append(trial.values)
+    most = problem.cost(values) + _as_good(problem, values)
+    best = max((one for one in found if problem.cost(one) <= most), key=meant)
+    turned = [one for one in found if float(np.sum(readouts(one) * readouts(values))) < 0.0]
+    if any(one is best for one in turned):
+        turned, values = [values], _weighed(problem, best)
+        problem.hold(values)
+    others = [one for one in found if distinct(one[:-1], values[:-1])
+              and float(np.sum(readouts(one) * readouts(values))) >= 0.0]
+    return values, others, [one for one in turned if problem.cost(one) <= most]
+
+
 def _that_runs(problem: CycleProblem, by_cost: Sequence[np.ndarray], way: np.ndarray
                ) -> tuple[np.ndarray | None, str]:
     """Return the best values that the generator runs, and why it rejects the very best, or ''.
@@ -180,7 +242,8 @@ def _that_runs(problem: CycleProblem, by_cost: Sequence[np.ndarray], way: np.nda
     """
     def flaw_at(values: np.ndarray) -> str:
         try:
-            return refusal(problem.best_readouts(values).orbit, problem.gait, problem.harmonics)
+            return refusal(problem.best_readouts(values).orbit, problem.gait,
+                           problem.readout.harmonics)
         except NoOrbit as error:
             return str(error)
 
@@ -242,12 +305,18 @@ def _judged(problem: CycleProblem, trials: Sequence[Minimisation], elsewhere: Se
         done(0.6 + 0.4 * k / len(problem.free))
         estimates[one.name] = optimum.estimate(k, profiles)
     done(1.0)
+    shares = {}
+    for order in WEIGHTS:
+        other = problem.at_order(order)
+        rest = other.best_readouts(other.rephased(values) if order != problem.order else values)
+        shares[order] = mean_share(joints.data.T, rest.residual.T)
     rows = [(float(row[0]), tuple(row[1:].tolist())) for row in placed.weights.T]
     misfit = _left(problem, values) / joints.stated
     count = len(problem.free)
     return Fit(
         network=placed.orbit.network, gait=problem.gait, orbit=placed.orbit,
-        order=problem.order, harmonics=problem.harmonics, parameters=estimates,
+        order=problem.order, shares=shares, harmonics=problem.readout.harmonics,
+        duty=problem.duty(values), stance=problem.readout.stance, parameters=estimates,
         correlation=known.correlation[:count, :count],
         cells=dict(zip(joints.names, (joints.cells + 1).tolist(), strict=True)),
         readouts=dict(zip(joints.names, rows, strict=True)), theta=joints.theta,

@@ -28,6 +28,7 @@ from cpg_ros.gaits.phase_average import average_cycles
 from cpg_ros.gaits.stride import Stride
 from cpg_ros.inversion.fallback_fits import fit_with_fallbacks
 from cpg_ros.inversion.gait_fit import STANDS
+from cpg_ros.inversion.leg_duty import GaitReadout
 from cpg_ros.inversion.recording_fit import leg_joints, networks_of, preset_of, stride_of
 from cpg_ros.inversion.variable_projection import WEIGHTS
 from cpg_ros.recordings.recording import Recording
@@ -98,7 +99,8 @@ def compare_networks(recording: Recording, robot: Robot | None = None, order: in
         parameters = preset_of(kind.name, gait).network.with_phases(stride.phases)
         done(count / len(kinds))
         try:
-            fit, _ = fit_with_fallbacks(half, cells, parameters, gait, (), order, ({},))
+            fit, _ = fit_with_fallbacks(half, cells, parameters, gait, order=order,
+                                        readout=GaitReadout.of(kind, gait, robot=robot))
         except CpgError as error:
             found.append(NetworkComparison(kind.name, gait, why=str(error)))
             continue

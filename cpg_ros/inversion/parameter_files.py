@@ -82,7 +82,8 @@ def fitted_robot(found: RecordingFit, robot: Robot | None) -> Robot:
     order = tuple(name for name in found.recording.joints if name in fit.readouts)
     # Without its frequency the gait would run at the generator's usual one.
     return Robot('fitted', (network.name,), assignment, fit.harmonics, legs, order,
-                 {fit.gait: Motion(float(found.stride.frequency))})
+                 {fit.gait: Motion(float(found.stride.frequency), duty=fit.duty,
+                                   stance=fit.stance)})
 
 
 def _scaled(motion: Motion, share: float) -> Motion:
@@ -137,8 +138,9 @@ def fitted_motion(found: RecordingFit, robot: Robot | None) -> Motion:
                              f'to {joint.upper:g}')
         in_place = joints[name].in_place if name in joints else ()
         joints[name] = JointMotion(float(offset), tuple(map(float, weights)), in_place)
-    # What was fitted is not retimed: the legs stand for as long as they do by themselves.
-    return replace(known, frequency=frequency, joints=joints, duty=None,
+    # A fit without a duty is not retimed: its legs stand for as long as they do by themselves.
+    return replace(known, frequency=frequency, joints=joints, duty=fit.duty,
+                   stance=known.stance if fit.duty is None else fit.stance,
                    steering=_slower(known.steering, frequency))
 
 
@@ -179,10 +181,11 @@ def running_parameters(found: RecordingFit, robot: Robot | None = None) -> dict[
     if robot is None:
         return wanted
     motion = robot.motion(fit.gait, fit.gait)
-    # What was fitted is not retimed: the legs stand for as long as they do by themselves.
+    # What was fitted without a duty has legs stand for as long as they do by themselves.
     own = (standing(fit.orbit, robot.leg_cells, fit.harmonics)[1].mean() if motion.stance is None
            else motion.stance[1])
-    return {**wanted, 'amplitude': 1.0, 'duty': 0.0 if motion.duty is None else float(own),
+    duty = fit.duty or (0.0 if motion.duty is None else float(own))
+    return {**wanted, 'amplitude': 1.0, 'duty': duty,
             **{READOUT + name: [float(offset), *map(float, weights)]
                for name, (offset, weights) in fit.readouts.items()}}
 

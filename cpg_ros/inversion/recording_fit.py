@@ -25,6 +25,7 @@ from cpg_ros.inversion.fallback_fits import fit_with_fallbacks
 from cpg_ros.inversion.fit_data import cells_of
 from cpg_ros.inversion.gait_fit import Fit
 from cpg_ros.inversion.identifiability import Estimate
+from cpg_ros.inversion.leg_duty import GaitReadout
 from cpg_ros.networks.network import Network, Preset
 from cpg_ros.networks.registry import (
     find_network,
@@ -43,8 +44,6 @@ import numpy as np
 #: Mean RMS error over range above which a fit is poor, by the order of the readout: real trots
 #: and walks leave 0.14 to 0.19, 0.05 to 0.09 and 0.03 to 0.04; and what it leaves of confidence.
 POOR, LEFT = {1: 0.25, 2: 0.15, 3: 0.1}, 0.5
-#: Orders of the readout that are compared.
-ORDERS = (1, 2, 3)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -106,10 +105,13 @@ class RecordingFit(ShortRepr):
             'rms_share_by_order': {str(order): value for order, value in self.shares.items()},
             'joints': {name: {'rms': rms[name], 'rms_share': share[name], 'cell': fit.cells[name]}
                        for name in fit.joints},
-            'starts': [{'start': dict(zip(fit.parameters, trial.start.tolist(), strict=False)),
-                        'end': dict(zip(fit.parameters, trial.values.tolist(), strict=False)),
+            'starts': [{'start': dict(zip(fit.free, trial.start.tolist(), strict=False)),
+                        'end': dict(zip(fit.free, trial.values.tolist(), strict=False)),
                         'iterations': trial.iterations, 'cost': trial.cost, 'why': trial.why}
                        for trial in fit.starts],
+            'minima': [{**dict(zip(fit.free, trial.values.tolist(), strict=False)),
+                        'cost': trial.cost} for trial in fit.minima],
+            'duty': fit.duty,
             'period': fit.orbit.period,
             'critical_delay': None if fit.hopf is None else fit.hopf.value,
             'stable': verdict.stable, 'stable_with_default_gain': verdict.stable_with_default_gain,
@@ -201,7 +203,7 @@ def _phases_as_estimates(fit: Fit, stride: Stride) -> dict[str, Estimate]:
 
 def fit_recording(recording: Recording, robot: Robot | None = None, network: str = '',
                   gait: str = '', *, free: Sequence[str] = (), order: int = 3, preset: str = '',
-                  starts: Sequence[Mapping[str, float]] = ({},),
+                  starts: Sequence[Mapping[str, float]] = (),
                   done: Callable[[float], None] = lambda share: None) -> RecordingFit:
     """Find the steady gait of a recording and fit a network's gait and readouts to it.
 
@@ -210,10 +212,12 @@ def fit_recording(recording: Recording, robot: Robot | None = None, network: str
         robot: which joints belong to which legs and cells; by default their names decide.
         network: name or file; by default the robot's first, or the first that has such legs.
         gait: of the network; by default the recorded one, as it is recognised.
-        free: parameters to fit; the network's usual ones by default.
+        free: parameters to fit, among them GAIT_DUTY, the share of the stride that legs stand; by
+            default the network's usual ones and that, if the robot's gait has a duty or the
+            recording tells it.
         order: of the readouts, 1 to 3.
         preset: whose parameters are taken that are not free; the gait's by default.
-        starts: free number -> value to start from.
+        starts: free number -> value to start from; by default several that cover the ranges.
         done: called with the share of the fit that is done, 0 to 1.
 
     Raises:
@@ -260,10 +264,12 @@ def fit_recording(recording: Recording, robot: Robot | None = None, network: str
     if stride.contacts is not None:
         warnings.append('feet bore loads: what servos, the ground and feedback changed of the '
                         "joints' motion counts as the network's, which intervals do not know")
-    fit, fallbacks = fit_with_fallbacks(stride, cells, parameters, gait, free, order, starts, done)
-    fit = replace(fit, parameters={**_phases_as_estimates(fit, stride), **fit.parameters})
+    readout = GaitReadout.of(kind, gait, preset, robot)
+    fit, fallbacks = fit_with_fallbacks(stride, cells, parameters, gait, free, order, starts,
+                                        readout, done)
+    fit = replace(fit, parameters={**fit.parameters, **_phases_as_estimates(fit, stride)})
     found = RecordingFit(recording, read, legs, stride, fit,
-                         {order: fit.share_at(order) for order in ORDERS},
+                         fit.shares,
                          (*warnings, *fallbacks, *fit.warnings))
     if not found.poor:
         return found

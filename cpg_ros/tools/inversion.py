@@ -34,6 +34,7 @@ from cpg_ros.files.yaml_reader import shown
 from cpg_ros.fleet.options import add_options, KEPT, working
 from cpg_ros.gaits.leg_names import BIPED, QUADRUPED
 from cpg_ros.inversion.gait_schedule import write_schedule
+from cpg_ros.inversion.leg_duty import GAIT_DUTY
 from cpg_ros.inversion.model_choice import (
     as_rows,
     compare_networks,
@@ -95,14 +96,16 @@ def _parser() -> Parser:
     parser.add_argument('--preset', metavar='NAME', help='shipped preset that supplies the '
                         "parameters that are not free (default: the gait's)")
     parser.add_argument('--free', nargs='+', default=[], metavar='PARAMETER',
-                        help='parameters to fit (default: ' + ', '.join(
+                        help=f'parameters to fit, and {GAIT_DUTY}, the share of the stride that '
+                        'legs stand (default: ' + ', '.join(
                             f'{name} {" ".join(kind.free) or "none"}'
-                            for name, kind in SHIPPED.items()) + ')')
+                            for name, kind in SHIPPED.items()) + f'; and {GAIT_DUTY} if the '
+                        'robot file has one for the gait or the recording shows one)')
     parser.add_argument('--order', type=int, choices=(1, 2, 3), default=3, metavar='N',
                         help='order of the readout, 1 to 3 (default: %(default)s)')
     parser.add_argument('--start', nargs='+', action='append', default=[], type=assignment,
                         metavar='PARAMETER=VALUE', help='starting values; repeat the option for '
-                        'several starting points')
+                        'several starting points (default: the best of many over the ranges)')
     parser.add_argument('--paper', action='store_true', help='also fit as Liu & Zhang (2024) do, '
                         'with eight joints as the eight cells, 20 instants and no readout, and '
                         'print the table of starts, iterations and errors')
@@ -198,7 +201,7 @@ def _invert_many(chosen: Namespace, robot: Robot | None, starts: list[dict[str, 
 def _invert(chosen: Namespace) -> int:
     _refuse_options(chosen)
     robot = None if chosen.robot is None else load_robot(chosen.robot)
-    starts = [dict(start) for start in chosen.start] or [{}]
+    starts = [dict(start) for start in chosen.start]
     if chosen.paper:
         refuse_others(robot, chosen.network or '')
     if chosen.bags is not None:
@@ -271,7 +274,8 @@ def _paper(chosen: Namespace, found: RecordingFit, starts: list[dict[str, float]
         return []
     network = preset_of(found.fit.network.name, chosen.preset or found.fit.gait).network
     return paper_fits(found.stride, found.fit.cells, network, found.fit.gait,
-                      list(found.fit.parameters), starts)
+                      [name for name in found.fit.parameters if name != GAIT_DUTY],
+                      starts or [{}])
 
 
 def _written(chosen: Namespace, found: RecordingFit, robot: Robot | None) -> list[Path]:

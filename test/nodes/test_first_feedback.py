@@ -14,6 +14,8 @@
 
 """The first feedback of an installation is compiled while the robot walks, by another process."""
 
+from itertools import pairwise
+
 from graph import until
 import pytest
 from rcl_interfaces.srv import SetParameters
@@ -37,7 +39,7 @@ def test_what_a_walking_generator_needs_is_compiled_elsewhere(start, tmp_path, m
     until(answer.done, 'the answer')
     assert answer.result().results[0].successful
     stamps = [sample[0] for sample in watcher.samples]
-    longest = max(after - before for before, after in zip(stamps, stamps[1:], strict=False))
+    longest = max(after - before for before, after in pairwise(stamps))
     print(f'longest gap {1e3 * longest:.0f} ms of {len(stamps)} samples')
     # What it compiles itself, it announces.
     assert 'compiling the feedback: about' not in process.log
